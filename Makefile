@@ -1,0 +1,74 @@
+# Every target sets itself up in .venv: GNU make and a Python 3.11 or newer are all that a fresh machine needs.
+#   make PYTHON=python3.13 test      chooses the interpreter
+
+MAKEFLAGS += --no-print-directory
+VENV := .venv
+OLD := import sys; sys.exit(sys.version_info < (3, 11))
+
+ifeq ($(OS),Windows_NT)
+  BIN := $(VENV)/Scripts
+  PYTHON ?= python
+else
+  BIN := $(VENV)/bin
+  PYTHON ?= $(shell for p in python3 python python3.14 python3.13 python3.12 python3.11; do \
+    if $$p -c '$(OLD)' >/dev/null 2>&1; then echo $$p; exit; fi; done; echo python3)
+endif
+PY := $(BIN)/python
+STAMP = @$(PY) -c "import pathlib; pathlib.Path('$@').touch()"
+INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
+
+.DEFAULT_GOAL := help
+# A set-up that failed half-way is done again from its start.
+.DELETE_ON_ERROR:
+.PHONY: help demo test check format docs bench clean
+
+help:
+	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
+	@$(info make test     run the tests)
+	@$(info make check    formatting, lint, types and import contracts)
+	@$(info make format   format the code and mend what lint can mend)
+	@$(info make docs     run the commands of README.md and docs/ and write down what they print now)
+	@$(info make bench    measure against other engines)
+	@$(info make clean    remove what was made, .venv too)
+	@cd .
+
+demo: $(VENV)/.runtime
+	@$(PY) -m contextdb demo
+
+test: $(VENV)/.dev
+	$(PY) -m pytest
+
+check: $(VENV)/.dev
+	$(PY) -m ruff format --check .
+	$(PY) -m ruff check .
+	$(PY) -m mypy
+	$(BIN)/lint-imports
+
+format: $(VENV)/.dev
+	$(PY) -m ruff check --fix .
+	$(PY) -m ruff format .
+
+docs: $(VENV)/.dev
+	$(PY) tests/test_docs.py --update
+
+bench: $(VENV)/.bench
+	$(PY) benchmarks/query.py
+
+clean:
+	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in '$(VENV) build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache'.split()]"
+
+$(VENV)/pyvenv.cfg:
+	@$(PYTHON) -c "$(OLD)" || (echo "contextdb needs Python 3.11 or newer; '$(PYTHON)' is none. Try: make PYTHON=python3.12"; exit 1)
+	@$(PYTHON) -m venv $(VENV) || (echo "'$(PYTHON) -m venv' failed. On Debian and Ubuntu: apt install python3-venv"; exit 1)
+
+$(VENV)/.runtime: pyproject.toml | $(VENV)/pyvenv.cfg
+	$(INSTALL) .
+	$(STAMP)
+
+$(VENV)/.dev: pyproject.toml | $(VENV)/pyvenv.cfg
+	$(INSTALL) ".[dev]"
+	$(STAMP)
+
+$(VENV)/.bench: pyproject.toml | $(VENV)/pyvenv.cfg
+	$(INSTALL) ".[bench]"
+	$(STAMP)

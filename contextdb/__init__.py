@@ -1,0 +1,111 @@
+"""A context database: which animation assets are valid now, why the others are not, and what no asset covers.
+
+    import contextdb as cdb
+
+    table = cdb.load("tables/hit_mid_air.csv")
+    compiled = table.compile()
+    compiled.query({"IsInMidAirAnim": False, ...}).assets
+
+Names are resolved when they are first used, so that importing the package costs little.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from contextdb.batch import ManyMatches
+    from contextdb.compiled import CompiledTable
+    from contextdb.errors import (
+        ArtefactError,
+        CellError,
+        ClipError,
+        ContextDBError,
+        ContextError,
+        Fault,
+        FileError,
+        MotionError,
+        Place,
+        PolicyError,
+        QueryError,
+        SchemaError,
+        TableError,
+    )
+    from contextdb.explain import Explanation, Failure, RowExplanation
+    from contextdb.facts import cell
+    from contextdb.findings import Finding
+    from contextdb.live import LiveContext
+    from contextdb.matches import Matches
+    from contextdb.project import Project
+    from contextdb.table import Table, load
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "batch": ("ManyMatches",),
+    "compiled": ("CompiledTable",),
+    "errors": (
+        "ArtefactError",
+        "CellError",
+        "ClipError",
+        "ContextDBError",
+        "ContextError",
+        "Fault",
+        "FileError",
+        "MotionError",
+        "Place",
+        "PolicyError",
+        "QueryError",
+        "SchemaError",
+        "TableError",
+    ),
+    "explain": ("Explanation", "Failure", "RowExplanation"),
+    "facts": ("cell",),
+    "findings": ("Finding",),
+    "live": ("LiveContext",),
+    "matches": ("Matches",),
+    "project": ("Project",),
+    "table": ("Table", "load"),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [  # noqa: RUF022
+    "load",
+    "Project",
+    "Table",
+    "CompiledTable",
+    "Matches",
+    "ManyMatches",
+    "LiveContext",
+    "cell",
+    "Explanation",
+    "RowExplanation",
+    "Failure",
+    "Finding",
+    "ContextDBError",
+    "CellError",
+    "SchemaError",
+    "TableError",
+    "FileError",
+    "ContextError",
+    "PolicyError",
+    "ArtefactError",
+    "MotionError",
+    "ClipError",
+    "QueryError",
+    "Fault",
+    "Place",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,416 @@
+"""Many contexts at once: columns of facts in, counts and hits out.
+
+N contexts, P slots (see `contextdb.stack`), W words a mask. Columns that are plainly typed are encoded without a Python step for
+each fact: values through polars, numbers inside the kernel. Anything else (lists of mixed things, tags) is read fact by fact,
+once for each distinct one. With numba the work is compiled; without it numpy does the same, slower.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.bitmask import Rows, Words
+from contextdb.cells import Cell
+from contextdb.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
+from contextdb.errors import ContextError, Fault, Place, plural
+from contextdb.facts import Unknown, check_mode, missing_error, misspelt, read_fact
+from contextdb.matches import Matches
+
+if TYPE_CHECKING:
+    from contextdb.compiled import CompiledTable
+
+Contexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
+Codes = NDArray[np.int32]
+
+NUMPY_BLOCK = 2048
+MUCH_WORK = 1 << 18
+"""Words of answers from which loading the compiled kernels, a third of a second, is worth it."""
+
+THREAD_CONTEXTS = 8192
+"""Fewer contexts than this are not worth a second thread."""
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """The number columns, to be encoded by bisection: column j stands in `facts[j]` and fills slot `slots[j]`.
+
+    facts float64 [columns, N]; column j bisects bounds[edges[j]:edges[j + 1]]; class k has code firsts[j] + k, NaN missing[j].
+    """
+
+    facts: NDArray[np.float64]
+    slots: NDArray[np.int64]
+    bounds: NDArray[np.float64]
+    edges: NDArray[np.int64]
+    firsts: NDArray[np.int64]
+    missing: NDArray[np.int64]
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """What the kernels take after the facts and slots."""
+        return self.bounds, self.edges, self.firsts, self.missing
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """The facts that are no numbers, as classes int32 [value slots, N], -1 where missing.
+
+    Slot j of these fills slot `slots[j]` of the codes; its class v is mask starts[j] + v, and a missing fact mask absent[j].
+    """
+
+    classes: Codes
+    slots: NDArray[np.int64]
+    starts: NDArray[np.int64]
+    absent: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ManyMatches:
+    """The valid rows of many contexts. What is asked for is worked out then, and kept."""
+
+    compiled: CompiledTable
+    n_contexts: int
+    values: Values
+    numbers: Numbers
+
+    @property
+    def counts(self) -> Rows:
+        """How many rows are valid in each context: int64 [N]."""
+        return self._counts_and_hits[0]
+
+    @property
+    def hits(self) -> Rows:
+        """In how many contexts each row is valid: int64 [n_rows]."""
+        return self._counts_and_hits[1]
+
+    @cached_property
+    def codes(self) -> Codes:
+        """The codes of every context, as `CompiledTable.encode` gives them for one: int32 [N, P]."""
+        values = self.values
+        out = np.empty((len(values.slots) + len(self.numbers.slots), self.n_contexts), np.int32)
+        present = values.classes >= 0
+        out[values.slots] = np.where(present, values.classes + values.starts[:, None], values.absent[:, None])
+        if kernels := load_kernels(self._work):
+            kernels.encode(self.numbers.facts, *self.numbers.arrays, self.numbers.slots, out)
+        else:
+            _encode_with_numpy(self.numbers, out)
+        return np.ascontiguousarray(out.T)
+
+    @cached_property
+    def mask(self) -> Words:
+        """The rows of each context as bits: uint64 [N, W]."""
+        return self._masks_of(self.codes)
+
+    def lists(self) -> list[Rows]:
+        """The row numbers of each context: a list of int64 arrays."""
+        found: list[Rows] = []
+        for start in range(0, self.n_contexts, NUMPY_BLOCK):
+            flags = bitmask.unpack(self._masks_of(self.codes[start : start + NUMPY_BLOCK]), self.compiled.n_rows)
+            contexts, rows = np.nonzero(flags)
+            found += np.split(rows, np.searchsorted(contexts, np.arange(1, len(flags))))
+        return found
+
+    def __len__(self) -> int:
+        return self.n_contexts
+
+    @property
+    def _work(self) -> int:
+        return self.n_contexts * len(self.compiled.enabled)
+
+    @cached_property
+    def _counts_and_hits(self) -> tuple[Rows, Rows]:
+        if kernels := load_kernels(self._work):
+            return self._with_kernels(kernels)
+        counts = np.zeros(self.n_contexts, np.int64)
+        hits = np.zeros(self.compiled.n_rows, np.int64)
+        for start in range(0, self.n_contexts, NUMPY_BLOCK):
+            masks = self._masks_of(self.codes[start : start + NUMPY_BLOCK])
+            counts[start : start + len(masks)] = bitmask.count(masks)
+            hits += bitmask.unpack(masks[masks.any(axis=1)], self.compiled.n_rows).sum(axis=0)
+        return counts, hits
+
+    def _with_kernels(self, kernels: ModuleType) -> tuple[Rows, Rows]:
+        stack, numbers = self.compiled.stack, self.numbers
+        counts = np.zeros(self.n_contexts, np.int64)
+        n_threads = max(1, min(os.cpu_count() or 1, self.n_contexts // THREAD_CONTEXTS))
+        cuts = np.linspace(0, self.n_contexts, n_threads + 1).astype(np.int64).tolist()
+        hits = np.zeros((n_threads, len(self.compiled.enabled) * 64), np.int64)
+        own_slots = np.argsort(np.argsort(numbers.slots))  # wide columns last, as in the codes
+        bounds = numbers.arrays
+        values = (self.values.classes, self.values.starts, self.values.absent, stack.groups.arrays)
+        given = (*values, numbers.facts, own_slots, bounds, stack.masks, stack.wide, self.compiled.enabled)
+
+        def part(i: int) -> None:
+            kernels.batch(*given, cuts[i], cuts[i + 1], counts, hits[i])
+
+        if n_threads == 1:
+            part(0)
+        else:
+            with ThreadPoolExecutor(n_threads) as pool:
+                list(pool.map(part, range(n_threads)))
+        return counts, hits.sum(axis=0)[: self.compiled.n_rows]
+
+    def _masks_of(self, codes: Codes) -> Words:
+        stack, enabled = self.compiled.stack, self.compiled.enabled
+        if kernels := load_kernels(self._work):
+            out = np.empty((len(codes), len(enabled)), np.uint64)
+            kernels.batch_masks(codes, stack.masks, stack.n_plain, stack.wide, enabled, out)
+            return out
+        return _masks_with_numpy(self.compiled, codes)
+
+
+def load_kernels(work: int = MUCH_WORK) -> ModuleType | None:
+    """The compiled kernels; None where numba is not installed, or where they are not loaded yet and the work is too little for
+    it."""
+    if work < MUCH_WORK and "contextdb.kernels" not in sys.modules:
+        return None
+    try:
+        from contextdb import kernels
+    except ImportError:
+        return None
+    return kernels
+
+
+def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
+    """The rows for the codes of one context."""
+    stack = compiled.stack
+    given = np.ascontiguousarray(codes, np.int32)
+    if given.shape != (stack.n_codes,):
+        raise ContextError(Fault(f"the codes have shape {given.shape}.", f"({stack.n_codes},), as encode gives them"))
+    found = np.empty(len(compiled.enabled), np.uint64)
+    if kernels := load_kernels():
+        is_right = kernels.query(stack.masks, given, stack.n_plain, stack.wide, compiled.enabled, found)
+    elif is_right := stack.holds(given):
+        found = _masks_with_numpy(compiled, given[None])[0]
+    if not is_right:
+        raise ContextError(Fault("a code is out of range.", "the codes that encode of this same compiled table gives"))
+    return compiled.matches(bitmask.to_int(found))
+
+
+def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "error") -> ManyMatches:
+    """Encode the columns of many contexts; see `CompiledTable.query_many`."""
+    check_mode(unknown)
+    columns = {name: contexts[name] for name in (contexts.columns if isinstance(contexts, pl.DataFrame) else contexts)}
+    n_contexts = _common_length(columns)
+    absent = [c.name for c in compiled.conditions if c.name not in columns]
+    extra = [n for n in columns if n not in compiled.single_lookups] if absent else []
+    if absent and (error := misspelt(absent, extra)) is not None:
+        raise error
+    if absent and unknown == "error":
+        raise missing_error(absent, extra)
+    return _Encoder(compiled, n_contexts, unknown).encode(columns)
+
+
+class _Encoder:
+    """Turns columns of facts into classes (values) and doubles (numbers)."""
+
+    def __init__(self, compiled: CompiledTable, n_contexts: int, unknown: Unknown) -> None:
+        self.compiled, self.n_contexts, self.unknown = compiled, n_contexts, unknown
+        self.classes: list[Codes] = []
+        self.value_slots: list[tuple[int, int, int]] = []
+        """Slot, first mask and mask for a missing fact of each entry of `classes`."""
+        self.facts: list[NDArray[np.float64]] = []
+        self.slots: list[int] = []
+        self.bounds: list[NDArray[np.float64]] = []
+        self.firsts: list[int] = []
+        self.missing: list[int] = []
+
+    def encode(self, columns: Mapping[str, Any]) -> ManyMatches:
+        """Every condition's column, in the order of slots."""
+        stack = self.compiled.stack
+        slot, wide_slot = 0, stack.n_plain
+        for at, masks in enumerate(self.compiled.masks):
+            given = columns.get(self.compiled.conditions[at].name)
+            is_wide = isinstance(masks, WideMasks)
+            if isinstance(masks, (NumberMasks, WideMasks)):
+                self._add_numbers(at, masks, given, wide_slot if is_wide else slot)
+            else:
+                self._add_values(at, masks, given, slot)
+            wide_slot += is_wide
+            slot += 0 if is_wide else stack.n_slots[at]
+        return ManyMatches(self.compiled, self.n_contexts, self._values(), self._numbers())
+
+    def _values(self) -> Values:
+        classes = np.array(self.classes, np.int32).reshape(len(self.classes), self.n_contexts)
+        return Values(classes, *np.array(self.value_slots, np.int64).reshape(-1, 3).T)
+
+    def _numbers(self) -> Numbers:
+        edges = np.cumsum([0, *(len(b) for b in self.bounds)])
+        facts = np.array(self.facts, np.float64).reshape(len(self.facts), self.n_contexts)
+        bounds = np.concatenate(self.bounds) if self.bounds else np.empty(0)
+        as_int = [np.array(a, np.int64) for a in (self.slots, edges, self.firsts, self.missing)]
+        return Numbers(facts, as_int[0], bounds, *as_int[1:])
+
+    def _add_numbers(self, at: int, masks: NumberMasks | WideMasks, given: Any, slot: int) -> None:
+        condition = self.compiled.conditions[at]
+        first = 0 if isinstance(masks, WideMasks) else self.compiled.stack.starts[at]
+        missing = first + masks.codes(None)[0]
+        facts = np.full(self.n_contexts, np.nan) if given is None else _plain_numbers(given, condition.domain.kind)
+        if facts is None:
+            facts = np.array([np.nan if f is None else f for f in self._read_each(at, given)], np.float64)
+        elif condition.domain.kind == "angle":
+            facts = _wrapped(facts)
+        if self.unknown == "error":
+            self._refuse_missing(at, np.isnan(facts))
+        self.facts.append(facts)
+        self.slots.append(slot)
+        self.bounds.append(masks.bounds)
+        self.firsts.append(first)
+        ignored = -1 if isinstance(masks, WideMasks) else 0
+        self.missing.append(ignored if self.unknown == "any" else missing)
+
+    def _add_values(self, at: int, masks: ValueMasks | TagMasks, given: Any, slot: int) -> None:
+        start, n_slots = self.compiled.stack.starts[at], self.compiled.stack.n_slots[at]
+        local = None if given is None or isinstance(masks, TagMasks) else _plain_values(given, masks)
+        if local is None:
+            local = self._read_values(at, masks, given)
+        if n_slots and self.unknown == "error":
+            self._refuse_missing(at, local[0] < 0)
+        for i in range(n_slots):
+            step = 3 * i if isinstance(masks, TagMasks) else 0
+            absent = 0 if self.unknown == "any" else start + masks.codes(None)[i]
+            self.classes.append(local[i] - np.int32(step) if step else local[i])
+            self.value_slots.append((slot + i, start + step, absent))
+
+    def _read_values(self, at: int, masks: ValueMasks | TagMasks, given: Any) -> Codes:
+        """Codes int32 [slots, N] read fact by fact, -1 where missing."""
+        n_slots = self.compiled.stack.n_slots[at]
+        absent = tuple(3 * i - 1 for i in range(n_slots))  # -1 once the slot's start is taken off
+        facts = [None] * self.n_contexts if given is None else self._read_each(at, given)
+        if self.unknown == "error":
+            self._refuse_missing(at, np.array([f is None for f in facts], np.bool_))
+        codes = [absent if f is None else masks.codes(f) for f in facts]
+        return np.array(codes, np.int32).reshape(self.n_contexts, n_slots).T
+
+    def _read_each(self, at: int, given: Any) -> list[Any]:
+        """Every fact in canonical form; each distinct one is read once."""
+        condition = self.compiled.conditions[at]
+        listed = (
+            given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
+        )
+        known: dict[object, Any] = {}
+        facts = []
+        for row, value in enumerate(listed):
+            key = (type(value), tuple(value)) if isinstance(value, (list, set, tuple)) else (type(value), value)
+            try:
+                if key not in known:
+                    known[key] = read_fact(value, condition)
+            except (ContextError, TypeError) as error:
+                raise _in_context(error, row, condition.name, value) from None
+            if isinstance(known[key], Cell):
+                place = Place(row=row, column=condition.name)
+                raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context", place=place))
+            facts.append(known[key])
+        return facts
+
+    def _refuse_missing(self, at: int, missing: NDArray[np.bool_]) -> None:
+        if missing.any():
+            rows = np.flatnonzero(missing)
+            name = self.compiled.conditions[at].name
+            found = f"the fact is missing in {plural(len(rows), 'context')}."
+            raise ContextError(
+                Fault(
+                    found, 'a value, or unknown="any" or "never"', place=Place(row=int(rows[0]), column=name), rule="missing-fact"
+                )
+            )
+
+
+def _in_context(error: Exception, row: int, name: str, value: object) -> ContextError:
+    place = Place(row=row, column=name)
+    if isinstance(error, ContextError):
+        return ContextError(*(f.at(place) for f in error.faults))
+    return ContextError(Fault(f"{type(value).__name__} is no fact.", "one value in each context", place=place))
+
+
+def _common_length(columns: Mapping[str, Any]) -> int:
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise ContextError(Fault(f"the columns are not equally long: {lengths}.", "one fact for each context in every column"))
+    return next(iter(lengths.values()), 0)
+
+
+def _plain_numbers(given: Any, kind: str) -> NDArray[np.float64] | None:
+    """A column of plain numbers as doubles, NaN where missing; None when it must be read fact by fact."""
+    series = _as_series(given)
+    if series is None or not (series.dtype.is_numeric() and not series.dtype.is_decimal()):
+        return None
+    facts = series.cast(pl.Float64).to_numpy(writable=False)
+    if series.null_count():
+        facts = series.cast(pl.Float64).fill_null(np.nan).to_numpy()
+    if kind == "int" and not series.dtype.is_integer() and not (np.isnan(facts) | (facts == np.trunc(facts))).all():
+        return None
+    return None if kind == "angle" and np.isinf(facts).any() else facts
+
+
+def _wrapped(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles in [-180, 180), exactly, as `domains.wrap_angle` does one."""
+    if not ((degrees < -180.0) | (degrees >= 180.0)).any():
+        return degrees
+    rest = np.fmod(degrees, 360.0)
+    return np.where(rest >= 180.0, rest - 360.0, np.where(rest < -180.0, rest + 360.0, rest))
+
+
+def _plain_values(given: Any, masks: ValueMasks) -> Codes | None:
+    """Class numbers int32 [1, N] of a column of plain values, -1 where missing; None when it must be read fact by fact."""
+    series = _as_series(given)
+    if series is None:
+        return None
+    if masks.values == (False, True):
+        if series.dtype != pl.Boolean:
+            return None
+        return _codes_of(series.cast(pl.Int32))
+    if isinstance(series.dtype, (pl.Categorical, pl.Enum)):
+        series = series.cast(pl.String)
+    if series.dtype != pl.String:
+        return None
+    found = series.cast(pl.Enum([str(v) for v in masks.values]), strict=False)
+    if masks.has_others:
+        codes = found.to_physical().cast(pl.Int32).fill_null(len(masks.values))
+        return pl.select(pl.when(series.is_null()).then(-1).otherwise(codes).cast(pl.Int32)).to_series().to_numpy()[None]
+    if found.null_count() > series.null_count():
+        return None
+    return _codes_of(found.to_physical().cast(pl.Int32))
+
+
+def _codes_of(classes: pl.Series) -> Codes:
+    return (classes.fill_null(-1) if classes.null_count() else classes).to_numpy()[None]
+
+
+def _as_series(given: Any) -> pl.Series | None:
+    """A column as a polars series, or None when it has no single plain type."""
+    if isinstance(given, pl.Series):
+        return given
+    if isinstance(given, np.ndarray) and given.dtype.kind not in "biuf":
+        given = given.tolist()
+    try:
+        return pl.Series(given, strict=True, nan_to_null=False) if len(given) else None
+    except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError):
+        return None
+
+
+def _encode_with_numpy(numbers: Numbers, out: Codes) -> None:
+    for j, facts in enumerate(numbers.facts):
+        own = numbers.bounds[numbers.edges[j] : numbers.edges[j + 1]]
+        classes = numbers.firsts[j] + np.searchsorted(own, facts, "right")
+        out[numbers.slots[j]] = np.where(np.isnan(facts), numbers.missing[j], classes)
+
+
+def _masks_with_numpy(compiled: CompiledTable, codes: Codes) -> Words:
+    stack = compiled.stack
+    found = np.broadcast_to(compiled.enabled, (len(codes), len(compiled.enabled))).copy()
+    for j in range(stack.n_plain):
+        found &= stack.masks[codes[:, j]]
+    for i in range(len(stack.wide)):
+        found &= stack.wide_masks(i, codes[:, stack.n_plain + i])
+    return found

@@ -1,0 +1,68 @@
+"""Sets of rows as bits in uint64 words: pack, unpack, count, and the same as one Python integer.
+
+Row r is bit r % 64 of word r // 64, in every mask of the project. A mask over R rows has W = ceil(R / 64) words; the bits past the
+last row are 0, always. As a Python integer, row r is bit r.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Words = NDArray[np.uint64]
+Flags = NDArray[np.bool_]
+Rows = NDArray[np.int64]
+
+
+def n_words(n_rows: int) -> int:
+    """Words that a mask over `n_rows` rows has."""
+    return (n_rows + 63) // 64
+
+
+def pack(flags: Flags) -> Words:
+    """Masks of flags: bool [..., R] to uint64 [..., W]."""
+    n_rows = flags.shape[-1]
+    octets = np.zeros((*flags.shape[:-1], n_words(n_rows) * 8), np.uint8)
+    packed = np.packbits(flags, axis=-1, bitorder="little")
+    octets[..., : packed.shape[-1]] = packed
+    return octets.view("<u8").astype(np.uint64, copy=False)
+
+
+def unpack(words: Words, n_rows: int) -> Flags:
+    """Flags of masks: uint64 [..., W] to bool [..., n_rows]."""
+    octets = np.ascontiguousarray(words.astype("<u8", copy=False)).view(np.uint8)
+    return np.unpackbits(octets, axis=-1, count=n_rows, bitorder="little").view(np.bool_)
+
+
+def rows(words: Words) -> Rows:
+    """Row numbers of one mask, ascending: uint64 [W] to int64 [count]."""
+    return np.flatnonzero(unpack(words, len(words) * 64))
+
+
+def from_rows(row_numbers: Rows, n_rows: int) -> Words:
+    """The mask that holds the given rows."""
+    words = np.zeros(n_words(n_rows), np.uint64)
+    numbers = np.asarray(row_numbers, np.int64)
+    np.bitwise_or.at(words, numbers >> 6, np.uint64(1) << (numbers & 63).astype(np.uint64))
+    return words
+
+
+def full(n_rows: int) -> Words:
+    """The mask of every row."""
+    return pack(np.ones(n_rows, np.bool_))
+
+
+def count(words: Words) -> NDArray[np.int64]:
+    """How many rows each mask holds: uint64 [..., W] to int64 [...]."""
+    return np.asarray(np.bitwise_count(words).sum(axis=-1, dtype=np.int64))
+
+
+def to_int(words: Words) -> int:
+    """One mask as a Python integer."""
+    return int.from_bytes(words.astype("<u8", copy=False).tobytes(), "little")
+
+
+def from_int(bits: int, n_rows: int) -> Words:
+    """One mask from a Python integer whose bits are all below `n_rows`."""
+    octets = bits.to_bytes(n_words(n_rows) * 8, "little")
+    return np.frombuffer(octets, "<u8").astype(np.uint64)

@@ -1,0 +1,81 @@
+"""What people type into cells, and what they mean: candidates for "did you mean".
+
+Each mend is tried by itself, then all of them in a row.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+from contextdb.cell_words import NUMBER_TEXT, quoted
+from contextdb.domains import NUMERIC, Domain
+from contextdb.errors import nearest
+
+_Mends = tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]
+
+
+def _as_interval(found: re.Match[str]) -> str:
+    """ ">= 1 and < 5" as "[1..5)"."""
+    low, first, high, last = found.groups()
+    is_closed = len(low) == len(high) == 2
+    return f"{first}..{last}" if is_closed else f"{'[' if len(low) == 2 else '('}{first}..{last}{']' if len(high) == 2 else ')'}"
+
+
+_NUMBER_MENDS: _Mends = (
+    (r"[−–—]", "-"),
+    (r"\s*;\s*", ", "),
+    (r"≤|=<", "<="),
+    (r"≥|=>", ">="),
+    (r"\+\s*/\s*-|±\s*-", "±"),
+    (r"\.{3,}|…", ".."),
+    (rf"(>=?)\s*({NUMBER_TEXT})\s*(?:,|&&?|and)?\s*(<=?)\s*({NUMBER_TEXT})", _as_interval),
+    (r"\b(?:or|OR)\b|/|\|\|", "|"),
+    (r"!=\s*|<>\s*|≠\s*", "not "),
+    (r"°|\b(?:deg|degrees|m/s|m|s|cm|km/h)\b", ""),
+    (rf"({NUMBER_TEXT})\s*(?:-|to|:)\s*({NUMBER_TEXT})", r"\1..\2"),
+    (r"^\*$|^(?i:all|every|none|null|n/a)$", "Any"),
+    (r"[\[\](){}\"']", ""),
+)
+_WORD_MENDS: _Mends = (
+    (r"\s*[,;|/]\s*", " "),
+    (r"\b(?:or|OR|and|AND)\b\s*", ""),
+    (r"!=?\s*|<>\s*", "not "),
+    (r"^\*$|^(?i:all|every|null|n/a)$", "Any"),
+    (r"'", '"'),
+)
+_TRUTH_MENDS: _Mends = (
+    (r"^(?i:tru|ture|treu|y|ja|on|x|wahr|vrai)$", "True"),
+    (r"^(?i:fals|flase|fasle|n|nein|off|falsch|faux)$", "False"),
+    (r"^[\"'=\s]+|[\"'\s]+$", ""),
+    (r"^!\s*", "not "),
+    (r"^\*$|^(?i:all|either|both|null|n/a)$", "Any"),
+)
+
+
+def candidates(text: str, domain: Domain) -> Iterator[str]:
+    """Texts near to one that cannot be read, the likeliest first; whether one reads is for the caller to try."""
+    rules = _NUMBER_MENDS if domain.kind in NUMERIC else _TRUTH_MENDS if domain.kind == "bool" else _WORD_MENDS
+    for pattern, replacement in rules:
+        yield re.sub(pattern, replacement, text).strip()
+    changed = text
+    for pattern, replacement in rules:
+        changed = re.sub(pattern, replacement, changed).strip()
+        yield changed
+    if domain.kind in ("enum", "text", "tags"):
+        yield from _word_mends(text, domain)
+
+
+def _word_mends(text: str, domain: Domain) -> Iterator[str]:
+    sign = "+" if domain.kind == "tags" else ""
+    known = domain.values or ()
+    if whole := nearest(text.strip("\"' +"), known):
+        yield sign + quoted(whole)
+    words = [w for w in re.split(r"[\s,;|\"']+", text) if w.strip("+-!")]
+    negation = "not " if words and words[0].casefold() == "not" else ""
+    spelt = [
+        ("-" if sign and w[0] == "-" else sign, w.strip("+!") if not sign else w.strip("+-!")) for w in words[bool(negation) :]
+    ]
+    yield negation + " ".join(s + quoted(w) for s, w in spelt)
+    yield negation + " ".join(s + quoted(nearest(w, known) or w) for s, w in spelt)
+    yield quoted(text.strip().strip('"'))

@@ -1,0 +1,31 @@
+"""The words that cells are made of: numbers, names, truth."""
+
+from __future__ import annotations
+
+import re
+
+NUMBER_TEXT = r"[+-]?(?:inf|(?:\d+(?:\.(?!\.)\d*)?|\.\d+)(?:[eE][+-]?\d+)?)"
+
+_NAME = re.compile(r"[\w.:/\-]+")
+_RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)
+_TRUTH = {"true": True, "t": True, "yes": True, "1": True, "false": False, "f": False, "no": False, "0": False}
+
+
+def is_name(text: str) -> bool:
+    """Whether a value can stand in a cell without quotes."""
+    return bool(_NAME.fullmatch(text)) and not is_reserved(text)
+
+
+def is_reserved(text: str) -> bool:
+    """Whether a word reads like Any, not or a number, so that a value of this name needs quotes."""
+    return bool(_RESERVED.fullmatch(text))
+
+
+def quoted(text: str) -> str:
+    """A value as a cell writes it: bare where it can be, else in double quotes."""
+    return text if is_name(text) else '"' + text.replace('"', '""') + '"'
+
+
+def truth_of(text: str) -> bool | None:
+    """True or False as people write it, or None."""
+    return _TRUTH.get(text.strip().casefold())

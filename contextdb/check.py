@@ -1,0 +1,129 @@
+"""What a table alone can show to be wrong: a table in, findings out. Each rule has a paragraph in docs/messages.md."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+
+from contextdb import intervals
+from contextdb.cells import Cell, NumberSet
+from contextdb.domains import Domain
+from contextdb.errors import in_quotes, nearest
+from contextdb.findings import Finding, Level
+from contextdb.source import Source
+from contextdb.table import ConditionColumn, Table
+
+MOST_ROWS = 1000
+"""A rule reports at most so many rows of one column, then says how many more there are."""
+
+
+def check(table: Table) -> list[Finding]:
+    """Every finding of a table, in the order of its rows, those of the whole table first."""
+    found = [*_whole_table(table), *_unreadable(table), *_cells(table), *_assets(table), *_identical(table)]
+    return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+
+
+def _whole_table(table: Table) -> Iterator[Finding]:
+    file = str(table.path) if table.path else None
+    if table.n_rows == 0:
+        yield Finding("no-rows", "warning", "the table has no rows, so no context has an asset.", table.name, file)
+    if isinstance(table.source, Source) and len(table.source.line_ends) > 1:
+        yield Finding(
+            "mixed-line-ends", "info", "some lines end in LF and some in CRLF; they are kept as they are.", table.name, file
+        )
+    for column in table.conditions:
+        if not column.condition.is_declared:
+            yield _undeclared(table, column, file)
+
+
+def _undeclared(table: Table, column: ConditionColumn, file: str | None) -> Finding:
+    name, kind = column.condition.name, column.condition.domain.kind
+    present = {c.name for c in table.columns}
+    near = nearest(name, [c for c in table.schema.conditions if c not in present])
+    hint = f" Did you mean {in_quotes(near)}?" if near else ""
+    level: Level = "warning" if table.schema.conditions else "info"
+    message = f"the condition is not declared in contextdb.toml; its cells read as {kind}.{hint}"
+    return Finding("undeclared-condition", level, message, table.name, file, column=name)
+
+
+def _unreadable(table: Table) -> Iterator[Finding]:
+    for fault in table.faults:
+        row = fault.place.row
+        yield Finding.of(fault, "error", table.name, None if row is None else table.assets[row])
+
+
+def _cells(table: Table) -> Iterator[Finding]:
+    for column in table.conditions:
+        said: dict[int, tuple[str, Level, str]] = {}
+        for i, cell in enumerate(column.cells):
+            verdict = _verdict(cell, column.condition.domain)
+            if verdict and i not in column.faults:
+                said[i] = verdict
+        rows = np.flatnonzero(np.isin(column.texts.codes, list(said))).tolist() if said else []
+        for row in rows[:MOST_ROWS]:
+            rule, level, why = said[int(column.texts.codes[row])]
+            yield _at(table, row, rule, level, f"{in_quotes(column.texts[row])} {why}", column.condition.name)
+        if len(rows) > MOST_ROWS:
+            message = f"{len(rows) - MOST_ROWS:,} more rows of this column have such cells."
+            yield _at(
+                table, rows[MOST_ROWS], "more", said[int(column.texts.codes[rows[MOST_ROWS]])][1], message, column.condition.name
+            )
+
+
+def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
+    """The rule that a cell breaks, its level and why."""
+    if cell.is_empty:
+        return "empty-cell", "error", "accepts no value at all, so the row never matches."
+    if not isinstance(cell.accepts, NumberSet) or domain.kind == "angle":
+        return None
+    low, high = domain.minimum, domain.maximum
+    spans = cell.accepts.spans
+    bounds = f"the declared {low:g} to {high:g}"
+    if spans[-1][1] < low or spans[0][0] > high:
+        return "outside-domain", "warning", f"lies wholly outside {bounds}, so the row matches no expected value."
+    ends = [e for span in spans for e in span if np.isfinite(e)]
+    if ends and (intervals.above(max(ends)) < low or min(ends) < low or max(ends) > high):
+        return "beyond-domain", "info", f"reaches beyond {bounds}."
+    return None
+
+
+def _assets(table: Table) -> Iterator[Finding]:
+    rows_of: dict[str, list[int]] = defaultdict(list)
+    for row, asset in enumerate(table.assets):
+        rows_of[asset].append(row)
+    for asset, rows in rows_of.items():
+        if not asset.strip():
+            for row in rows[:MOST_ROWS]:
+                yield _at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
+        elif len(rows) > 1:
+            for row in rows[1:MOST_ROWS]:
+                message = f"the asset {in_quotes(asset)} stands in row {rows[0]} too."
+                yield _at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
+
+
+def _identical(table: Table) -> Iterator[Finding]:
+    """Rows whose every condition accepts the same values, whatever way it is written."""
+    if table.n_rows < 2 or not table.conditions:
+        return
+    meanings = [_meanings(column) for column in table.conditions]
+    _, first, group = np.unique(np.stack(meanings, axis=1), axis=0, return_index=True, return_inverse=True)
+    origin = first[group.reshape(-1)]
+    for row in np.flatnonzero(origin != np.arange(table.n_rows)).tolist()[:MOST_ROWS]:
+        other = int(origin[row])
+        message = f"every condition is the same as in row {other} ({in_quotes(table.assets[other])})."
+        yield _at(table, row, "identical-rows", "warning", message, None, (other,))
+
+
+def _meanings(column: ConditionColumn) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """For each row a number that is the same for cells that mean the same; a cell that cannot be read means itself."""
+    known: dict[object, int] = {}
+    keys = [("fault", i) if i in column.faults else (c.accepts, c.penalty) for i, c in enumerate(column.cells)]
+    numbers = np.array([known.setdefault(k, len(known)) for k in keys], np.int64)
+    return numbers[column.texts.codes]
+
+
+def _at(table: Table, row: int, rule: str, level: Level, message: str, column: str | None, by: tuple[int, ...] = ()) -> Finding:
+    place = table.place(row, column)
+    return Finding(rule, level, message, table.name, place.file, row, table.assets[row], place.line, column, by)

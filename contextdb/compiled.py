@@ -1,0 +1,321 @@
+"""Compile a table into bitmasks, and look contexts up in them.
+
+Each condition's domain is cut into the fewest classes its column tells apart; each class keeps one bit a row. A query finds the
+class of every fact and ANDs the masks, so its cost grows with conditions x rows / 64 and not with how the cells are written.
+
+W = ceil(n_rows / 64). Bit r % 64 of word r // 64 is row r; bits past the last row are 0, always. A compiled table is never
+changed and may be asked from several threads. Nothing here reads a file, prints, or looks at the clock; `save` and `open` call
+`contextdb.artefact`.
+
+Source: Lakshman and Stiliadis, "High-speed policy-based packet forwarding using efficient multi-dimensional range matching",
+SIGCOMM 1998.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.bitmask import Words
+from contextdb.cells import Cell, NumberSet, TagSet, ValueSet
+from contextdb.classes import ColumnMasks, TagMasks, ValueMasks, WideMasks
+from contextdb.columns import TextColumn
+from contextdb.conditions import Condition
+from contextdb.errors import ContextError, Fault, Place
+from contextdb.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact
+from contextdb.intervals import EVERYTHING
+from contextdb.live import LiveContext
+from contextdb.lookup import Lookup, SingleLookup, build_lookup, single_lookup
+from contextdb.matches import Answering, Matches, SetMatches
+from contextdb.stack import MaskStack
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from contextdb.batch import ManyMatches
+    from contextdb.explain import Explanation
+    from contextdb.pick import Memory, Rng
+    from contextdb.shapes import Policy
+    from contextdb.table import Table
+
+SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledTable:
+    """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`."""
+
+    name: str
+    assets: Sequence[str]
+    conditions: tuple[Condition, ...]
+    masks: tuple[ColumnMasks, ...]
+    """One for each condition."""
+    enabled: Words
+    """The rows that may match at all."""
+    soft: tuple[SoftMasks | None, ...]
+    """For each condition with soft cells: masks of the rows that they match, and the penalty of each row float64 [n_rows]."""
+    priorities: NDArray[np.int64]
+    row_weights: NDArray[np.float64]
+    texts: tuple[TextColumn, ...]
+    """The cells of each condition as they are written, for explanations."""
+    policy: Policy = "collect"
+    fallback: str | None = None
+
+    @classmethod
+    def of(cls, table: Table) -> CompiledTable:
+        """Compile a table whose cells can all be read; columns compiled before are taken as they are."""
+        return cls(
+            name=table.name,
+            assets=table.assets,
+            conditions=tuple(c.condition for c in table.conditions),
+            masks=tuple(c.masks for c in table.conditions),
+            enabled=bitmask.pack(table.enabled),
+            soft=tuple(c.soft for c in table.conditions),
+            priorities=table.priorities,
+            row_weights=table.row_weights,
+            texts=tuple(c.texts for c in table.conditions),
+            policy=table.settings.policy,
+            fallback=table.settings.fallback,
+        )
+
+    @property
+    def n_rows(self) -> int:
+        """How many rows the table has."""
+        return len(self.assets)
+
+    @cached_property
+    def enabled_bits(self) -> int:
+        """The rows that may match at all, as an integer."""
+        return bitmask.to_int(self.enabled)
+
+    def query(self, context: Context, unknown: Unknown = "error") -> Matches:
+        """Find the rows whose every cell accepts its fact.
+
+        Parameters
+        ----------
+        context : mapping of str to fact
+            A value for each condition; a set of values as `cdb.cell("0 ± 90")`. Facts that the table does not ask for are passed
+            over.
+        unknown : {"error", "any", "never"}
+            What a missing fact (absent, None or NaN) does: raises; its condition is ignored; only cells that are Any accept it.
+
+        Raises
+        ------
+        ContextError
+            A fact is missing (named, with a misspelt one near it), of the wrong type, or outside an enum's or tag's domain.
+
+        Notes
+        -----
+        With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
+        """
+        try:
+            bits = self._lookup(context)
+        except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
+            return self.matches(*self._bits_carefully(context, unknown))
+        return Matches(bits, self.answering)
+
+    def query_many(
+        self, contexts: Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame, unknown: Unknown = "error"
+    ) -> ManyMatches:
+        """Find the valid rows for many contexts at once: counts, hits and masks.
+
+        Parameters
+        ----------
+        contexts : polars DataFrame, or mapping of str to list or array
+            One column for each condition, equally long; others are passed over.
+
+        Raises
+        ------
+        ContextError
+            As `query`, naming the first contexts concerned.
+        """
+        from contextdb.batch import query_many
+
+        return query_many(self, contexts, unknown)
+
+    def live(self, facts: Context | None = None, unknown: Unknown = "error") -> LiveContext:
+        """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`."""
+        check_mode(unknown)
+        live = LiveContext(self, unknown)
+        live.update(facts or {})
+        return live
+
+    def encode(self, context: Context, unknown: Unknown = "error") -> NDArray[np.int32]:
+        """The class of every fact, as codes for `query_codes`: int32 [n_slots], see `contextdb.stack`."""
+        facts = self.read_context(context, unknown)
+        local: list[tuple[int, ...] | None] = []
+        for name, masks in zip(facts, self.masks, strict=True):
+            fact = facts[name]
+            if isinstance(fact, Cell):
+                raise ContextError(Fault("a set of values has no single code.", "one value", place=Place(column=name)))
+            local.append(None if fact is None and unknown == "any" else masks.codes(fact))  # type: ignore[arg-type]
+        return self.stack.codes(local)
+
+    def query_codes(self, codes: NDArray[np.int32]) -> Matches:
+        """The rows for codes that `encode` made."""
+        from contextdb.batch import query_codes
+
+        return query_codes(self, codes)
+
+    def explain(self, context: Context, unknown: Unknown = "error") -> Explanation:
+        """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first."""
+        from contextdb.explain import explain
+
+        return explain(self, context, unknown)
+
+    def pick(
+        self, context: Context | Matches, rng: Rng | int | None = None, last: str | None = None, unknown: Unknown = "error"
+    ) -> str | None:
+        """One asset by the table's policy: see `contextdb.pick.pick`."""
+        from contextdb.pick import pick
+
+        return pick(self, context if isinstance(context, Matches) else self.query(context, unknown), rng, last)
+
+    def penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:
+        """What each row's soft cells cost in a search: float64 [n_rows], the sum of the penalties of those that do not match.
+
+        A soft cell whose fact is missing costs nothing with unknown="any", its penalty with "never". A set-valued fact costs
+        nothing where some value of the set matches.
+        """
+        costs = np.zeros(self.n_rows)
+        if any(self.soft):
+            facts = self.read_context(context, unknown)
+            for condition, soft in zip(self.conditions, self.soft, strict=True):
+                fact = facts[condition.name]
+                if soft is not None and not (fact is None and unknown == "any"):
+                    masks, row_penalties = soft
+                    fails = ~bitmask.unpack(bitmask.from_int(_bits_of(masks, fact)[0], self.n_rows), self.n_rows)
+                    costs += np.where(fails, row_penalties, 0.0)
+        return costs
+
+    def read_context(self, context: Context, unknown: Unknown = "error") -> dict[str, Fact]:
+        """Every condition's fact in canonical form, None where it is missing; raises ContextError as `query` does."""
+        check_mode(unknown)
+        if not isinstance(context, Mapping):
+            raise ContextError(Fault(f"a context is a mapping of facts, not {type(context).__name__}.", "a dict"))
+        facts: dict[str, Fact] = {}
+        faults: list[Fault] = []
+        for condition in self.conditions:
+            try:
+                facts[condition.name] = read_fact(context.get(condition.name), condition)
+            except ContextError as error:
+                faults += error.faults
+        if faults:
+            raise ContextError(*faults)
+        missing = [name for name, fact in facts.items() if fact is None]
+        extra = [name for name in context if name not in facts] if missing else []
+        if missing and (slip := misspelt(missing, extra)):
+            raise slip
+        if missing and unknown == "error":
+            raise missing_error(missing, extra)
+        return facts
+
+    def condition_bits(self, at: int, fact: Fact, unknown: Unknown = "error") -> tuple[int, int]:
+        """Rows whose cell accepts some, and rows whose cell accepts every, value of a fact in canonical form."""
+        return self._all_bits if fact is None and unknown == "any" else _bits_of(self.masks[at], fact)
+
+    def fact_bits(self, name: str, value: object, unknown: Unknown) -> tuple[int, int, bool]:
+        """For one given fact: rows that accept some of it, rows that accept all of it, and whether it is missing."""
+        at = self.places[name]
+        fact = read_fact(value, self.conditions[at])
+        some_bits, every = self.condition_bits(at, fact, unknown)
+        return some_bits, every, fact is None
+
+    def matches(self, bits: int, always: int | None = None) -> Matches:
+        """An answer of this table from its rows as an integer."""
+        return Matches(bits, self.answering) if always is None or always == bits else SetMatches(bits, self.answering, always)
+
+    @cached_property
+    def single_lookups(self) -> dict[str, SingleLookup]:
+        """For each condition what finds the mask of a usual fact."""
+        return {c.name: single_lookup(c, m) for c, m in zip(self.conditions, self.masks, strict=True)}
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """Where each condition stands among `conditions`."""
+        return {c.name: at for at, c in enumerate(self.conditions)}
+
+    @cached_property
+    def stack(self) -> MaskStack:
+        """Every mask of the table in one array, for the kernels."""
+        return MaskStack.of(self.masks, self.n_rows)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the masks take."""
+        return sum(nbytes(m) for m in self.masks)
+
+    def save(self, path: str | Path) -> None:
+        """Write the artefact for the game: .safetensors, atomic."""
+        from contextdb.artefact import save
+
+        save(self, Path(path))
+
+    @classmethod
+    def open(cls, path: str | Path) -> CompiledTable:
+        """Open an artefact by memory map. A truncated, altered or foreign file is refused with ArtefactError."""
+        from contextdb.artefact import open_artefact
+
+        return open_artefact(Path(path))
+
+    @cached_property
+    def _lookup(self) -> Lookup:
+        return build_lookup(list(zip(self.conditions, self.masks, strict=True)), self.enabled_bits, self.n_rows)
+
+    @cached_property
+    def memory(self) -> Memory:
+        """Which asset each random generator picked last."""
+        from contextdb.pick import Memory
+
+        return Memory()
+
+    @cached_property
+    def answering(self) -> Answering:
+        """What the answers of this table share."""
+        return Answering(self.assets)
+
+    @cached_property
+    def _all_bits(self) -> tuple[int, int]:
+        everything = (1 << self.n_rows) - 1
+        return everything, everything
+
+    def _bits_carefully(self, context: Context, unknown: Unknown) -> tuple[int, int]:
+        facts = self.read_context(context, unknown)
+        some_bits = every = self.enabled_bits
+        for at, condition in enumerate(self.conditions):
+            one, all_ = self.condition_bits(at, facts[condition.name], unknown)
+            some_bits &= one
+            every &= all_
+        return some_bits, every
+
+
+def nbytes(masks: ColumnMasks) -> int:
+    """Bytes that a column's masks take."""
+    if isinstance(masks, WideMasks):
+        return masks.low.nbytes + masks.high.nbytes + masks.any_mask.nbytes + masks.bounds.nbytes
+    return masks.masks.nbytes
+
+
+def _bits_of(masks: ColumnMasks, fact: Fact) -> tuple[int, int]:
+    if isinstance(fact, Cell):
+        return _every_value(masks) if fact.accepts is None else masks.set_bits(fact.accepts)
+    if isinstance(masks, WideMasks):
+        bits = masks.bits(masks.codes(fact)[0])  # type: ignore[arg-type]
+    else:
+        bits = (1 << masks.n_rows) - 1
+        for code in masks.codes(fact):  # type: ignore[arg-type]
+            bits &= masks.ints[code]
+    return bits, bits
+
+
+def _every_value(masks: ColumnMasks) -> tuple[int, int]:
+    if isinstance(masks, TagMasks):
+        return masks.set_bits(TagSet(frozenset()))
+    return masks.set_bits(ValueSet(frozenset(), True)) if isinstance(masks, ValueMasks) else masks.set_bits(NumberSet(EVERYTHING))

@@ -1,0 +1,68 @@
+"""Text for people in a terminal: aligned columns, colour only where a terminal shows it, progress on standard error."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import unicodedata
+from collections.abc import Iterable, Iterator, Sequence
+from typing import IO, TypeVar
+
+Item = TypeVar("Item")
+
+STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}
+
+
+def wants_colour(stream: IO[str]) -> bool:
+    """Whether to colour: on a terminal that can, unless NO_COLOR says otherwise; FORCE_COLOR colours anywhere."""
+    if os.environ.get("NO_COLOR"):
+        return False
+    if os.environ.get("FORCE_COLOR"):
+        return True
+    return stream.isatty() and os.environ.get("TERM", "") not in ("dumb", "unknown")
+
+
+def styled(text: str, style: str, colour: bool) -> str:
+    """The text in a style, where colour is wanted."""
+    return f"\x1b[{STYLES[style]}m{text}\x1b[0m" if colour and text else text
+
+
+def printable(text: str) -> str:
+    """The text without what would move the cursor or ring the bell."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def width_of(text: str) -> int:
+    """How many terminal cells the text takes; wide characters take two, combining ones none."""
+    return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
+
+
+def aligned(rows: Sequence[Sequence[str]], right: Sequence[int] = (), indent: str = "") -> Iterator[str]:
+    """Rows of texts as lines with aligned columns, two spaces between; columns in `right` stand to the right."""
+    clean = [[printable(t) for t in row] for row in rows]
+    widths = [max(map(width_of, column)) for column in zip(*clean, strict=True)]
+    for row in clean:
+        cells = [_padded(t, w, i in right) for i, (t, w) in enumerate(zip(row, widths, strict=True))]
+        yield (indent + "  ".join(cells)).rstrip()
+
+
+def _padded(text: str, width: int, to_right: bool) -> str:
+    gap = " " * (width - width_of(text))
+    return gap + text if to_right else text + gap
+
+
+def terminal_width() -> int:
+    """How many cells a line of the terminal has; 100 where there is none."""
+    return shutil.get_terminal_size((100, 24)).columns
+
+
+def progress(items: Iterable[Item], label: str, total: int | None = None) -> Iterator[Item]:
+    """Pass the items on, with a progress bar on standard error when that is a terminal."""
+    if not sys.stderr.isatty():
+        yield from items
+        return
+    from rich.console import Console
+    from rich.progress import track
+
+    yield from track(items, description=label, total=total, console=Console(stderr=True), transient=True)

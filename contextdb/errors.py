@@ -1,0 +1,158 @@
+"""What can go wrong, said so that it can be mended.
+
+An error carries one or more faults. A fault says where (a `Place`), what was found, what is accepted and the nearest mend, in that
+order. All faults of a file travel together in one error.
+
+    ContextDBError
+    ├── CellError       a cell whose text is not in the grammar
+    ├── SchemaError     contextdb.toml says something that cannot be meant
+    ├── TableError      a table file that cannot be read, or rows that cannot be compiled
+    ├── FileError       the disk says no: missing, not permitted, full, changed under us
+    ├── ContextError    facts that a table cannot be asked with
+    ├── PolicyError     a table breaks the promise of its own policy
+    ├── ArtefactError   a compiled file that is truncated, altered or from another version
+    └── MotionError     clips, features and searches
+        ├── ClipError   a clip that cannot be read
+        └── QueryError  a motion query that cannot be searched with
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+SHOWN_CHARACTERS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a fault stands: a file with a line (from 1), or a table's row (from 0) and column."""
+
+    file: str | None = None
+    line: int | None = None
+    column: str | None = None
+    row: int | None = None
+
+    def __str__(self) -> str:
+        parts = [self.file] if self.file else []
+        if self.line is not None:
+            parts.append(f"line {self.line}")
+        elif self.row is not None:
+            parts.append(f"row {self.row}")
+        if self.column is not None:
+            parts.append(f'column "{shown(self.column)}"')
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong: its place, what was found, what is accepted, and the nearest mend."""
+
+    found: str
+    accepted: str = ""
+    mend: str = ""
+    place: Place = Place()
+    rule: str = "unreadable"
+
+    @property
+    def message(self) -> str:
+        """The fault without its place, on one line."""
+        parts = [self.found]
+        if self.accepted:
+            parts.append(f"Accepted: {self.accepted}.")
+        if self.mend:
+            parts.append(f"Did you mean {self.mend}?")
+        return " ".join(parts)
+
+    def __str__(self) -> str:
+        place = str(self.place)
+        return f"{place}: {self.message}" if place else self.message
+
+    def at(self, place: Place) -> Fault:
+        """The same fault, placed."""
+        return replace(self, place=place)
+
+
+class ContextDBError(Exception):
+    """Something contextdb refuses, with every fault that made it refuse."""
+
+    def __init__(self, *faults: Fault | str) -> None:
+        self.faults: tuple[Fault, ...] = tuple(Fault(f) if isinstance(f, str) else f for f in faults)
+        super().__init__("\n".join(str(f) for f in self.faults))
+
+    def __reduce__(self) -> tuple[type[ContextDBError], tuple[Fault, ...]]:
+        return type(self), self.faults
+
+
+class CellError(ContextDBError):
+    """A cell whose text is not in the grammar of its type."""
+
+
+class SchemaError(ContextDBError):
+    """contextdb.toml, or a schema given in Python, says something that cannot be meant."""
+
+
+class TableError(ContextDBError):
+    """A table file that cannot be read, or rows that cannot be compiled."""
+
+
+class FileError(ContextDBError):
+    """The file system refuses: a file is missing, not permitted, or the disk is full."""
+
+
+class ContextError(ContextDBError):
+    """Facts that a table cannot be asked with: missing, unknown, of the wrong type, or outside the domain."""
+
+
+class PolicyError(ContextDBError):
+    """A table breaks the promise of its own policy: two rows valid at once where it says "unique"."""
+
+
+class ArtefactError(ContextDBError):
+    """A compiled file that is truncated, altered, or written by another version."""
+
+
+class MotionError(ContextDBError):
+    """Clips, features or a search that cannot be used."""
+
+
+class ClipError(MotionError):
+    """A motion clip that cannot be read."""
+
+
+class QueryError(MotionError):
+    """A motion query that cannot be searched with."""
+
+
+def shown(text: str, most: int = SHOWN_CHARACTERS) -> str:
+    """Text as a message shows it: control characters escaped, the middle of a long text left out."""
+    short = text if len(text) <= most else f"{text[: most - 20]} … ({len(text):,} characters)"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in short)
+
+
+def in_quotes(text: str, most: int = SHOWN_CHARACTERS) -> str:
+    """Text in quotes for a message: in double ones, or in single ones where it has double ones itself."""
+    mark = "'" if '"' in text else '"'
+    return f"{mark}{shown(text, most)}{mark}"
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The known name most like `word`, in spelling and apart from its case, or None when none is near."""
+    folded: dict[str, str] = {}
+    for name in known:
+        folded.setdefault(name.casefold(), name)
+    found = difflib.get_close_matches(word.casefold()[:200], folded, n=1, cutoff=0.6)
+    return folded[found[0]] if found else None
+
+
+def some(names: Iterable[str], most: int = 6) -> str:
+    """The first few names, quoted, and how many more there are."""
+    listed = list(names)
+    head = ", ".join(f'"{shown(n)}"' for n in listed[:most])
+    return head if len(listed) <= most else f"{head} and {len(listed) - most} more"
+
+
+def plural(count: int, noun: str) -> str:
+    """ "1 row", "2 rows": a count with its noun."""
+    return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"

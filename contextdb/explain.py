@@ -1,0 +1,219 @@
+"""Why a row is valid for a context, or is not: which of its cells fail, with which fact, and what to change.
+
+Winner first: valid rows stand before all others, then the rows nearest to valid, with the fewest failing cells. The details of a
+row are worked out when they are asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask, intervals
+from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, format_cell, parse_cell
+from contextdb.conditions import Condition
+from contextdb.errors import plural
+from contextdb.facts import Context, Fact, Unknown, describe
+from contextdb.matches import Matches
+
+if TYPE_CHECKING:
+    from contextdb.compiled import CompiledTable
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """One cell that does not accept its fact."""
+
+    condition: str
+    cell: str
+    """The cell as the table writes it."""
+    fact: str
+    mend: str
+    """The cell with which the row would match, as near to the present one as can be."""
+
+    def __str__(self) -> str:
+        return f"{self.condition} is {self.fact}, the cell says {self.cell}"
+
+
+@dataclass(frozen=True, slots=True)
+class RowExplanation:
+    """One row for a context."""
+
+    row: int
+    asset: str
+    is_enabled: bool
+    failures: tuple[Failure, ...]
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the row is valid."""
+        return self.is_enabled and not self.failures
+
+    def __str__(self) -> str:
+        if self.is_valid:
+            return f"{self.asset}: valid"
+        reasons = [str(f) for f in self.failures] + ([] if self.is_enabled else ["the row is disabled"])
+        return f"{self.asset}: " + "; ".join(reasons)
+
+
+class Explanation:
+    """All rows for one context, in order: valid ones, then the nearest. Iterate, index, or ask for one row or asset."""
+
+    def __init__(self, compiled: CompiledTable, facts: dict[str, Fact], unknown: Unknown, matches: Matches) -> None:
+        self.compiled = compiled
+        self.facts = facts
+        """The facts in canonical form."""
+        self.matches = matches
+        """The answer explained."""
+        self._unknown = unknown
+
+    def __len__(self) -> int:
+        return self.compiled.n_rows
+
+    def __iter__(self) -> Iterator[RowExplanation]:
+        return (self.row(r) for r in self.order.tolist())
+
+    def __getitem__(self, place: int) -> RowExplanation:
+        return self.row(int(self.order[place]))
+
+    def row(self, row: int) -> RowExplanation:
+        """Why this row is valid or not."""
+        at = np.flatnonzero(self._fails[:, row]).tolist()
+        failures = tuple(self._failure(i, row) for i in at)
+        return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), failures)
+
+    def asset(self, asset: str) -> list[RowExplanation]:
+        """Why the rows of this asset are valid or not."""
+        return [self.row(r) for r, name in enumerate(self.compiled.assets) if name == asset]
+
+    def nearest(self, most: int = 5) -> list[RowExplanation]:
+        """The rows that are not valid but nearest to it: fewest failing cells, then least far off."""
+        n_valid = len(self.matches)
+        return [self.row(r) for r in self.order[n_valid : n_valid + most].tolist()]
+
+    def always_rows(self) -> list[int]:
+        """The rows that match for every value of set-valued facts."""
+        return [int(r) for r in bitmask.rows(self.matches.always)]
+
+    @property
+    def n_failures(self) -> NDArray[np.int64]:
+        """How many cells of each row fail: int64 [n_rows]; a disabled row counts one more."""
+        return np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + ~self._enabled
+
+    @cached_property
+    def order(self) -> NDArray[np.int64]:
+        """Row numbers, valid ones first, then by failing cells, how far the facts are off, and place in the file: int64
+        [n_rows]."""
+        return np.lexsort((self._distances, self.n_failures))
+
+    def __str__(self) -> str:
+        lines = [f"{plural(len(self.matches), 'row')} of {self.compiled.n_rows} valid"]
+        return "\n".join(lines + [str(r) for r, _ in zip(self, range(10), strict=False)])
+
+    @cached_property
+    def _enabled(self) -> NDArray[np.bool_]:
+        return bitmask.unpack(self.compiled.enabled, self.compiled.n_rows)
+
+    @cached_property
+    def _fails(self) -> NDArray[np.bool_]:
+        """Whether the cell of a condition fails: bool [conditions, n_rows]."""
+        compiled = self.compiled
+        fails = np.empty((len(compiled.conditions), compiled.n_rows), np.bool_)
+        for at, condition in enumerate(compiled.conditions):
+            bits, _ = compiled.condition_bits(at, self.facts[condition.name], self._unknown)
+            fails[at] = ~bitmask.unpack(bitmask.from_int(bits, compiled.n_rows), compiled.n_rows)
+        return fails
+
+    @cached_property
+    def _distances(self) -> NDArray[np.float64]:
+        """How far the failing facts are off, summed: float64 [n_rows]; a number by its share of the domain, at most 1; others 1."""
+        far = np.zeros(self.compiled.n_rows)
+        for at, condition in enumerate(self.compiled.conditions):
+            if self._fails[at].any():
+                far += np.where(self._fails[at], self._column_distances(at, condition), 0.0)
+        return far
+
+    def _column_distances(self, at: int, condition: Condition) -> NDArray[np.float64]:
+        column = self.compiled.texts[at]
+        fact = self.facts[condition.name]
+        if not isinstance(fact, float):
+            return np.ones(len(column.codes))
+        cells = [parse_cell(t, condition.domain).accepts for t in column.texts]
+        width = _width(condition, cells)
+        return np.array([_distance(c, fact, width) for c in cells], np.float64)[column.codes]
+
+    def _failure(self, at: int, row: int) -> Failure:
+        condition = self.compiled.conditions[at]
+        text = self.compiled.texts[at][row]
+        fact = self.facts[condition.name]
+        cell = parse_cell(text, condition.domain)
+        mend = format_cell(Cell(widened(cell.accepts, fact)), condition.domain)
+        return Failure(condition.name, text, _with_unit(describe_fact(fact, condition), condition), mend)
+
+
+def explain(compiled: CompiledTable, context: Context, unknown: Unknown = "error") -> Explanation:
+    """Explain every row of a table for one context; raises ContextError as `query` does."""
+    return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown))
+
+
+def describe_fact(fact: Fact, condition: Condition) -> str:
+    """A fact in canonical form as people write it; a set as a cell."""
+    return format_cell(fact, condition.domain) if isinstance(fact, Cell) else describe(fact)
+
+
+def widened(accepts: Accepted | None, fact: Fact) -> Accepted | None:
+    """The smallest change of a cell's set so that it holds the fact; None (Any) where there is no small one."""
+    if isinstance(accepts, NumberSet) and isinstance(fact, float):
+        return _widened_numbers(accepts, fact)
+    if isinstance(accepts, ValueSet) and isinstance(fact, str):
+        values = accepts.values - {fact} if accepts.is_complement else accepts.values | {fact}
+        return ValueSet(values, accepts.is_complement)
+    if isinstance(accepts, TagSet) and isinstance(fact, frozenset) and not accepts.is_complement:
+        needs = frozenset(t for t in accepts.needs if covers(t, fact))
+        bans = frozenset(t for t in accepts.bans if not covers(t, fact))
+        return TagSet(needs, bans) if needs or bans else None
+    return None
+
+
+def _widened_numbers(accepts: NumberSet, fact: float) -> NumberSet:
+    if not accepts.spans:
+        return NumberSet(((fact, fact),), accepts.is_circular)
+    ends = [end for span in accepts.spans for end in span]
+    near = min(ends, key=lambda end: _gap(end, fact, accepts.is_circular))
+    if not accepts.is_circular:
+        return NumberSet(intervals.union([*accepts.spans, (min(near, fact), max(near, fact))]))
+    turn = (fact - near + 180.0) % 360.0 - 180.0
+    bridge = intervals.arc(near, fact) if turn >= 0.0 else intervals.arc(fact, near)
+    return NumberSet(intervals.union([*accepts.spans, *bridge]), True)
+
+
+def _gap(end: float, fact: float, is_circular: bool) -> float:
+    gap = abs(end - fact)
+    return min(gap, 360.0 - gap) if is_circular else gap
+
+
+def _width(condition: Condition, cells: list[Accepted | None]) -> float:
+    """What a number's distance is measured by: its domain, else the spread of the column's bounds."""
+    domain = condition.domain
+    if domain.kind == "angle":
+        return 180.0
+    if np.isfinite(domain.maximum - domain.minimum):
+        return domain.maximum - domain.minimum or 1.0
+    ends = [e for c in cells if isinstance(c, NumberSet) for span in c.spans for e in span if np.isfinite(e)]
+    return (max(ends) - min(ends)) if len(set(ends)) > 1 else 1.0
+
+
+def _distance(accepts: Accepted | None, fact: float, width: float) -> float:
+    if not isinstance(accepts, NumberSet) or not accepts.spans:
+        return 1.0
+    gaps = [_gap(end, fact, accepts.is_circular) for span in accepts.spans for end in span]
+    return min(min(gaps) / width, 1.0) if not np.isinf(fact) else 1.0
+
+
+def _with_unit(text: str, condition: Condition) -> str:
+    return f"{text} {condition.unit}" if condition.unit and text != "(missing)" else text

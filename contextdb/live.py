@@ -1,0 +1,149 @@
+"""A context that the game keeps: set what changed, then ask. The cheap way to query every frame.
+
+Most facts stay as they are from one frame to the next. The masks of those are intersected once, and a question costs one `&` for
+each fact that has been moving; a fact that starts to move joins those, and the rest is intersected anew.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping
+from functools import reduce
+from operator import and_
+from typing import TYPE_CHECKING, Any
+
+from contextdb.facts import Unknown, missing_error, no_condition
+from contextdb.lookup import SingleLookup
+from contextdb.matches import Matches
+
+if TYPE_CHECKING:
+    from contextdb.compiled import CompiledTable
+
+MOST_MOVING = 8
+
+
+class LiveContext:
+    """Facts kept between questions. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` asks."""
+
+    __slots__ = (
+        "_answer",
+        "_answering",
+        "_compiled",
+        "_facts",
+        "_lookups",
+        "_masks",
+        "_moving",
+        "_n_moving",
+        "_odd",
+        "_still",
+        "_unknown",
+    )
+
+    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+        self._compiled = compiled
+        self._answering = compiled.answering
+        self._unknown = unknown
+        self._lookups: dict[str, SingleLookup] = compiled.single_lookups
+        self._facts: dict[str, object] = {}
+        self._masks: dict[str, Any] = {}
+        """The mask of every fact when `_still` was intersected."""
+        self._moving: dict[str, Any] = {}
+        """The masks of the facts that have been moving; None where the value must be read with care."""
+        self._n_moving = -1
+        """How many facts moved when `_still` was intersected."""
+        self._still = 0
+        self._odd: dict[str, tuple[int, bool]] = {}
+        """Facts that are missing or sets: the rows that accept all of it, and whether it is missing."""
+        self._answer = Matches(0, self._answering)
+        """The last answer: while the rows stay the same, so does the object."""
+        for condition in compiled.conditions:
+            self._set_carefully(condition.name, None)
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        """Set one fact. A wrong value raises ContextError, here or when next asked, and names the fact."""
+        try:
+            bounds, masks = self._lookups[name]
+            self._moving[name] = masks[value] if bounds is None else masks[bisect_right(bounds, value)]
+        except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
+            self._set_carefully(name, value)
+        else:
+            self._facts[name] = value
+            if self._odd:
+                self._odd.pop(name, None)
+
+    def __getitem__(self, name: str) -> object:
+        return self._facts[name]
+
+    def __delitem__(self, name: str) -> None:
+        self[name] = None
+
+    def __contains__(self, name: str) -> bool:
+        return self._facts.get(name) is not None
+
+    def update(self, facts: Mapping[str, object]) -> None:
+        """Set several facts; those that no condition of the table asks for are passed over, as in `query`."""
+        for name, value in facts.items():
+            if name in self._lookups:
+                self[name] = value
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """The facts as they were set; None where one is missing."""
+        return dict(self._facts)
+
+    def matches(self) -> Matches:
+        """The valid rows now; the same object as before while they stay the same.
+
+        Raises
+        ------
+        ContextError
+            Facts are missing and the context was made with unknown="error".
+        """
+        if self._odd:
+            self._refuse_missing()
+        moving = self._moving
+        if len(moving) != self._n_moving:
+            self._settle()
+        bits = self._still
+        try:
+            for mask in moving.values():
+                bits &= mask
+        except TypeError:
+            for name in [n for n, mask in moving.items() if mask is None]:
+                self._set_carefully(name, self._facts[name])
+            return self.matches()
+        if self._odd:
+            return self._set_matches(bits)
+        if bits != self._answer.bits:
+            self._answer = Matches(bits, self._answering)
+        return self._answer
+
+    def _settle(self) -> None:
+        """Intersect what stands still; when too many facts have moved, let all of them stand still again."""
+        moving, masks = self._moving, self._masks
+        masks.update(moving)
+        if len(moving) > MOST_MOVING and None not in moving.values():
+            moving.clear()
+        self._n_moving = len(moving)
+        still = {**masks, **dict.fromkeys(moving, -1)}
+        self._still = reduce(and_, still.values(), self._compiled.enabled_bits)
+
+    def _set_carefully(self, name: str, value: object) -> None:
+        if name not in self._lookups:
+            raise no_condition(name, self._lookups)
+        some, every, is_missing = self._compiled.fact_bits(name, value, self._unknown)
+        self._moving[name] = some
+        self._facts[name] = value
+        self._odd.pop(name, None)
+        if is_missing or every != some:
+            self._odd[name] = (every, is_missing)
+
+    def _refuse_missing(self) -> None:
+        missing = [c.name for c in self._compiled.conditions if self._odd.get(c.name, (0, False))[1]]
+        if missing and self._unknown == "error":
+            raise missing_error(missing, ())
+
+    def _set_matches(self, bits: int) -> Matches:
+        masks = {**self._masks, **self._moving}
+        every = (self._odd[n][0] if n in self._odd else m for n, m in masks.items())
+        return self._compiled.matches(bits, reduce(and_, every, self._compiled.enabled_bits))

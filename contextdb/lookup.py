@@ -1,0 +1,175 @@
+"""From a context to the bits of its rows, as fast as Python goes: one generated function a table.
+
+Reading thirty facts from a dict costs more than intersecting thirty masks, so the work is in the reading. Columns with few values
+are joined (`contextdb.groups`), a nested dict for each group, whose leaves are the masks already intersected: `g0[c['a']][c['b']]`.
+Numbers are bisected.
+
+The function knows only the straight way. A missing fact, NaN, a wrong type, a set of values, a number past 2**53: everything
+unusual ends in an exception, and the caller then takes the careful way, which says what is wrong or answers it.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Mapping, Sequence
+from operator import index
+from typing import Any
+
+from contextdb.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
+from contextdb.conditions import Condition
+from contextdb.facts import read_fact
+from contextdb.groups import groups_of
+
+EXACT = 2.0**53
+"""Below this every whole number is a double, so an int and a double compare as two doubles do."""
+
+MOST_TAG_SETS = 4096
+
+Lookup = Callable[[Mapping[str, object]], int]
+Column = tuple[Condition, ColumnMasks]
+SingleLookup = tuple[list[float] | None, Any]
+
+
+def build_lookup(columns: Sequence[Column], enabled: int, n_rows: int) -> Lookup:
+    """A function from a context to its rows as an integer; raises whatever it raises when a fact is unusual."""
+    names: dict[str, Any] = {"bisect_right": bisect_right, "index": index}
+    terms = []
+    values = [(c, m) for c, m in columns if isinstance(m, ValueMasks)]
+    for i, places in enumerate(groups_of([len(m.masks) - 1 for _, m in values], n_rows)):
+        group = [values[p] for p in places]
+        names[f"g{i}"] = _trie([m for _, m in group], -1)
+        terms.append(f"g{i}" + "".join(f"[c[{condition.name!r}]]" for condition, _ in group))
+    for i, (condition, masks) in enumerate(columns):
+        fact = f"c[{condition.name!r}]"
+        if isinstance(masks, ValueMasks):
+            continue
+        if isinstance(masks, NumberMasks):
+            names[f"b{i}"], names[f"m{i}"] = _straight(condition, masks)
+            fact = f"index({fact})" if condition.domain.kind == "int" else fact
+            terms.append(f"m{i}[bisect_right(b{i}, {fact})]")
+        else:
+            names[f"f{i}"] = _careful_lookup(condition, masks)
+            terms.append(f"f{i}({fact})")
+    if enabled != (1 << n_rows) - 1 or not terms:
+        names["enabled"] = enabled
+        terms.append("enabled")
+    source = f"def lookup(c, {', '.join(f'{n}={n}' for n in names)}):\n    return {' & '.join(terms)}"
+    exec(compile(source, "<contextdb lookup>", "exec"), names)
+    found: Lookup = names["lookup"]
+    return found
+
+
+def single_lookup(condition: Condition, masks: ColumnMasks) -> SingleLookup:
+    """What finds the mask of one fact: bounds to bisect in, or None, and the masks by interval or by value.
+
+    An unusual fact finds None or raises whatever it raises.
+    """
+    if isinstance(masks, ValueMasks):
+        return None, _leaves(masks, masks.ints)
+    if isinstance(masks, NumberMasks):
+        bounds, ints = _straight(condition, masks)
+        if condition.domain.kind != "int":
+            return bounds, ints
+        return None, _Asked(lambda fact: ints[bisect_right(bounds, index(fact))])
+    return None, _Asked(_careful_lookup(condition, masks))
+
+
+class _Asked:
+    """A function that is asked like a dict: `asked[fact]`."""
+
+    __slots__ = ("_ask",)
+
+    def __init__(self, ask: Callable[[Any], int | None]) -> None:
+        self._ask = ask
+
+    def __getitem__(self, fact: Any) -> int | None:
+        return self._ask(fact)
+
+
+def _careful_lookup(condition: Condition, masks: WideMasks | TagMasks) -> Callable[[Any], int]:
+    return _tag_lookup(condition, masks) if isinstance(masks, TagMasks) else _wide_lookup(condition, masks)
+
+
+class _TextLeaves(dict[Any, Any]):
+    """The leaves of a text column: a text that no cell names finds the class of all others."""
+
+    others: Any
+
+    def __missing__(self, key: object) -> Any:
+        if isinstance(key, str):
+            return self.others
+        raise KeyError(key)
+
+
+def _leaves(masks: ValueMasks, leaves: Sequence[Any]) -> dict[Any, Any]:
+    if not masks.has_others:
+        return dict(zip(masks.values, leaves, strict=False))
+    found = _TextLeaves(zip(masks.values, leaves, strict=False))
+    found.others = leaves[len(masks.values)]
+    return found
+
+
+def _trie(group: Sequence[ValueMasks], bits: int) -> Any:
+    head, rest = group[0], group[1:]
+    leaves = [bits & mask for mask in head.ints[:-1]]
+    return _leaves(head, [_trie(rest, b) for b in leaves] if rest else leaves)
+
+
+def _straight(condition: Condition, masks: NumberMasks) -> tuple[list[float], list[int | None]]:
+    """Bounds to bisect in and the mask of each interval between; None, which no `&` takes, where the careful way must decide.
+
+    Angles are laid out three times round the circle, so that -540 up to 540 need no wrapping: the shifts by 360 are exact there.
+    """
+    inner = masks.ints[:-1]
+    if condition.domain.kind == "angle":
+        turns = [b for base in (-360.0, 0.0, 360.0) for b in (base - 180.0, *(_shifted(b, base) for b in masks.bound_list))]
+        return [*turns, 540.0], [None, *inner, *inner, *inner, None]
+    bounds = masks.bound_list
+    first, last = bisect_right(bounds, -EXACT), bisect_left(bounds, EXACT)
+    return [-EXACT, *bounds[first:last], EXACT], [None, *inner[first : last + 1], None]
+
+
+def _shifted(bound: float, turn: float) -> float:
+    """The first double x with x - turn >= bound, the difference taken exactly."""
+    near = bound + turn
+    while near - turn < bound:
+        near = math.nextafter(near, math.inf)
+    while math.nextafter(near, -math.inf) - turn >= bound:
+        near = math.nextafter(near, -math.inf)
+    return near
+
+
+def _wide_lookup(condition: Condition, masks: WideMasks) -> Callable[[Any], int]:
+    bounds, is_int, is_angle = masks.bound_list, condition.domain.kind == "int", condition.domain.kind == "angle"
+    low, high = (-180.0, 180.0) if is_angle else (-EXACT, EXACT)
+
+    def lookup(fact: Any) -> int:
+        value = index(fact) if is_int else fact
+        if not low <= value < high:
+            raise ValueError
+        return masks.bits(bisect_right(bounds, value))
+
+    return lookup
+
+
+def _tag_lookup(condition: Condition, masks: TagMasks) -> Callable[[Any], int]:
+    """Tag sets recur, so the mask of each that was found right is kept."""
+    known: dict[frozenset[str], int] = {}
+    everything = (1 << masks.n_rows) - 1
+
+    def lookup(fact: Any) -> int:
+        bits = known.get(frozenset(fact)) if isinstance(fact, (frozenset, set)) else None
+        if bits is None:
+            tags = read_fact(fact, condition)
+            if not isinstance(tags, frozenset):
+                raise ValueError
+            bits = everything
+            for code in masks.codes(tags):
+                bits &= masks.ints[code]
+            if len(known) >= MOST_TAG_SETS:
+                known.clear()
+            known[tags] = bits
+        return bits
+
+    return lookup

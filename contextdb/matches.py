@@ -1,0 +1,136 @@
+"""The rows that match a context: a set of rows, told as numbers, assets or bits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from contextdb import bitmask
+from contextdb.bitmask import Rows, Words
+
+FEW = 48
+"""Up to this many rows are read off the integer bit by bit; beyond, unpacking all bits at once is faster."""
+
+
+class Answering:
+    """What the answers of one table share: its assets, and 0 … n_rows - 1 to cut row numbers from."""
+
+    __slots__ = ("assets", "row_numbers")
+
+    def __init__(self, assets: Sequence[str]) -> None:
+        self.assets = assets
+        self.row_numbers: Rows = np.arange(len(assets), dtype=np.int64)
+        self.row_numbers.flags.writeable = False
+
+
+class Matches:
+    """The valid rows for one context. True when there is at least one; its length is their number.
+
+    Attributes
+    ----------
+    indices : int64 array
+        Row numbers, ascending, from 0. Not to be written to.
+    assets : list of str
+        The assets of those rows.
+    mask : uint64 array, shape (W,)
+        Bit r % 64 of word r // 64 is row r.
+    always : uint64 array, shape (W,)
+        The rows that hold *all* values of the facts that were given as sets; the same as `mask` when none was.
+    """
+
+    __slots__ = ("_rows", "_table", "bits")
+
+    def __init__(self, bits: int, table: Answering) -> None:
+        self.bits = bits
+        """The rows as one Python integer, row r as bit r."""
+        self._table = table
+        self._rows: Rows | None = None
+
+    @property
+    def n_rows(self) -> int:
+        """How many rows the table has, valid or not."""
+        return len(self._table.row_numbers)
+
+    @property
+    def indices(self) -> Rows:
+        """Row numbers, ascending: int64 [count]."""
+        if self._rows is None:
+            self._rows = rows_of(self.bits, self._table.row_numbers)
+        return self._rows
+
+    @property
+    def assets(self) -> list[str]:
+        """The assets of the valid rows."""
+        assets = self._table.assets
+        return [assets[r] for r in self.indices.tolist()]
+
+    @property
+    def mask(self) -> Words:
+        """The rows as bits: uint64 [W]."""
+        return bitmask.from_int(self.bits, self.n_rows)
+
+    @property
+    def always(self) -> Words:
+        """The rows that hold all values of set-valued facts: uint64 [W]."""
+        return self.mask
+
+    def __len__(self) -> int:
+        return self.bits.bit_count()
+
+    def __bool__(self) -> bool:
+        return self.bits != 0
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self.indices.tolist())
+
+    def __contains__(self, row: int) -> bool:
+        return 0 <= row < self.n_rows and bool(self.bits >> row & 1)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Matches):
+            return NotImplemented
+        return (self.bits, self.n_rows) == (other.bits, other.n_rows)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"<Matches: {len(self)} of {self.n_rows} rows>"
+
+
+class SetMatches(Matches):
+    """The answer to a context with set-valued facts: the rows that may match, and those that always match."""
+
+    __slots__ = ("_always",)
+
+    def __init__(self, bits: int, table: Answering, always: int) -> None:
+        super().__init__(bits, table)
+        self._always = always
+
+    @property
+    def always(self) -> Words:
+        """The rows that hold all values of set-valued facts: uint64 [W]."""
+        return bitmask.from_int(self._always, self.n_rows)
+
+
+def rows_of(bits: int, numbers: Rows) -> Rows:
+    """The rows of an integer mask: int64 [count]. One row, the usual answer, is a view of `numbers` and costs no array."""
+    top = bits.bit_length() - 1
+    if top < 0:
+        return numbers[:0]
+    rest = bits ^ (1 << top)
+    if not rest:
+        return numbers[top : top + 1]
+    found = [top]
+    while rest:
+        if len(found) == FEW:
+            rows = bitmask.rows(bitmask.from_int(bits, len(numbers)))
+            rows.flags.writeable = False
+            return rows
+        top = rest.bit_length() - 1
+        found.append(top)
+        rest ^= 1 << top
+    found.reverse()
+    rows = np.array(found, np.int64)
+    rows.flags.writeable = False
+    return rows

@@ -1,0 +1,121 @@
+"""Check what a search is given, and say what does not fit: numbers, flags, frames."""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Sequence
+from typing import Protocol, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes, plural, some
+from contextdb.motion.quaternions import Floats
+
+Flags = NDArray[np.bool_]
+
+
+class HasAssets(Protocol):
+    """What a table's query answers: something with the names of the valid assets."""
+
+    @property
+    def assets(self) -> Sequence[str]:
+        """The valid assets."""
+
+
+Valid: TypeAlias = HasAssets | ArrayLike
+
+
+def array_of(values: object, what: str, error: type[MotionError] = QueryError) -> NDArray[np.generic]:
+    """An array of real numbers or bools, of whatever type they have."""
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise error(Fault(f"{what} cannot be an array: rows of different lengths.", "numbers in rows of one length")) from None
+    if array.dtype.kind not in "fiub" and array.size:
+        raise error(Fault(f"{what} has type {array.dtype}.", "real numbers"))
+    return array
+
+
+def numbers_of(values: object, what: str) -> Floats:
+    """An array of real numbers as float64."""
+    return array_of(values, what).astype(np.float64)
+
+
+def flags_of(values: object, n_wanted: int, what: str, of: str) -> Flags:
+    """A bool array of one length; numbers are refused, for they may be meant as indices."""
+    accepted = f"{'Matches, or ' if what == 'valid' else ''}one bool for each of {plural(n_wanted, of)}"
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise QueryError(Fault(f"{what} has rows of different lengths.", accepted)) from None
+    if array.dtype != np.bool_ and array.size:
+        raise QueryError(Fault(f"{what} has type {array.dtype}.", accepted))
+    if array.shape != (n_wanted,):
+        raise QueryError(Fault(f"{what} has shape {array.shape}.", accepted))
+    return array.astype(np.bool_)
+
+
+def query_of(query: object, names: Sequence[str]) -> Floats:
+    """One query as float64 [F], or a QueryError that names the features that are no finite numbers."""
+    array = numbers_of(query, "the query")
+    if array.shape != (len(names),):
+        raise QueryError(Fault(f"the query has shape {array.shape}.", f"{plural(len(names), 'feature')}: {some(names, 3)}"))
+    refuse_infinite(array, array, names)
+    return array
+
+
+def refuse_infinite(values: Floats, told: Floats, names: Sequence[str]) -> None:
+    """Refuse a query whose `values` are not all finite as float32; the message shows what was given, `told`."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        wrong = np.flatnonzero(~np.isfinite(values.astype(np.float32))).tolist()
+    if wrong:
+        listed = ", ".join(f"{in_quotes(names[i])} is {told[i]:g}" for i in wrong[:3])
+        more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+        raise QueryError(Fault(f"no frame can be compared with the query: {listed}{more}.", "finite numbers that fit a float32"))
+
+
+def frame_of(frame: object, n_frames: int, what: str) -> int:
+    """A frame's number, checked."""
+    if isinstance(frame, bool) or not isinstance(frame, numbers.Integral) or not 0 <= int(frame) < n_frames:
+        accepted = f"a whole number from 0 to {n_frames - 1}" if n_frames else "none: the database has no frames"
+        raise QueryError(Fault(f"the {what} is {frame!r}.", accepted))
+    return int(frame)
+
+
+def current_of(current: object, n_frames: int) -> int | None:
+    """The current frame; None and -1, the frame of a miss, are none."""
+    is_none = current is None or (isinstance(current, numbers.Integral) and not isinstance(current, bool) and current == -1)
+    return None if is_none else frame_of(current, n_frames, "current frame")
+
+
+def bias_of(bias: object, n_frames: int) -> Floats | None:
+    """The bias of each frame, without NaN and without negative infinity."""
+    if bias is None:
+        return None
+    array = numbers_of(bias, "the bias")
+    if array.shape != (n_frames,):
+        raise QueryError(Fault(f"the bias has shape {array.shape}.", f"one number for each of {plural(n_frames, 'frame')}"))
+    wrong = np.flatnonzero(np.isnan(array) | np.isneginf(array))
+    if len(wrong):
+        found = f"the bias of frame {wrong[0]} is {array[wrong[0]]}."
+        raise QueryError(Fault(found, "a number; positive infinity forbids a frame"))
+    return array
+
+
+def for_each(valid: Valid | Sequence[Valid | None] | None, n_queries: int) -> list[Valid | None]:
+    """One mask for each query, from one for all or from as many as there are queries."""
+    if not _is_one_for_each(valid):
+        return [cast("Valid | None", valid)] * n_queries
+    each = list(cast("Sequence[Valid | None]", valid))
+    if len(each) != n_queries:
+        raise QueryError(Fault(f"{plural(len(each), 'mask')} for {n_queries} queries.", "one for all, or one for each query"))
+    return each
+
+
+def _is_one_for_each(valid: object) -> bool:
+    if isinstance(valid, np.ndarray):
+        return valid.ndim == 2
+    if not isinstance(valid, (list, tuple)) or hasattr(valid, "assets"):
+        return False
+    return any(mask is None or hasattr(mask, "assets") or np.ndim(mask) for mask in valid)

@@ -1,0 +1,130 @@
+"""Footfalls: when each foot is down, and the questions that locomotion asks of it.
+
+A footfall is a time, a footstep a place (not here). A foot is either down or up; down it is an interval of seconds.
+
+Source: Forsyth, "How a Character Should Walk", Game Tech 2004: two times for each foot and cycle, from which follow "is my foot
+down or up, how long is it till the next transition, and what fraction of the way through the current state am I".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.motion.clips import Clip
+from contextdb.motion.poses import poses_of
+from contextdb.motion.quaternions import Floats
+from contextdb.motion.skeleton import Skeleton, sided_pairs
+
+FOOT_WORDS = ("foot", "ankle")
+SHORTEST_S = 0.07
+"""A foot that rests or leaves the ground for less is taken not to: noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Footfalls:
+    """When each foot is down within a clip.
+
+    Attributes
+    ----------
+    duration_s : float
+        Seconds from the clip's first frame to its last.
+    down : mapping of foot to float64 array, shape (n, 2)
+        Seconds at which the foot comes down and goes up, ascending, from 0 to `duration_s`.
+    """
+
+    duration_s: float
+    down: Mapping[str, Floats]
+
+    @property
+    def feet(self) -> tuple[str, ...]:
+        """The bones of the feet, left first."""
+        return tuple(self.down)
+
+    def is_down(self, foot: str, time_s: float) -> bool:
+        """Whether the foot is down."""
+        intervals = self._of(foot)
+        return bool(((intervals[:, 0] <= time_s) & (time_s <= intervals[:, 1])).any())
+
+    def until_change_s(self, foot: str, time_s: float) -> float:
+        """Seconds until the foot next comes down or goes up; infinite when it does neither before the clip ends."""
+        later = self._changes(foot)
+        later = later[later > time_s]
+        return float(later[0]) - time_s if len(later) else math.inf
+
+    def share_of_state(self, foot: str, time_s: float) -> float:
+        """How much of the time for which the foot is now down, or now up, has passed: 0 to 1. The clip's ends count as changes."""
+        changes = np.concatenate(([0.0], self._changes(foot), [self.duration_s]))
+        begin = changes[changes <= time_s].max(initial=0.0)
+        end = changes[changes > time_s].min(initial=self.duration_s)
+        return float(np.clip((time_s - begin) / (end - begin), 0.0, 1.0)) if end > begin else 0.0
+
+    def _changes(self, foot: str) -> Floats:
+        """The times within the clip at which the foot comes down or goes up."""
+        times = np.sort(self._of(foot).ravel())
+        return times[(times > 0.0) & (times < self.duration_s)]
+
+    def _of(self, foot: str) -> Floats:
+        if foot not in self.down:
+            near = nearest(foot, self.feet)
+            raise MotionError(Fault(f"there is no foot {in_quotes(foot)}.", some(self.feet), in_quotes(near) if near else ""))
+        return self.down[foot]
+
+
+def footfalls(clip: Clip, feet: tuple[str, str] | None = None, *, slowest_mps: float = 0.2, highest_m: float = 0.15) -> Footfalls:
+    """Find when each foot of a clip is down: where it is slow and low, for at least 0.07 s.
+
+    Parameters
+    ----------
+    clip : Clip
+    feet : (left bone, right bone), optional
+        Default: the sided bones whose names hold "foot" or "ankle".
+    slowest_mps : float
+        A foot that moves faster, from frame to frame, is up.
+    highest_m : float
+        A foot higher above its lowest place in the clip is up.
+    """
+    bones = _feet(clip.skeleton) if feet is None else feet
+    joints = [clip.skeleton.index(bone) for bone in bones]
+    if clip.n_frames == 0:
+        return Footfalls(0.0, {bone: np.zeros((0, 2)) for bone in bones})
+    places = poses_of(clip).positions[:, joints]
+    return Footfalls(
+        clip.duration_s,
+        {bone: _intervals(places[:, i], clip.frame_time_s, slowest_mps, highest_m) for i, bone in enumerate(bones)},
+    )
+
+
+def _intervals(places: Floats, frame_time_s: float, slowest_mps: float, highest_m: float) -> Floats:
+    """The intervals of seconds [n, 2] in which a foot that takes these places [F, 3] is down."""
+    if len(places) < 2:
+        return np.zeros((1, 2))
+    is_low = places[:, 1] - places[:, 1].min() <= highest_m
+    is_slow = np.linalg.norm(np.diff(places, axis=0), axis=-1) <= slowest_mps * frame_time_s
+    is_down = is_slow & is_low[1:] & is_low[:-1]
+    shortest = SHORTEST_S / frame_time_s
+    for first, after in _spans(~is_down):
+        if first > 0 and after < len(is_down) and after - first < shortest:
+            is_down[first:after] = True
+    n = len(is_down)  # a stance that the clip's ends cut may be short
+    found = [(first, after) for first, after in _spans(is_down) if after - first >= shortest or first == 0 or after == n]
+    return np.array(found, np.float64).reshape(-1, 2) * frame_time_s
+
+
+def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Where each run of True begins, and the index behind its end."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _feet(skeleton: Skeleton) -> tuple[str, str]:
+    pairs = sided_pairs(skeleton.names)
+    found = next((pair for word in FOOT_WORDS for pair in pairs if word in pair[0].casefold()), None)
+    if found is None:
+        raise MotionError(Fault("no pair of bones is named like feet.", f"feet=(left, right), of {some(skeleton.names)}"))
+    return found

@@ -1,0 +1,139 @@
+"""A folder of tables: contextdb.toml and one file a table, read from the disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contextdb import files
+from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.schema import EMPTY, Schema, read_schema
+from contextdb.table import Table, build_table
+
+if TYPE_CHECKING:
+    from contextdb.compiled import CompiledTable
+
+SCHEMA_FILE = "contextdb.toml"
+TABLE_SUFFIXES = (".csv", ".parquet")
+CASES_SUFFIX = ".cases.csv"
+
+
+@dataclass(frozen=True)
+class Project:
+    """All tables of a folder, under one contextdb.toml."""
+
+    folder: Path
+    schema: Schema
+    tables: Mapping[str, Table]
+
+    @classmethod
+    def load(cls, path: str | Path, strict: bool = True) -> Project:
+        """Read a folder of tables (or its contextdb.toml).
+
+        Parameters
+        ----------
+        strict : bool
+            False keeps cells that cannot be read, in each table's `faults`.
+
+        Raises
+        ------
+        ContextDBError
+            With every fault of every file.
+        """
+        folder = folder_of(Path(path))
+        schema = read_folder_schema(folder)
+        tables: dict[str, Table] = {}
+        faults: list[Fault] = []
+        for name, file in table_files(folder, schema):
+            try:
+                tables[name] = _read_table(file, schema, folder, strict)
+            except ContextDBError as error:
+                faults += error.faults
+        if faults:
+            raise TableError(*faults)
+        return cls(folder, schema, tables)
+
+    def __getitem__(self, name: str) -> Table:
+        """One table by its name; a name that is not there raises TableError and names the nearest."""
+        if name not in self.tables:
+            near = nearest(name, self.tables)
+            found = f"there is no table {in_quotes(name)}."
+            raise TableError(Fault(found, some(self.tables) or "none: the folder has no table", in_quotes(near) if near else ""))
+        return self.tables[name]
+
+    def compile(self) -> dict[str, CompiledTable]:
+        """Every table compiled, by name."""
+        return {name: table.compile() for name, table in self.tables.items()}
+
+
+def load_table(path: Path, strict: bool = True) -> Table:
+    """Read one table under the contextdb.toml beside it, or above it where that one declares the file."""
+    folder, schema = schema_for(path)
+    return _read_table(path, schema, folder, strict)
+
+
+def schema_for(path: Path) -> tuple[Path, Schema]:
+    """The folder and the schema that a table file belongs to."""
+    beside = path.parent / SCHEMA_FILE
+    if beside.is_file():
+        return path.parent, read_folder_schema(path.parent)
+    for folder in path.resolve().parent.parents:
+        if (folder / SCHEMA_FILE).is_file():
+            schema = read_folder_schema(folder)
+            below = path.resolve().relative_to(folder).as_posix()
+            if any(below in settings.files for settings in schema.tables.values()):
+                return folder, schema
+            break
+    return path.parent, EMPTY
+
+
+def read_folder_schema(folder: Path) -> Schema:
+    """What the folder's contextdb.toml says; nothing where there is none."""
+    path = folder / SCHEMA_FILE
+    if not path.is_file():
+        return EMPTY
+    raw = files.read_bytes(path)
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(str(path), line))) from None
+    return read_schema(text, str(path))
+
+
+def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
+    """Name and file of every table: those that contextdb.toml declares, then others that lie in the folder."""
+    taken: set[Path] = set()
+    for settings in schema.tables.values():
+        candidates = [folder / f for f in settings.files]
+        path = next((p for p in candidates if p.is_file()), candidates[0])
+        taken.add(path)
+        yield settings.name, path
+    for path in sorted(folder.iterdir()):
+        if path.suffix in TABLE_SUFFIXES and path not in taken and not path.name.endswith(CASES_SUFFIX) and path.is_file():
+            yield path.stem, path
+
+
+def folder_of(path: Path) -> Path:
+    """The folder that a path to a folder, or to a contextdb.toml, means."""
+    if path.is_dir():
+        return path
+    if path.name == SCHEMA_FILE and path.is_file():
+        return path.parent
+    found = "it is no folder." if path.exists() else "there is no such folder."
+    siblings = [p.name for p in path.parent.iterdir() if p.is_dir()] if path.parent.is_dir() else []
+    near = nearest(path.name, siblings)
+    mend = in_quotes(str(path.parent / near)) if near else ""
+    raise FileError(Fault(found, f"a folder of tables, or its {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
+
+
+def _read_table(path: Path, schema: Schema, folder: Path, strict: bool) -> Table:
+    below = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
+    settings = schema.settings_for(below)
+    source, columns = files.read_texts(path)
+    table = build_table(settings.name, columns, schema, settings, path, source)
+    if strict:
+        table.require_readable()
+    return table

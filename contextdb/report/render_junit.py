@@ -1,0 +1,78 @@
+"""Findings as JUnit XML: one suite a table, one case a rule, so that a case keeps its name from run to run.
+
+A case fails when its rule has a finding of a level that makes the check fail; its text then lists every place. What does not fail is
+told in the case's `system-out`. The first line is complete in itself: some CI systems show no more. No times and no dates, so the
+same findings give the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from xml.etree import ElementTree as ET
+
+from contextdb.console import printable
+from contextdb.errors import plural
+from contextdb.findings import Finding, Level
+from contextdb.report.results import CheckReport, Group, as_path, place_in, told
+from contextdb.report.rules import TABLE_RULES
+
+MOST_LISTED = 200
+"""A case lists so many findings, then says how many more there are: CI systems refuse reports that grow without end."""
+
+
+def render(report: CheckReport, failing: Collection[Level] = ("error",), shows_all: bool = False) -> str:
+    """The findings as a JUnit document; levels in `failing` make a case fail."""
+    root = ET.Element("testsuites", name="contextdb check")
+    for group in report.groups():
+        root.append(_suite(group, failing, shows_all))
+    for name in ("tests", "failures", "errors", "skipped"):
+        root.set(name, str(sum(int(suite.get(name, "0")) for suite in root)))
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def _suite(group: Group, failing: Collection[Level], shows_all: bool) -> ET.Element:
+    suite = ET.Element("testsuite", name=group.label)
+    for rule, findings in _by_rule(group).items():
+        case = ET.SubElement(suite, "testcase", classname=group.label, name=printable(rule), time="0")
+        if group.file:
+            case.set("file", as_path(group.file))
+        failed = [f for f in findings if f.level in failing]
+        passed = [f for f in findings if f.level not in failing]
+        if failed:
+            failure = ET.SubElement(case, "failure", type=failed[0].level, message=_headline(failed))
+            failure.text = "\n".join(_lines(failed, shows_all))
+        if passed:
+            ET.SubElement(case, "system-out").text = "\n".join(_lines(passed, shows_all))
+    counts = {"tests": len(suite), "failures": len(suite.findall("testcase/failure")), "errors": 0, "skipped": 0}
+    for name, count in counts.items():
+        suite.set(name, str(count))
+    return suite
+
+
+def _by_rule(group: Group) -> dict[str, list[Finding]]:
+    """The findings of each rule; of a table that was read also the rules that found nothing."""
+    found: dict[str, list[Finding]] = {rule: [] for rule in TABLE_RULES} if group.table else {}
+    for finding in group.findings:
+        found.setdefault(finding.rule, []).append(finding)
+    return found
+
+
+def _headline(findings: list[Finding]) -> str:
+    first = f"{place_in(findings[0])}, {told(findings[0])}" if findings[0].line is not None else told(findings[0])
+    return first if len(findings) == 1 else f"{plural(len(findings), 'finding')}, the first: {first}"
+
+
+def _lines(findings: list[Finding], shows_all: bool) -> Iterator[str]:
+    listed = findings if shows_all else findings[:MOST_LISTED]
+    for finding in listed:
+        yield f"{finding.level}: {_placed(finding)}{told(finding)}"
+    if len(listed) < len(findings):
+        yield f"… and {len(findings) - len(listed):,} more"
+
+
+def _placed(finding: Finding) -> str:
+    if not finding.file:
+        return ""
+    line = "" if finding.line is None else f":{finding.line}"
+    return f"{as_path(finding.file)}{line}: "

@@ -1,0 +1,92 @@
+"""Findings for people in a terminal: by table, then by rule, each with its `file:line`; about 40 lines, unless all are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import accumulate
+
+from contextdb.console import printable, styled, width_of
+from contextdb.errors import plural
+from contextdb.findings import Finding, Level
+from contextdb.report.results import Block, CheckReport, Group, place_of, told
+from contextdb.report.shorten import fitted
+
+MOST_LINES = 40
+MOST_CLEAN = 8
+"""Tables without a finding that are listed by name."""
+
+LEAST_ROOM = 40
+"""With fewer terminal cells beside its place, a message stands under it."""
+
+STYLES: dict[Level, str] = {"error": "red", "warning": "yellow", "info": "cyan"}
+
+
+def render(report: CheckReport, colour: bool = False, width: int = 100, shows_all: bool = False) -> str:
+    """The findings as aligned text; messages are wrapped to `width` terminal cells."""
+    groups = report.groups()
+    faulty = [g for g in groups if g.findings]
+    clean = [g for g in groups if not g.findings]
+    n_clean = len(clean) if shows_all else MOST_CLEAN
+
+    def sections_at(most: int) -> list[str]:
+        return [_section(group, most, width, colour) for group in faulty]
+
+    calm = "".join(f"{line}\n" for line in _clean_lines(clean, n_clean, width))
+    room = MOST_LINES - calm.count("\n") - 3
+    sections = sections_at(len(report.findings)) if shows_all else fitted(sections_at, lambda s: s.count("\n") + 1, room)
+    left_out = faulty[len(sections) :]
+    if left_out:
+        sections.append(f"… and {plural(sum(len(g.findings) for g in left_out), 'finding')} in {len(left_out):,} more places\n")
+    hint = " --all shows every one." if "… and " in "".join(sections) else ""
+    return "\n".join([*sections, *([calm] if calm else []), styled(report.summary, "bold", colour) + hint + "\n"])
+
+
+def _section(group: Group, most: int, width: int, colour: bool) -> str:
+    size = f": {group.table.size}" if group.table else ""
+    lines = [styled(line, "bold", colour) for line in wrapped(f"{group.label}{size}", width)]
+    blocks = group.blocks()
+    places = [width_of(place_of(f)) for _, _, findings in blocks for f in findings[:most]]
+    for block in blocks:
+        lines += _block(block, most, max(places), width, colour)
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _block(block: Block, most: int, place_width: int, width: int, colour: bool) -> Iterator[str]:
+    level, rule, findings = block
+    yield f"  {styled(level, STYLES[level], colour)}  {printable(rule)}"
+    for finding in findings[:most]:
+        yield from _finding_lines(finding, place_width, width)
+    if len(findings) > most:
+        yield f"    … and {len(findings) - most:,} more"
+
+
+def _finding_lines(finding: Finding, place_width: int, width: int) -> Iterator[str]:
+    place, message = place_of(finding), told(finding, names_asset=False)
+    indent = 4 + place_width + 2 if place_width else 4
+    if width - indent < LEAST_ROOM:
+        yield f"    {place}"
+        yield from (f"      {line}" for line in wrapped(message, width - 6))
+        return
+    for i, line in enumerate(wrapped(message, width - indent)):
+        head = f"    {place}" if i == 0 else ""
+        yield f"{head}{' ' * (indent - width_of(head))}{line}"
+
+
+def _clean_lines(clean: list[Group], most: int, width: int) -> Iterator[str]:
+    for group in clean[:most]:
+        size = group.table.size if group.table else ""
+        yield from wrapped(f"{group.label}: {size}, nothing found", width)
+    if len(clean) > most:
+        yield f"… and {len(clean) - most:,} more tables with nothing found"
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """Text in lines of at most `width` terminal cells, broken at spaces where there are some; none is lost, nor doubled."""
+    lines: list[str] = []
+    line = ""
+    for word in text.split(" "):
+        if line and width_of(line) + 1 + width_of(word) > width:
+            lines.append(line)
+            line = ""
+        ...
+    return lines

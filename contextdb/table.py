@@ -1,0 +1,427 @@
+"""A table: assets (rows) against conditions (columns), as texts and as the cells they mean.
+
+A Table is never changed: an edit gives a new one that shares every column it did not touch, and with it whatever was already
+worked out for that column (its cells, its masks). Texts that cannot be read stay as they are and stand in `faults`; only
+`compile` insists on none. Nothing here touches the disk; `load` and `Table.save` call `contextdb.files`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cell_words import truth_of
+from contextdb.cells import ANY, Cell, parse_cell
+from contextdb.classes import ColumnMasks, column_masks
+from contextdb.columns import TextColumn
+from contextdb.conditions import Condition, infer_condition
+from contextdb.errors import CellError, Fault, Place, TableError, in_quotes, nearest, some
+from contextdb.schema import EMPTY, Schema, TableSettings, conditions_from_dict
+
+if TYPE_CHECKING:
+    from contextdb.compiled import CompiledTable
+    from contextdb.files import AnySource
+
+MOST_MENDS = 20
+"""Texts of one column that get a mend when they cannot be read; looking for one is slow, and a column of the wrong type has
+thousands."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionColumn:
+    """One condition's column: its texts, and the cell that each distinct text means."""
+
+    condition: Condition
+    texts: TextColumn
+    cells: tuple[Cell, ...]
+    """The cell of `texts.texts[i]`; Any for a text that cannot be read."""
+    faults: Mapping[int, Fault]
+    """Why `texts.texts[i]` cannot be read."""
+
+    @classmethod
+    def read(cls, texts: TextColumn, condition: Condition) -> ConditionColumn:
+        """Read every distinct text once."""
+        cells, faults = _read_cells(texts.texts, condition)
+        return cls(condition, texts, cells, faults)
+
+    def with_texts(self, texts: TextColumn) -> ConditionColumn:
+        """The column with other texts; those that it had already are not read again."""
+        known = len(self.texts.texts)
+        if texts.texts is self.texts.texts:
+            return ConditionColumn(self.condition, texts, self.cells, self.faults)
+        if texts.texts[:known] != self.texts.texts:
+            return ConditionColumn.read(texts, self.condition)
+        cells, faults = _read_cells(texts.texts[known:], self.condition)
+        more = {known + i: fault for i, fault in faults.items()}
+        return ConditionColumn(self.condition, texts, self.cells + cells, {**self.faults, **more})
+
+    def cell(self, row: int) -> Cell:
+        """What the row accepts."""
+        return self.cells[int(self.texts.codes[row])]
+
+    @cached_property
+    def masks(self) -> ColumnMasks:
+        """The column compiled; worked out once, and shared by every table that holds the column."""
+        return column_masks(self.cells, self.texts.codes, self.condition.domain)
+
+    @cached_property
+    def soft(self) -> tuple[ColumnMasks, NDArray[np.float64]] | None:
+        """Of soft cells: masks of the rows they match, and the penalty float64 [n_rows] where they do not; None when none is
+        soft."""
+        if not any(c.is_soft for c in self.cells):
+            return None
+        hard = [Cell(c.accepts) if c.is_soft else ANY for c in self.cells]
+        penalties = np.array([c.penalty or 0.0 for c in self.cells])
+        return column_masks(hard, self.texts.codes, self.condition.domain), penalties[self.texts.codes]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Assets against conditions. Get one from `cdb.load`, `Table.from_columns` or a `Project`."""
+
+    name: str
+    settings: TableSettings
+    columns: tuple[TextColumn, ...]
+    """Every column of the file, in its order."""
+    conditions: tuple[ConditionColumn, ...]
+    """The columns that are conditions, in the file's order."""
+    schema: Schema = EMPTY
+    path: Path | None = None
+    source: AnySource | None = None
+    origin: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    """Which record of the source each row came from; -1 for a new row."""
+
+    @classmethod
+    def from_columns(
+        cls,
+        columns: Mapping[str, Sequence[str]],
+        schema: Mapping[str, Mapping[str, object]] | Schema | None = None,
+        settings: TableSettings | None = None,
+        name: str = "table",
+    ) -> Table:
+        """Build a table from texts.
+
+        Parameters
+        ----------
+        columns : mapping of str to sequence of str
+            The cells of each column, equally many; the first column names the assets unless `settings.asset` says otherwise.
+        schema : mapping, optional
+            What `[conditions.NAME]` of contextdb.toml would hold: `{"speed": {"type": "number"}}`. Others are inferred.
+
+        Raises
+        ------
+        SchemaError
+            The schema cannot be meant.
+        TableError
+            Columns of unequal length, or cells that cannot be read.
+        """
+        if not isinstance(schema, Schema):
+            schema = replace(EMPTY, conditions=conditions_from_dict(schema or {}))
+        texts = [TextColumn.of(n, map(str, values)) for n, values in columns.items()]
+        lengths = {c.name: c.n_rows for c in texts}
+        if len(set(lengths.values())) > 1:
+            raise TableError(Fault(f"the columns are not equally long: {lengths}.", "one text for each row in every column"))
+        table = build_table(name, texts, schema, settings)
+        table.require_readable()
+        return table
+
+    @property
+    def n_rows(self) -> int:
+        """How many rows the table has."""
+        return self.columns[0].n_rows if self.columns else 0
+
+    def __len__(self) -> int:
+        return self.n_rows
+
+    @cached_property
+    def assets(self) -> list[str]:
+        """The asset of each row."""
+        return self.text_column(self.asset_column).to_list()
+
+    @property
+    def asset_column(self) -> str:
+        """The name of the column that names the assets."""
+        return self.settings.asset or self.columns[0].name
+
+    def text_column(self, name: str) -> TextColumn:
+        """The texts of a column."""
+        return self.columns[self._column_at(name)]
+
+    def condition(self, name: str) -> ConditionColumn:
+        """The column of a condition."""
+        for column in self.conditions:
+            if column.condition.name == name:
+                return column
+        raise TableError(_no_such("condition", name, [c.condition.name for c in self.conditions]))
+
+    def text(self, row: int, column: str) -> str:
+        """The text of one cell."""
+        return self.text_column(column)[row]
+
+    def place(self, row: int, column: str | None = None) -> Place:
+        """Where a row stands: its file and line where it has one, else its number."""
+        file = str(self.path) if self.path else None
+        record = int(self.origin[row]) if self.source is not None and row < len(self.origin) else -1
+        line = self.source.line(record) if self.source is not None and record >= 0 else None
+        return Place(file, line, column, row)
+
+    @cached_property
+    def faults(self) -> list[Fault]:
+        """Every cell that cannot be read, in the order of rows."""
+        found = [(row, at, fault) for at, column in enumerate(self.conditions) for row, fault in _faulty_rows(column)]
+        found += [(row, -1, fault) for row, fault in self._plain.faults]
+        names = [c.condition.name for c in self.conditions]
+        found.sort(key=lambda item: item[:2])
+        return [f if at < 0 else f.at(self.place(row, names[at])) for row, at, f in found]
+
+    def require_readable(self) -> None:
+        """Raise TableError with every cell that cannot be read, if there is one."""
+        if self.faults:
+            raise TableError(*self.faults)
+
+    def with_cell(self, row: int, column: str, text: str) -> Table:
+        """The table with one cell changed; every other column is shared."""
+        return self.with_cells([(row, column, text)])
+
+    def with_cells(self, edits: Iterable[tuple[int, str, str]]) -> Table:
+        """The table with some cells changed, given as (row, column, text)."""
+        changed: dict[int, TextColumn] = {}
+        for row, name, text in edits:
+            at = self._column_at(name)
+            if not 0 <= row < self.n_rows:
+                raise TableError(
+                    Fault(
+                        f"there is no row {row}.", f"rows 0 to {self.n_rows - 1}" if self.n_rows else "no row: the table is empty"
+                    )
+                )
+            changed[at] = changed.get(at, self.columns[at]).with_text(row, text)
+        return self._with_columns([changed.get(i, c) for i, c in enumerate(self.columns)], self.origin)
+
+    def with_rows(self, at: int, rows: Sequence[Mapping[str, str]]) -> Table:
+        """The table with new rows before row `at`; columns that a row leaves out are empty (Any)."""
+        for row in rows:
+            for name in row:
+                self._column_at(name)
+        columns = [c.with_inserted(at, [row.get(c.name, "") for row in rows]) for c in self.columns]
+        return self._with_columns(columns, np.insert(self.origin, at, np.full(len(rows), -1)))
+
+    def with_rows_taken(self, rows: Sequence[int] | NDArray[np.int64]) -> Table:
+        """The table of the given rows in the given order: deletes, moves, sorts."""
+        taken = np.asarray(rows, np.int64)
+        return self._with_columns([c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
+
+    def save(self, path: str | Path | None = None) -> Table:
+        """Write the table: atomic, only changed lines differ. Gives the table as it now stands on the disk.
+
+        Raises
+        ------
+        FileError
+            The disk refuses; the old file is then whole.
+        """
+        from contextdb import files
+
+        target = Path(path) if path is not None else self.path
+        if target is None:
+            raise TableError(Fault(f"the table {in_quotes(self.name)} has no file yet.", "save(path)"))
+        source = files.write_texts(target, self.columns, self.source, self.origin)
+        return replace(self, path=target, source=source, origin=np.arange(self.n_rows))
+
+    def compile(self) -> CompiledTable:
+        """Compile into masks. Columns that were compiled before, in this table or one it was edited from, are not compiled again.
+
+        Raises
+        ------
+        TableError
+            Cells that cannot be read, all of them.
+        """
+        from contextdb.compiled import CompiledTable
+
+        self.require_readable()
+        return CompiledTable.of(self)
+
+    @property
+    def enabled(self) -> NDArray[np.bool_]:
+        """Whether each row may match at all: bool [n_rows]."""
+        return self._plain.enabled
+
+    @property
+    def priorities(self) -> NDArray[np.int64]:
+        """The priority of each row, higher first: int64 [n_rows]; 0 without a priority column."""
+        return self._plain.priorities
+
+    @property
+    def row_weights(self) -> NDArray[np.float64]:
+        """The weight of each row in a random pick: float64 [n_rows]; 1 without a weight column."""
+        return self._plain.weights
+
+    @cached_property
+    def _plain(self) -> _PlainColumns:
+        return _PlainColumns.read(self)
+
+    def _column_at(self, name: str) -> int:
+        for at, column in enumerate(self.columns):
+            if column.name == name:
+                return at
+        raise TableError(_no_such("column", name, [c.name for c in self.columns]))
+
+    def _with_columns(self, columns: Sequence[TextColumn], origin: NDArray[np.int64]) -> Table:
+        now = {c.name: c for c in columns}
+        conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in self.conditions)
+        return replace(self, columns=tuple(columns), conditions=conditions, origin=origin)
+
+
+@dataclass(frozen=True, eq=False)
+class _PlainColumns:
+    """The columns that are not conditions but mean something: enabled, priority, weight."""
+
+    enabled: NDArray[np.bool_]
+    priorities: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    faults: tuple[tuple[int, Fault], ...]
+
+    @classmethod
+    def read(cls, table: Table) -> _PlainColumns:
+        faults: list[tuple[int, Fault]] = []
+        enabled = _plain_column(table, table.settings.enabled, _enabled, True, '"True" or "False"', faults)
+        priorities = _plain_column(table, table.settings.priority, _priority, 0, "a whole number", faults)
+        weights = _plain_column(table, table.settings.weight, _weight, 1.0, "a number from 0 up", faults)
+        return cls(enabled.astype(np.bool_), priorities.astype(np.int64), weights.astype(np.float64), tuple(faults))
+
+
+def build_table(
+    name: str,
+    columns: Sequence[TextColumn],
+    schema: Schema = EMPTY,
+    settings: TableSettings | None = None,
+    path: Path | None = None,
+    source: AnySource | None = None,
+) -> Table:
+    """A table of texts under a schema; cells that cannot be read are kept and stand in its `faults`.
+
+    Raises
+    ------
+    TableError
+        A column that the settings name is not there, or two columns have one name.
+    """
+    settings = settings or TableSettings(name=name)
+    _require_columns(columns, settings, path)
+    plain = _plain_names(columns, settings)
+    conditions = tuple(
+        ConditionColumn.read(c, schema.conditions.get(c.name) or infer_condition(c)) for c in columns if c.name not in plain
+    )
+    n_rows = columns[0].n_rows if columns else 0
+    return Table(name, settings, tuple(columns), conditions, schema, path, source, np.arange(n_rows))
+
+
+def load(path: str | Path, strict: bool = True) -> Table:
+    """Read one table and the contextdb.toml beside it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A .csv or .parquet file.
+    strict : bool
+        False keeps cells that cannot be read, in `table.faults`, as an editor needs it.
+
+    Raises
+    ------
+    FileError, SchemaError, TableError
+        Each with every fault it found, its place, what is accepted and the nearest mend.
+    """
+    from contextdb.project import load_table
+
+    return load_table(Path(path), strict)
+
+
+def _read_cells(texts: Sequence[str], condition: Condition) -> tuple[tuple[Cell, ...], dict[int, Fault]]:
+    cells: list[Cell] = []
+    faults: dict[int, Fault] = {}
+    for i, text in enumerate(texts):
+        try:
+            cells.append(parse_cell(text, condition.domain, len(faults) < MOST_MENDS))
+        except CellError as error:
+            cells.append(ANY)
+            faults[i] = error.faults[0]
+    return tuple(cells), faults
+
+
+def _faulty_rows(column: ConditionColumn) -> Iterable[tuple[int, Fault]]:
+    if not column.faults:
+        return
+    for row in np.flatnonzero(np.isin(column.texts.codes, list(column.faults))).tolist():
+        yield row, column.faults[int(column.texts.codes[row])]
+
+
+def _no_such(what: str, name: str, known: list[str]) -> Fault:
+    near = nearest(name, known)
+    return Fault(
+        f"there is no {what} {in_quotes(name)}.", some(known) or f"no {what}: there is none", in_quotes(near) if near else ""
+    )
+
+
+def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, path: Path | None) -> None:
+    names = [c.name for c in columns]
+    place = Place(str(path) if path else None)
+    faults = [
+        Fault(f"the column name {in_quotes(n)} stands twice.", "each name once", place=place)
+        for n in sorted({n for n in names if names.count(n) > 1})
+    ]
+    wanted = {"asset": settings.asset, "enabled": settings.enabled, "priority": settings.priority, "weight": settings.weight}
+    for key, name in [*wanted.items(), *(("outputs", n) for n in settings.outputs)]:
+        if name is not None and name not in names:
+            fault = _no_such("column", name, names)
+            faults.append(replace(fault, found=f"{fault.found[:-1]}, which [tables.{settings.name}] names as {key}.", place=place))
+    if faults:
+        raise TableError(*faults)
+
+
+def _plain_names(columns: Sequence[TextColumn], settings: TableSettings) -> set[str]:
+    asset = settings.asset or (columns[0].name if columns else None)
+    jobs = (asset, settings.enabled, settings.priority, settings.weight, *settings.outputs)
+    return {name for name in jobs if name is not None}
+
+
+def _plain_column(
+    table: Table,
+    name: str | None,
+    read: Callable[[str], float | None],
+    default: float,
+    accepted: str,
+    faults: list[tuple[int, Fault]],
+) -> NDArray[np.float64]:
+    """Read a column of plain values; an empty cell is the default."""
+    if name is None:
+        return np.full(table.n_rows, default)
+    column = table.text_column(name)
+    values = [default if not t.strip() else read(t.strip()) for t in column.texts]
+    for row in np.flatnonzero(np.array([v is None for v in values], np.bool_)[column.codes]).tolist() if values else ():
+        fault = Fault(f"cannot read {in_quotes(column[row])}.", accepted, place=table.place(row, name), rule="unreadable-cell")
+        faults.append((row, fault))
+    return np.array([default if v is None else v for v in values], np.float64)[column.codes]
+
+
+def _enabled(text: str) -> float | None:
+    return truth_of(text)
+
+
+def _priority(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if value.is_integer() and abs(value) < 2.0**53 else None
+
+
+def _weight(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if 0.0 <= value < math.inf else None

@@ -1,0 +1,130 @@
+"""TOML with the lines kept: which line a key stands on, and which line cannot be read.
+
+`tomllib` gives the values of a document but not where they stand. So a document that reads is walked once more, statement by
+statement, when a fault in it has to be placed. Keys of inline tables are not followed: they stand on the line of their statement.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, shown
+
+Path = tuple[str, ...]
+
+MOST_KEYS = 8
+"""Deeper keys are placed on the line of their first ones; no section of ours goes as deep."""
+
+_TOKEN = re.compile(
+    r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+'  # strings over several lines
+    r'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\''
+    r"|#[^\n]*|[\[\]{}=\n]|[^\s\[\]{}=#\"']+|[^\S\n]+",
+    re.DOTALL,
+)
+_PLACE = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
+
+_ACCEPTED = '[section.name], key = "text", key = 1.5, key = ["A", "B"]'
+_TWICE = re.compile(r"Cannot (overwrite a value|declare .* twice|mutate immutable .*)", re.DOTALL)
+
+# What people write, and what they mean. Tried in turn; the first that reads is offered.
+_LINE_MENDS: tuple[tuple[str, str], ...] = (
+    (r"^(\s*[\w.-]+\s*=\s*)True\b", r"\1true"),
+    (r"^(\s*[\w.-]+\s*=\s*)False\b", r"\1false"),
+    (r"^\s*([\w.-]+)\s*:=?\s*", r"\1 = "),
+    (r"$", "]"),
+    (r"^", "["),
+    (r"$", '"'),
+    (r"^\s*\[\s*([\w-]+)\.([^\"'\[\]]+?)\s*\]?\s*$", r'[\1."\2"]'),
+    (r"^(\s*[\w.-]+\s*=\s*)([^\s\"'\[{][^\"'#]*?)\s*(#.*)?$", r'\1"\2"'),
+    (r"([\[,]\s*)([^\s\"'\[\],][^\"'\[\],]*?)(?=\s*[,\]])", r'\1"\2"'),
+)
+
+
+def read_toml(text: str, file: str) -> dict[str, object]:
+    """The values of a TOML document.
+
+    Raises
+    ------
+    SchemaError
+        With the line that cannot be read, the character in it and what would be read in its place.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise SchemaError(Fault("lists stand in lists too deep to be read.", "lists of names", place=Place(file))) from None
+    except ValueError as error:  # TOMLDecodeError, and a whole number of too many digits
+        raise SchemaError(_syntax_fault(str(error), text, file)) from None
+
+
+def key_lines(text: str) -> dict[Path, int]:
+    """The line (from 1) on which each key, and each section, of a document that reads first stands."""
+    lines: dict[Path, int] = {}
+    section: Path = ()
+    for line, tokens in _statements(text):
+        if tokens[0] == "[":
+            section = _keys("".join(tokens).strip("[] \t\r"))
+            path = section
+        else:
+            path = section + _keys("".join(tokens[: tokens.index("=")]))
+        for depth in range(1, len(path[:MOST_KEYS]) + 1):
+            lines.setdefault(path[:depth], line)
+    return lines
+
+
+def line_of(path: Path, lines: Mapping[Path, int]) -> int | None:
+    """The line of a key, else of the nearest section that holds it."""
+    return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), None)
+
+
+def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Each section header and each `key = value`: the line it starts on and its tokens, without space and comments around them."""
+    line, depth, start = 1, 0, 1
+    tokens: list[str] = []
+    for token in _TOKEN.findall(text + "\n"):
+        depth += (token in ("[", "{")) - (token in ("]", "}"))
+        if token == "\n" and depth == 0 and tokens:
+            yield start, tokens
+            tokens = []
+        elif not token.isspace() and token[0] != "#":
+            start = start if tokens else line
+            tokens.append(token)
+        line += token.count("\n")
+
+
+def _keys(dotted: str) -> Path:
+    value: object = tomllib.loads(f"{dotted} = 0")
+    path: list[str] = []
+    while isinstance(value, dict):
+        key, value = next(iter(value.items()))
+        path.append(key)
+    return tuple(path)
+
+
+def _syntax_fault(error: str, text: str, file: str) -> Fault:
+    found = _PLACE.fullmatch(error)
+    if not found:
+        return Fault("a whole number has too many digits to be read.", "a number, such as -1.5", place=Place(file))
+    number = int(found[2]) if found[2] else text.rstrip().count("\n") + 1
+    line, place = text.split("\n")[number - 1].strip(), Place(file, number)
+    if _TWICE.fullmatch(found[1]):
+        return Fault(f"{in_quotes(line)} stands twice.", "each section once, and each key once in it", place=place)
+    character = f"at character {found[3]}" if found[2] else "the file ends here"
+    why = f"{found[1][:1].lower()}{found[1][1:]}, {character}"
+    return Fault(f"cannot read {in_quotes(line)} as TOML: {why}.", _ACCEPTED, _line_mend(line[:1000]), place)
+
+
+def _line_mend(line: str) -> str:
+    if _reads(line):
+        return ""
+    mended = (re.sub(pattern, replacement, line) for pattern, replacement in _LINE_MENDS)
+    return next((shown(m) for m in mended if m != line and _reads(m)), "")
+
+
+def _reads(line: str) -> bool:
+    try:
+        tomllib.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return True

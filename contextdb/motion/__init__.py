@@ -12,7 +12,7 @@ from contextdb.motion.config import DatabaseSettings, MotionConfig, SelectorSett
 from contextdb.motion.database import Hit, MotionDatabase, build_databases
 from contextdb.motion.extraction import features_of, query_from, with_path
 from contextdb.motion.features import Channel, FeatureSchema
-from contextdb.motion.footfalls import Footfalls, footfalls
+from contextdb.motion.feet import Footfalls, footfalls
 from contextdb.motion.made import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
 from contextdb.motion.normalisation import Normalisation
 from contextdb.motion.poses import LocalPoses, Poses, forward_kinematics, local_poses, poses_of, resampled

@@ -43,7 +43,8 @@ def features_of(clip: Clip, schema: FeatureSchema) -> Features:
         raise MotionError(*(fault.at(Place(clip.name)) for fault in faults))
     if clip.n_frames == 0:
         return np.zeros((0, schema.n_features), np.float32)
-    poses = poses_of(clip, schema.rate)
+    with np.errstate(all="ignore"):  # numbers too large become infinite or NaN, and are refused below
+        poses = poses_of(clip, schema.rate)
     _check_size(poses, clip)
     path = root_trajectory(poses, schema.root, schema.facing)
     return np.concatenate([_channel_features(channel, poses, path) for channel in schema.channels], axis=1).astype(np.float32)

@@ -20,7 +20,7 @@ import numpy as np
 
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, plural
 from contextdb.motion.clips import CENTIMETRE, Clip, write_bvh
-from contextdb.motion.footfalls import Footfalls
+from contextdb.motion.feet import Footfalls
 from contextdb.motion.made_body import SIDES, STEP_WIDTH_M, Manner, made_skeleton, made_values
 from contextdb.motion.made_steps import RATE, Change, Pace, Steps, steps_of, timeline
 from contextdb.motion.poses import poses_of
@@ -207,7 +207,7 @@ def describe(clip: Clip, recipe: Recipe) -> Description:
         end_mps=end,
         direction_deg=round(float(np.rad2deg(np.arctan2(left, ahead)))) + 0.0 if whole else 0.0,
         turn_dps=round(turned / clip.duration_s, 1) + 0.0,
-        heading_change_deg=round(turned, 1) + 0.0,
+        heading_change_deg=round(turned) + 0.0,
         duration_s=round(clip.duration_s, 3),
     )
 

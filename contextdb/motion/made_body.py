@@ -33,6 +33,7 @@ ANKLE_M = 0.08
 HIPS_M = ANKLE_M + LEG_M + HIP_DROP_M - 0.01
 """Height of the hips when standing."""
 SOFTNESS_M = 0.015
+BREATH_S = 3.0
 STEP_WIDTH_M = 0.08
 """From the middle of the path to a footstep."""
 TIPS = {"Head": (0.0, 20.0, 0.0), "Hand": (0.0, -16.0, 0.0), "Toe": (0.0, 0.0, 8.0)}
@@ -165,7 +166,7 @@ def _trunk(way: Timeline, times: Floats, manner: Manner, turn_dps: float, speed_
     effort = np.sqrt(way.at(way.shares, times))
     pushed = np.gradient(way.at(way.shares, times), 1.0 / RATE) * speed_mps
     lean = np.deg2rad(manner.lean_deg) * effort + 0.04 * pushed
-    stoop = np.deg2rad(manner.stoop_deg) + 0.01 * np.sin(2.0 * np.pi * times / 2.0)
+    stoop = np.deg2rad(manner.stoop_deg) + 0.01 * np.sin(_breaths(way, times))
     twist = np.deg2rad(manner.twist_deg) * effort * np.sin(cycle)
     roll = -np.arctan(np.deg2rad(turn_dps) * speed_mps / 9.81) * way.at(way.shares, times) * 0.5
     zero = np.zeros_like(times)
@@ -202,10 +203,15 @@ def _hips(way: Timeline, times: Floats, manner: Manner, rotations: Floats, feet:
     sway = manner.sway_m * effort * np.cos(cycle)
     ground = way.at(way.places, times) + sway[:, None] * heading_vectors(headings + np.pi / 2.0)
     bob = manner.bob_m * effort * np.cos(2.0 * cycle) * (-1.0 if manner.is_run else 1.0)
-    breath = manner.breath_m * (np.cos(2.0 * np.pi * times / 2.0) - 1.0)
+    breath = manner.breath_m * (np.cos(_breaths(way, times)) - 1.0)
     wanted = HIPS_M - manner.crouch_m * effort - manner.bob_m * effort + bob + breath
     limits = [wanted, *(_reach(ground, rotations, sign, feet[side].ankle) for side, sign in SIDES.items())]
     return np.stack((ground[:, 0], _soft_minimum(np.stack(limits)), ground[:, 1]), axis=-1)
+
+
+def _breaths(way: Timeline, times: Floats) -> Floats:
+    """The phase of breathing in radians: a whole number of breaths in a clip, so that it loops."""
+    return 2.0 * np.pi * max(1, round(way.duration_s / BREATH_S)) * times / way.duration_s
 
 
 def _reach(ground: Floats, rotations: Floats, sign: float, ankle: Floats) -> Floats:

@@ -53,11 +53,6 @@ class Trajectory:
         steps = np.linalg.norm(np.diff(self.positions, axis=0), axis=-1)
         return np.concatenate(([0.0], np.cumsum(steps)))
 
-    @property
-    def mean_speed_mps(self) -> float:
-        """Metres along the path a second, from the first frame to the last."""
-        return float(self.lengths[-1]) * self.rate / max(1, len(self.lengths) - 1)
-
 
 @dataclass(frozen=True, eq=False)
 class PathPoints:

@@ -1,0 +1,303 @@
+"""Feature schemas: what is read from contextdb.toml, and the numbers that come of a clip."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contextdb.errors import MotionError, QueryError, SchemaError
+from contextdb.motion import (
+    Channel,
+    Clip,
+    FeatureSchema,
+    Skeleton,
+    features_of,
+    make_clip,
+    poses_of,
+    query_from,
+    steady_path,
+    with_path,
+)
+
+POINTS = {
+    "rate": 30.0,
+    "channels": [
+        {"type": "position", "bone": "LeftFoot", "weight": 0.75},
+        {"type": "velocity", "bone": "Hips", "weight": 1},
+        {"type": "trajectory", "what": "position", "at": [-0.5, 0.33, 1.0], "weight": 1.0},
+        {"type": "trajectory", "what": "direction", "along": [0.5, 2.0], "weight": 1.5},
+        {"type": "trajectory", "what": "velocity", "at": 0.5},
+        {"type": "trajectory", "what": "speed", "at": [0.0, 1.0]},
+    ],
+}
+LOCO = FeatureSchema.from_dict("loco", POINTS)
+
+
+def faults_of(mapping):
+    with pytest.raises(SchemaError) as error:
+        FeatureSchema.from_dict("loco", mapping, file="contextdb.toml")
+    return [str(fault) for fault in error.value.faults]
+
+
+def one_channel(**keys):
+    return {"rate": 30.0, "channels": [keys]}
+
+
+# ---- reading
+
+
+def test_a_schema_is_read_with_its_channels_in_order():
+    assert (LOCO.name, LOCO.rate, LOCO.n_features) == ("loco", 30.0, 3 + 3 + 6 + 4 + 2 + 2)
+    assert LOCO.channels[0] == Channel("position", 0.75, "LeftFoot")
+    assert LOCO.channels[3] == Channel("trajectory", 1.5, None, "direction", (), (0.5, 2.0))
+    assert LOCO.weights.tolist() == [0.75, 1.0, 1.0, 1.5, 1.0, 1.0]
+    assert LOCO.slices["trajectory direction along 0.5 2 m"] == slice(12, 16)
+    assert LOCO.feature_names[:3] == ("LeftFoot position left", "LeftFoot position up", "LeftFoot position ahead")
+    assert LOCO.feature_names[6] == "trajectory position at -0.5 s left"
+    assert LOCO.feature_names[-1] == "trajectory speed at 1 s"
+    assert LOCO.bones == ("LeftFoot", "Hips")
+
+
+def test_root_and_facing_are_read():
+    schema = FeatureSchema.from_dict("x", {**POINTS, "root": "Pelvis", "facing": ["LeftArm", "RightArm"]})
+    assert (schema.root, schema.facing) == ("Pelvis", ("LeftArm", "RightArm"))
+    assert schema.bones[-3:] == ("Pelvis", "LeftArm", "RightArm")
+
+
+REFUSED = {
+    "no rate": (
+        {"channels": POINTS["channels"]},
+        '[features.loco] has no "rate". Accepted: frames a second, from 1 to 1000, such as 30.0.',
+    ),
+    "a rate in quotes": ({**POINTS, "rate": "30"}, '[features.loco] rate = "30": this is text, not a number.'),
+    "a rate that is true": ({**POINTS, "rate": True}, "[features.loco] rate = true: this is true or false, not a number."),
+    "a rate of nothing": ({**POINTS, "rate": 0}, "[features.loco] rate = 0: this is out of range."),
+    "a rate that is nan": (
+        {**POINTS, "rate": math.nan},
+        "[features.loco] rate = NaN: this is a number that is not finite, not a number.",
+    ),
+    "a misspelt key": (
+        {**POINTS, "rat": 3},
+        '[features.loco] has no key "rat". Accepted: "rate", "channels", "root", "facing". Did you mean "rate"?',
+    ),
+    "no channels": ({"rate": 30.0}, '[features.loco] has no "channels".'),
+    "an empty list": ({"rate": 30.0, "channels": []}, "[features.loco] channels = []: the list is empty."),
+    "channels that are no list": ({"rate": 30.0, "channels": "all"}, '[features.loco] channels = "all": this is text, not a list.'),
+    "a channel that is no table": (
+        {"rate": 30.0, "channels": ["LeftFoot"]},
+        '[features.loco] channel 1 is "LeftFoot": this is text, not a table.',
+    ),
+    "no type": (one_channel(bone="Hips"), '[features.loco] channel 1 has no "type".'),
+    "a misspelt type": (
+        one_channel(type="positon", bone="Hips"),
+        '[features.loco] channel 1 type = "positon": there is no such type. Accepted: "position", "velocity", "trajectory". '
+        'Did you mean type = "position"?',
+    ),
+    "a type under another name": (one_channel(type="path", what="speed", at=[1]), 'Did you mean type = "trajectory"?'),
+    "no bone": (one_channel(type="position"), '[features.loco] channel 1 has no "bone".'),
+    "a bone that is no text": (one_channel(type="position", bone=3), "bone = 3: this is a number, not text."),
+    "a misspelt key of a channel": (one_channel(type="position", bone="Hips", wieght=1), 'has no key "wieght".'),
+    "a key of another type": (one_channel(type="position", bone="Hips", at=[1]), '[features.loco] channel 1 has no key "at".'),
+    "no what": (one_channel(type="trajectory", at=[1]), '[features.loco] channel 1 has no "what".'),
+    "a misspelt what": (one_channel(type="trajectory", what="postion", at=[1]), 'Did you mean what = "position"?'),
+    "a what under another name": (one_channel(type="trajectory", what="facing", at=[1]), 'Did you mean what = "direction"?'),
+    "both at and along": (one_channel(type="trajectory", what="speed", at=[1], along=[1]), 'channel 1 has both "at" and "along".'),
+    "neither at nor along": (one_channel(type="trajectory", what="speed"), 'channel 1 has neither "at" nor "along".'),
+    "no points": (one_channel(type="trajectory", what="speed", at=[]), "at = []: the list is empty."),
+    "a point that is no number": (
+        one_channel(type="trajectory", what="speed", at=[1, "2"]),
+        'at = [1, "2"]: "2" is text, not a number.',
+    ),
+    "a point twice": (one_channel(type="trajectory", what="speed", at=[1, 1.0]), "a number is out of range or stands twice."),
+    "a point too far away": (one_channel(type="trajectory", what="speed", at=[61]), "a number is out of range or stands twice."),
+    "a negative weight": (one_channel(type="position", bone="Hips", weight=-1), "weight = -1: this is out of range."),
+    "a weight in quotes": (one_channel(type="position", bone="Hips", weight="2"), "Did you mean weight = 2?"),
+    "weights that are all zero": (
+        one_channel(type="position", bone="Hips", weight=0),
+        "[features.loco]: the weight of every channel is 0.",
+    ),
+    "a facing of one bone": ({**POINTS, "facing": ["Hips", "Hips"]}, 'facing = ["Hips", "Hips"]: this is no pair of bones.'),
+    "an empty root": ({**POINTS, "root": " "}, 'root = " ": this is empty.'),
+    "an empty group": (one_channel(type="position", bone="Hips", group=""), 'group = "": this is empty.'),
+}
+
+
+@pytest.mark.parametrize(("mapping", "message"), REFUSED.values(), ids=REFUSED)
+def test_a_fault_of_a_schema_is_told_with_what_is_accepted(mapping, message):
+    found = faults_of(mapping)
+    assert len(found) == 1
+    assert found[0].startswith("contextdb.toml: [features.loco]")
+    assert message in found[0]
+
+
+def test_all_faults_of_a_schema_are_reported_together():
+    channels = [{"type": "positon"}, {"type": "velocity"}, 7, {"type": "trajectory", "what": "sped"}]
+    assert len(faults_of({"rate": -1, "chanels": [], "channels": channels})) == 7
+
+
+def test_a_channel_twice_is_refused_but_two_with_other_points_are_not():
+    past = {"type": "trajectory", "what": "position", "at": [-0.5], "weight": 0.5}
+    assert 'has the channel "trajectory position at -0.5 s" 2 times' in faults_of({"rate": 30.0, "channels": [past, past]})[0]
+    assert FeatureSchema.from_dict("x", {"rate": 30.0, "channels": [past, {**past, "at": [0.5]}]}).n_features == 4
+
+
+JUNK = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5), lambda x: st.lists(x, max_size=3)
+)
+KEYS = st.sampled_from(["type", "bone", "what", "at", "along", "weight", "group", "x"])
+WORDS = st.sampled_from(["position", "velocity", "trajectory", "speed", "direction", "Hips"])
+
+
+@given(st.lists(st.dictionaries(KEYS, JUNK | WORDS | st.just([1.0, 2.0]), max_size=6) | JUNK, max_size=4) | JUNK, JUNK)
+def test_any_mapping_is_a_schema_or_a_schema_error(channels, rate):
+    try:
+        schema = FeatureSchema.from_dict("any", {"rate": rate, "channels": channels})
+    except SchemaError as refused:
+        faults = refused.faults
+    else:
+        assert schema.n_features > 0
+        return
+    assert all(str(fault).startswith("[features.any]") for fault in faults)
+
+
+# ---- extraction
+
+
+def slow_features(clip, schema):
+    """The features of a clip in world axes and plain loops, for a clip at the schema's rate that faces +z throughout."""
+    poses = poses_of(clip)
+    hips = poses.positions[:, poses.skeleton.hips]
+    rows = []
+    for frame in range(poses.n_frames):
+        before, after = max(frame - 1, 0), min(frame + 1, poses.n_frames - 1)
+        row = []
+        for channel in schema.channels:
+            if channel.type == "position":
+                place = poses.positions[frame, poses.skeleton.index(channel.bone)]
+                row += [place[0] - hips[frame, 0], place[1], place[2] - hips[frame, 2]]
+            elif channel.type == "velocity":
+                places = poses.positions[:, poses.skeleton.index(channel.bone)]
+                row += ((places[after] - places[before]) * clip.rate / (after - before)).tolist()
+        rows.append(row)
+    return np.array(rows)
+
+
+def test_positions_and_velocities_are_in_the_body_s_own_frame():
+    made = make_clip("idle").clip
+    schema = FeatureSchema.from_dict(
+        "pose", {"rate": 30.0, "channels": [*POINTS["channels"][:2], {"type": "velocity", "bone": "Head"}]}
+    )
+    assert np.allclose(features_of(made, schema), slow_features(made, schema), atol=1e-6)
+
+
+def moved(clip, degrees, x, z):
+    """The same clip, begun elsewhere and turned."""
+    values = clip.values.copy()
+    turn = np.deg2rad(degrees)
+    values[:, 0] = x + np.cos(turn) * clip.values[:, 0] + np.sin(turn) * clip.values[:, 2]
+    values[:, 2] = z - np.sin(turn) * clip.values[:, 0] + np.cos(turn) * clip.values[:, 2]
+    values[:, 3] += degrees
+    return Clip(clip.name, clip.skeleton, clip.frame_time_s, values, clip.metres_per_unit)
+
+
+@given(st.floats(-720, 720), st.floats(-1000, 1000), st.floats(-1000, 1000))
+def test_features_do_not_depend_on_where_the_clip_begins_and_where_it_faces(degrees, x, z):
+    clip = make_clip("walk_turn_left_90").clip
+    assert np.allclose(features_of(moved(clip, degrees, x, z), LOCO), features_of(clip, LOCO), atol=2e-5)
+
+
+def test_a_turning_trajectory_bends_to_its_side():
+    left, right = (features_of(make_clip(f"walk_turn_{side}_90").clip, LOCO) for side in ("left", "right"))
+    at_1s = LOCO.feature_names.index("trajectory position at 1 s left")
+    facing = LOCO.feature_names.index("trajectory direction along 0.5 m left")
+    assert left[:60, at_1s].min() > 0.4
+    assert right[:60, at_1s].max() < -0.4
+    assert left[:60, facing].mean() > 0.4
+    assert right[:60, facing].mean() < -0.4
+
+
+def test_directions_are_unit_vectors():
+    features = features_of(make_clip("jog_turn_right_60").clip, LOCO)
+    assert np.allclose(np.linalg.norm(features[:, 12:16].reshape(-1, 2), axis=1), 1.0, atol=1e-6)
+
+
+def test_features_are_float32_one_row_for_each_frame_at_the_schema_s_rate():
+    clip = make_clip("walk").clip
+    for rate in (10.0, 30.0, 60.0):
+        features = features_of(clip, FeatureSchema.from_dict("x", {**POINTS, "rate": rate}))
+        assert features.dtype == np.float32
+        assert features.shape == (int(clip.duration_s * rate + 1e-6) + 1, LOCO.n_features)
+
+
+def test_the_speed_of_a_trajectory_is_that_of_its_velocity():
+    features = features_of(make_clip("run").clip, LOCO)
+    speed = features[:, LOCO.feature_names.index("trajectory speed at 1 s")]
+    assert np.allclose(speed, 3.6, atol=0.05)
+
+
+def test_clips_without_frames_or_with_one_have_as_many_rows():
+    skeleton = make_clip("idle").clip.skeleton
+    for n_frames in (0, 1):
+        clip = Clip("short", skeleton, 0.1, np.zeros((n_frames, skeleton.n_channels)))
+        assert features_of(clip, LOCO).shape == (n_frames, LOCO.n_features)
+
+
+def test_a_missing_bone_is_told_with_the_clip_and_the_nearest_bone():
+    schema = FeatureSchema.from_dict("x", one_channel(type="position", bone="leftfot"))
+    with pytest.raises(MotionError, match=r'walk: there is no bone "leftfot".*Did you mean "LeftFoot"\?'):
+        features_of(make_clip("walk").clip, schema)
+
+
+def test_a_body_more_than_a_thousand_kilometres_away_is_refused():
+    skeleton = Skeleton(("Hips",), np.array([-1]), np.zeros((1, 3)), (("Xposition",),))
+    schema = FeatureSchema.from_dict("x", {**one_channel(type="position", bone="Hips"), "rate": 10.0})
+    for far in (1e9, 1e300):
+        clip = Clip("far", skeleton, 0.1, np.array([[0.0], [far]]), 1e9)
+        with pytest.raises(
+            MotionError, match=r'far: bone "Hips" is more than 1,000 km away in frame 1\. Accepted: positions of a body'
+        ):
+            features_of(clip, schema)
+
+
+# ---- queries
+
+
+def test_a_query_from_a_clip_is_that_frame_s_features():
+    clip = make_clip("jog").clip
+    assert np.array_equal(query_from(LOCO, clip, 7), features_of(clip, LOCO)[7])
+
+
+def test_a_wished_path_replaces_the_trajectory_and_leaves_the_pose():
+    clip = make_clip("jog").clip
+    pose = query_from(LOCO, clip, 7)
+    query = query_from(LOCO, clip, 7, steady_path(2.0, 90.0))
+    assert np.array_equal(query, with_path(LOCO, pose, steady_path(2.0, 90.0)))
+    assert np.array_equal(query[:6], pose[:6])
+    wanted = dict(zip(LOCO.feature_names, query.tolist(), strict=True))
+    radius = 2.0 / (np.pi / 2.0)
+    assert wanted["trajectory position at 1 s left"] == pytest.approx(radius, abs=0.01)
+    assert wanted["trajectory position at 1 s ahead"] == pytest.approx(radius, abs=0.01)
+    assert wanted["trajectory position at -0.5 s ahead"] == pytest.approx(-radius * math.sin(np.pi / 4.0), abs=0.01)
+    assert wanted["trajectory direction along 2 m left"] == pytest.approx(1.0, abs=0.01)
+    assert wanted["trajectory speed at 1 s"] == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_made_clip_wishes_for_nearly_the_path_it_takes():
+    clip = make_clip("walk").clip
+    own, wished = query_from(LOCO, clip, 31), query_from(LOCO, clip, 31, steady_path(1.3))
+    assert np.abs(own - wished).max() < 0.15
+
+
+@pytest.mark.parametrize("frame", [-1, 125, 10**9])
+def test_a_frame_that_a_clip_has_not_is_refused(frame):
+    with pytest.raises(QueryError, match="it has 125 frames at 30 a second"):
+        query_from(LOCO, make_clip("walk").clip, frame)
+
+
+def test_a_query_of_another_length_has_no_path_to_replace():
+    with pytest.raises(QueryError, match="a query of 20 features"):
+        with_path(LOCO, np.zeros(3), steady_path(1.0))

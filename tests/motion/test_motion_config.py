@@ -1,0 +1,174 @@
+"""The sections features, databases and selectors of contextdb.toml, from reading to a search."""
+
+from __future__ import annotations
+
+import copy
+
+import pytest
+
+from contextdb.errors import ClipError, MotionError, SchemaError
+from contextdb.motion import MotionConfig, Reason, make_clip, query_from, steady_path, write_bvh
+
+SECTIONS = {
+    "features": {
+        "loco": {
+            "rate": 30.0,
+            "channels": [
+                {"type": "position", "bone": "LeftFoot", "weight": 0.75},
+                {"type": "velocity", "bone": "Hips", "weight": 1.0},
+                {"type": "trajectory", "what": "position", "at": [0.33, 0.67, 1.0], "weight": 1.0},
+                {"type": "trajectory", "what": "direction", "along": [0.5, 1.0, 2.0], "weight": 1.5},
+            ],
+        }
+    },
+    "databases": {
+        "jog": {"table": "locomotion", "clips": "clips/*.bvh", "features": "loco"},
+        "jog_tired": {"clips": "clips/*_tired.bvh", "features": "loco"},
+    },
+    "selectors": {"locomotion": {"order": [{"database": "jog_tired", "threshold": 2.75}, {"database": "jog"}]}},
+    "conditions": {"other sections": "are passed over"},
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "clips").mkdir()
+    for name in ("walk", "jog", "jog_tired", "idle"):
+        write_bvh(make_clip(name).clip, tmp_path / "clips" / f"{name}.bvh")
+    return tmp_path
+
+
+def test_the_sections_become_a_selector_over_built_databases(folder):
+    config = MotionConfig.from_dict(SECTIONS, tables=["locomotion"])
+    databases = config.build(folder, {"locomotion": ["walk", "jog", "swim"]})
+    assert {name: database.assets for name, database in databases.items()} == {"jog": ("jog", "walk"), "jog_tired": ("jog_tired",)}
+    assert databases["jog"].normalisation is databases["jog_tired"].normalisation
+    selector = config.selector("locomotion", databases)
+    schema = config.features["loco"]
+    tired = selector.search(query_from(schema, make_clip("jog_tired").clip, 20))
+    assert (tired.database, tired.reason) == ("jog_tired", Reason.UNDER_THRESHOLD)
+    walking = selector.search(query_from(schema, make_clip("walk").clip, 20, steady_path(1.3)))
+    assert (walking.database, walking.hit.asset) == ("jog", "walk")
+
+
+def test_without_a_table_s_assets_all_clips_of_the_pattern_are_loaded(folder):
+    built = MotionConfig.from_dict(SECTIONS).build(folder)
+    assert built["jog"].assets == ("idle", "jog", "jog_tired", "walk")
+
+
+def test_a_database_that_was_not_built_counts_as_not_loaded(folder):
+    config = MotionConfig.from_dict(SECTIONS)
+    databases = config.build(folder)
+    selector = config.selector("locomotion", {"jog": databases["jog"]})
+    assert selector.search(databases["jog"].raw(0)).database == "jog"
+
+
+def test_the_unit_and_the_axis_of_clips_are_read():
+    part = {"clips": "a/*.bvh", "features": "loco", "metres_per_unit": 0.056444, "up": "z"}
+    config = MotionConfig.from_dict({**SECTIONS, "databases": {"x": part}, "selectors": {}})
+    assert (config.databases["x"].metres_per_unit, config.databases["x"].up) == (0.056444, "z")
+
+
+def test_nothing_is_a_config_too():
+    assert MotionConfig.from_dict({}) == MotionConfig()
+    assert MotionConfig().build("nowhere") == {}
+
+
+def test_no_clips_and_broken_clips_are_told(folder):
+    config = MotionConfig.from_dict(SECTIONS, file="contextdb.toml")
+    with pytest.raises(MotionError, match=r'contextdb.toml: \[databases.jog_tired\] no file fits clips = "clips/\*_tired.bvh"'):
+        config.load_clips("jog_tired", folder / "clips")
+    (folder / "clips" / "broken.bvh").write_text("HIERARCHY")
+    with pytest.raises(ClipError, match=r"broken\.bvh, line 1"):
+        config.build(folder)
+
+
+def test_an_unknown_name_is_refused_with_the_nearest(folder):
+    config = MotionConfig.from_dict(SECTIONS)
+    with pytest.raises(SchemaError, match=r'there is no \[databases.jgo\].*Did you mean "jog"\?'):
+        config.load_clips("jgo", folder)
+    with pytest.raises(SchemaError, match=r"there is no \[selectors.locomotive\]"):
+        config.selector("locomotive", {})
+
+
+def with_change(path, value):
+    """The sections with one value changed, or taken out when it is None."""
+    sections = copy.deepcopy(SECTIONS)
+    part = sections
+    for key in path[:-1]:
+        part = part[key]
+    if value is None:
+        del part[path[-1]]
+    else:
+        part[path[-1]] = value
+    return sections
+
+
+OTHER = {"rate": 60.0, "channels": [{"type": "velocity", "bone": "Hips"}]}
+REFUSED = {
+    "a section that is no table": (("databases",), 3, "databases is a number, not a table."),
+    "a database that is no table": (("databases", "x"), 3, "databases.x = 3: this is a number, not a table."),
+    "a misspelt key": (("databases", "jog", "clip"), "a", '[databases.jog] has no key "clip".'),
+    "no clips": (("databases", "jog", "clips"), None, '[databases.jog] has no "clips".'),
+    "no features": (("databases", "jog", "features"), None, '[databases.jog] has no "features".'),
+    "clips elsewhere": (("databases", "jog", "clips"), "../clips/*.bvh", "this leaves the folder, or is a place on one machine."),
+    "clips on one machine": (("databases", "jog", "clips"), "/clips/*.bvh", "this leaves the folder"),
+    "clips of another format": (("databases", "jog", "clips"), "clips/*.fbx", "these are no BVH files."),
+    "an unknown table": (("databases", "jog", "table"), "locomotoin", 'Did you mean table = "locomotion"?'),
+    "a unit of nothing": (("databases", "jog", "metres_per_unit"), 0, "metres_per_unit = 0: this is out of range."),
+    "an unknown axis": (
+        ("databases", "jog", "up"),
+        "Y",
+        'up = "Y": there is no such axis. Accepted: "y", "z", "x". Did you mean up = "y"?',
+    ),
+    "no order": (("selectors", "locomotion", "order"), None, '[selectors.locomotion] has no "order".'),
+    "an order that is no list": (("selectors", "locomotion", "order"), "jog", "this is no list, or empty."),
+    "an empty order": (("selectors", "locomotion", "order"), [], "this is no list, or empty."),
+    "a step that is no table": (
+        ("selectors", "locomotion", "order", 1),
+        "jog",
+        '[selectors.locomotion] order 2 is "jog": this is text, not a table. Accepted: { database = "jog" }.',
+    ),
+    "an unknown database": (
+        ("selectors", "locomotion", "order", 1, "database"),
+        "jgo",
+        '[selectors.locomotion] order 2 database = "jgo": there is no such database. Accepted: "jog", "jog_tired". '
+        'Did you mean database = "jog"?',
+    ),
+    "a database twice": (("selectors", "locomotion", "order", 0, "database"), "jog", 'names the database "jog" 2 times.'),
+    "no threshold before the last": (
+        ("selectors", "locomotion", "order", 0, "threshold"),
+        None,
+        '[selectors.locomotion] order 1 has no "threshold". Accepted: a cost, such as 2.75: under it this database wins outright',
+    ),
+    "a threshold on the last": (
+        ("selectors", "locomotion", "order", 1, "threshold"),
+        1.0,
+        "nothing follows that it could spare a search.",
+    ),
+    "a threshold in quotes": (("selectors", "locomotion", "order", 0, "threshold"), "2.75", "Did you mean threshold = 2.75?"),
+}
+
+
+@pytest.mark.parametrize(("path", "value", "message"), REFUSED.values(), ids=REFUSED)
+def test_a_fault_is_told_with_what_is_accepted(path, value, message):
+    with pytest.raises(SchemaError) as error:
+        MotionConfig.from_dict(with_change(path, value), tables=["locomotion"], file="contextdb.toml")
+    assert str(error.value).startswith("contextdb.toml: ")
+    assert message in str(error.value)
+
+
+def test_faults_of_all_sections_are_reported_together():
+    sections = with_change(("features", "loco", "rate"), "fast")
+    sections["databases"]["jog"]["features"] = "lco"
+    sections["selectors"]["locomotion"]["order"][0] = {"database": "jgo_tired"}
+    with pytest.raises(SchemaError) as error:
+        MotionConfig.from_dict(sections)
+    assert len(error.value.faults) == 4
+
+
+def test_databases_of_different_features_cannot_stand_in_one_selector():
+    sections = with_change(("features", "other"), OTHER)
+    sections["databases"]["jog"]["features"] = "other"
+    with pytest.raises(SchemaError, match='has databases of different features: "jog_tired" "loco", "jog" "other"'):
+        MotionConfig.from_dict(sections)

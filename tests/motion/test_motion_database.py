@@ -1,0 +1,363 @@
+"""The search is exact: held to a scan of every frame in float64, for any ranges, masks, tags, ties, biases and current frames."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from motion_oracles import best_frame
+
+from contextdb.errors import MotionError, QueryError
+from contextdb.motion import (
+    Clip,
+    FeatureSchema,
+    Hit,
+    MotionDatabase,
+    build_databases,
+    features_of,
+    made_clips,
+    make_clip,
+    query_from,
+)
+
+SCHEMA = FeatureSchema.from_dict(
+    "loco",
+    {
+        "rate": 30.0,
+        "channels": [
+            {"type": "position", "bone": "LeftFoot", "weight": 0.75},
+            {"type": "velocity", "bone": "LeftFoot"},
+            {"type": "velocity", "bone": "Hips"},
+            {"type": "trajectory", "what": "position", "at": [0.33, 0.67, 1.0]},
+            {"type": "trajectory", "what": "direction", "along": [0.5, 1.0], "weight": 1.5},
+        ],
+    },
+)
+CLIPS = [made.clip for made in made_clips()]
+LOCO = MotionDatabase.build(CLIPS, SCHEMA)
+
+
+def matches(*names):
+    """What a table's query answers, as far as a search looks."""
+    return SimpleNamespace(assets=list(names))
+
+
+@st.composite
+def databases(draw):
+    """Few features with many equal values, so that ties are common; ranges with gaps, some empty, in any order."""
+    n_frames, n_features = draw(st.integers(0, 40)), draw(st.integers(1, 4))
+    values = st.sampled_from([0.0, -0.0, 1.0, -1.5, 0.1, 1e-30, 3e38]) | st.floats(-10, 10, width=32)
+    features = draw(st.lists(st.lists(values, min_size=n_features, max_size=n_features), min_size=n_frames, max_size=n_frames))
+    array = np.array(features, np.float32).reshape(n_frames, n_features)
+    cuts = sorted(draw(st.lists(st.integers(0, n_frames), max_size=12)))
+    pairs = draw(st.permutations(list(zip(cuts[::2], cuts[1::2], strict=False))))
+    assets = [draw(st.sampled_from(["a", "b", "c"])) for _ in pairs]
+    database = MotionDatabase.from_features(array, [start for start, _ in pairs], [stop for _, stop in pairs], assets)
+    query = draw(st.lists(values, min_size=n_features, max_size=n_features))
+    return database, np.array(query)
+
+
+@given(databases(), st.data())
+def test_a_search_finds_what_scanning_every_frame_finds(drawn, data):
+    database, query = drawn
+    n_ranges, n_frames = len(database.assets), database.n_frames
+    flags = data.draw(st.none() | st.lists(st.booleans(), min_size=n_ranges, max_size=n_ranges))
+    tags = data.draw(st.none() | st.lists(st.booleans(), min_size=n_frames, max_size=n_frames))
+    numbers = st.sampled_from([0.0, -1.0, 0.5, math.inf])
+    bias = data.draw(st.none() | st.lists(numbers, min_size=n_frames, max_size=n_frames))
+    current = data.draw(st.none() | st.integers(0, n_frames - 1)) if n_frames else None
+    frame, cost = best_frame(database.features, database.starts, database.stops, query, None, flags, tags, current, bias)
+    hit = database.search(query, flags, tags, current, bias)
+    if frame is None:
+        assert (bool(hit), hit.cost, hit.asset) == (False, math.inf, None)
+    else:
+        i = database.range_of(frame)
+        assert hit == Hit(database.assets[i], i, frame, cost)
+        assert database.starts[i] <= frame < database.stops[i]
+
+
+@given(databases(), st.sets(st.sampled_from(["a", "b", "c", "elsewhere"])))
+def test_matches_allow_the_ranges_of_their_assets(drawn, names):
+    database, query = drawn
+    flags = np.array([asset in names for asset in database.assets], bool)
+    assert database.search(query, matches(*names)) == database.search(query, flags)
+
+
+@given(databases(), st.data())
+def test_searching_for_many_is_searching_for_each(drawn, data):
+    database, query = drawn
+    n_ranges, n_frames = len(database.assets), database.n_frames
+    n_queries = data.draw(st.integers(0, 4))
+    queries = np.array([query + i for i in range(n_queries)]).reshape(n_queries, database.n_features)
+    flags = np.array(
+        data.draw(st.lists(st.lists(st.booleans(), min_size=n_ranges, max_size=n_ranges), min_size=n_queries, max_size=n_queries))
+    )
+    masks = flags.astype(bool).reshape(n_queries, n_ranges)
+    frames = data.draw(st.lists(st.integers(-1, n_frames - 1), min_size=n_queries, max_size=n_queries))
+    singly = [database.search(q, m, current=None if f < 0 else f) for q, m, f in zip(queries, masks, frames, strict=True)]
+    assert database.search_many(queries, masks, frames) == singly
+    assert database.search_many(queries, list(masks), np.array(frames, int)) == singly
+    assert database.search_many(queries) == [database.search(q) for q in queries]
+
+
+def test_one_mask_serves_all_queries_or_each_has_its_own():
+    database = MotionDatabase.from_features(np.arange(4.0)[:, None], [0, 2], [2, 4], ["a", "b"])
+    queries = [[0.0], [3.0]]
+
+    def frames(valid):
+        return [hit.frame for hit in database.search_many(queries, valid)]
+
+    assert frames(None) == [0, 3]
+    assert frames(matches("b")) == [2, 3]
+    assert frames([False, True]) == [2, 3]
+    assert frames(np.array([False, True])) == [2, 3]
+    assert frames([matches("b"), None]) == [2, 3]
+    assert frames([None, [True, False]]) == [0, 1]
+
+
+def test_frames_between_ranges_are_never_chosen_and_may_hold_anything():
+    features = np.array([[1.0], [np.nan], [0.0], [np.inf], [2.0]])
+    database = MotionDatabase.from_features(features, [0, 4], [1, 5], ["a", "b"])
+    assert database.search([0.0]) == Hit("a", 0, 0, 1.0)
+    assert [database.range_of(frame) for frame in range(5)] == [0, -1, -1, -1, 1]
+    assert database.search([0.0], current=2) == Hit("a", 0, 0, 1.0)
+
+
+def test_the_current_frame_wins_ties_only_while_its_asset_is_valid():
+    database = MotionDatabase.from_features(np.zeros((6, 2)), [0, 3], [3, 6], ["walk", "run"])
+    assert database.search([0, 0]).frame == 0
+    assert database.search([0, 0], current=4).frame == 4
+    assert database.search([0, 0], matches("walk"), current=4).frame == 0
+    assert database.search([0, 0], tags=[True] * 4 + [False] * 2, current=4).frame == 0
+    assert database.search([0, 0], current=-1).frame == 0
+
+
+def test_a_hit_in_a_database_of_many_blocks_is_the_lowest_of_equal_frames():
+    database = MotionDatabase.from_features(np.ones((40_000, 3), np.float32), [10], [40_000], ["a"])
+    assert database.search([0, 0, 0]) == Hit("a", 0, 10, 3.0)
+    assert database.search([0, 0, 0], current=39_999) == Hit("a", 0, 39_999, 3.0)
+
+
+def test_nothing_valid_is_a_false_hit_of_infinite_cost():
+    for hit in (
+        LOCO.search(np.zeros(LOCO.n_features), matches()),
+        LOCO.search(np.zeros(LOCO.n_features), tags=np.zeros(LOCO.n_frames, bool)),
+    ):
+        assert not hit
+        assert hit == Hit(None, -1, -1, math.inf)
+    empty = MotionDatabase.from_features(np.zeros((0, 2)), [], [], [])
+    assert not empty.search([0, 0])
+    assert not empty.search([0, 0], valid=[])
+    assert not MotionDatabase.build([], SCHEMA).search(np.zeros(LOCO.n_features))
+
+
+# ---- built from clips
+
+
+def test_a_frame_of_a_clip_is_found_by_its_own_features():
+    for name, frame in (("walk", 40), ("jog_turn_left_60", 3), ("stop_run", 100)):
+        query = query_from(SCHEMA, make_clip(name).clip, frame)
+        hit = LOCO.search(query)
+        assert (hit.asset, hit.frame - LOCO.starts[hit.range]) == (name, frame)
+        assert hit.cost < 1e-9
+        assert LOCO.time_s(hit) == pytest.approx(frame / 30.0)
+        assert np.allclose(LOCO.raw(hit), query, atol=1e-5)
+
+
+def test_a_built_search_equals_a_scan_of_normalised_frames():
+    rng = np.random.default_rng(5)
+    scale, offset = LOCO.normalisation.scale, LOCO.normalisation.offset
+    weights = np.concatenate([np.full(part.stop - part.start, w) for part, w in zip(LOCO.slices, LOCO.weights, strict=True)])
+    for _ in range(20):
+        query = offset + rng.normal(size=LOCO.n_features) * scale
+        valid = rng.random(len(LOCO.assets)) < 0.2
+        costs = (((LOCO.features - (query - offset) / scale) ** 2) * weights).sum(axis=1)
+        allowed = np.concatenate(
+            [np.full(stop - start, flag) for start, stop, flag in zip(LOCO.starts, LOCO.stops, valid, strict=True)]
+        )
+        hit = LOCO.search(query, valid)
+        assert hit.cost == pytest.approx(costs[allowed].min(), rel=1e-12)
+        assert hit.frame == np.flatnonzero(allowed)[np.argmin(costs[allowed])]
+
+
+def test_channel_costs_add_up_to_the_cost_that_the_choice_was_made_by():
+    query = query_from(SCHEMA, make_clip("walk_tired").clip, 10)
+    for valid in (None, matches("run"), matches("idle", "sprint")):
+        hit = LOCO.search(query, valid)
+        parts = LOCO.channel_costs(hit, query)
+        assert list(parts) == list(SCHEMA.slices)
+        assert sum(parts.values()) == hit.cost
+        assert LOCO.channel_costs(hit.frame, query) == parts
+
+
+def test_features_are_normalised_by_their_mean_and_one_scale_for_each_channel():
+    raw = np.concatenate([features_of(clip, SCHEMA) for clip in CLIPS]).astype(float)
+    assert np.allclose(LOCO.normalisation.offset, raw.mean(axis=0))
+    for part in SCHEMA.slices.values():
+        assert np.allclose(LOCO.normalisation.scale[part], raw[:, part].std(axis=0).mean())
+    assert np.allclose(LOCO.normalisation.undo(LOCO.features), raw, atol=1e-4)
+
+
+def test_channels_of_one_group_share_a_scale():
+    feet = [{"type": "position", "bone": bone, "group": "feet"} for bone in ("LeftFoot", "Head")]
+    schema = FeatureSchema.from_dict("feet", {"rate": 30.0, "channels": feet})
+    scale = MotionDatabase.build(CLIPS, schema).normalisation.scale
+    assert len(set(scale.tolist())) == 1
+
+
+def test_features_without_variation_are_compared_in_their_own_units():
+    still = Clip("still", CLIPS[0].skeleton, 1 / 30, np.repeat(CLIPS[0].values[:1], 10, axis=0))
+    database = MotionDatabase.build([still], SCHEMA)
+    assert database.normalisation.scale.tolist() == [1.0] * SCHEMA.n_features
+    query = database.raw(0)
+    query[0] += 2.0
+    assert database.search(query).cost == pytest.approx(0.75 * 4.0)
+
+
+def test_turning_a_weight_shares_the_features_and_changes_the_cost():
+    query = query_from(SCHEMA, make_clip("walk").clip, 10) + 0.1
+    turned = LOCO.with_weights({"Hips velocity": 5.0})
+    assert turned.features is LOCO.features
+    before, after = LOCO.channel_costs(7, query), turned.channel_costs(7, query)
+    assert after.pop("Hips velocity") == pytest.approx(5.0 * before.pop("Hips velocity"))
+    assert after == before
+
+
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [
+        ({"hips velocity": 1.0}, 'Did you mean "Hips velocity"'),
+        ({"Hips velocity": -1.0}, "is -1.0"),
+        ({"Hips velocity": math.nan}, "is nan"),
+    ],
+)
+def test_a_weight_that_cannot_be_is_refused(weights, message):
+    with pytest.raises(MotionError, match=message):
+        LOCO.with_weights(weights)
+
+
+def test_databases_built_together_share_their_normalisation():
+    tired = [clip for clip in CLIPS if clip.name.endswith("_tired")]
+    both = build_databases({"tired": tired, "all": CLIPS}, SCHEMA)
+    assert both["tired"].normalisation is both["all"].normalisation
+    query = query_from(SCHEMA, tired[0], 5)
+    assert both["tired"].search(query).cost == both["all"].search(query).cost
+    again = MotionDatabase.build(tired, SCHEMA, normalisation=both["all"].normalisation)
+    assert np.array_equal(again.features, both["tired"].features)
+
+
+def test_an_empty_clip_is_an_empty_range():
+    empty = Clip("empty", CLIPS[0].skeleton, 1 / 30, np.zeros((0, CLIPS[0].skeleton.n_channels)))
+    database = MotionDatabase.build([empty, CLIPS[1], Clip("too", empty.skeleton, 1 / 30, empty.values)], SCHEMA)
+    assert database.starts.tolist() == [0, 0, CLIPS[1].n_frames]
+    assert database.search(database.raw(3)).frame == 3
+    assert not database.search(database.raw(3), matches("empty", "too"))
+
+
+def test_faults_of_all_clips_are_reported_together():
+    schema = FeatureSchema.from_dict("x", {"rate": 30.0, "channels": [{"type": "position", "bone": "Tail"}]})
+    with pytest.raises(MotionError) as error:
+        MotionDatabase.build([CLIPS[0], CLIPS[1], CLIPS[0]], schema)
+    told = str(error.value)
+    assert [f"{name}: there is no bone" in told for name in ("idle", "walk_slow")] == [True, True]
+    assert 'two clips are named "idle"' in told
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize(
+    ("query", "message"),
+    [
+        (np.zeros(3), r"the query has shape \(3,\). Accepted: 19 features: \"LeftFoot position left\""),
+        (np.zeros((1, 19)), r"the query has shape \(1, 19\)"),
+        (["x"] * 19, "the query has type <U1. Accepted: real numbers"),
+        ([[0.0], [0.0, 1.0]], "rows of different lengths"),
+        (np.zeros(19, complex), "the query has type complex128"),
+        ([None] * 19, "the query has type object"),
+    ],
+)
+def test_a_query_that_does_not_fit_is_refused(query, message):
+    with pytest.raises(QueryError, match=message):
+        LOCO.search(query)
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, 1e200])
+def test_a_query_with_a_number_that_cannot_be_compared_names_the_feature(wrong):
+    query = np.zeros(19)
+    query[4] = wrong
+    with pytest.raises(
+        QueryError, match=r'no frame can be compared with the query: "LeftFoot velocity up" is (nan|-?inf|1e\+200)\.'
+    ):
+        LOCO.search(query)
+    with pytest.raises(QueryError, match='"feature 0" is nan'):
+        MotionDatabase.from_features(np.zeros((1, 1)), [0], [1], ["a"]).search([math.nan])
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"valid": [True]}, r"valid has shape \(1,\). Accepted: Matches, or one bool for each of 2 ranges"),
+        ({"valid": [0, 1]}, "valid has type int64. Accepted: Matches, or one bool"),
+        ({"valid": "ab"}, "valid has type <U2"),
+        ({"valid": [[True], [True, False]]}, "valid has rows of different lengths"),
+        ({"tags": [True, False]}, r"tags has shape \(2,\). Accepted: one bool for each of 4 frames"),
+        ({"tags": [1, 0, 1, 0]}, "tags has type int64"),
+        ({"bias": [0.0]}, r"the bias has shape \(1,\)"),
+        ({"bias": [0.0, math.nan, 0.0, 0.0]}, "the bias of frame 1 is nan"),
+        ({"bias": [0.0, 0.0, 0.0, -math.inf]}, "the bias of frame 3 is -inf"),
+        ({"current": 4}, "the current frame is 4. Accepted: a whole number from 0 to 3"),
+        ({"current": -2}, "the current frame is -2"),
+        ({"current": 1.0}, r"the current frame is 1\.0"),
+        ({"current": True}, "the current frame is True"),
+    ],
+)
+def test_masks_biases_and_frames_that_do_not_fit_are_refused(keys, message):
+    database = MotionDatabase.from_features(np.zeros((4, 1)), [0, 2], [2, 4], ["a", "b"])
+    with pytest.raises(QueryError, match=message):
+        database.search([0.0], **keys)
+
+
+def test_many_queries_that_do_not_fit_are_refused():
+    database = MotionDatabase.from_features(np.zeros((4, 1)), [0, 2], [2, 4], ["a", "b"])
+    with pytest.raises(QueryError, match=r"the queries have shape \(1,\)"):
+        database.search_many([0.0])
+    with pytest.raises(QueryError, match="1 mask for 2 queries"):
+        database.search_many([[0.0], [0.0]], [matches("a")])
+    with pytest.raises(QueryError, match="1 current frame for 2 queries"):
+        database.search_many([[0.0], [0.0]], current=[0])
+    with pytest.raises(QueryError, match='"feature 0" is nan'):
+        database.search_many([[0.0], [math.nan]])
+
+
+@pytest.mark.parametrize(
+    ("features", "starts", "stops", "assets", "message"),
+    [
+        (np.zeros(3), [0], [1], ["a"], r"the features have shape \(3,\). Accepted: frames x features"),
+        (np.zeros((3, 1)), [0], [4], ["a"], r'range 0, asset "a", is \[0, 4\). Accepted: 0 <= start <= stop <= 3'),
+        (np.zeros((3, 1)), [-1], [1], ["a"], r"is \[-1, 1\)"),
+        (np.zeros((3, 1)), [2], [1], ["a"], r"is \[2, 1\)"),
+        (np.zeros((3, 1)), [0, 1], [2, 3], ["a", "b"], r'range 0 of "a", \[0, 2\), and range 1 of "b", \[1, 3\), overlap'),
+        (np.zeros((3, 1)), [0], [1, 2], ["a"], "the ranges have 1 start, 2 stops and 1 asset. Accepted: as many of each"),
+        (np.zeros((3, 1)), [0.5], [1.0], ["a"], "starts has shape"),
+        (np.zeros((3, 1)), [0], [1], [7], "an asset is 7"),
+        ([["x"]], [0], [1], ["a"], "the features has type|the features have type|type <U1"),
+        (np.array([[0.0], [np.nan]]), [0], [2], ["a"], r'feature 0 of frame 1 is nan \(range 0, asset "a"\)'),
+        (np.array([[1e300]]), [0], [1], ["a"], "feature 0 of frame 0 is inf"),
+    ],
+)
+def test_features_and_ranges_that_do_not_fit_are_refused(features, starts, stops, assets, message):
+    with pytest.raises(MotionError, match=message):
+        MotionDatabase.from_features(features, starts, stops, assets)
+
+
+def test_a_miss_has_no_time_and_no_costs():
+    miss = LOCO.search(np.zeros(19), matches())
+    with pytest.raises(QueryError, match="there is no time to tell"):
+        LOCO.time_s(miss)
+    with pytest.raises(QueryError, match="the frame is -1"):
+        LOCO.channel_costs(miss, np.zeros(19))

@@ -380,6 +380,7 @@ def format_cell(cell: Cell, domain: Domain) -> str:
 
 def format_number(value: float) -> str:
     """A double in the fewest digits that read back as the same double."""
+    value += 0.0  # -0.0 is 0
     short = f"{value:.15g}"
     return short if float(short) == value and "e" not in short else repr(value).removesuffix(".0")
 

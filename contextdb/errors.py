@@ -47,7 +47,10 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong: its place, what was found, what is accepted, and the nearest mend."""
+    """One thing that is wrong: its place, what was found, what is accepted, and the nearest mend.
+
+    `mend` is what was probably meant, or what to do: "to save it as UTF-8".
+    """
 
     found: str
     accepted: str = ""
@@ -62,7 +65,7 @@ class Fault:
         if self.accepted:
             parts.append(f"Accepted: {self.accepted}.")
         if self.mend:
-            parts.append(f"Did you mean {self.mend}?")
+            parts.append(f"Try {self.mend}." if self.mend.startswith("to ") else f"Did you mean {self.mend}?")
         return " ".join(parts)
 
     def __str__(self) -> str:

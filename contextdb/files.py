@@ -76,11 +76,12 @@ def write_texts(
     """
     new: AnySource
     fresh = np.full(len(origin), -1)
-    if _suffix(path) == ".parquet":
-        is_related = isinstance(source, ParquetSource)
-        new = rewritten_parquet(columns, source, origin, field_of) if is_related else rewritten_parquet(columns, None, fresh)
-    else:
+    if _suffix(path) == ".csv":
         new = rewritten(columns, source, origin, field_of) if isinstance(source, Source) else rewritten(columns, None, fresh)
+    elif isinstance(source, ParquetSource):
+        new = rewritten_parquet(columns, source, origin, field_of)
+    else:
+        new = rewritten_parquet(columns, None, fresh)
     write_atomic(path, new.raw)
     return new
 
@@ -188,14 +189,14 @@ def _suffix(path: str | Path) -> str:
     if suffix.lower() in SUFFIXES:
         return suffix.lower()
     near = nearest(suffix, SUFFIXES)
-    mend = '"contextdb import"' if suffix.lower() in _IMPORTED else in_quotes(str(Path(path).with_suffix(near))) if near else ""
+    mend = '"contextdb import"' if suffix.lower() in _IMPORTED else _in_quotes(Path(path).with_suffix(near)) if near else ""
     found = f"a table file does not end in {in_quotes(suffix)}." if suffix else "the name has no suffix."
     raise FileError(Fault(found, " or ".join(SUFFIXES), mend, Place(str(path))))
 
 
 def _is_folder(folder: Path) -> Fault:
     tables = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES)
-    return Fault("this is a folder.", "one file", in_quotes(str(tables[0])) if tables else "", Place(str(folder)))
+    return Fault("this is a folder.", "one file", _in_quotes(tables[0]) if tables else "", Place(str(folder)))
 
 
 def _why_unread(error: OSError, file: Path) -> Fault:
@@ -203,7 +204,7 @@ def _why_unread(error: OSError, file: Path) -> Fault:
     if isinstance(error, FileNotFoundError):
         return _missing(file)
     if isinstance(error, NotADirectoryError):
-        return Fault(f"{in_quotes(str(file.parent))} is no folder.", "a file in a folder", place=place, rule="no-such-path")
+        return Fault(f"{_in_quotes(file.parent)} is no folder.", "a file in a folder", place=place, rule="no-such-path")
     if isinstance(error, PermissionError):
         return Fault("the file may not be read.", "a file that you have the permission to read", place=place)
     return Fault(f"the file cannot be read: {error.strerror}.", place=place)
@@ -213,20 +214,20 @@ def _missing(file: Path) -> Fault:
     """There is no such file; the nearest name in its folder, or, if the folder is missing too, the nearest folder."""
     place = Place(str(file))
     if file.is_symlink():
-        return Fault(f"this is a link to {in_quotes(os.readlink(file))}, which is not there.", place=place, rule="no-such-path")
+        return Fault(f"this is a link to {_in_quotes(os.readlink(file))}, which is not there.", place=place, rule="no-such-path")
     part = file
     while not part.parent.is_dir() and part.parent != part:
         part = part.parent
-    what = "file" if part is file else f"folder {in_quotes(str(part))}"
+    what = "file" if part is file else f"folder {_in_quotes(part)}"
     with suppress(OSError):
         near = nearest(part.name, os.listdir(part.parent))
-        mend = in_quotes(str(part.with_name(near))) if near else ""
+        mend = _in_quotes(part.with_name(near)) if near else ""
         return Fault(f"there is no such {what}.", mend=mend, place=place, rule="no-such-path")
     return Fault(f"there is no such {what}.", place=place, rule="no-such-path")
 
 
 def _why_unwritten(error: OSError, file: Path, size: int) -> Fault:
-    place, folder = Place(str(file)), in_quotes(str(Path(os.path.realpath(file)).parent))
+    place, folder = Place(str(file)), _in_quotes(Path(os.path.realpath(file)).parent)
     kept = " The old file is as it was." if os.path.exists(file) else ""
     if error.errno in _FULL:
         return Fault(f"the disk is full.{kept}", f"{size:,} free bytes", "to free some space and save again", place)
@@ -238,3 +239,8 @@ def _why_unwritten(error: OSError, file: Path, size: int) -> Fault:
         busy = ", or another program has the file open" if os.name == "nt" else ""
         return Fault(f"the folder {folder} may not be written in{busy}.{kept}", mend="to save elsewhere", place=place)
     return Fault(f"the file cannot be written: {error.strerror}.{kept}", mend="to save elsewhere", place=place)
+
+
+def _in_quotes(path: str | Path) -> str:
+    """A path in quotes, in full: half a path is no help."""
+    return in_quotes(str(path), most=4096)

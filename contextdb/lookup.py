@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
-from operator import index
+from itertools import product
+from operator import index, itemgetter
 from typing import Any
 
 from contextdb.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
@@ -34,30 +35,46 @@ SingleLookup = tuple[list[float] | None, Any]
 def build_lookup(columns: Sequence[Column], enabled: int, n_rows: int) -> Lookup:
     """A function from a context to its rows as an integer; raises whatever it raises when a fact is unusual."""
     names: dict[str, Any] = {"bisect_right": bisect_right, "index": index}
-    terms = []
-    values = [(c, m) for c, m in columns if isinstance(m, ValueMasks)]
-    for i, places in enumerate(groups_of([len(m.masks) - 1 for _, m in values], n_rows)):
-        group = [values[p] for p in places]
-        names[f"g{i}"] = _trie([m for _, m in group], -1)
-        terms.append(f"g{i}" + "".join(f"[c[{condition.name!r}]]" for condition, _ in group))
-    for i, (condition, masks) in enumerate(columns):
-        fact = f"c[{condition.name!r}]"
-        if isinstance(masks, ValueMasks):
-            continue
-        if isinstance(masks, NumberMasks):
-            names[f"b{i}"], names[f"m{i}"] = _straight(condition, masks)
-            fact = f"index({fact})" if condition.domain.kind == "int" else fact
-            terms.append(f"m{i}[bisect_right(b{i}, {fact})]")
-        else:
-            names[f"f{i}"] = _careful_lookup(condition, masks)
-            terms.append(f"f{i}({fact})")
-    if enabled != (1 << n_rows) - 1 or not terms:
+    values = _value_terms([(c, m) for c, m in columns if isinstance(m, ValueMasks)], n_rows, names)
+    numbers = [_term(i, c, m, names) for i, (c, m) in enumerate(columns) if not isinstance(m, ValueMasks)]
+    if enabled != (1 << n_rows) - 1 or not values:
         names["enabled"] = enabled
-        terms.append("enabled")
-    source = f"def lookup(c, {', '.join(f'{n}={n}' for n in names)}):\n    return {' & '.join(terms)}"
+        values.append("enabled")
+    # Every fact is looked up, also when no row is left: a missing one is an error whatever the others say.
+    source = f"def lookup(c, {', '.join(f'{n}={n}' for n in names)}):\n    return {' & '.join(values + numbers)}"
     exec(compile(source, "<contextdb lookup>", "exec"), names)
     found: Lookup = names["lookup"]
     return found
+
+
+def _value_terms(columns: Sequence[tuple[Condition, ValueMasks]], n_rows: int, names: dict[str, Any]) -> list[str]:
+    """One term for each group of columns: a pair as a dict of dicts, more as a dict by tuples."""
+    terms = []
+    for i, places in enumerate(groups_of([len(m.masks) - 1 for _, m in columns], n_rows)):
+        group = [columns[p] for p in places]
+        members = [m for _, m in group]
+        keys = [c.name for c, _ in group]
+        terms.append(_group_term(i, keys, members, names, _joint_masks(members)))
+    return terms
+
+
+def _group_term(i: int, keys: Sequence[str], members: Sequence[ValueMasks], names: dict[str, Any], leaves: Sequence[Any]) -> str:
+    """The term that finds a group's leaf by its facts; leaves stand in the order of the joint classes, the last column fastest."""
+    if len(members) > 2 and not any(m.has_others for m in members):
+        names[f"g{i}"] = dict(zip(product(*(m.values for m in members)), leaves, strict=True))
+        names[f"k{i}"] = itemgetter(*keys)
+        return f"g{i}[k{i}(c)]"
+    names[f"g{i}"] = _nested(members, leaves)
+    return f"g{i}" + "".join(f"[c[{key!r}]]" for key in keys)
+
+
+def _term(i: int, condition: Condition, masks: NumberMasks | WideMasks | TagMasks, names: dict[str, Any]) -> str:
+    fact = f"c[{condition.name!r}]"
+    if not isinstance(masks, NumberMasks):
+        names[f"f{i}"] = _careful_lookup(condition, masks)
+        return f"f{i}({fact})"
+    names[f"b{i}"], names[f"m{i}"] = _straight(condition, masks)
+    return f"m{i}[bisect_right(b{i}, {f'index({fact})' if condition.domain.kind == 'int' else fact})]"
 
 
 def single_lookup(condition: Condition, masks: ColumnMasks) -> SingleLookup:
@@ -110,10 +127,21 @@ def _leaves(masks: ValueMasks, leaves: Sequence[Any]) -> dict[Any, Any]:
     return found
 
 
-def _trie(group: Sequence[ValueMasks], bits: int) -> Any:
-    head, rest = group[0], group[1:]
-    leaves = [bits & mask for mask in head.ints[:-1]]
-    return _leaves(head, [_trie(rest, b) for b in leaves] if rest else leaves)
+def _nested(members: Sequence[ValueMasks], leaves: Sequence[Any]) -> Any:
+    """A group's leaves by the values of its columns: dicts in dicts."""
+    head, rest = members[0], members[1:]
+    n_classes = len(head.masks) - 1
+    size = len(leaves) // n_classes
+    parts = [leaves[k * size : (k + 1) * size] for k in range(n_classes)]
+    return _leaves(head, [_nested(rest, part) for part in parts] if rest else leaves)
+
+
+def _joint_masks(members: Sequence[ValueMasks]) -> list[int]:
+    """The mask of every joint class, the last column's class fastest."""
+    bits = [-1]
+    for masks in members:
+        bits = [b & mask for b in bits for mask in masks.ints[:-1]]
+    return bits
 
 
 def _straight(condition: Condition, masks: NumberMasks) -> tuple[list[float], list[int | None]]:

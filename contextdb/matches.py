@@ -124,13 +124,9 @@ def rows_of(bits: int, numbers: Rows) -> Rows:
     found = [top]
     while rest:
         if len(found) == FEW:
-            rows = bitmask.rows(bitmask.from_int(bits, len(numbers)))
-            rows.flags.writeable = False
-            return rows
+            return bitmask.rows(bitmask.from_int(bits, len(numbers)))
         top = rest.bit_length() - 1
         found.append(top)
         rest ^= 1 << top
     found.reverse()
-    rows = np.array(found, np.int64)
-    rows.flags.writeable = False
-    return rows
+    return np.array(found, np.int64)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from contextdb.bitmask import Flags
 from contextdb.cell_words import NUMBER_TEXT, quoted, truth_of
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, Place, TableError
+from contextdb.errors import Fault, Place, TableError, shown
 from contextdb.foreign import seems_to_be
 from contextdb.record_faults import MOST_CHARACTERS
 from contextdb.rewrite import Origin, changed_rows, source_fields
@@ -123,9 +123,11 @@ def _frame(raw: bytes, file: str) -> pl.DataFrame:
         raise TableError(fault.at(Place(file)))
     try:
         return pl.read_parquet(io.BytesIO(raw))
-    except (Exception, pl.exceptions.PanicException) as error:  # polars answers damage in many ways
-        reason = str(error).split("\n")[0]
-        raise TableError(Fault(f"the file is damaged: {reason}.", "a Parquet file as it was written", place=Place(file))) from None
+    except pl.exceptions.PolarsError as error:
+        reason = shown(str(error).split("\n")[0], 200)
+    except (Exception, pl.exceptions.PanicException):  # some damage makes polars stumble instead of complain
+        reason = "its parts contradict each other"
+    raise TableError(Fault(f"the file is damaged: {reason}.", "a Parquet file as it was written", place=Place(file)))
 
 
 def _no_parquet(raw: bytes) -> Fault | None:

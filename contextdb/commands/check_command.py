@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from contextdb import report
@@ -55,7 +56,7 @@ def check_path(text: str) -> CheckReport:
     return _check_files(files)
 
 
-def _check_files(files: list[tuple[str | None, Path]] | list[tuple[str, Path]]) -> CheckReport:
+def _check_files(files: Sequence[tuple[str | None, Path]]) -> CheckReport:
     tables: list[TableSummary] = []
     findings: list[Finding] = []
     for name, path in progress(files, "checking"):

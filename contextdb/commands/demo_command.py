@@ -8,17 +8,28 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import contextdb
 from contextdb.compiled import CompiledTable
-from contextdb.console import aligned, progress, styled, wants_colour
+from contextdb.console import aligned, styled, wants_colour
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import Context
 from contextdb.matches import Matches
-from contextdb.motion import Choice, Hit, MotionConfig, MotionDatabase, load_bvh, query_from, steady_path, write_made_clips
+from contextdb.motion import (
+    FeatureSchema,
+    MotionConfig,
+    MotionDatabase,
+    Selector,
+    load_bvh,
+    query_from,
+    steady_path,
+    write_made_clips,
+)
+from contextdb.motion.extraction import Features
 from contextdb.project import SCHEMA_FILE, Project
 
 TACKLE = {
@@ -31,9 +42,10 @@ TACKLE = {
     "ActivateDiveAtMidAirGround": False,
     "ActivateHitMidAirFar": False,
 }
-TIRED_WALK = {"gait": "Walk", "speed": 1.2, "direction": 0.0, "style": "tired"}
-TIRED_TURN = {"gait": "Walk", "speed": 1.2, "direction": 80.0, "style": "tired"}
-POSE_CLIP, POSE_FRAME = "walk_tired", 40
+REST = {"gait": "Walk", "speed": 1.3, "direction": 0.0, "style": "normal"}
+TIRED = {"gait": "Walk", "speed": 1.3, "direction": 0.0, "style": "tired"}
+TURN = {"gait": "Walk", "speed": 1.3, "direction": 65.0, "style": "tired"}
+SPEED_MPS, TURN_DPS = 1.3, 60.0
 N_NEAREST = 2
 
 
@@ -63,7 +75,9 @@ def sample_folder() -> Path:
     for folder in (package / "_tables", package.parent / "tables"):
         if (folder / SCHEMA_FILE).is_file():
             return folder
-    raise FileError(Fault("the sample tables are not there.", "tables/ of the checkout: --tables FOLDER", place=Place(str(package))))
+    raise FileError(
+        Fault("the sample tables are not there.", "tables/ of the checkout: --tables FOLDER", place=Place(str(package)))
+    )
 
 
 def _steps(folder: Path) -> Iterator[str]:
@@ -83,7 +97,7 @@ def _steps(folder: Path) -> Iterator[str]:
 def _answer(compiled: CompiledTable, context: Context) -> Iterator[str]:
     """The context, the valid rows, and why the nearest others are not valid."""
     explanation = compiled.explain(context)
-    yield from aligned([(name, "=", str(value)) for name, value in context.items()], indent="   ")
+    yield from _context(context)
     yield ""
     yield f"   {len(explanation.matches)} of {plural(compiled.n_rows, 'row')} valid:"
     yield from (f"     {asset}" for asset in explanation.matches.assets)
@@ -93,45 +107,80 @@ def _answer(compiled: CompiledTable, context: Context) -> Iterator[str]:
 
 
 def _motion(project: Project, folder: Path) -> Iterator[str]:
-    schema = project.schema
-    sections = {"features": schema.features, "databases": schema.databases, "selectors": schema.selectors}
-    config = MotionConfig.from_dict(sections, tables=project.tables, file=schema.file)
-    (folder / "clips").mkdir()
-    paths = list(progress(write_made_clips(folder / "clips"), "reading clips"))
-    table = project["locomotion"].compile()
-    databases = config.build(folder, {"locomotion": table.assets})
-    loco = databases["loco"]
-    yield "3. Clips of the locomotion table: made by formulas, not captured, written as BVH and read back"
+    stage = Stage.of(project, folder)
+    loco = stage.databases["loco"]
+    yield "3. Clips for the locomotion table: made by formulas, not captured; written as BVH and read back"
     yield ""
-    yield f"   {plural(len(paths), 'clip')}, {plural(loco.n_frames, 'frame')}, {loco.n_features} features a frame: feet, hips and the path ahead"
+    size = f"{plural(stage.n_clips, 'clip')}, {plural(loco.n_frames, 'frame')}, {loco.n_features} numbers a frame"
+    yield f"   {size}: feet, hips and the way ahead"
     yield ""
-    yield "4. A tired character walks on. The table says which clips are valid; the search ranks only their frames"
+    yield "4. Someone walks as if tired and has just recovered. The table says which clips are valid; only their frames are ranked"
     yield ""
-    pose = load_bvh(folder / "clips" / f"{POSE_CLIP}.bvh")
-    straight = query_from(config.features["loco"], pose, POSE_FRAME, steady_path(TIRED_WALK["speed"]))  # type: ignore[arg-type]
-    valid = table.query(TIRED_WALK)
-    yield from aligned([(name, "=", str(value)) for name, value in TIRED_WALK.items()], indent="   ")
-    yield f"   {len(valid)} of {plural(table.n_rows, 'row')} valid: {', '.join(valid.assets)}"
-    yield f"   best frame of all clips:    {_hit(loco, loco.search(straight))}"
-    yield f"   best frame of the valid:    {_hit(loco, loco.search(straight, valid))}"
+    query = stage.query("walk_tired", 60)
+    valid = stage.table.query(REST)
+    yield from _context(REST)
     yield ""
-    yield "5. Tired clips come first: their database wins outright while its best cost is under its threshold"
+    yield f"   {len(valid)} of {plural(stage.table.n_rows, 'row')} valid: {', '.join(valid.assets)}"
+    yield from aligned(
+        [_hit("best frame of all clips", loco, query), _hit("best frame of the valid ones", loco, query, valid)], indent="   "
+    )
     yield ""
-    selector = config.selector("locomotion", databases)
-    yield from _choice("walking straight on", selector.search(straight, valid), valid)
-    turn = query_from(config.features["loco"], pose, POSE_FRAME, steady_path(TIRED_TURN["speed"], 90.0))  # type: ignore[arg-type]
-    turning = table.query(TIRED_TURN)
-    yield from _choice("turning sharply to the left", selector.search(turn, turning), turning)
+    yield "5. Someone walks and is tired by now. Tired clips have a database of their own, and it comes first: while its best"
+    yield "   cost is under its threshold it wins outright, even where another clip would cost less"
+    yield ""
+    yield from _choice(stage, TIRED, stage.query("walk", 60))
+    yield "6. The same, turning sharply: no tired clip fits well, so all valid clips are searched and the lowest cost wins"
+    yield ""
+    yield from _choice(stage, TURN, stage.query("walk", 40, TURN_DPS))
     yield 'Next: "contextdb query --help", and docs/tutorial.md.'
 
 
-def _hit(database: MotionDatabase, hit: Hit) -> str:
+@dataclass(frozen=True)
+class Stage:
+    """What the motion part of the demo plays with: the compiled table, its clips' databases and the selector over them."""
 
-    return f"{hit.asset} at {database.time_s(hit):.2f} s, cost {hit.cost:.3f}"
+    table: CompiledTable
+    databases: Mapping[str, MotionDatabase]
+    selector: Selector
+    features: FeatureSchema
+    folder: Path
+    n_clips: int
+
+    @classmethod
+    def of(cls, project: Project, folder: Path) -> Stage:
+        """Make the clips into a folder, read them back, and build what contextdb.toml says."""
+        schema = project.schema
+        sections = {"features": schema.features, "databases": schema.databases, "selectors": schema.selectors}
+        config = MotionConfig.from_dict(sections, tables=project.tables, file=schema.file)
+        clips = folder / "clips"
+        clips.mkdir()
+        paths = write_made_clips(clips)
+        table = project["locomotion"].compile()
+        databases = config.build(folder, {"locomotion": table.assets})
+        return cls(table, databases, config.selector("locomotion", databases), config.features["loco"], clips, len(paths))
+
+    def query(self, clip: str, frame: int, turn_dps: float = 0.0) -> Features:
+        """The pose of a clip's frame, and the wish to go on at walking speed."""
+        return query_from(self.features, load_bvh(self.folder / f"{clip}.bvh"), frame, steady_path(SPEED_MPS, turn_dps))
 
 
-def _choice(what: str, choice: Choice, valid: Matches) -> Iterator[str]:
-    yield f"   {what}: {plural(len(valid), 'clip')} valid"
-    yield from (f"     {search}" for search in choice.searches)
-    yield f"     {choice.database} wins ({choice.reason}): {choice.hit.asset}"
+def _context(context: Context) -> Iterator[str]:
+    yield from aligned([(name, "=", str(value)) for name, value in context.items()], indent="   ")
+
+
+def _hit(what: str, database: MotionDatabase, query: Features, valid: Matches | None = None) -> tuple[str, str]:
+    hit = database.search(query, valid)
+    return f"{what}:", f"{hit.asset} at {database.time_s(hit):.2f} s, cost {hit.cost:.2f}"
+
+
+def _choice(stage: Stage, context: Context, query: Features) -> Iterator[str]:
+    valid = stage.table.query(context)
+    choice = stage.selector.search(query, valid)
+    yield from _context(context)
+    yield ""
+    yield f"   {len(valid)} of {plural(stage.table.n_rows, 'row')} valid: {', '.join(valid.assets)}"
+    yield from aligned([_hit("best frame of the valid ones", stage.databases["loco"], query, valid)], indent="   ")
+    yield ""
+    yield from (f"   {search}" for search in choice.searches)
+    yield f"   {choice.database} wins ({choice.reason}): {choice.hit.asset}"
     yield ""

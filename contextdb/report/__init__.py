@@ -11,22 +11,23 @@ from contextdb.report.results import CheckReport
 
 Format = Literal["text", "json", "github", "junit", "sarif", "markdown"]
 FORMATS: tuple[Format, ...] = get_args(Format)
+ERRORS: tuple[Level, ...] = ("error",)
 
 
 def render(
-    format: str,
+    format_name: str,
     report: CheckReport,
     *,
     colour: bool = False,
     width: int = 100,
     shows_all: bool = False,
-    failing: Collection[Level] = ("error",),
+    failing: Collection[Level] = ERRORS,
 ) -> str:
     """Render the findings of a check; the same arguments always give the same text.
 
     Parameters
     ----------
-    format : str
+    format_name : str
         One of `FORMATS`.
     colour, width : bool, int
         For `text`: whether to colour it, and how many terminal cells a line may have.
@@ -40,7 +41,7 @@ def render(
     ContextDBError
         There is no such format.
     """
-    match format:
+    match format_name:
         case "text":
             from contextdb.report import render_text
 
@@ -65,6 +66,6 @@ def render(
             from contextdb.report import render_markdown
 
             return render_markdown.render(report, shows_all)
-    near = nearest(format, FORMATS)
-    found = f"there is no format {in_quotes(format)}."
+    near = nearest(format_name, FORMATS)
+    found = f"there is no format {in_quotes(format_name)}."
     raise ContextDBError(Fault(found, some(FORMATS), in_quotes(near) if near else ""))

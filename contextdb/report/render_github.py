@@ -8,6 +8,7 @@ Source: actions/toolkit, `packages/core/src/command.ts`; actions/runner, `Action
 
 from __future__ import annotations
 
+from contextdb.console import printable
 from contextdb.findings import Finding, Level
 from contextdb.report.results import CheckReport, as_path, told, worst_first
 
@@ -20,7 +21,7 @@ def render(report: CheckReport) -> str:
 
 
 def _annotation(finding: Finding) -> str:
-    properties = {"title": f"contextdb {finding.rule}"}
+    properties = {"title": f"contextdb {printable(finding.rule)}"}
     if finding.file:
         place = {"file": as_path(finding.file)} | ({"line": str(finding.line)} if finding.line is not None else {})
         properties = place | properties

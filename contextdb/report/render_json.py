@@ -1,4 +1,5 @@
-"""Findings as JSON: `{"format": 1, "findings": [{"rule", "level", "row", "asset", "line", "column", "message", "by", …}], "tables"}`.
+"""Findings as JSON: `{"format": 1, "findings": [{"rule", "level", "row", "asset", "line", "column", "message", "by", …}],
+"tables"}`.
 
 Rows count from 0, lines from 1; `by` are the rows that cause a finding. What is not known is null.
 """
@@ -21,7 +22,8 @@ def render(report: CheckReport) -> str:
 
 
 def as_json(document: object) -> str:
-    """A JSON text that is valid UTF-8 and moves no cursor; half of a surrogate pair, which JSON cannot hold, becomes its escape as text."""
+    """A JSON text that is valid UTF-8 and moves no cursor; half of a surrogate pair, which JSON cannot hold, becomes its escape
+    as text."""
     return _UNSAFE.sub(_escaped, json.dumps(document, ensure_ascii=False, indent=2)) + "\n"
 
 

@@ -1,8 +1,8 @@
 """Findings as JUnit XML: one suite a table, one case a rule, so that a case keeps its name from run to run.
 
-A case fails when its rule has a finding of a level that makes the check fail; its text then lists every place. What does not fail is
-told in the case's `system-out`. The first line is complete in itself: some CI systems show no more. No times and no dates, so the
-same findings give the same bytes.
+A case fails when its rule has a finding of a level that makes the check fail; its text then lists every place. What does not fail
+is told in the case's `system-out`. The first line is complete in itself: some CI systems show no more. No times and no dates, so
+the same findings give the same bytes.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from xml.etree import ElementTree as ET
 from contextdb.console import printable
 from contextdb.errors import plural
 from contextdb.findings import Finding, Level
-from contextdb.report.results import CheckReport, Group, as_path, place_in, told
+from contextdb.report.results import CheckReport, Group, as_path, place_of, told
 from contextdb.report.rules import TABLE_RULES
 
 MOST_LISTED = 200
 """A case lists so many findings, then says how many more there are: CI systems refuse reports that grow without end."""
 
 
-def render(report: CheckReport, failing: Collection[Level] = ("error",), shows_all: bool = False) -> str:
+def render(report: CheckReport, failing: Collection[Level], shows_all: bool = False) -> str:
     """The findings as a JUnit document; levels in `failing` make a case fail."""
     root = ET.Element("testsuites", name="contextdb check")
     for group in report.groups():
@@ -59,20 +59,18 @@ def _by_rule(group: Group) -> dict[str, list[Finding]]:
 
 
 def _headline(findings: list[Finding]) -> str:
-    first = f"{place_in(findings[0])}, {told(findings[0])}" if findings[0].line is not None else told(findings[0])
+    first = _placed(findings[0])
     return first if len(findings) == 1 else f"{plural(len(findings), 'finding')}, the first: {first}"
 
 
 def _lines(findings: list[Finding], shows_all: bool) -> Iterator[str]:
     listed = findings if shows_all else findings[:MOST_LISTED]
     for finding in listed:
-        yield f"{finding.level}: {_placed(finding)}{told(finding)}"
+        yield f"{finding.level}: {_placed(finding)}"
     if len(listed) < len(findings):
         yield f"… and {len(findings) - len(listed):,} more"
 
 
 def _placed(finding: Finding) -> str:
-    if not finding.file:
-        return ""
-    line = "" if finding.line is None else f":{finding.line}"
-    return f"{as_path(finding.file)}{line}: "
+    place = place_of(finding)
+    return f"{place}: {told(finding)}" if place else told(finding)

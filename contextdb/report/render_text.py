@@ -1,15 +1,16 @@
-"""Findings for people in a terminal: by table, then by rule, each with its `file:line`; about 40 lines, unless all are asked for."""
+"""Findings for people in a terminal: by table, then by rule, each with its `file:line`; about 40 lines, unless all are asked
+for."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import accumulate
+import sys
+from collections.abc import Iterator
 
 from contextdb.console import printable, styled, width_of
 from contextdb.errors import plural
 from contextdb.findings import Finding, Level
 from contextdb.report.results import Block, CheckReport, Group, place_of, told
-from contextdb.report.shorten import fitted
+from contextdb.report.shorten import fitted, n_hidden
 
 MOST_LINES = 40
 MOST_CLEAN = 8
@@ -24,21 +25,25 @@ STYLES: dict[Level, str] = {"error": "red", "warning": "yellow", "info": "cyan"}
 def render(report: CheckReport, colour: bool = False, width: int = 100, shows_all: bool = False) -> str:
     """The findings as aligned text; messages are wrapped to `width` terminal cells."""
     groups = report.groups()
-    faulty = [g for g in groups if g.findings]
-    clean = [g for g in groups if not g.findings]
-    n_clean = len(clean) if shows_all else MOST_CLEAN
+    faulty, clean = [g for g in groups if g.findings], [g for g in groups if not g.findings]
+    calm = list(_clean_lines(clean, len(clean) if shows_all else MOST_CLEAN, width))
 
     def sections_at(most: int) -> list[str]:
         return [_section(group, most, width, colour) for group in faulty]
 
-    calm = "".join(f"{line}\n" for line in _clean_lines(clean, n_clean, width))
-    room = MOST_LINES - calm.count("\n") - 3
-    sections = sections_at(len(report.findings)) if shows_all else fitted(sections_at, lambda s: s.count("\n") + 1, room)
-    left_out = faulty[len(sections) :]
-    if left_out:
-        sections.append(f"… and {plural(sum(len(g.findings) for g in left_out), 'finding')} in {len(left_out):,} more places\n")
-    hint = " --all shows every one." if "… and " in "".join(sections) else ""
-    return "\n".join([*sections, *([calm] if calm else []), styled(report.summary, "bold", colour) + hint + "\n"])
+    room = sys.maxsize if shows_all else MOST_LINES - len(calm) - 2
+    sections, most = (sections_at(sys.maxsize), sys.maxsize) if shows_all else fitted(sections_at, _n_lines, room)
+    n_left_out, hidden = len(faulty) - len(sections), n_hidden(faulty, len(sections), most)
+    if n_left_out:
+        sections.append(f"… and {plural(n_left_out, 'more file')} with findings\n")
+    if calm:
+        sections.append("".join(f"{line}\n" for line in calm))
+    hint = f" {hidden:,} of them not shown; --all shows every one." if hidden else ""
+    return "\n".join([*sections, f"{styled(report.summary, 'bold', colour)}{hint}\n"])
+
+
+def _n_lines(section: str) -> int:
+    return section.count("\n") + 1
 
 
 def _section(group: Group, most: int, width: int, colour: bool) -> str:
@@ -81,12 +86,26 @@ def _clean_lines(clean: list[Group], most: int, width: int) -> Iterator[str]:
 
 
 def wrapped(text: str, width: int) -> list[str]:
-    """Text in lines of at most `width` terminal cells, broken at spaces where there are some; none is lost, nor doubled."""
-    lines: list[str] = []
-    line = ""
+    """Text in lines of at most `width` terminal cells, broken at spaces, and inside a word only where it is longer than a line."""
+    lines, line, used = [], "", 0
     for word in text.split(" "):
-        if line and width_of(line) + 1 + width_of(word) > width:
-            lines.append(line)
-            line = ""
-        ...
-    return lines
+        room = width_of(word)
+        if line and used + 1 + room <= width:
+            line, used = f"{line} {word}", used + 1 + room
+            continue
+        lines += [line] if line else []
+        *full, line = _cut(word, width) if room > width else [word]
+        lines, used = lines + full, width_of(line)
+    return [*lines, line]
+
+
+def _cut(word: str, width: int) -> list[str]:
+    pieces, used = [""], 0
+    for character in word:
+        room = width_of(character)
+        if used + room > width and pieces[-1]:
+            pieces.append("")
+            used = 0
+        pieces[-1] += character
+        used += room
+    return pieces

@@ -6,8 +6,9 @@ A renderer is a pure function of a `CheckReport` that gives text: the same repor
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import chain, count
 from pathlib import PurePath
 
 from contextdb.console import printable
@@ -83,18 +84,18 @@ class CheckReport:
         return sorted(_with_labels(found), key=_rank)
 
 
-def place_in(finding: Finding) -> str:
-    """Where in its file a finding stands: "line 12", "row 3" where lines are not known, or nothing."""
-    if finding.line is not None:
-        return f"line {finding.line}"
-    return "" if finding.row is None else f"row {finding.row}"
+def place_of(finding: Finding) -> str:
+    """Where a finding stands, so that editors and terminals can open it: "tables/jog.csv:12", without a line only the file."""
+    if not finding.file:
+        return ""
+    return as_path(finding.file) if finding.line is None else f"{as_path(finding.file)}:{finding.line}"
 
 
-def told(finding: Finding) -> str:
-    """The message with the asset and the column that it is about, on one line without control characters."""
-    about = [f'"{finding.asset}"'] if finding.asset else []
-    if finding.line is None and finding.row is not None:
-        about.insert(0, f"row {finding.row}")
+def told(finding: Finding, names_asset: bool = True) -> str:
+    """The message on one printable line, after what it is about: the row where no line is known, the asset, the column."""
+    about = [f"row {finding.row}"] if finding.line is None and finding.row is not None else []
+    if names_asset and finding.asset:
+        about.append(f'"{finding.asset}"')
     if finding.column is not None:
         about.append(f'column "{finding.column}"')
     return printable(f"{', '.join(about)}: {finding.message}" if about else finding.message)
@@ -125,9 +126,12 @@ def _group(table: TableSummary | None, findings: list[Finding]) -> Group:
     return Group(printable(named or (as_path(file) if file else "no file")), file, table, tuple(findings))
 
 
-def _with_labels(groups: list[Group]) -> list[Group]:
-    """The groups with their file in the label where the name alone could mean another one."""
+def _with_labels(groups: list[Group]) -> Iterator[Group]:
+    """The groups with different labels: with the file where a name stands twice, and a number where that does not help."""
     times = Counter(group.label for group in groups)
-    return [
-        Group(f"{g.label} ({as_path(g.file)})", g.file, g.table, g.findings) if times[g.label] > 1 and g.file else g for g in groups
-    ]
+    taken: set[str] = set()
+    for group in groups:
+        label = f"{group.label} ({as_path(group.file)})" if times[group.label] > 1 and group.file else group.label
+        label = next(text for text in chain([label], (f"{label} #{n}" for n in count(2))) if text not in taken)
+        taken.add(label)
+        yield replace(group, label=label)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import accumulate
 
+from contextdb.report.results import Group
+
 STEPS = (20, 10, 5, 3, 2, 1)
 """How many findings of one rule are shown; the first that fits."""
 
 
-def fitted(sections_at: Callable[[int], Sequence[str]], size: Callable[[str], int], room: int) -> list[str]:
-    """The sections that fit.
+def fitted(sections_at: Callable[[int], Sequence[str]], size: Callable[[str], int], room: int) -> tuple[list[str], int]:
+    """Find the longest form of a report that fits.
 
     Parameters
     ----------
@@ -19,12 +21,25 @@ def fitted(sections_at: Callable[[int], Sequence[str]], size: Callable[[str], in
     size : function of str
         How much room a section takes.
     room : int
-        How much there is. Where not even one finding of each rule fits, the last sections are left out; the first one never is.
+        How much there is.
+
+    Returns
+    -------
+    list of str
+        The sections. Where not even one finding of each rule fits, the last sections are left out; the first one never is.
+    int
+        How many findings of one rule they show.
     """
     sections: Sequence[str] = ()
     for most in STEPS:
         sections = sections_at(most)
         if sum(map(size, sections)) <= room:
-            return list(sections)
+            return list(sections), most
     n_fitting = sum(total <= room for total in accumulate(map(size, sections)))
-    return list(sections[: max(1, n_fitting)])
+    return list(sections[: max(1, n_fitting)]), STEPS[-1]
+
+
+def n_hidden(groups: Sequence[Group], n_shown: int, most: int) -> int:
+    """How many findings are not shown, with the first `n_shown` groups and at most so many findings of each rule."""
+    cut = sum(max(0, len(findings) - most) for group in groups[:n_shown] for _, _, findings in group.blocks())
+    return cut + sum(len(group.findings) for group in groups[n_shown:])

@@ -70,12 +70,19 @@ def save(compiled: CompiledTable, path: Path) -> None:
             "fallback": compiled.fallback,
             "conditions": [_condition_to_json(c) for c in compiled.conditions],
             "columns": kinds,
-        },
-        ensure_ascii=False,
+        }
     )
     tensors = {name: np.ascontiguousarray(array) for name, array in tensors.items()}
     metadata = {"contextdb": str(LAYOUT), "about": about, "digest": _digest(about, tensors)}
-    write_atomic(path, to_bytes(tensors, metadata))
+    write_atomic(path, _with_metadata(to_bytes(tensors), metadata))
+
+
+def _with_metadata(raw: bytes, metadata: dict[str, str]) -> bytes:
+    """A .safetensors file with metadata; the library itself would put them in another order each time."""
+    start = 8 + int.from_bytes(raw[:8], "little")
+    header = json.dumps({"__metadata__": metadata, **json.loads(raw[8:start])}, separators=(",", ":")).encode()
+    header += b" " * (-len(header) % 8)
+    return len(header).to_bytes(8, "little") + header + raw[start:]
 
 
 def open_artefact(path: Path) -> CompiledTable:
@@ -96,11 +103,8 @@ def open_artefact(path: Path) -> CompiledTable:
 
 def _open(path: Path) -> CompiledTable:
     tensors, metadata = _read_tensors(path)
-    layout = metadata.get("contextdb")
-    if layout is None:
-        raise _refused(path, "a .safetensors file, but not one that contextdb compiled.")
-    if layout != str(LAYOUT):
-        raise _refused(path, f"layout {layout}; this version reads layout {LAYOUT}.")
+    if metadata["contextdb"] != str(LAYOUT):
+        raise _refused(path, f"layout {metadata['contextdb']}; this version reads layout {LAYOUT}.")
     if _digest(metadata["about"], tensors) != metadata.get("digest"):
         raise _refused(path, "the file was altered: its contents do not give its digest.")
     about = json.loads(metadata["about"])
@@ -136,7 +140,10 @@ def _read_tensors(path: Path) -> tuple[Tensors, dict[str, str]]:
         with safe_open(path, framework="numpy") as frame:
             metadata = dict(frame.metadata() or {})
     except (SafetensorError, OSError) as error:
+        read_bytes(path)  # raises FileError where it is the disk that refuses
         raise _refused(path, f"not a whole .safetensors file ({error}).") from None
+    if "contextdb" not in metadata:
+        raise _refused(path, "a .safetensors file, but not one that contextdb compiled.")
     with path.open("rb") as file:
         mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     start = 8 + int.from_bytes(mapped[:8], "little")

@@ -185,23 +185,25 @@ def load_kernels(work: int = MUCH_WORK) -> ModuleType | None:
 def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
     """The rows for the codes of one context."""
     stack = compiled.stack
-    given = np.ascontiguousarray(codes, np.int32)
-    if given.shape != (stack.n_codes,):
-        raise ContextError(Fault(f"the codes have shape {given.shape}.", f"({stack.n_codes},), as encode gives them"))
-    found = np.empty(len(compiled.enabled), np.uint64)
+    given = np.asarray(codes)
+    if given.shape != (stack.n_codes,) or given.dtype.kind not in "iu":
+        told = f"shape {given.shape}" if given.dtype.kind in "iu" else f"type {given.dtype}"
+        raise ContextError(Fault(f"the codes have {told}.", f"({stack.n_codes},), as encode gives them"))
+    given = np.clip(given, -2, 2**31 - 1).astype(np.int32) if given.dtype != np.int32 else np.ascontiguousarray(given)
+    mask = np.empty(len(compiled.enabled), np.uint64)
     if kernels := load_kernels():
-        is_right = kernels.query(stack.masks, given, stack.n_plain, stack.wide, compiled.enabled, found)
+        is_right = kernels.query(stack.masks, given, stack.n_plain, stack.wide, compiled.enabled, mask)
     elif is_right := stack.holds(given):
-        found = _masks_with_numpy(compiled, given[None])[0]
+        mask = _masks_with_numpy(compiled, given[None])[0]
     if not is_right:
         raise ContextError(Fault("a code is out of range.", "the codes that encode of this same compiled table gives"))
-    return compiled.matches(bitmask.to_int(found))
+    return compiled.matches(bitmask.to_int(mask))
 
 
 def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "error") -> ManyMatches:
     """Encode the columns of many contexts; see `CompiledTable.query_many`."""
     check_mode(unknown)
-    columns = {name: contexts[name] for name in (contexts.columns if isinstance(contexts, pl.DataFrame) else contexts)}
+    columns = _columns_of(contexts)
     n_contexts = _common_length(columns)
     absent = [c.name for c in compiled.conditions if c.name not in columns]
     extra = [n for n in columns if n not in compiled.single_lookups] if absent else []
@@ -333,6 +335,23 @@ def _in_context(error: Exception, row: int, name: str, value: object) -> Context
     return ContextError(Fault(f"{type(value).__name__} is no fact.", "one value in each context", place=place))
 
 
+def _columns_of(contexts: object) -> dict[str, Any]:
+    """The columns of some contexts by name."""
+    if isinstance(contexts, pl.DataFrame):
+        return {name: contexts[name] for name in contexts.columns}
+    if not isinstance(contexts, Mapping):
+        accepted = "a polars DataFrame, or a mapping of names to equally long columns"
+        raise ContextError(Fault(f"{type(contexts).__name__} is no columns of facts.", accepted))
+    for name, column in contexts.items():
+        is_flat = column.ndim == 1 if isinstance(column, np.ndarray) else isinstance(column, (list, tuple, range, pl.Series))
+        if not is_flat:
+            place = Place(column=str(name))
+            raise ContextError(
+                Fault(f"{type(column).__name__} is no column of facts.", "a list, a flat array or a series", place=place)
+            )
+    return dict(contexts)
+
+
 def _common_length(columns: Mapping[str, Any]) -> int:
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
@@ -342,7 +361,7 @@ def _common_length(columns: Mapping[str, Any]) -> int:
 
 def _plain_numbers(given: Any, kind: str) -> NDArray[np.float64] | None:
     """A column of plain numbers as doubles, NaN where missing; None when it must be read fact by fact."""
-    series = _as_series(given)
+    series = _as_series(given, pl.Float64)
     if series is None or not (series.dtype.is_numeric() and not series.dtype.is_decimal()):
         return None
     facts = series.cast(pl.Float64).to_numpy(writable=False)
@@ -363,10 +382,11 @@ def _wrapped(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _plain_values(given: Any, masks: ValueMasks) -> Codes | None:
     """Class numbers int32 [1, N] of a column of plain values, -1 where missing; None when it must be read fact by fact."""
-    series = _as_series(given)
+    is_truth = masks.values == (False, True)
+    series = _as_series(given, pl.Boolean if is_truth else pl.String)
     if series is None:
         return None
-    if masks.values == (False, True):
+    if is_truth:
         if series.dtype != pl.Boolean:
             return None
         return _codes_of(series.cast(pl.Int32))
@@ -387,15 +407,19 @@ def _codes_of(classes: pl.Series) -> Codes:
     return (classes.fill_null(-1) if classes.null_count() else classes).to_numpy()[None]
 
 
-def _as_series(given: Any) -> pl.Series | None:
-    """A column as a polars series, or None when it has no single plain type."""
+def _as_series(given: Any, listed: type[pl.DataType]) -> pl.Series | None:
+    """A column as a polars series, or None when it has no single plain type.
+
+    What is listed must be of the type `listed`: left to itself polars takes a list after its first items for float32 or for truth.
+    """
     if isinstance(given, pl.Series):
         return given
-    if isinstance(given, np.ndarray) and given.dtype.kind not in "biuf":
-        given = given.tolist()
+    is_typed = isinstance(given, np.ndarray) and given.dtype.kind in "biuf"
     try:
-        return pl.Series(given, strict=True, nan_to_null=False) if len(given) else None
-    except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError):
+        if is_typed:
+            return pl.Series(given, nan_to_null=False)
+        return pl.Series(list(given), dtype=listed, strict=True, nan_to_null=False) if len(given) else None
+    except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
         return None
 
 

@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from difflib import SequenceMatcher
 
 from contextdb.cell_words import NUMBER_TEXT, quoted
 from contextdb.domains import NUMERIC, Domain
 from contextdb.errors import nearest
+
+CLOSE = 0.85
+"""From this likeness on a cell of several words is taken for one value that lacks its quotes."""
 
 _Mends = tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]
 
@@ -62,20 +66,32 @@ def candidates(text: str, domain: Domain) -> Iterator[str]:
     for pattern, replacement in rules:
         changed = re.sub(pattern, replacement, changed).strip()
         yield changed
-    if domain.kind in ("enum", "text", "tags"):
+    if domain.kind in ("enum", "text", "tags") and "~" not in text:
         yield from _word_mends(text, domain)
 
 
 def _word_mends(text: str, domain: Domain) -> Iterator[str]:
-    sign = "+" if domain.kind == "tags" else ""
+    """The words of an enum, text or tags cell, each spelt as the nearest declared value, quoted and signed as it must be."""
     known = domain.values or ()
-    if whole := nearest(text.strip("\"' +"), known):
-        yield sign + quoted(whole)
-    words = [w for w in re.split(r"[\s,;|\"']+", text) if w.strip("+-!")]
-    negation = "not " if words and words[0].casefold() == "not" else ""
-    spelt = [
-        ("-" if sign and w[0] == "-" else sign, w.strip("+!") if not sign else w.strip("+-!")) for w in words[bool(negation) :]
-    ]
-    yield negation + " ".join(s + quoted(w) for s, w in spelt)
-    yield negation + " ".join(s + quoted(nearest(w, known) or w) for s, w in spelt)
-    yield quoted(text.strip().strip('"'))
+    body = text.strip()
+    negation = "not " if body[:4].casefold() == "not " else ""
+    body = body[len(negation) :]
+    whole = nearest(body.strip("\"' +"), known)
+    is_close = whole is not None and SequenceMatcher(None, whole.casefold(), body.strip("\"' +").casefold()).ratio() > CLOSE
+    signed = [_signed(w, domain) for w in re.split(r"[\s,;|\"']+", body) if w.strip("+-!")]
+    if whole is not None and is_close and len(signed) > 1:
+        yield negation + _sign(body, domain) + quoted(whole)
+    yield negation + " ".join(sign + quoted(word) for sign, word in signed)
+    yield negation + " ".join(sign + quoted(nearest(word, known) or word) for sign, word in signed)
+    if whole is not None:
+        yield negation + _sign(body, domain) + quoted(whole)
+    if body.strip('"'):
+        yield negation + quoted(body.strip('"'))
+
+
+def _signed(word: str, domain: Domain) -> tuple[str, str]:
+    return (_sign(word, domain), word.strip("+-!")) if domain.kind == "tags" else ("", word.strip("+!"))
+
+
+def _sign(word: str, domain: Domain) -> str:
+    return "" if domain.kind != "tags" else "-" if word[:1] in ("-", "!") else "+"

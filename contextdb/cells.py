@@ -154,7 +154,7 @@ def parse_cell(text: str, domain: Domain, wants_mend: bool = True) -> Cell:
     try:
         return _read(text, domain)
     except CellError as error:
-        if not wants_mend:
+        if not wants_mend or error.faults[0].rule == "unreadable-penalty":
             raise
         raise CellError(replace(error.faults[0], mend=_mend(text, domain))) from None
 
@@ -167,7 +167,7 @@ def parse_tags(text: str) -> frozenset[str]:
 def _mend(text: str, domain: Domain) -> str:
     """The nearest text that reads, quoted for a message, or nothing."""
     short = text[:1000].strip()
-    return next((in_quotes(c) for c in candidates(short, domain) if c != short and reads(c, domain)), "")
+    return next((in_quotes(c) for c in candidates(short, domain) if c and c != short and reads(c, domain)), "")
 
 
 def reads(text: str, domain: Domain) -> bool:
@@ -191,7 +191,8 @@ def _split_penalty(text: str, domain: Domain) -> tuple[str, float | None]:
     number = _NUMBER.fullmatch(tail.strip())
     penalty = float(number[0]) if number else math.nan
     if not 0.0 <= penalty < math.inf:
-        raise _unreadable(text, domain, f'the penalty after "~" must be a number from 0 up, not "{shown(tail.strip())}"')
+        why = f'the penalty after "~" must be a number from 0 up, not {in_quotes(tail.strip())}'
+        raise CellError(replace(_unreadable(text, domain, why).faults[0], rule="unreadable-penalty"))
     return body.strip(), penalty
 
 
@@ -291,6 +292,8 @@ def _centred(centre: float, tolerance: float, text: str, domain: Domain) -> Span
 def _between(low: float | None, high: float | None, is_low_open: bool, is_high_open: bool, text: str, domain: Domain) -> Spans:
     if domain.kind == "angle":
         return _angles_between(low, high, is_low_open, is_high_open, text, domain)
+    if (is_low_open and low == math.inf) or (is_high_open and high == -math.inf):
+        return ()
     first = -math.inf if low is None else intervals.above(low) if is_low_open else low
     last = math.inf if high is None else intervals.below(high) if is_high_open else high
     return ((first, last),)
@@ -386,12 +389,12 @@ def format_number(value: float) -> str:
 
 
 def _format_set(accepts: Accepted, domain: Domain) -> str:
+    if isinstance(accepts, TagSet):
+        return _format_tags(accepts)
     if accepts.is_empty:
         return "not Any"
     if isinstance(accepts, NumberSet):
         return _format_spans(accepts.spans, domain)
-    if isinstance(accepts, TagSet):
-        return _format_tags(accepts)
     if domain.kind == "bool":
         return "not not Any" if len(accepts.values) == 2 else str(next(iter(accepts.values)))
     order = domain.values if domain.values is not None else sorted(str(v) for v in accepts.values)
@@ -401,8 +404,9 @@ def _format_set(accepts: Accepted, domain: Domain) -> str:
 
 def _format_tags(tags: TagSet) -> str:
     words = [f"+{quoted(t)}" for t in sorted(tags.needs)] + [f"-{quoted(t)}" for t in sorted(tags.bans)]
-    text = " ".join(words) or "not Any"
-    return f"not {text}" if tags.is_complement or not words else text
+    if not words:
+        return "not Any" if tags.is_complement else "not not Any"
+    return f"not {' '.join(words)}" if tags.is_complement else " ".join(words)
 
 
 def _format_spans(spans: Spans, domain: Domain) -> str:
@@ -410,6 +414,9 @@ def _format_spans(spans: Spans, domain: Domain) -> str:
         return " | ".join(_format_span(low, high) for low, high in spans)
     if spans == (intervals.CIRCLE,):
         return "-180..180"
+    rest = intervals.complement(spans, *intervals.CIRCLE)
+    if len(spans) > 1 and len(rest) == 1 and rest[0][0] == rest[0][1]:
+        return f"not {format_number(rest[0][0])}"
     first, last = spans[0], spans[-1]
     if len(spans) > 1 and first[0] == -180.0 and last[1] == intervals.CIRCLE[1]:
         spans = (*spans[1:-1], (last[0], first[1]))

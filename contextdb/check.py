@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,8 +22,29 @@ MOST_ROWS = 1000
 
 def check(table: Table) -> list[Finding]:
     """Every finding of a table, in the order of its rows, those of the whole table first."""
-    found = [*_whole_table(table), *_unreadable(table), *_cells(table), *_assets(table), *_identical(table)]
+    rules = (_whole_table, _unreadable, _cells, _assets, _identical)
+    found = _capped(finding for rule in rules for finding in rule(table))
     return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+
+
+def _capped(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """The findings; of those of one rule in one column the first `MOST_ROWS`, and one that says how many more there are."""
+    counts: Counter[tuple[str, str | None]] = Counter()
+    first_left: dict[tuple[str, str | None], Finding] = {}
+    for finding in findings:
+        kind = (finding.rule, finding.column)
+        counts[kind] += 1
+        if counts[kind] <= MOST_ROWS:
+            yield finding
+        else:
+            first_left.setdefault(kind, finding)
+    for kind, finding in first_left.items():
+        yield replace(finding, message=f"{finding.message} ({counts[kind] - MOST_ROWS:,} rows like this one are not listed.)")
+
+
+def _where(table: Table, row: int) -> str:
+    line = table.place(row).line
+    return f"row {row}" if line is None else f"line {line}"
 
 
 def _whole_table(table: Table) -> Iterator[Finding]:
@@ -62,14 +84,9 @@ def _cells(table: Table) -> Iterator[Finding]:
             if verdict and i not in column.faults:
                 said[i] = verdict
         rows = np.flatnonzero(np.isin(column.texts.codes, list(said))).tolist() if said else []
-        for row in rows[:MOST_ROWS]:
+        for row in rows:
             rule, level, why = said[int(column.texts.codes[row])]
             yield _at(table, row, rule, level, f"{in_quotes(column.texts[row])} {why}", column.condition.name)
-        if len(rows) > MOST_ROWS:
-            message = f"{len(rows) - MOST_ROWS:,} more rows of this column have such cells."
-            yield _at(
-                table, rows[MOST_ROWS], "more", said[int(column.texts.codes[rows[MOST_ROWS]])][1], message, column.condition.name
-            )
 
 
 def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
@@ -95,11 +112,11 @@ def _assets(table: Table) -> Iterator[Finding]:
         rows_of[asset].append(row)
     for asset, rows in rows_of.items():
         if not asset.strip():
-            for row in rows[:MOST_ROWS]:
+            for row in rows:
                 yield _at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
         elif len(rows) > 1:
-            for row in rows[1:MOST_ROWS]:
-                message = f"the asset {in_quotes(asset)} stands in row {rows[0]} too."
+            for row in rows[1:]:
+                message = f"the asset {in_quotes(asset)} stands in {_where(table, rows[0])} too."
                 yield _at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
 
 
@@ -110,9 +127,9 @@ def _identical(table: Table) -> Iterator[Finding]:
     meanings = [_meanings(column) for column in table.conditions]
     _, first, group = np.unique(np.stack(meanings, axis=1), axis=0, return_index=True, return_inverse=True)
     origin = first[group.reshape(-1)]
-    for row in np.flatnonzero(origin != np.arange(table.n_rows)).tolist()[:MOST_ROWS]:
+    for row in np.flatnonzero(origin != np.arange(table.n_rows)).tolist():
         other = int(origin[row])
-        message = f"every condition is the same as in row {other} ({in_quotes(table.assets[other])})."
+        message = f"every condition is the same as in {_where(table, other)} ({in_quotes(table.assets[other])})."
         yield _at(table, row, "identical-rows", "warning", message, None, (other,))
 
 

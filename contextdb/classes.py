@@ -313,7 +313,8 @@ def _intervals(cells: Sequence[Accepted | None], step: float) -> tuple[Pairs, Pa
         (i, layer, low, high) for i, c in enumerate(cells) if isinstance(c, NumberSet) for layer, (low, high) in enumerate(c.spans)
     ]
     owners, layers, lows, highs = np.array(found, np.float64).reshape(-1, 4).T
-    ends = np.maximum(np.nextafter(highs, np.inf), highs + step)
+    with np.errstate(over="ignore"):  # the number after the largest double is inf, as it shall be
+        ends = np.maximum(np.nextafter(highs, np.inf), highs + step)
     ends[np.isposinf(highs)] = np.nan
     return owners.astype(np.int64), layers.astype(np.int64), lows, ends
 
@@ -371,9 +372,14 @@ def _digit_masks(cell: Pairs, number: Pairs, codes: Codes, n_classes: int, shift
     return np.concatenate([upto ^ at, at, fine_upto])
 
 
+_EVERY_SET = TagSet(frozenset(("",)), frozenset(("",)), True)
+
+
 def _tag_masks(cells: Sequence[Accepted | None], codes: Codes) -> TagMasks:
     plain = [(i, c) for i, c in enumerate(cells) if isinstance(c, TagSet) and not c.is_complement]
     negated = [(i, c) for i, c in enumerate(cells) if isinstance(c, TagSet) and c.is_complement]
+    # "not not Any" accepts every set of tags and yet is not Any: as a negated contradiction it has a slot to say so.
+    negated += [(i, _EVERY_SET) for i, c in plain if not c.needs | c.bans]
     tags = tuple(sorted({t for _, c in plain for t in c.needs | c.bans}))
     slot_of = {t: slot for slot, t in enumerate(tags)}
     needs = [(i, 3 * slot_of[t]) for i, c in plain for t in c.needs]

@@ -6,6 +6,8 @@ row are worked out when they are asked for.
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,14 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask, intervals
-from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, format_cell, parse_cell
+from contextdb.cell_words import NUMBER_TEXT
+from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, format_cell, format_number, parse_cell, reads
 from contextdb.conditions import Condition
+from contextdb.domains import Domain
 from contextdb.errors import plural
 from contextdb.facts import Context, Fact, Unknown, describe
 from contextdb.matches import Matches
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
+
+FEW_DIGITS = 12
+"""A number of more characters than this is the work of rounding, not of a person: 29.990000000000002."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +119,7 @@ class Explanation:
         return np.lexsort((self._distances, self.n_failures))
 
     def __str__(self) -> str:
-        lines = [f"{plural(len(self.matches), 'row')} of {self.compiled.n_rows} valid"]
+        lines = [f"{len(self.matches)} of {plural(self.compiled.n_rows, 'row')} valid"]
         return "\n".join(lines + [str(r) for r, _ in zip(self, range(10), strict=False)])
 
     @cached_property
@@ -143,7 +150,8 @@ class Explanation:
         fact = self.facts[condition.name]
         if not isinstance(fact, float):
             return np.ones(len(column.codes))
-        cells = [parse_cell(t, condition.domain).accepts for t in column.texts]
+        held = np.bincount(column.codes, minlength=len(column.texts))  # a text that no row holds any more need not read
+        cells = [parse_cell(t, condition.domain).accepts if n else None for t, n in zip(column.texts, held, strict=True)]
         width = _width(condition, cells)
         return np.array([_distance(c, fact, width) for c in cells], np.float64)[column.codes]
 
@@ -151,9 +159,9 @@ class Explanation:
         condition = self.compiled.conditions[at]
         text = self.compiled.texts[at][row]
         fact = self.facts[condition.name]
-        cell = parse_cell(text, condition.domain)
-        mend = format_cell(Cell(widened(cell.accepts, fact)), condition.domain)
-        return Failure(condition.name, text, _with_unit(describe_fact(fact, condition), condition), mend)
+        return Failure(
+            condition.name, text, _with_unit(describe_fact(fact, condition), condition), mended(text, fact, condition.domain)
+        )
 
 
 def explain(compiled: CompiledTable, context: Context, unknown: Unknown = "error") -> Explanation:
@@ -166,13 +174,29 @@ def describe_fact(fact: Fact, condition: Condition) -> str:
     return format_cell(fact, condition.domain) if isinstance(fact, Cell) else describe(fact)
 
 
+def mended(text: str, fact: Fact, domain: Domain) -> str:
+    """The cell that holds what `text` says and the fact, or all values of a set-valued one; in few digits where that can be."""
+    accepts = parse_cell(text, domain).accepts
+    wider = widened(accepts, fact)
+    mend = format_cell(Cell(wider), domain)
+    if not (isinstance(accepts, NumberSet) and isinstance(fact, float)) or _most_digits(mend) <= FEW_DIGITS:
+        return mend
+    low, high = (end if end == fact else _shortened(end, accepts) for end in _stretch(accepts, fact))
+    in_old_words = f"{text} | {format_number(low)}..{format_number(high)}"
+    is_same = reads(in_old_words, domain) and parse_cell(in_old_words, domain).accepts == wider
+    return min((mend, in_old_words), key=_most_digits) if is_same else mend
+
+
 def widened(accepts: Accepted | None, fact: Fact) -> Accepted | None:
     """The smallest change of a cell's set so that it holds the fact; None (Any) where there is no small one."""
+    if isinstance(fact, Cell):
+        return _joined(accepts, fact.accepts)
     if isinstance(accepts, NumberSet) and isinstance(fact, float):
-        return _widened_numbers(accepts, fact)
-    if isinstance(accepts, ValueSet) and isinstance(fact, str):
-        values = accepts.values - {fact} if accepts.is_complement else accepts.values | {fact}
-        return ValueSet(values, accepts.is_complement)
+        stretch = _stretch(accepts, fact)
+        added = intervals.arc(*stretch) if accepts.is_circular else (stretch,)
+        return _joined(accepts, NumberSet(added, accepts.is_circular))
+    if isinstance(accepts, ValueSet) and isinstance(fact, (bool, str)):
+        return _joined(accepts, ValueSet(frozenset((fact,))))
     if isinstance(accepts, TagSet) and isinstance(fact, frozenset) and not accepts.is_complement:
         needs = frozenset(t for t in accepts.needs if covers(t, fact))
         bans = frozenset(t for t in accepts.bans if not covers(t, fact))
@@ -180,16 +204,36 @@ def widened(accepts: Accepted | None, fact: Fact) -> Accepted | None:
     return None
 
 
-def _widened_numbers(accepts: NumberSet, fact: float) -> NumberSet:
-    if not accepts.spans:
-        return NumberSet(((fact, fact),), accepts.is_circular)
-    ends = [end for span in accepts.spans for end in span]
-    near = min(ends, key=lambda end: _gap(end, fact, accepts.is_circular))
-    if not accepts.is_circular:
-        return NumberSet(intervals.union([*accepts.spans, (min(near, fact), max(near, fact))]))
-    turn = (fact - near + 180.0) % 360.0 - 180.0
-    bridge = intervals.arc(near, fact) if turn >= 0.0 else intervals.arc(fact, near)
-    return NumberSet(intervals.union([*accepts.spans, *bridge]), True)
+def _joined(one: Accepted | None, other: Accepted | None) -> Accepted | None:
+    """The values of both sets; None (Any) where they are all values, or no set that a cell can say."""
+    if isinstance(one, NumberSet) and isinstance(other, NumberSet):
+        return NumberSet(intervals.union([*one.spans, *other.spans]), one.is_circular)
+    if not (isinstance(one, ValueSet) and isinstance(other, ValueSet)):
+        return None
+    named = one.values | other.values
+    if not (one.is_complement or other.is_complement):
+        return None if named == {False, True} else ValueSet(named)
+    left_out = frozenset(v for v in named if not (one.holds(v) or other.holds(v)))
+    return ValueSet(left_out, True) if left_out else None
+
+
+def _stretch(accepts: NumberSet, fact: float) -> intervals.Span:
+    """From the nearest end of the set to the fact, or back where that is upwards; the fact alone where the set is empty."""
+    ends = [end for span in accepts.spans for end in span] or [fact]
+    near = min(ends, key=lambda end: (_gap(end, fact, accepts.is_circular), end if fact < 0.0 else -end))
+    low, high = min(near, fact), max(near, fact)
+    return (high, low) if accepts.is_circular and high - low > 180.0 else (low, high)
+
+
+def _most_digits(text: str) -> int:
+    """How long the longest number in a cell is."""
+    return max(map(len, re.findall(NUMBER_TEXT, text)), default=0)
+
+
+def _shortened(end: float, accepts: NumberSet) -> float:
+    """A number of few digits that the set holds, next to its end; the end itself where there is none."""
+    short = round(end, FEW_DIGITS - 4)
+    return short if accepts.holds(short) else end
 
 
 def _gap(end: float, fact: float, is_circular: bool) -> float:
@@ -205,7 +249,7 @@ def _width(condition: Condition, cells: list[Accepted | None]) -> float:
     if np.isfinite(domain.maximum - domain.minimum):
         return domain.maximum - domain.minimum or 1.0
     ends = [e for c in cells if isinstance(c, NumberSet) for span in c.spans for e in span if np.isfinite(e)]
-    return (max(ends) - min(ends)) if len(set(ends)) > 1 else 1.0
+    return min(max(ends) - min(ends), sys.float_info.max) if len(set(ends)) > 1 else 1.0
 
 
 def _distance(accepts: Accepted | None, fact: float, width: float) -> float:

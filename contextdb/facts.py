@@ -11,13 +11,14 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from numbers import Real
 from typing import Literal
 
 import numpy as np
 
 from contextdb.cell_words import truth_of
-from contextdb.cells import Cell, NumberSet, ValueSet, covers, format_number, parse_cell, parse_tags
+from contextdb.cells import Cell, NumberSet, TagSet, ValueSet, covers, format_number, parse_cell, parse_tags
 from contextdb.conditions import Condition
 from contextdb.domains import NUMERIC, wrap_angle
 from contextdb.errors import CellError, ContextError, Fault, Place, in_quotes, nearest, plural, shown, some
@@ -84,7 +85,7 @@ def read_fact(value: object, condition: Condition) -> Fact:
     if isinstance(value, FactSet):
         return _read_set(value.text, condition)
     if isinstance(value, Cell):
-        return value
+        return _checked_set(value, condition)
     kind = condition.domain.kind
     if kind in NUMERIC:
         return _read_number(value, condition)
@@ -140,10 +141,26 @@ def _is_slip(name: str, near: str) -> bool:
 
 
 def _fault(value: object, condition: Condition, mend: str = "", accepted: str = "") -> ContextError:
-    what = f"{type(value).__name__} {in_quotes(str(value))}"
+    what = f"{type(value).__name__} {in_quotes(_text_of(value))}"
     expected = accepted or _EXPECTED[condition.domain.kind]
     place = Place(column=condition.name)
     return ContextError(Fault(f"{what} is not a fact of type {condition.domain.kind}.", expected, mend, place, "wrong-fact"))
+
+
+def _text_of(value: object) -> str:
+    try:
+        return str(value)
+    except ValueError:  # a whole number of very many digits
+        return "…"
+
+
+def _checked_set(found: Cell, condition: Condition) -> Cell:
+    """A set of values that was read before, if it is one of the condition's own kind."""
+    kind = condition.domain.kind
+    accepts = NumberSet if kind in NUMERIC else TagSet if kind == "tags" else ValueSet
+    if found.accepts is None or (isinstance(found.accepts, accepts) and not found.is_soft and not found.is_empty):
+        return found
+    raise _fault(found, condition, accepted=f"a set of values of type {kind}")
 
 
 def _read_set(text: str, condition: Condition) -> Cell:
@@ -171,13 +188,15 @@ def _plain_if_single(found: Cell) -> Fact:
 def _read_number(value: object, condition: Condition) -> Fact:
     if isinstance(value, str):
         return _plain_if_single(_read_set(value, condition)) if value.strip() else None
-    if not isinstance(value, (Real, np.number, np.bool_)) or isinstance(value, complex):
+    if not isinstance(value, (Real, Decimal, np.integer, np.floating, np.bool_)):
         raise _fault(value, condition)
     try:
         number = float(value) + 0.0
-    except OverflowError:
+    except (OverflowError, ValueError):
         raise _fault(value, condition, accepted="a number that a double can hold") from None
     kind = condition.domain.kind
+    if math.isnan(number):
+        return None
     if kind == "angle":
         if math.isinf(number):
             raise _fault(value, condition)

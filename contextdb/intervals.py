@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterable
+from fractions import Fraction
 
 from contextdb.domains import wrap_angle
 
@@ -77,7 +78,7 @@ def whole(spans: Spans) -> Spans:
 
 def arc(low: float, high: float, is_low_open: bool = False, is_high_open: bool = False) -> Spans:
     """The angles from `low` upwards to `high`: through 180 where `high` lies behind, and all of them from 360 degrees on."""
-    turn = high - low
+    turn = _turn(low, high)
     first, last = wrap_angle(low), wrap_angle(high)
     if turn > 360.0 or (turn == 360.0 and not (is_low_open and is_high_open)):
         return (CIRCLE,)
@@ -88,6 +89,12 @@ def arc(low: float, high: float, is_low_open: bool = False, is_high_open: bool =
     if first <= last:
         return union([(start, end)])
     return union([(start, CIRCLE[1]), (-180.0, end)])
+
+
+def _turn(low: float, high: float) -> float | Fraction:
+    """high - low; exactly where rounding could make it 360."""
+    turn = high - low
+    return Fraction(high) - Fraction(low) if abs(turn - 360.0) < 1.0 else turn
 
 
 def _ceil(value: float) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping
 from functools import reduce
+from math import ldexp
 from operator import and_
 from typing import TYPE_CHECKING, Any
 
@@ -63,7 +64,7 @@ class LiveContext:
         """Set one fact. A wrong value raises ContextError, here or when next asked, and names the fact."""
         try:
             bounds, masks = self._lookups[name]
-            self._moving[name] = masks[value] if bounds is None else masks[bisect_right(bounds, value)]
+            self._moving[name] = masks[value] if bounds is None else masks[bisect_right(bounds, ldexp(value, 0))]
         except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
             self._set_carefully(name, value)
         else:
@@ -100,6 +101,7 @@ class LiveContext:
             Facts are missing and the context was made with unknown="error".
         """
         if self._odd:
+            self._read_unusual()
             self._refuse_missing()
         moving = self._moving
         if len(moving) != self._n_moving:
@@ -109,8 +111,7 @@ class LiveContext:
             for mask in moving.values():
                 bits &= mask
         except TypeError:
-            for name in [n for n, mask in moving.items() if mask is None]:
-                self._set_carefully(name, self._facts[name])
+            self._read_unusual()
             return self.matches()
         if self._odd:
             return self._set_matches(bits)
@@ -137,6 +138,11 @@ class LiveContext:
         self._odd.pop(name, None)
         if is_missing or every != some:
             self._odd[name] = (every, is_missing)
+
+    def _read_unusual(self) -> None:
+        """Read with care the values whose masks were not found in the usual way: NaN, numbers far out."""
+        for name in [n for n, mask in self._moving.items() if mask is None]:
+            self._set_carefully(name, self._facts[name])
 
     def _refuse_missing(self) -> None:
         missing = [c.name for c in self._compiled.conditions if self._odd.get(c.name, (0, False))[1]]

@@ -4,6 +4,8 @@ Reading thirty facts from a dict costs more than intersecting thirty masks, so t
 are joined (`contextdb.groups`), a nested dict for each group, whose leaves are the masks already intersected: `g0[c['a']][c['b']]`.
 Numbers are bisected.
 
+`ldexp(x, 0)` is the double that any number means, and refuses texts: a float32 would else be compared in its own precision.
+
 The function knows only the straight way. A missing fact, NaN, a wrong type, a set of values, a number past 2**53: everything
 unusual ends in an exception, and the caller then takes the careful way, which says what is wrong or answers it.
 """
@@ -34,7 +36,7 @@ SingleLookup = tuple[list[float] | None, Any]
 
 def build_lookup(columns: Sequence[Column], enabled: int, n_rows: int) -> Lookup:
     """A function from a context to its rows as an integer; raises whatever it raises when a fact is unusual."""
-    names: dict[str, Any] = {"bisect_right": bisect_right, "index": index}
+    names: dict[str, Any] = {"bisect_right": bisect_right, "index": index, "ldexp": math.ldexp}
     values = _value_terms([(c, m) for c, m in columns if isinstance(m, ValueMasks)], n_rows, names)
     numbers = [_term(i, c, m, names) for i, (c, m) in enumerate(columns) if not isinstance(m, ValueMasks)]
     if enabled != (1 << n_rows) - 1 or not values:
@@ -74,7 +76,7 @@ def _term(i: int, condition: Condition, masks: NumberMasks | WideMasks | TagMask
         names[f"f{i}"] = _careful_lookup(condition, masks)
         return f"f{i}({fact})"
     names[f"b{i}"], names[f"m{i}"] = _straight(condition, masks)
-    return f"m{i}[bisect_right(b{i}, {f'index({fact})' if condition.domain.kind == 'int' else fact})]"
+    return f"m{i}[bisect_right(b{i}, {f'index({fact})' if condition.domain.kind == 'int' else f'ldexp({fact}, 0)'})]"
 
 
 def single_lookup(condition: Condition, masks: ColumnMasks) -> SingleLookup:
@@ -173,7 +175,7 @@ def _wide_lookup(condition: Condition, masks: WideMasks) -> Callable[[Any], int]
     low, high = (-180.0, 180.0) if is_angle else (-EXACT, EXACT)
 
     def lookup(fact: Any) -> int:
-        value = index(fact) if is_int else fact
+        value = index(fact) if is_int else math.ldexp(fact, 0)
         if not low <= value < high:
             raise ValueError
         return masks.bits(bisect_right(bounds, value))

@@ -85,7 +85,7 @@ class Matches:
         return iter(self.indices.tolist())
 
     def __contains__(self, row: int) -> bool:
-        return 0 <= row < self.n_rows and bool(self.bits >> row & 1)
+        return 0 <= row < self.n_rows and bool(self.bits >> int(row) & 1)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Matches):

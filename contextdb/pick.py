@@ -2,24 +2,30 @@
 
     first               the first valid row of the file
     unique              the only valid row; two at once break the table's promise and raise PolicyError
-    collect, priority   of the rows with the highest priority one at random, by row weight, and not the one picked last
+    collect, priority   of the rows with the highest priority one at random, by row weight, and not the asset picked last
 
-Rows of weight 0 are never picked at random. When no row is left, the table's fallback is the answer.
+Rows of weight 0 are never picked at random, and hold no others back. When no row is left, the table's fallback is the answer.
 """
 
 from __future__ import annotations
 
 import random
+from collections import OrderedDict
 from typing import TYPE_CHECKING, Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from contextdb.errors import Fault, PolicyError, some
+from contextdb.bitmask import Rows
+from contextdb.errors import Fault, PolicyError, in_quotes, some
 from contextdb.matches import Matches
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
+
+
+MOST_KEPT = 1024
+"""How many generators of a kind that cannot be forgotten by itself are remembered."""
 
 
 class Rng(Protocol):
@@ -36,27 +42,36 @@ class Memory:
     def __init__(self) -> None:
         self._own = random.Random()
         self._last: WeakKeyDictionary[Rng, str] = WeakKeyDictionary()
-        self._last_of_others: str | None = None
+        self._kept: OrderedDict[int, tuple[Rng, str]] = OrderedDict()
+        """Generators that cannot be referred to weakly, as numpy's, by their id; the last used ones."""
+
+    def __len__(self) -> int:
+        return len(self._last) + len(self._kept)
 
     def rng(self, given: Rng | int | None) -> Rng:
         """The generator to use: the given one, one seeded with the given number, or the table's own."""
         if given is None:
             return self._own
-        return random.Random(given) if isinstance(given, int) else given
+        return random.Random(int(given)) if isinstance(given, (int, np.integer)) else given
 
     def last(self, rng: Rng) -> str | None:
         """The asset that this generator picked last."""
+        if id(rng) in self._kept:
+            return self._kept[id(rng)][1]
         try:
             return self._last.get(rng)
         except TypeError:
-            return self._last_of_others
+            return None
 
     def remember(self, rng: Rng, asset: str) -> None:
         """Keep what this generator picked."""
         try:
             self._last[rng] = asset
         except TypeError:
-            self._last_of_others = asset
+            self._kept[id(rng)] = rng, asset
+            self._kept.move_to_end(id(rng))
+            if len(self._kept) > MOST_KEPT:
+                self._kept.popitem(last=False)
 
 
 def pick(compiled: CompiledTable, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> str | None:
@@ -92,28 +107,29 @@ def pick_row(compiled: CompiledTable, matches: Matches, rng: Rng | int | None = 
     if compiled.policy == "unique" and len(rows) > 1:
         raise PolicyError(
             Fault(
-                f"{len(rows)} rows are valid at once: {some(matches.assets)}.",
+                f"{len(rows)} rows of {in_quotes(compiled.name)} are valid at once: {some(matches.assets)}.",
                 'one: the table\'s policy is "unique"',
                 rule="not-unique",
             )
         )
     if compiled.policy in ("first", "unique"):
         return int(rows[0])
+    return _weighted(compiled, rows, rng, last)
+
+
+def _weighted(compiled: CompiledTable, rows: Rows, rng: Rng | int | None, last: str | None) -> int | None:
+    rows = rows[compiled.row_weights[rows] > 0.0]
+    if not len(rows):
+        return None
     priorities = compiled.priorities[rows]
-    return _weighted(compiled, rows[priorities == priorities.max()].tolist(), rng, last)
-
-
-def _weighted(compiled: CompiledTable, rows: list[int], rng: Rng | int | None, last: str | None) -> int | None:
+    top = rows[priorities == priorities.max()].tolist()
     memory = compiled.memory
     source = memory.rng(rng)
     last = memory.last(source) if last is None else last
-    rows = [r for r in rows if compiled.row_weights[r] > 0.0]
-    fresh = [r for r in rows if compiled.assets[r] != last]
-    candidates = fresh or rows
-    if not candidates:
-        return None
-    sums = np.cumsum(compiled.row_weights[candidates])
+    candidates = [r for r in top if compiled.assets[r] != last] or top
+    weights = compiled.row_weights[candidates]
+    sums = np.cumsum(weights / weights.max())
     at = int(np.searchsorted(sums, source.random() * sums[-1], "right"))
-    row = candidates[min(at, len(candidates) - 1)]
+    row: int = candidates[min(at, len(candidates) - 1)]
     memory.remember(source, compiled.assets[row])
     return row

@@ -143,12 +143,12 @@ class Table:
     @cached_property
     def assets(self) -> list[str]:
         """The asset of each row."""
-        return self.text_column(self.asset_column).to_list()
+        return self.text_column(self.asset_column).to_list() if self.columns else []
 
     @property
     def asset_column(self) -> str:
         """The name of the column that names the assets."""
-        return self.settings.asset or self.columns[0].name
+        return self.settings.asset or (self.columns[0].name if self.columns else "")
 
     def text_column(self, name: str) -> TextColumn:
         """The texts of a column."""
@@ -196,25 +196,24 @@ class Table:
         for row, name, text in edits:
             at = self._column_at(name)
             if not 0 <= row < self.n_rows:
-                raise TableError(
-                    Fault(
-                        f"there is no row {row}.", f"rows 0 to {self.n_rows - 1}" if self.n_rows else "no row: the table is empty"
-                    )
-                )
+                raise TableError(self._no_row(row))
             changed[at] = changed.get(at, self.columns[at]).with_text(row, text)
         return self._with_columns([changed.get(i, c) for i, c in enumerate(self.columns)], self.origin)
 
     def with_rows(self, at: int, rows: Sequence[Mapping[str, str]]) -> Table:
         """The table with new rows before row `at`; columns that a row leaves out are empty (Any)."""
-        for row in rows:
-            for name in row:
-                self._column_at(name)
+        for name in (n for row in rows for n in row):
+            self._column_at(name)
+        if not 0 <= at <= self.n_rows:
+            raise TableError(Fault(f"there is no row {at}.", f"0 to {self.n_rows}, to insert before"))
         columns = [c.with_inserted(at, [row.get(c.name, "") for row in rows]) for c in self.columns]
         return self._with_columns(columns, np.insert(self.origin, at, np.full(len(rows), -1)))
 
     def with_rows_taken(self, rows: Sequence[int] | NDArray[np.int64]) -> Table:
         """The table of the given rows in the given order: deletes, moves, sorts."""
         taken = np.asarray(rows, np.int64)
+        for row in taken[(taken < 0) | (taken >= self.n_rows)][:1].tolist():
+            raise TableError(self._no_row(row))
         return self._with_columns([c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
 
     def save(self, path: str | Path | None = None) -> Table:
@@ -264,6 +263,10 @@ class Table:
     @cached_property
     def _plain(self) -> _PlainColumns:
         return _PlainColumns.read(self)
+
+    def _no_row(self, row: int) -> Fault:
+        accepted = f"rows 0 to {self.n_rows - 1}" if self.n_rows else "no row: the table is empty"
+        return Fault(f"there is no row {row}.", accepted)
 
     def _column_at(self, name: str) -> int:
         for at, column in enumerate(self.columns):

@@ -53,6 +53,11 @@ def check_path(text: str) -> CheckReport:
         files = list(table_files(folder, read_folder_schema(folder)))
     except ContextDBError as error:
         return CheckReport((), tuple(_as_findings(error, None)))
+    if not files:
+        accepted = f"a folder with {SCHEMA_FILE} and a .csv or .parquet file for each table"
+        return CheckReport(
+            (), (Finding("no-tables", "error", f"the folder holds no table. Accepted: {accepted}.", file=str(folder)),)
+        )
     return _check_files(files)
 
 

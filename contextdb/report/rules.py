@@ -32,6 +32,11 @@ RULES: dict[str, Rule] = {
         "The text of a cell is not in the grammar of its type.",
         "Write the cell as the message says is accepted, or correct the type of the condition in contextdb.toml.",
     ),
+    "unreadable-penalty": Rule(
+        "error",
+        "What stands after the ~ of a soft cell is no penalty.",
+        "Write a number from 0 up after the ~, such as 3..5 ~2.5, or put a text with a ~ in it in double quotes.",
+    ),
     "unknown-value": Rule(
         "error",
         "A cell names a value or a tag that the condition does not declare.",
@@ -82,10 +87,10 @@ RULES: dict[str, Rule] = {
         "Some lines of a file end in LF and some in CRLF.",
         "Nothing need be done; to have one kind, convert the file once and set `text` or `eol` in .gitattributes.",
     ),
-    "more": Rule(
+    "no-tables": Rule(
         "error",
-        "A column has more findings of a kind than are listed.",
-        "Mend the listed ones first; thousands of them often mean that the condition has the wrong type in contextdb.toml.",
+        "The folder holds no table.",
+        "Name the folder that holds contextdb.toml and the tables.",
     ),
 }
 """Every rule that a check may break, by name."""

@@ -1,0 +1,97 @@
+"""docs/messages.md: a section for each rule, examples that are true, and the words of the reports that carry their own help."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from contextdb import report
+from contextdb.commands.check_command import check_path
+from contextdb.findings import LEVELS
+from contextdb.report.rules import RULES, TABLE_RULES
+
+ROOT = Path(__file__).parent.parent.parent
+PAGE = (ROOT / "docs" / "messages.md").read_text(encoding="utf-8")
+SECTIONS = {
+    part.partition("\n")[0].strip(): part for part in re.split(r"^### ", re.sub(r"^## .*", "", PAGE, flags=re.M), flags=re.M)[1:]
+}
+RULE_ARGUMENT = {"Finding": 0, "_at": 2, "Fault": 4}
+"""Where calls that make a finding or a fault take the name of a rule."""
+
+
+def rules_in(tree: ast.AST) -> Iterator[str]:
+    """Every rule that a module names: as an argument, as a default, or before a level in a tuple."""
+    for node in ast.walk(tree):
+        found: list[ast.expr | None] = []
+        if isinstance(node, ast.keyword):
+            found = [node.value] if node.arg == "rule" else []
+        elif isinstance(node, ast.AnnAssign):
+            found = [node.value] if isinstance(node.target, ast.Name) and node.target.id == "rule" else []
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            at = RULE_ARGUMENT.get(node.func.id, len(node.args))
+            found = [*node.args[at : at + 1]]
+        elif isinstance(node, ast.Tuple):
+            found = [a for a, b in pairwise(node.elts) if isinstance(b, ast.Constant) and b.value in LEVELS]
+        yield from (f.value for f in found if isinstance(f, ast.Constant) and isinstance(f.value, str) and f.value not in LEVELS)
+
+
+def rules_of(*patterns: str) -> set[str]:
+    """Every rule that the modules of contextdb/ name."""
+    paths = [path for pattern in patterns for path in (ROOT / "contextdb").glob(pattern)]
+    return {rule for path in paths for rule in rules_in(ast.parse(path.read_text(encoding="utf-8")))}
+
+
+def fenced(section: str, language: str) -> str | None:
+    """The block of a language in a section."""
+    found = re.search(rf"^```{language}\n(.*?)^```$", section, re.M | re.S)
+    return found and found[1]
+
+
+EXAMPLES = [rule for rule, section in SECTIONS.items() if fenced(section, "csv")]
+
+
+def printed(section: str, folder: Path) -> str:
+    """What a check of a section's example prints."""
+    (folder / "example.csv").write_text(fenced(section, "csv") or "", encoding="utf-8")
+    (folder / "contextdb.toml").write_text(fenced(section, "toml") or "", encoding="utf-8")
+    return report.render("text", check_path("example.csv"))
+
+
+def test_every_rule_that_the_code_names_has_its_section_and_the_other_way_round():
+    assert rules_of("**/*.py") == set(SECTIONS)
+
+
+def test_every_rule_of_a_check_carries_its_own_help():
+    assert rules_of("check.py", "cell*.py", "table.py", "errors.py") <= set(RULES) <= rules_of("**/*.py")
+    assert set(TABLE_RULES) < set(RULES)
+
+
+def test_no_rule_has_two_sections():
+    assert len(re.findall(r"^### ", PAGE, re.M)) == len(SECTIONS)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_section_and_the_help_of_a_report_agree(rule: str):
+    words = " ".join(SECTIONS[rule].replace("`", "").split())
+    assert RULES[rule].summary.rstrip(".").replace("`", "") in words
+    assert "Cure: " in words
+    if rule != "more":
+        assert f"*{RULES[rule].level}*" in words
+
+
+@pytest.mark.parametrize("rule", SECTIONS)
+def test_every_section_tells_the_cure(rule: str):
+    assert re.search(r"^Cure: ", SECTIONS[rule], re.M)
+
+
+@pytest.mark.parametrize("rule", EXAMPLES)
+def test_an_example_is_found_as_the_page_says(rule: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    section = SECTIONS[rule]
+    assert printed(section, tmp_path) == fenced(section, "text")
+    assert {f.rule for f in check_path("example.csv").findings} == {rule}

@@ -1,10 +1,10 @@
 """What every answer is held to: each cell of each row read anew for one context, in the plainest way.
 
-Of contextdb only the data that a table is made of is used: texts, and what is declared of a condition. How cells are read, the intervals,
-the classes and the masks are done again here, slowly, with regular expressions and comparisons, so that a fault of theirs shows.
+Of contextdb only the data that a table is made of is used: texts, and what is declared of a condition. How cells are read, the
+intervals, the classes and the masks are done again here, slowly, with regular expressions and comparisons: their faults show.
 
-A fact is here as `contextdb.facts` would have it: bool, float, str or frozenset of tags; None is missing; a list holds the values of a
-set-valued fact.
+A fact is here as `contextdb.facts` would have it: bool, float, str or frozenset of tags; None is missing; a list holds the values
+of a set-valued fact.
 """
 
 from __future__ import annotations
@@ -140,9 +140,9 @@ def is_between(ends: Interval, fact: float) -> bool:
 
 def is_on_arc(part: str, fact: float) -> bool:
     """Whether some turn of the angle lies from the low end upwards to the high end; exact."""
-    if found := re.fullmatch(r".+?(?:,|±|\+-)\s*(.+)", part):
-        if float(found[1]) >= 180.0:
-            return True
+    tolerance = re.fullmatch(r".+?(?:,|±|\+-)\s*(.+)", part)
+    if tolerance and float(tolerance[1]) >= 180.0:
+        return True
     low, is_low_open, high, is_high_open = interval(part, -180.0, 180.0)
     start, stop, angle = Fraction(low), Fraction(high), Fraction(fact)
     stop += 360 * max(0, math.ceil((start - stop) / 360))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cache, lru_cache
 
 import numpy as np
 import oracles
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from contextdb.conditions import Condition
@@ -26,13 +29,33 @@ WHOLE = [0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 2.0**53 - 1, 2.0**53, 2.0**53 + 2, 1e300
 ANGLES = [0.0, -0.0, 0.1, 5.0, 90.0, 179.99999999999997, 180.0, 185.0, 190.0, 350.0, 360.0, 365.0, 540.0, 725.0]
 
 ANY_TEXTS = st.sampled_from(["Any", "-", "", " any "])
+ANY_SETS = st.sampled_from(["Any", "-", " any "])
+INDEX = st.integers(0, 59)
+BOOLEANS = st.booleans()
+ON_CIRCLE = st.sampled_from([-180.0, -90.0, 0.0, 90.0, 180.0]) | st.floats(-180.0, 180.0)
 NOTHING = {"int": "5..3", "number": "5..3", "angle": "(5..5)", "tags": "+Move.Run -Move"}
 """Cells that no fact matches, though each part of them could."""
+
+
+def examples(times: float) -> settings:
+    """So many times the examples that the profile asks for: see conftest.py."""
+    return settings(max_examples=math.ceil(times * settings.default.max_examples))
+
+
+def one_of(*values: object) -> st.SearchStrategy:
+    """One of a few values; the strategy is made once, which is most of the cost of drawing from it."""
+    return _one_of(values)
+
+
+@cache
+def _one_of(values: Sequence[object]) -> st.SearchStrategy:
+    return st.sampled_from(values)
 
 
 # ---- conditions
 
 
+@cache
 @st.composite
 def domains(draw: st.DrawFn, kinds: tuple[str, ...] = KINDS) -> Domain:
     """A domain of any kind, with declared values or bounds where the kind can have them."""
@@ -42,13 +65,14 @@ def domains(draw: st.DrawFn, kinds: tuple[str, ...] = KINDS) -> Domain:
     if kind == "tags":
         return Domain(kind, draw(st.none() | st.just(tuple(TAGS))))
     if kind in ("int", "number"):
-        return Domain(kind, None, draw(st.sampled_from([-math.inf, -5.0, 0.0, 0.5])), draw(st.sampled_from([math.inf, 10.0, 2.5])))
+        return Domain(kind, None, draw(one_of(-math.inf, -5.0, 0.0, 0.5)), draw(one_of(math.inf, 10.0, 2.5)))
     return Domain(kind)
 
 
 # ---- cells as texts
 
 
+@cache
 def numbers(kind: str) -> st.SearchStrategy[float]:
     """Numbers for the cells of a kind, those where doubles misbehave more often than others."""
     special = {"int": WHOLE, "number": NUMBERS, "angle": ANGLES}[kind]
@@ -58,6 +82,7 @@ def numbers(kind: str) -> st.SearchStrategy[float]:
     return signed | st.integers(-400, 400).map(lambda n: n / 2) | st.floats(-1000.0, 1000.0)
 
 
+@cache
 @st.composite
 def number_texts(draw: st.DrawFn, kind: str, is_finite: bool = False) -> str:
     """A number in one of the ways to write it."""
@@ -65,29 +90,33 @@ def number_texts(draw: st.DrawFn, kind: str, is_finite: bool = False) -> str:
     if is_finite and math.isinf(value):
         value = 7.0
     forms = [repr(value), f"{value:.17g}", repr(value).removesuffix(".0")]
-    return draw(st.sampled_from(forms if value < 0 or forms[0][0] == "-" else [*forms, "+" + forms[0]]))
+    forms += [] if forms[0][0] == "-" else ["+" + forms[0]]
+    return forms[draw(INDEX) % len(forms)]
 
 
+@cache
 @st.composite
 def intervals(draw: st.DrawFn, kind: str) -> str:
     """One part of a union of numbers."""
-    form = draw(st.integers(0, 4))
+    form = draw(INDEX) % 5
     if form == 0:
-        mark = draw(st.sampled_from([", ", ",", " ± ", "±", " +- "]))
+        mark = draw(one_of(", ", ",", " ± ", "±", " +- "))
         tolerance = abs(float(draw(number_texts(kind, is_finite=True))))
         return draw(number_texts(kind, is_finite=True)) + mark + repr(tolerance)
     if form == 1:
-        return draw(st.sampled_from(["", "=", "= "])) + draw(number_texts(kind))
-    if kind == "angle" and form < 4:
-        one = repr(draw(st.floats(-180.0, 180.0) | st.sampled_from([-180.0, -90.0, 0.0, 90.0, 180.0])))
-    else:
-        one = draw(number_texts(kind))
+        return draw(one_of("", "=", "= ")) + draw(number_texts(kind))
+    one = repr(draw(ON_CIRCLE)) if kind == "angle" and form < 4 else draw(number_texts(kind))
     if form == 2:
-        return draw(st.sampled_from(["<", "<=", "> ", ">="])) + one
+        return draw(one_of("<", "<=", "> ", ">=")) + one
     if form == 3:
-        return draw(st.sampled_from([f"{one}..", f"({one}..", f"[{one} ..", f"..{one}", f".. {one})", f"..{one}]"]))
-    left, right = draw(st.sampled_from(["", "(", "[ "])), draw(st.sampled_from(["", ")", " ]"]))
-    return left + one + draw(st.sampled_from(["..", " .. "])) + draw(number_texts(kind)) + right
+        return draw(one_of("{}..", "({}..", "[{} ..", "..{}", ".. {})", "..{}]")).format(one)
+    left, dots, right = draw(one_of("", "(", "[ ")), draw(one_of("..", " .. ")), draw(one_of("", ")", " ]"))
+    return left + one + dots + draw(number_texts(kind)) + right
+
+
+@cache
+def interval_lists(kind: str) -> st.SearchStrategy[list[str]]:
+    return st.lists(intervals(kind), min_size=1, max_size=3)
 
 
 def quoted(name: str, always: bool = False) -> str:
@@ -96,68 +125,82 @@ def quoted(name: str, always: bool = False) -> str:
     return name if bare and not always else '"' + name.replace('"', '""') + '"'
 
 
+@cache
 @st.composite
 def name_lists(draw: st.DrawFn, domain: Domain) -> str:
     known = domain.values or NAMES
     chosen = draw(st.lists(st.sampled_from(known), min_size=1, max_size=3))
-    return draw(st.sampled_from([" ", "  "])).join(quoted(n, draw(st.booleans())) for n in chosen)
+    return draw(one_of(" ", "  ")).join(quoted(n, draw(BOOLEANS)) for n in chosen)
 
 
 def known_tags(domain: Domain) -> list[str]:
     return [tag for tag in TAGS if domain.values is None or oracles.has(tag, frozenset(domain.values))]
 
 
+@cache
 @st.composite
 def tag_lists(draw: st.DrawFn, domain: Domain) -> str:
     chosen = draw(st.lists(st.sampled_from(known_tags(domain)), min_size=1, max_size=3))
-    return " ".join(draw(st.sampled_from("+-")) + quoted(t) for t in chosen)
+    return " ".join(draw(one_of("+", "-")) + quoted(t) for t in chosen)
 
 
+@cache
 @st.composite
 def sets(draw: st.DrawFn, domain: Domain) -> str:
     """A cell without a penalty: what may stand in a table and in a set-valued fact."""
     kind = domain.kind
     if kind == "bool":
-        body = draw(st.sampled_from(["True", "False", "yes", "no", "T", "f", "1", "0"]))
+        body = draw(one_of("True", "False", "yes", "no", "T", "f", "1", "0"))
     elif kind in ("enum", "text"):
         body = draw(name_lists(domain))
     elif kind == "tags":
         body = draw(tag_lists(domain))
     else:
-        body = " | ".join(draw(st.lists(intervals(kind), min_size=1, max_size=3)))
-    return draw(st.sampled_from(["", "", "", "not ", "NOT not "])) + body
+        body = " | ".join(draw(interval_lists(kind)))
+    return draw(one_of("", "", "", "not ", "NOT not ")) + body
 
 
+@cache
 @st.composite
 def cells(draw: st.DrawFn, domain: Domain) -> str:
     """A cell of any form, soft ones and those without any value included."""
-    form = draw(st.integers(0, 11))
+    form = draw(INDEX) % 12
     if form == 0:
         body = draw(ANY_TEXTS)
     elif form == 1:
-        body = draw(st.sampled_from(["not Any", NOTHING.get(domain.kind, "not -")]))
+        body = draw(one_of("not Any", NOTHING.get(domain.kind, "not -")))
     else:
         body = draw(sets(domain))
-    return body + (draw(st.sampled_from([" ~2.5", "~0", " ~ 1e-3"])) if form in (2, 3) else "")
+    return body + (draw(one_of(" ~2.5", "~0", " ~ 1e-3")) if form in (2, 3) else "")
 
 
 # ---- tables
 
 
+@cache
+def cell_lists(domain: Domain) -> st.SearchStrategy[list[str]]:
+    return st.lists(cells(domain), min_size=1, max_size=6)
+
+
+@cache
+def bytes_of(length: int) -> st.SearchStrategy[bytes]:
+    return st.binary(min_size=length, max_size=length)
+
+
 @st.composite
 def tables(draw: st.DrawFn, kinds: tuple[str, ...] = KINDS, most_conditions: int = 4, least_conditions: int = 0) -> Table:
     """A table of any size round the edges of words, from 0 conditions on; some have rows that are not enabled."""
-    n_rows = draw(st.sampled_from(N_ROWS))
+    n_rows = draw(one_of(*N_ROWS))
     names = CONDITIONS[: draw(st.integers(least_conditions, most_conditions))]
     conditions = {name: Condition(name, draw(domains(kinds))) for name in names}
     columns = {"Asset": [f"A{row % 50}" for row in range(n_rows)]}
     for name, condition in conditions.items():
-        texts = draw(st.lists(cells(condition.domain), min_size=1, max_size=6))
-        columns[name] = [texts[i % len(texts)] for i in draw(st.binary(min_size=n_rows, max_size=n_rows))]
+        texts = draw(cell_lists(condition.domain))
+        columns[name] = [texts[i % len(texts)] for i in draw(bytes_of(n_rows))]
     settings = TableSettings("table")
-    if draw(st.integers(0, 3)) == 0:
+    if draw(INDEX) % 4 == 1:
         settings = replace(settings, enabled="Enabled")
-        columns["Enabled"] = [("True", "false", "")[i % 3] for i in draw(st.binary(min_size=n_rows, max_size=n_rows))]
+        columns["Enabled"] = [("True", "false", "")[i % 3] for i in draw(bytes_of(n_rows))]
     return Table.from_columns(columns, replace(EMPTY, conditions=conditions), settings)
 
 
@@ -172,44 +215,52 @@ class Fact:
     plain: oracles.Plain | list[oracles.Plain]
 
 
+@lru_cache(500)
+def near(texts: tuple[str, ...], domain: Domain) -> st.SearchStrategy[oracles.Plain]:
+    """Values of which one lies in every part of the domain that the texts tell apart."""
+    return st.sampled_from(oracles.representatives(texts, domain))
+
+
+@lru_cache(500)
 @st.composite
 def plain_facts(draw: st.DrawFn, domain: Domain, texts: tuple[str, ...] = ()) -> Fact:
     """One value, most often near one that a cell of these texts names, in one of the types that Python has for it."""
     if domain.kind in ("int", "number", "angle"):
         return draw(number_facts(domain, texts))
-    more = ["+" + known_tags(domain)[0]] if domain.kind == "tags" else []
-    value = draw(st.sampled_from(oracles.representatives([*texts, *more], domain)))
+    more = ("+" + known_tags(domain)[0],) if domain.kind == "tags" else ()
+    value = draw(near(texts + more, domain))
     if domain.kind == "bool":
-        return Fact(draw(st.sampled_from([value, int(value), np.bool_(value), float(value)])), value)
+        return Fact(draw(one_of(bool, int, np.bool_, float))(value), value)
     if domain.kind == "tags":
-        return Fact(draw(st.sampled_from([value, set(value), sorted(value), tuple(sorted(value))])), value)
-    return Fact(draw(st.sampled_from([value, np.str_(value)])), value)
+        return Fact(draw(one_of(frozenset, set, sorted, tuple))(value), value)
+    return Fact(draw(one_of(str, np.str_))(value), value)
 
 
 @st.composite
 def number_facts(draw: st.DrawFn, domain: Domain, texts: tuple[str, ...]) -> Fact:
-    value = draw(st.sampled_from(oracles.representatives(texts, domain)))
+    value = draw(near(texts, domain))
     if domain.kind == "angle":
-        value += draw(st.sampled_from([0.0, 0.0, 360.0, -360.0, 720.0]))
+        value += draw(one_of(0.0, 0.0, 360.0, -360.0, 720.0))
     forms = [value, np.float64(value), np.float32(value) if abs(value) < 1e38 else value]
     forms += [-0.0] if value == 0.0 else []
     if math.isfinite(value):
         forms += [Fraction(value), Fraction(repr(value))]
         if value.is_integer():
             forms.append(int(value))
-    given = draw(st.sampled_from(forms))
+    given = forms[draw(INDEX) % len(forms)]
     return Fact(given, float(given) if domain.kind != "angle" else oracles.wrapped(float(given)))
 
 
+@lru_cache(500)
 @st.composite
 def set_facts(draw: st.DrawFn, domain: Domain, texts: tuple[str, ...] = ()) -> Fact:
     """A set of values, not empty, with enough of its values that every class of them is there."""
-    text = draw(ANY_TEXTS.filter(str.strip) | sets(domain))
+    text = draw(ANY_SETS | sets(domain))
     held = [v for v in oracles.representatives([*texts, text], domain) if oracles.accepts(text, domain, v)]
     if not held:
         text, held = "Any", oracles.representatives(texts, domain)
     is_plain_text_read = domain.kind in ("int", "number", "angle")
-    return Fact(draw(st.sampled_from([cell(text), text])) if is_plain_text_read else cell(text), held)
+    return Fact(text if is_plain_text_read and draw(BOOLEANS) else cell(text), held)
 
 
 MISSING = st.sampled_from([Fact(None, None), Fact(math.nan, None), Fact(np.float64(math.nan), None)])
@@ -226,11 +277,12 @@ def contexts(
         name, domain, texts = column.condition.name, column.condition.domain, column.texts.texts
         fact = draw(_facts(domain, texts, has_missing, has_sets))
         plain[name] = fact.plain
-        if fact.given is not None or draw(st.booleans()):
+        if fact.given is not None or draw(BOOLEANS):
             given[name] = fact.given
     return given, plain
 
 
+@lru_cache(500)
 def _facts(domain: Domain, texts: tuple[str, ...], has_missing: bool, has_sets: bool) -> st.SearchStrategy[Fact]:
     choices = [plain_facts(domain, texts)]
     choices += [MISSING] if has_missing else []

@@ -10,7 +10,7 @@ from pathlib import Path
 import oracles
 import pytest
 import strategies
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.cells import Cell, NumberSet, TagSet, ValueSet, format_cell, parse_cell
@@ -116,7 +116,7 @@ def read_or_refuse(text: str, domain: Domain) -> Cell | Fault:
 
 
 @given(DOMAINS, st.data())
-@settings(max_examples=400)
+@strategies.examples(4)
 def test_reading_what_is_written_gives_an_equal_cell(domain: Domain, data: st.DataObject):
     cell = parse_cell(data.draw(strategies.cells(domain)), domain)
     assert parse_cell(format_cell(cell, domain), domain) == cell
@@ -148,7 +148,7 @@ def test_reading_what_is_written_gives_an_equal_set_of_any_tags(needs: frozenset
 
 
 @given(DOMAINS, st.data())
-@settings(max_examples=300)
+@strategies.examples(3)
 def test_a_cell_holds_what_the_plainest_reading_of_it_says(domain: Domain, data: st.DataObject):
     text = data.draw(strategies.cells(domain))
     fact = data.draw(strategies.plain_facts(domain, (text,))).plain
@@ -156,14 +156,14 @@ def test_a_cell_holds_what_the_plainest_reading_of_it_says(domain: Domain, data:
 
 
 @given(ANY_TEXT, DOMAINS)
-@settings(max_examples=1000)
+@strategies.examples(10)
 def test_any_text_is_read_or_refused_with_its_find_and_what_is_accepted(text: str, domain: Domain):
     found = read_or_refuse(text, domain)
     assert isinstance(found, Cell) or (found.found and found.accepted)
 
 
 @given(ANY_TEXT, DOMAINS)
-@settings(max_examples=1000)
+@strategies.examples(10)
 def test_a_mend_that_is_offered_can_itself_be_read(text: str, domain: Domain):
     found = read_or_refuse(text, domain)
     if isinstance(found, Fault) and found.mend.isprintable() and "\\" not in found.mend and "…" not in found.mend:

@@ -173,7 +173,7 @@ def archive() -> bytes:
     ("raw", "kind"),
     [
         (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "a PNG image"),
-        (workbook(), 'an Excel workbook (.xlsx). Accepted: CSV text in UTF-8. Did you mean to save it as "CSV UTF-8"'),
+        (workbook(), 'an Excel workbook (.xlsx). Accepted: CSV text in UTF-8. Try to save it as "CSV UTF-8"'),
         (archive(), "a ZIP archive"),
         (b"PAR1\x15\x04\0\0", "a Parquet file. Accepted: CSV text in UTF-8. Did you mean the suffix .parquet?"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook (.xls)"),
@@ -195,14 +195,14 @@ def test_other_binary_data_is_refused_with_the_line_of_its_first_nul_byte():
 def test_utf16_is_named_and_utf8_asked_for(raw: bytes):
     assert fault_of(raw) == (
         "t.csv: the file is UTF-16 text. Accepted: UTF-8, with or without BOM. "
-        'Did you mean to save it as UTF-8 (Excel calls it "CSV UTF-8")?'
+        'Try to save it as UTF-8 (Excel calls it "CSV UTF-8").'
     )
 
 
 def test_bytes_of_an_old_encoding_are_refused_with_line_and_byte():
     assert fault_of("a,b\n1,2\ncafé,3\n".encode("latin-1")) == (
         't.csv, line 3: byte 0xE9 on this line is not UTF-8 (in Windows-1252 it would be "é"). '
-        'Accepted: UTF-8, with or without BOM. Did you mean to save it as UTF-8 (Excel calls it "CSV UTF-8")?'
+        'Accepted: UTF-8, with or without BOM. Try to save it as UTF-8 (Excel calls it "CSV UTF-8").'
     )
 
 
@@ -214,7 +214,7 @@ def test_another_delimiter_is_named(mark: str, said: str):
         .replace(f"20{mark}", "20,")
     )
     assert fault_of(text) == (
-        f"t.csv, line 2: the header has no comma but {said}. Accepted: commas between fields. Did you mean to save it with commas?"
+        f"t.csv, line 2: the header has no comma but {said}. Accepted: commas between fields. Try to save it with commas."
     )
 
 
@@ -227,7 +227,7 @@ def test_a_git_lfs_pointer_is_not_taken_for_a_table():
     raw = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
     assert (
         fault_of(raw)
-        == 't.csv: this is a Git LFS pointer, not the table itself. Accepted: the table. Did you mean to run "git lfs pull"?'
+        == 't.csv: this is a Git LFS pointer, not the table itself. Accepted: the table. Try to run "git lfs pull".'
     )
 
 

@@ -1,0 +1,379 @@
+"""Many contexts at once: counts, hits and masks are those of one query after another, in every form that columns come in."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import date
+from fractions import Fraction
+from unittest import mock
+
+import numpy as np
+import oracles
+import polars as pl
+import pytest
+import strategies
+from hypothesis import given
+from hypothesis import strategies as st
+
+import contextdb
+from contextdb import batch, bitmask, kernels
+from contextdb.batch import ManyMatches
+from contextdb.classes import FLAT_BYTES
+from contextdb.compiled import CompiledTable
+from contextdb.domains import NUMERIC, Domain
+from contextdb.errors import ContextError
+from contextdb.table import Table
+
+ENGINES = pytest.mark.parametrize("engine", [kernels, None], ids=["numba", "numpy"])
+COLUMNS = pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0, 100], ids=["flat", "wide", "mixed"])
+N_CONTEXTS = [0, 1, 2, 127, 128, 129, 300]
+
+
+@contextmanager
+def using(engine: object, flat_bytes: int = FLAT_BYTES) -> Iterator[None]:
+    """With or without the compiled kernels, however little the work; number columns whose masks take more bytes are wide."""
+    with mock.patch.object(batch, "load_kernels", return_value=engine), mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+        yield
+
+
+def assert_answers(many: ManyMatches, n_rows: int, expected: list[list[int]]) -> None:
+    """Every form of the answer tells the expected rows of each context."""
+    flags = np.zeros((len(expected), n_rows), np.bool_)
+    for context, rows in enumerate(expected):
+        flags[context, rows] = True
+    assert len(many) == len(expected)
+    assert (many.counts.dtype, many.hits.dtype, many.mask.dtype) == (np.int64, np.int64, np.uint64)
+    assert many.counts.tolist() == flags.sum(axis=1).tolist()
+    assert many.hits.tolist() == flags.sum(axis=0).tolist()
+    assert many.mask.shape == (len(expected), bitmask.n_words(n_rows))
+    assert many.mask.tolist() == bitmask.pack(flags).tolist()
+    assert [rows.tolist() for rows in many.lists()] == expected
+
+
+# ---- the forms that a column of facts comes in
+
+
+def as_list(facts: list[strategies.Fact], domain: Domain) -> object:
+    return [fact.given for fact in facts]
+
+
+def as_array(facts: list[strategies.Fact], domain: Domain) -> object:
+    plain = [fact.plain for fact in facts]
+    if domain.kind in NUMERIC:
+        return np.array([math.nan if value is None else value for value in plain], np.float64)
+    if domain.kind == "tags" or None in plain:
+        objects = np.empty(len(plain), np.object_)
+        objects[:] = plain
+        return objects
+    return np.array(plain, np.bool_ if domain.kind == "bool" else np.str_)
+
+
+def as_series(facts: list[strategies.Fact], domain: Domain) -> pl.Series:
+    plain = [sorted(fact.plain) if isinstance(fact.plain, frozenset) else fact.plain for fact in facts]
+    dtype = {"bool": pl.Boolean, "tags": pl.List(pl.String)}.get(domain.kind, pl.Float64 if domain.kind in NUMERIC else pl.String)
+    return pl.Series(plain, dtype=dtype)
+
+
+def as_narrow_series(facts: list[strategies.Fact], domain: Domain) -> pl.Series:
+    """Categories for texts, float32 for numbers that keep their value in it, whole numbers for those that are whole."""
+    series = as_series(facts, domain)
+    if domain.kind in ("enum", "text"):
+        return series.cast(pl.Categorical)
+    if domain.kind in NUMERIC and series.null_count() < len(series):
+        for dtype in (pl.Int16, pl.Int64, pl.Float32):
+            narrow = series.cast(dtype, strict=False)
+            if narrow.cast(pl.Float64).equals(series, null_equal=True):
+                return narrow
+    return series
+
+
+def as_enum_series(facts: list[strategies.Fact], domain: Domain) -> pl.Series:
+    """Polars enums whose values stand in an order of their own, with one that the condition may not know."""
+    series = as_series(facts, domain)
+    if domain.kind not in ("enum", "text"):
+        return series
+    return series.cast(pl.Enum(["(unused)", *sorted(set(series.drop_nulls()), reverse=True)]))
+
+
+FORMS: dict[str, Callable[[list[strategies.Fact], Domain], object]] = {
+    "lists": as_list,
+    "arrays": as_array,
+    "series": as_series,
+    "narrow": as_narrow_series,
+    "enums": as_enum_series,
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@ENGINES
+@COLUMNS
+@given(strategies.tables(least_conditions=1), st.sampled_from(["any", "never"]), st.data())
+@strategies.examples(0.25)
+def test_a_batch_finds_what_reading_every_cell_for_each_context_finds(flat_bytes, engine, form, table, unknown, data):
+    pools = {}
+    for column in table.conditions:
+        fact = strategies.plain_facts(column.condition.domain, column.texts.texts)
+        pools[column.condition.name] = data.draw(st.lists(fact | fact | strategies.MISSING, min_size=1, max_size=4))
+    steps = range(data.draw(st.sampled_from(N_CONTEXTS)))
+    chosen = {name: [pool[(i * 7 + i // 5) % len(pool)] for i in steps] for name, pool in pools.items()}
+    columns = {c.condition.name: FORMS[form](chosen[c.condition.name], c.condition.domain) for c in table.conditions}
+    contexts = pl.DataFrame(columns) if form in ("series", "narrow", "enums") else columns
+    known: dict[tuple[object, ...], list[int]] = {}
+    expected = []
+    for i in steps:
+        plain = {name: facts[i].plain for name, facts in chosen.items()}
+        key = tuple(plain.values())
+        known[key] = known[key] if key in known else oracles.rows(table, plain, unknown)
+        expected.append(known[key])
+    with using(engine, flat_bytes):
+        assert_answers(table.compile().query_many(contexts, unknown), table.n_rows, expected)
+
+
+@ENGINES
+@COLUMNS
+@given(strategies.tables(least_conditions=1), st.data())
+@strategies.examples(0.25)
+def test_the_codes_of_a_batch_are_those_of_each_context(flat_bytes, engine, table, data):
+    contexts = [data.draw(strategies.contexts(table, has_missing=True))[0] for _ in range(3)]
+    columns = {c.condition.name: [context.get(c.condition.name) for context in contexts] for c in table.conditions}
+    with using(engine, flat_bytes):
+        compiled = table.compile()
+        codes = compiled.query_many(columns, "never").codes
+    assert codes.dtype == np.int32
+    assert codes.tolist() == [compiled.encode(context, "never").tolist() for context in contexts]
+
+
+def big_table() -> Table:
+    n_rows = 200
+    return Table.from_columns(
+        {
+            "Asset": [f"A{r}" for r in range(n_rows)],
+            "speed": [f"{r % 17}..{r % 17 + 5}" for r in range(n_rows)],
+            "state": [("CB", "FS SS", "Any", "not CB")[r % 4] for r in range(n_rows)],
+            "tags": [("+InAir", "-InAir", "Any")[r % 3] for r in range(n_rows)],
+        },
+        {"speed": {"type": "number"}, "state": {"type": "enum", "values": ["CB", "FS", "SS"]}, "tags": {"type": "tags"}},
+    )
+
+
+@ENGINES
+def test_more_contexts_than_one_thread_and_one_block_takes_are_all_answered(engine):
+    table, n_contexts = big_table(), 2 * batch.THREAD_CONTEXTS + batch.NUMPY_BLOCK + 77
+    speeds, states, tags = np.arange(n_contexts) % 23, ["CB", "FS", "SS"], [["InAir"], []]
+    columns = {
+        "speed": speeds,
+        "state": [states[i % 3] for i in range(n_contexts)],
+        "tags": [tags[i % 2] for i in range(n_contexts)],
+    }
+    period = 23 * 3 * 2
+    one = [
+        oracles.rows(table, {"speed": float(i % 23), "state": states[i % 3], "tags": frozenset(tags[i % 2])}) for i in range(period)
+    ]
+    with using(engine), mock.patch("os.cpu_count", return_value=4):
+        many = table.compile().query_many(columns)
+        counts, hits = many.counts, many.hits
+    expected = [one[i % period] for i in range(n_contexts)]
+    assert counts.tolist() == [len(rows) for rows in expected]
+    assert hits.tolist() == np.bincount(np.concatenate(expected).astype(np.int64), minlength=table.n_rows).tolist()
+
+
+@ENGINES
+def test_a_table_without_conditions_answers_every_row_in_every_context(engine):
+    with using(engine):
+        assert_answers(Table.from_columns({"Asset": ["a", "b"]}).compile().query_many({"speed": [1, 2, 3]}), 2, [[0, 1]] * 3)
+
+
+@ENGINES
+def test_no_contexts_have_no_answers(engine):
+    with using(engine):
+        many = big_table().compile().query_many({"speed": [], "state": [], "tags": []})
+        assert_answers(many, 200, [])
+
+
+def test_the_kernels_are_loaded_when_there_is_much_work_or_they_are_there_already(monkeypatch):
+    assert batch.load_kernels(0) is kernels
+    monkeypatch.delitem(sys.modules, "contextdb.kernels")
+    assert batch.load_kernels(batch.MUCH_WORK - 1) is None
+    assert batch.load_kernels(batch.MUCH_WORK) is not None
+
+
+def test_without_numba_numpy_answers(monkeypatch):
+    monkeypatch.delattr(contextdb, "kernels")
+    monkeypatch.setitem(sys.modules, "contextdb.kernels", None)
+    assert batch.load_kernels() is None
+    compiled = big_table().compile()
+    context = {"speed": 3, "state": "CB", "tags": []}
+    assert compiled.query_codes(compiled.encode(context)) == compiled.query(context)
+    assert compiled.query_many({name: [fact] for name, fact in context.items()}).counts.tolist() == [len(compiled.query(context))]
+
+
+# ---- what is said of contexts that cannot be asked with
+
+TABLE = Table.from_columns(
+    {"Asset": ["run", "jump"], "speed": ["3..6", "Any"], "state": ["Ground", "Air"], "steps": ["1..2", "Any"]},
+    {
+        "speed": {"type": "number"},
+        "state": {"type": "enum", "values": ["Ground", "Air"]},
+        "steps": {"type": "int"},
+    },
+).compile()
+COLUMNS_GIVEN = {"speed": [1.0, 4.0, 5.0], "state": ["Ground", "Air", "Ground"], "steps": [1, 1, 2]}
+
+
+def said_of(changes: dict[str, object], unknown: str = "error", compiled: CompiledTable = TABLE) -> str:
+    columns = {name: column for name, column in {**COLUMNS_GIVEN, **changes}.items() if column is not ...}
+    with pytest.raises(ContextError) as caught:
+        compiled.query_many(columns, unknown)
+    return str(caught.value)
+
+
+def test_the_columns_of_these_tests_can_be_asked_with():
+    assert [rows.tolist() for rows in TABLE.query_many(COLUMNS_GIVEN).lists()] == [[], [1], [0]]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"speed": [1.0, 2.0]}, "the columns are not equally long"),
+        (
+            {"state": ["Ground", "Grond", "Air"]},
+            'row 1, column "state": "Grond" is not a declared value. Accepted: "Ground", "Air". Did you mean "Ground"?',
+        ),
+        ({"state": np.array(["Ground", "Air", "Ar"])}, 'row 2, column "state": "Ar" is not a declared value.'),
+        (
+            {"state": pl.Series(["Ground", "Air", "Ar"], dtype=pl.Categorical)},
+            'row 2, column "state": "Ar" is not a declared value.',
+        ),
+        ({"state": [1, 2, 3]}, 'row 0, column "state": int "1" is not a fact of type enum.'),
+        (
+            {"speed": [1.0, None, 2.0]},
+            'row 1, column "speed": the fact is missing in 1 context. Accepted: a value, or unknown="any" or "never".',
+        ),
+        ({"speed": np.array([1.0, math.nan, math.nan])}, 'row 1, column "speed": the fact is missing in 2 contexts.'),
+        ({"state": [None, "Air", None]}, 'row 0, column "state": the fact is missing in 2 contexts.'),
+        ({"speed": pl.Series([1.0, None, math.nan])}, 'row 1, column "speed": the fact is missing in 2 contexts.'),
+        ({"speed": ...}, 'the fact "speed" is missing.'),
+        ({"speed": ..., "sped": [1.0] * 3}, 'there is no condition "sped", and "speed" is missing.'),
+        ({"speed": ["fast"] * 3}, 'row 0, column "speed": cannot read "fast" as a number.'),
+        (
+            {"speed": [1.0, "0..5", 2.0]},
+            'row 1, column "speed": a set of values is for one query at a time. Accepted: one value in each context.',
+        ),
+        ({"state": [["Ground", "Air"]] * 3}, 'row 0, column "state": a set of values is for one query at a time.'),
+        ({"speed": [date(2024, 1, 1)] * 3}, 'row 0, column "speed": date "2024-01-01" is not a fact of type number.'),
+        ({"speed": [{}, {}, {}]}, 'row 0, column "speed": '),
+        (
+            {"steps": [1.0, 2.5, 3.0]},
+            'row 1, column "steps": float "2.5" is not a fact of type int. Accepted: a whole number. Did you mean 2?',
+        ),
+        ({"steps": np.array([1.0, 2.0, 2.5])}, 'row 2, column "steps": float "2.5" is not a fact of type int.'),
+    ],
+    ids=str,
+)
+def test_contexts_that_cannot_be_asked_with_are_refused_with_the_first_one(changes, message):
+    assert message in said_of(changes)
+
+
+@pytest.mark.parametrize("unknown", ["any", "never"])
+def test_a_misspelt_column_is_told_even_where_missing_facts_are_no_error(unknown):
+    assert 'there is no condition "sped", and "speed" is missing.' in said_of({"speed": ..., "sped": [1.0] * 3}, unknown)
+
+
+def test_an_unknown_treatment_of_missing_facts_is_told():
+    assert said_of({}, "anny") == (
+        'there is no treatment "anny" of missing facts. Accepted: "error", "any", "never". Did you mean "any"?'
+    )
+
+
+@pytest.mark.parametrize(
+    "contexts",
+    [
+        {**COLUMNS_GIVEN, "speed": 5.0},
+        {**COLUMNS_GIVEN, "state": "Air"},
+        {**COLUMNS_GIVEN, "speed": None},
+        {**COLUMNS_GIVEN, "speed": np.float64(5.0)},
+        {**COLUMNS_GIVEN, "speed": np.zeros((3, 2))},
+        {**COLUMNS_GIVEN, "state": {"Ground", "Air", "Swim"}},
+        {**COLUMNS_GIVEN, "speed": (v for v in (1.0, 2.0, 3.0))},
+        [{"speed": 1.0, "state": "Air", "steps": 1}],
+        pl.DataFrame(COLUMNS_GIVEN).lazy(),
+        "contexts.csv",
+        None,
+        5,
+    ],
+    ids=["number", "text", "nothing", "numpy number", "matrix", "set", "generator", "rows", "lazy frame", "path", "none", "five"],
+)
+def test_what_is_no_columns_of_facts_is_refused(contexts):
+    with pytest.raises(ContextError):
+        TABLE.query_many(contexts)
+
+
+def test_columns_that_no_condition_asks_for_are_passed_over():
+    many = TABLE.query_many({**COLUMNS_GIVEN, "weather": ["rain", None, object()]})
+    assert many.counts.tolist() == [0, 1, 1]
+
+
+TRUTHS = [
+    [0, 1, True],
+    [False, True, True],
+    np.array([0, 1, 1]),
+    pl.Series([0.0, 1.0, 1.0]),
+    [np.False_, 1.0, np.int8(1)],
+]
+
+
+@pytest.mark.parametrize("column", TRUTHS, ids=["mixed", "bool", "array", "series", "numpy"])
+def test_a_column_of_truth_may_be_of_zeros_and_ones(column):
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["True", "False"]}, {"x": {"type": "bool"}}).compile()
+    assert [rows.tolist() for rows in table.query_many({"x": column}).lists()] == [[1], [0], [0]]
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        [2**53 + 1, 5.5, 2**70],
+        [np.float32(2**53), Fraction(11, 2), 1e30],
+        ["9007199254740992", "5.5", "1e30"],
+        pl.Series(["9007199254740992", "5.5", "1e30"]),
+    ],
+    ids=["big integers", "mixed", "texts", "a series of texts"],
+)
+def test_a_column_of_numbers_may_be_mixed_and_very_large(column):
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["9007199254740992", "5..6"]}, {"x": {"type": "number"}}).compile()
+    assert [rows.tolist() for rows in table.query_many({"x": column}).lists()] == [[0], [1], []]
+
+
+def test_truth_of_numpy_among_other_things_makes_no_truth_of_them():
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["True", "False"]}, {"x": {"type": "bool"}}).compile()
+    many = table.query_many({"x": [np.False_, math.nan, None, 1.0]}, "never")
+    assert [rows.tolist() for rows in many.lists()] == [[1], [], [], [0]]
+    with pytest.raises(ContextError, match=r'row 1, column "x": float "2\.5" is not a fact of type bool'):
+        table.query_many({"x": [np.True_, 2.5]})
+
+
+def test_a_float32_among_other_numbers_makes_no_float32_of_them():
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["0.1", "1e300"]}, {"x": {"type": "number"}}).compile()
+    assert [rows.tolist() for rows in table.query_many({"x": [np.float32(2.5), 0.1, 1e300]}).lists()] == [[], [0], [1]]
+
+
+def test_a_column_of_angles_is_wrapped_exactly():
+    angles = [540.0, -180.0, 180.0, 170.0 + 360.0, 0.0, -0.0, 725.0, 1e17, -190.0]
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["170..-170", "0..5"]}, {"x": {"type": "angle"}}).compile()
+    expected = [[i for i, part in enumerate(["170..-170", "0..5"]) if oracles.is_on_arc(part, angle)] for angle in angles]
+    for column in (angles, np.array(angles), pl.Series(angles)):
+        assert [rows.tolist() for rows in table.query_many({"x": column}).lists()] == expected
+
+
+def test_a_frame_with_a_column_of_nulls_has_missing_facts():
+    frame = pl.DataFrame({"speed": pl.Series([None, None], dtype=pl.Null), "state": ["Ground", "Air"], "steps": [1, 2]})
+    assert [rows.tolist() for rows in TABLE.query_many(frame, "any").lists()] == [[0], [1]]
+    assert [rows.tolist() for rows in TABLE.query_many(frame, "never").lists()] == [[], [1]]
+
+
+def test_tags_may_be_lists_sets_or_texts():
+    table = Table.from_columns({"Asset": ["a", "b"], "x": ["+InAir", "-Move"]}, {"x": {"type": "tags"}}).compile()
+    for column in ([["InAir"], []], [{"InAir"}, set()], ["InAir", ""], pl.Series([["InAir"], []], dtype=pl.List(pl.String))):
+        assert [rows.tolist() for rows in table.query_many({"x": column}).lists()] == [[0, 1], [1]]

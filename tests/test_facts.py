@@ -1,0 +1,355 @@
+"""Facts: what a game may give, what it is taken for, and what is said of what cannot be taken."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import oracles
+import pytest
+import strategies
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contextdb.cells import Cell, parse_cell
+from contextdb.conditions import Condition
+from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.errors import ContextError
+from contextdb.facts import cell, check_mode, describe, missing_error, misspelt, read_fact, read_fact_text
+
+DEPTH = Domain("enum", ("CB", "FS", "Half Back", "5"))
+STATE = Domain("tags", ("InAir", "Stunned", "Move.Run"))
+SPEED = Domain("number", None, 0.0, 10.0)
+
+
+def short(value: object) -> str:
+    return value.kind if isinstance(value, Domain) else str(value)[:40]
+
+
+def read(value: object, domain: Domain) -> object:
+    return read_fact(value, Condition("x", domain))
+
+
+def refused(value: object, domain: Domain) -> str:
+    with pytest.raises(ContextError) as caught:
+        read(value, domain)
+    return str(caught.value)
+
+
+# ---- what is taken, and for what
+
+
+@pytest.mark.parametrize("value", [True, 1, 1.0, np.True_, np.int8(1)])
+def test_true_may_be_a_one(value):
+    assert read(value, BOOL) is True
+
+
+@pytest.mark.parametrize("value", [False, 0, 0.0, -0.0, np.False_])
+def test_false_may_be_a_nothing(value):
+    assert read(value, BOOL) is False
+
+
+FIVES = [5, 5.0, np.int16(5), np.float32(5), np.uint64(5), Fraction(5), "5", " =5 ", "5..5", cell("5..5")]
+
+
+@pytest.mark.parametrize("value", FIVES)
+@pytest.mark.parametrize("domain", [INT, NUMBER, ANGLE], ids=lambda domain: domain.kind)
+def test_a_number_may_be_of_any_number_type_or_a_text(value, domain):
+    fact = read(value, domain)
+    assert fact == 5.0 or (isinstance(fact, Cell) and fact == parse_cell("5", domain))
+    assert isinstance(fact, (float, Cell))
+
+
+@pytest.mark.parametrize("value", [True, np.True_])
+def test_true_may_count_as_one(value):
+    assert read(value, NUMBER) == 1.0
+
+
+def test_a_number_past_what_is_declared_is_taken_as_it_is():
+    assert read(12.5, SPEED) == 12.5
+
+
+@pytest.mark.parametrize("value", [-0.0, np.float64(-0.0), np.float32(-0.0), "-0.0"])
+def test_a_nothing_with_a_sign_is_a_nothing(value):
+    assert math.copysign(1.0, read(value, NUMBER)) == 1.0
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, np.float32("inf"), "inf"])
+@pytest.mark.parametrize("domain", [INT, NUMBER], ids=lambda domain: domain.kind)
+def test_a_number_may_be_infinite(value, domain):
+    assert math.isinf(read(value, domain))
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"), [(2**53 + 1, 2.0**53), (2**63, 2.0**63), (np.uint64(2**64 - 1), 2.0**64), (10**300, 1e300)]
+)
+def test_a_whole_number_past_2_to_the_53_is_taken_as_the_nearest_double(value, expected):
+    assert read(value, INT) == expected
+    assert read(value, NUMBER) == expected
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False) | st.integers(-5000, 5000))
+def test_an_angle_is_brought_onto_the_circle_exactly(value):
+    assert read(value, ANGLE) == oracles.wrapped(float(value))
+
+
+@pytest.mark.parametrize("value", ["CB", np.str_("CB")])
+def test_a_value_is_a_text(value):
+    assert read(value, DEPTH) == "CB"
+    assert type(read(value, DEPTH)) is str
+
+
+def test_a_text_may_be_any_text():
+    assert read("", TEXT) == ""
+    assert read("not Any ~2", TEXT) == "not Any ~2"
+
+
+@pytest.mark.parametrize(
+    "value", [{"InAir", "Stunned"}, ["InAir", "Stunned"], ("Stunned", "InAir"), "InAir Stunned", " InAir  Stunned "], ids=str
+)
+def test_tags_may_be_any_collection_of_texts_or_a_text(value):
+    assert read(value, STATE) == frozenset(("InAir", "Stunned"))
+
+
+def test_no_tags_are_a_fact_and_not_a_missing_one():
+    assert read([], STATE) == read("", STATE) == frozenset()
+
+
+def test_a_tag_over_declared_ones_is_declared():
+    assert read({"Move"}, STATE) == frozenset(("Move",))
+
+
+def test_a_tag_with_a_space_stands_in_quotes_in_a_text():
+    assert read('"Half Way" InAir', TAGS) == frozenset(("Half Way", "InAir"))
+
+
+@pytest.mark.parametrize("value", [None, math.nan, np.float32("nan"), np.float64("nan")])
+@pytest.mark.parametrize("domain", [BOOL, INT, NUMBER, ANGLE, TEXT, DEPTH, STATE], ids=lambda domain: domain.kind)
+def test_nothing_and_nan_are_missing_facts_of_every_type(value, domain):
+    assert read(value, domain) is None
+
+
+# ---- sets
+
+
+@given(strategies.domains(), st.data())
+def test_a_set_is_read_as_the_cell_that_it_is_written_as(domain, data):
+    text = data.draw(strategies.sets(domain))
+    expected = parse_cell(text, domain)
+    if expected.is_empty:
+        assert "a set that holds at least one value" in refused(cell(text), domain)
+    else:
+        assert read(cell(text), domain) == expected
+
+
+@pytest.mark.parametrize("domain", [INT, NUMBER, ANGLE], ids=lambda domain: domain.kind)
+def test_a_plain_text_of_a_number_is_a_set(domain):
+    assert read("0 ± 90", domain) == read(cell("0 ± 90"), domain) == parse_cell("0 ± 90", domain)
+
+
+def test_a_list_of_values_is_a_set_of_them():
+    assert read(["CB", "FS"], DEPTH) == read({"FS", "CB"}, DEPTH) == parse_cell("CB FS", DEPTH)
+    assert read(["left", "right"], TEXT) == parse_cell("left right", TEXT)
+
+
+def test_a_text_with_signs_is_a_set_of_tag_sets():
+    assert read("+InAir -Stunned", STATE) == read(cell("+InAir -Stunned"), STATE) == parse_cell("+InAir -Stunned", STATE)
+    assert read("not +InAir", STATE) == parse_cell("not +InAir", STATE)
+    assert read("Any", STATE) == Cell()
+
+
+# ---- what is refused, and in which words
+
+
+@pytest.mark.parametrize(
+    ("value", "domain", "message"),
+    [
+        ("True", BOOL, 'column "x": str "True" is not a fact of type bool. Accepted: True or False. Did you mean True?'),
+        ("off", BOOL, 'str "off" is not a fact of type bool. Accepted: True or False.'),
+        (2, BOOL, 'int "2" is not a fact of type bool. Accepted: True or False.'),
+        (0.5, BOOL, 'float "0.5" is not a fact of type bool. Accepted: True or False.'),
+        ([True], BOOL, "is not a fact of type bool. Accepted: True or False."),
+        (4.6, INT, 'float "4.6" is not a fact of type int. Accepted: a whole number. Did you mean 5?'),
+        (np.float32(4.5), INT, "is not a fact of type int. Accepted: a whole number."),
+        ("many", INT, 'column "x": cannot read "many" as an int.'),
+        ("fast", NUMBER, 'column "x": cannot read "fast" as a number. Accepted: "20, 9.99" (centre, tolerance)'),
+        ("10-30", NUMBER, 'Did you mean "10..30"?'),
+        ([1.0], NUMBER, 'list "[1.0]" is not a fact of type number. Accepted: a number.'),
+        ({}, NUMBER, 'dict "{}" is not a fact of type number. Accepted: a number.'),
+        (1j, NUMBER, 'complex "1j" is not a fact of type number. Accepted: a number.'),
+        (np.complex64(1 + 2j), NUMBER, "is not a fact of type number. Accepted: a number."),
+        (np.array([1.0, 2.0]), NUMBER, "is not a fact of type number. Accepted: a number."),
+        (10**400, NUMBER, "is not a fact of type number. Accepted: a number that a double can hold."),
+        (object, NUMBER, "is not a fact of type number. Accepted: a number."),
+        (math.inf, ANGLE, 'float "inf" is not a fact of type angle. Accepted: a finite number of degrees.'),
+        ("-inf", ANGLE, "is too large for a number"),
+        ("CV", DEPTH, '"CV" is not a declared value. Accepted: "CB", "FS", "Half Back", "5".'),
+        ("cb", DEPTH, 'column "x": "cb" is not a declared value. Accepted: "CB", "FS", "Half Back", "5". Did you mean "CB"?'),
+        ("half back", DEPTH, 'Did you mean "Half Back"?'),
+        (5, DEPTH, 'int "5" is not a fact of type enum. Accepted: one of its declared values.'),
+        (True, DEPTH, 'bool "True" is not a fact of type enum.'),
+        ([], DEPTH, 'list "[]" is not a fact of type enum.'),
+        (["CB", "FX"], DEPTH, '"FX" is not a declared value.'),
+        (["CB", 5], DEPTH, 'int "5" is not a fact of type enum.'),
+        (5, TEXT, 'int "5" is not a fact of type text. Accepted: a text.'),
+        (b"left", TEXT, "is not a fact of type text. Accepted: a text."),
+        ("InAr", STATE, '"InAr" is not a declared value. Accepted: "InAir", "Stunned", "Move.Run". Did you mean "InAir"?'),
+        ({"Move.Walk"}, STATE, '"Move.Walk" is not a declared value.'),
+        (["InAir", 5], STATE, 'int "5" is not a fact of type tags. Accepted: a set of texts.'),
+        (5, STATE, 'int "5" is not a fact of type tags. Accepted: a set of tags.'),
+        ({"InAir": True}, STATE, "is not a fact of type tags. Accepted: a set of tags."),
+        ("InAir,Stunned", STATE, "has characters that need quotes"),
+        (cell("0..5 ~2"), NUMBER, 'Accepted: a set without a penalty ("~").'),
+        (cell("5..3"), NUMBER, "Accepted: a set that holds at least one value."),
+        (cell("not Any"), BOOL, "Accepted: a set that holds at least one value."),
+        (cell("2.5"), INT, "Accepted: a set that holds at least one value."),
+        (cell("+Move.Run -Move"), STATE, "Accepted: a set that holds at least one value."),
+        (cell("20; 5"), NUMBER, 'Did you mean "20, 5"?'),
+        (cell("CB FX"), DEPTH, '"FX" is not a declared value.'),
+    ],
+    ids=short,
+)
+def test_a_fact_that_cannot_be_taken_is_refused_by_name_with_what_is_accepted(value, domain, message):
+    said = refused(value, domain)
+    assert message in said
+    assert said.startswith('column "x": ')
+
+
+def taken(value: object, domain: Domain) -> bool:
+    """Whether a value is taken, as one of the things that a fact can be, and not refused as a wrong fact."""
+    try:
+        fact = read(value, domain)
+    except ContextError:
+        return False
+    assert fact is None or isinstance(fact, (bool, float, str, frozenset, Cell))
+    return True
+
+
+@pytest.mark.parametrize("value", [Decimal("0.1"), Decimal("NaN"), 10**5000], ids=["decimal", "decimal nan", "very long"])
+def test_odd_numbers_are_taken_or_refused_and_never_crash(value):
+    assert taken(value, NUMBER) is isinstance(value, Decimal)
+
+
+ANYTHING = (
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.binary() | st.lists(st.text()) | st.just(object())
+)
+
+
+@given(strategies.domains(), ANYTHING)
+def test_any_value_whatsoever_is_taken_or_refused(domain, value):
+    assert taken(value, domain) in (True, False)
+
+
+def test_a_cell_of_another_type_is_refused_as_a_fact():
+    assert "is not a fact of type number" in refused(parse_cell("CB", DEPTH), NUMBER)
+    assert "is not a fact of type enum" in refused(parse_cell("0..5", NUMBER), DEPTH)
+
+
+def test_a_long_fact_is_shown_short():
+    assert len(refused("x" * 100_000, DEPTH)) < 400
+
+
+# ---- facts as texts, from a command line or a file
+
+
+@pytest.mark.parametrize(
+    ("text", "domain", "expected"),
+    [
+        ("true", BOOL, True),
+        ("No", BOOL, False),
+        (" 1 ", BOOL, True),
+        ("5", NUMBER, 5.0),
+        ("-0.0", NUMBER, 0.0),
+        ("540", ANGLE, -180.0),
+        ("5", INT, 5.0),
+        ("inf", NUMBER, math.inf),
+        ("CB", DEPTH, "CB"),
+        ("Half Back", DEPTH, "Half Back"),
+        ('"Half Back"', DEPTH, "Half Back"),
+        ("5", DEPTH, "5"),
+        ("left", TEXT, "left"),
+        ("5", TEXT, "5"),
+        ('"upper left"', TEXT, "upper left"),
+        ("InAir Stunned", STATE, frozenset(("InAir", "Stunned"))),
+    ],
+    ids=short,
+)
+def test_a_fact_as_text_is_the_value_it_says(text, domain, expected):
+    assert read_fact_text(text, Condition("x", domain)) == expected
+
+
+@pytest.mark.parametrize("domain", [BOOL, INT, NUMBER, ANGLE, TEXT, DEPTH, STATE], ids=lambda domain: domain.kind)
+def test_an_empty_text_is_a_missing_fact(domain):
+    assert read_fact_text("  ", Condition("x", domain)) is None
+
+
+@pytest.mark.parametrize("text", ["nan", "NaN"])
+def test_nan_as_text_is_a_missing_number(text):
+    assert read_fact_text(text, Condition("x", NUMBER)) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "domain"),
+    [
+        ("0..5", NUMBER),
+        ("0 ± 90", ANGLE),
+        (">5", INT),
+        ("CB FS", DEPTH),
+        ("not CB", DEPTH),
+        ("Any", BOOL),
+        ("left right", TEXT),
+        ("+InAir", STATE),
+    ],
+    ids=short,
+)
+def test_a_set_as_text_is_the_cell_it_says(text, domain):
+    assert read_fact_text(text, Condition("x", domain)) == parse_cell(text, domain)
+
+
+@given(strategies.domains(), st.data())
+def test_a_fact_is_described_in_a_text_that_reads_as_the_same_fact(domain, data):
+    fact = read_fact(data.draw(strategies.plain_facts(domain)).given, Condition("x", domain))
+    if domain.kind not in ("enum", "text", "tags"):
+        assert read_fact_text(describe(fact), Condition("x", domain)) == fact
+
+
+def test_facts_are_described_as_people_write_them():
+    assert describe(None) == "(missing)"
+    assert describe(frozenset()) == "(no tags)"
+    assert describe(frozenset(("Stunned", "InAir"))) == "InAir Stunned"
+    assert describe(True) == "True"
+    assert describe(0.1) == "0.1"
+    assert describe(5.0) == "5"
+    assert describe("CB") == "CB"
+
+
+# ---- words for what is missing
+
+
+def test_an_unknown_treatment_of_missing_facts_is_refused_with_the_nearest_one():
+    with pytest.raises(ContextError) as caught:
+        check_mode("eror")
+    assert str(caught.value) == (
+        'there is no treatment "eror" of missing facts. Accepted: "error", "any", "never". Did you mean "error"?'
+    )
+
+
+def test_a_missing_fact_is_named():
+    assert str(missing_error(["speed"], [])) == (
+        'the fact "speed" is missing. Accepted: a value for each condition, or unknown="any" or "never".'
+    )
+
+
+def test_many_missing_facts_are_counted_and_the_first_are_named():
+    said = str(missing_error([f"c{i}" for i in range(9)], []))
+    assert said.startswith('the fact "c0" is missing (9 facts missing: "c0", "c1", "c2", "c3", "c4", "c5" and 3 more).')
+
+
+def test_a_given_fact_that_is_nearly_a_missing_one_is_taken_for_a_slip():
+    assert str(misspelt(["speed"], ["colour", "sped"])) == (
+        'there is no condition "sped", and "speed" is missing. '
+        'Accepted: the names of the table\'s conditions. Did you mean "speed"?'
+    )
+    assert misspelt(["speed"], ["colour", "heading"]) is None

@@ -1,0 +1,244 @@
+"""Picks: one asset of the valid ones, by policy, priority and row weight, and not the one picked last."""
+
+from __future__ import annotations
+
+import gc
+import random
+from collections import Counter
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contextdb.compiled import CompiledTable
+from contextdb.errors import ContextError, PolicyError
+from contextdb.pick import MOST_KEPT, Memory, pick_row
+from contextdb.schema import TableSettings
+from contextdb.shapes import Policy
+from contextdb.table import Table
+
+
+def table_of(
+    policy: Policy, *rows: tuple[str, str] | tuple[str, str, str] | tuple[str, str, str, str], fallback: str | None = None
+) -> CompiledTable:
+    """Rows of asset, cell of the bool `x`, priority and weight."""
+    full = [(*row, *("", "")[len(row) - 2 :]) for row in rows]
+    columns = {name: [row[i] for row in full] for i, name in enumerate(("Asset", "x", "P", "W"))}
+    settings = TableSettings("t", priority="P", weight="W", policy=policy, fallback=fallback)
+    return Table.from_columns(columns, {"x": {"type": "bool"}}, settings, "t").compile()
+
+
+def picks(table: CompiledTable, n: int, seed: int = 1, last: str | None = None) -> list[str | None]:
+    rng = random.Random(seed)
+    return [table.pick({"x": True}, rng=rng, last=last) for _ in range(n)]
+
+
+ABC = table_of("collect", ("a", "True"), ("b", "Any"), ("c", "True"), ("d", "False"))
+
+
+# ---- policies
+
+
+def test_first_picks_the_first_valid_row_of_the_file():
+    table = table_of("first", ("a", "False"), ("b", "True", "0", "0"), ("c", "Any", "9", "9"))
+    assert set(picks(table, 5)) == {"b"}
+    assert table.pick({"x": False}) == "a"
+
+
+def test_unique_picks_the_only_valid_row():
+    table = table_of("unique", ("a", "True"), ("b", "False"))
+    assert (table.pick({"x": True}), table.pick({"x": False})) == ("a", "b")
+
+
+def test_unique_refuses_two_valid_rows_and_names_them():
+    table = table_of("unique", ("a", "True"), ("b", "Any"), ("c", "False"), fallback="z")
+    with pytest.raises(PolicyError) as caught:
+        table.pick({"x": True})
+    (fault,) = caught.value.faults
+    assert str(fault) == '2 rows of "t" are valid at once: "a", "b". Accepted: one: the table\'s policy is "unique".'
+    assert fault.rule == "not-unique"
+
+
+@pytest.mark.parametrize("policy", ["collect", "priority"])
+def test_the_highest_priority_is_picked_whatever_the_weights(policy: Policy):
+    table = table_of(policy, ("low", "Any", "-1", "1000"), ("high", "True", "2", "0.001"), ("also", "True", "2", "0.001"))
+    assert set(picks(table, 50)) == {"high", "also"}
+    assert table.pick({"x": False}, rng=1) == "low"
+
+
+@pytest.mark.parametrize("policy", ["collect", "priority", "first", "unique"])
+def test_without_a_valid_row_the_fallback_is_the_answer(policy: Policy):
+    assert table_of(policy, ("a", "False"), fallback="idle").pick({"x": True}) == "idle"
+    assert table_of(policy, ("a", "False")).pick({"x": True}) is None
+    assert table_of(policy, fallback="idle").pick({"x": True}) == "idle"
+
+
+@given(st.lists(st.tuples(st.booleans(), st.integers(0, 2), st.sampled_from([0.0, 0.5, 3.0])), max_size=8), st.integers())
+def test_a_random_pick_is_a_valid_row_of_the_highest_priority_that_has_a_weight(rows: list[tuple[bool, int, float]], seed: int):
+    table = table_of("collect", *((f"a{i}", str(x), str(p), str(w)) for i, (x, p, w) in enumerate(rows)))
+    may = [i for i, (x, _, w) in enumerate(rows) if x and w > 0]
+    top = max((rows[i][1] for i in may), default=None)
+    row = pick_row(table, table.query({"x": True}), seed)
+    assert row in [i for i in may if rows[i][1] == top] if may else row is None
+
+
+# ---- weights
+
+
+def test_rows_are_picked_in_proportion_to_their_weights():
+    weights = {"a": 1.0, "b": 2.0, "c": 4.0, "d": 0.5}
+    table = table_of("collect", *((name, "True", "", str(weight)) for name, weight in weights.items()))
+    n, seen = 6000, Counter(picks(table, 6000, last=""))
+    expected = {name: n * weight / sum(weights.values()) for name, weight in weights.items()}
+    chi_square = sum((seen[name] - expected[name]) ** 2 / expected[name] for name in weights)
+    assert chi_square < 16.3  # 3 degrees of freedom: exceeded once in a thousand seeds, and this seed is fixed
+
+
+def test_after_a_row_the_others_are_picked_in_proportion_to_their_weights():
+    table = table_of("collect", ("a", "True", "", "10"), ("b", "True", "", "1"), ("c", "True", "", "3"))
+    seen = Counter(picks(table, 4000, last="a"))
+    assert seen["a"] == 0
+    assert abs(seen["b"] - 1000) < 120  # four standard deviations
+
+
+def test_a_row_of_weight_0_is_never_picked_and_holds_no_other_back():
+    table = table_of("collect", ("never", "True", "9", "0"), ("a", "True", "", "1"), ("b", "True", "", "1"), fallback="idle")
+    assert set(picks(table, 50)) == {"a", "b"}
+    assert table_of("collect", ("never", "True", "", "0"), fallback="idle").pick({"x": True}) == "idle"
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("weight", ["1e308", "5e-324"])
+def test_weights_at_the_ends_of_the_doubles_are_shared_evenly(weight: str):
+    table = table_of("collect", *((name, "True", "", weight) for name in "abcd"))
+    assert all(400 < n < 600 for n in Counter(picks(table, 2000, last="")).values())
+
+
+# ---- no immediate repeats
+
+
+def test_no_asset_is_picked_twice_in_a_row():
+    seen = picks(ABC, 300)
+    assert set(seen) == {"a", "b", "c"}
+    assert all(one != next_one for one, next_one in pairwise(seen))
+
+
+def test_two_rows_of_one_asset_are_one_asset_for_repeats():
+    table = table_of("collect", ("a", "True"), ("a", "True"), ("b", "True"))
+    assert set(zip(picks(table, 40)[::2], picks(table, 40)[1::2], strict=True)) <= {("a", "b"), ("b", "a")}
+
+
+def test_the_only_valid_asset_is_repeated():
+    assert picks(table_of("collect", ("a", "True"), ("b", "False")), 3) == ["a", "a", "a"]
+
+
+def test_an_asset_of_higher_priority_is_repeated_before_a_lower_one_is_taken():
+    assert picks(table_of("priority", ("a", "True", "1"), ("b", "True", "0")), 3) == ["a", "a", "a"]
+
+
+def test_the_asset_not_to_repeat_can_be_given():
+    assert all(ABC.pick({"x": True}, rng=seed, last="a") != "a" for seed in range(30))
+
+
+MADE = [random.Random, np.random.default_rng]
+
+
+@pytest.mark.parametrize("make", MADE)
+def test_each_generator_has_its_own_memory(make):
+    one, two = make(1), make(2)
+    table = table_of("collect", ("a", "True"), ("b", "True"))
+    first, second = table.pick({"x": True}, rng=one), table.pick({"x": True}, rng=two)
+    for _ in range(20):
+        next_first, next_second = table.pick({"x": True}, rng=one), table.pick({"x": True}, rng=two)
+        assert (next_first != first, next_second != second) == (True, True)
+        first, second = next_first, next_second
+
+
+def test_the_tables_own_generator_does_not_repeat_itself_either():
+    seen = [ABC.pick({"x": True}) for _ in range(60)]
+    assert all(one != next_one for one, next_one in pairwise(seen))
+
+
+def test_two_tables_do_not_share_a_memory():
+    rng = random.Random(1)
+    one, two = table_of("collect", ("a", "True")), table_of("collect", ("a", "True"), ("b", "True", "", "1e-9"))
+    assert one.pick({"x": True}, rng=rng) == "a"
+    assert two.pick({"x": True}, rng=rng) == "a"
+
+
+def test_generators_that_are_gone_are_forgotten():
+    memory = Memory()
+    rng = random.Random(1)
+    memory.remember(rng, "a")
+    assert memory.last(rng) == "a"
+    del rng
+    gc.collect()
+    assert len(memory) == 0
+    for seed in range(MOST_KEPT + 10):
+        memory.remember(np.random.default_rng(seed), "a")
+    assert len(memory) == MOST_KEPT
+
+
+def test_a_generator_that_is_used_is_not_forgotten_for_others():
+    memory, hero = Memory(), np.random.default_rng(0)
+    for seed in range(2 * MOST_KEPT):
+        memory.remember(hero, f"asset {seed}")
+        memory.remember(np.random.default_rng(seed), "a")
+    assert memory.last(hero) == f"asset {2 * MOST_KEPT - 1}"
+
+
+# ---- chance
+
+
+@pytest.mark.parametrize("make", MADE)
+def test_the_same_seed_gives_the_same_picks(make):
+    def play() -> list[str | None]:
+        table = table_of("collect", ("a", "True"), ("b", "True"), ("c", "True"), ("d", "True"))
+        rng = make(7)
+        return [table.pick({"x": True}, rng=rng) for _ in range(30)]
+
+    assert play() == play()
+
+
+@pytest.mark.parametrize("seed", [3, np.int64(3), np.uint8(3)])
+def test_a_number_as_generator_is_a_seed(seed):
+    assert ABC.pick({"x": True}, rng=seed) == ABC.pick({"x": True}, rng=3)
+    assert len({ABC.pick({"x": True}, rng=n) for n in range(20)}) == 3
+
+
+class Edge:
+    """A generator at the edge of what it may give."""
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+    def random(self) -> float:
+        return self.value
+
+
+@pytest.mark.parametrize(("value", "asset"), [(0.0, "b"), (1.0 - 2.0**-53, "c")])
+def test_the_least_and_the_greatest_chance_pick_rows_that_have_a_weight(value: float, asset: str):
+    table = table_of("collect", *((n, "True", "", w) for n, w in [("a", "0"), ("b", "0.1"), ("c", "0.1"), ("d", "0")]))
+    assert table.pick({"x": True}, rng=Edge(value)) == asset
+
+
+# ---- what is given
+
+
+def test_an_answer_can_be_picked_from_as_well_as_a_context():
+    matches = ABC.query({"x": False})
+    assert {ABC.pick(matches, rng=seed) for seed in range(20)} == {"b", "d"}
+
+
+def test_missing_facts_are_treated_as_said():
+    assert ABC.pick({}, rng=1, unknown="never") == "b"
+    with pytest.raises(ContextError, match='the fact "x" is missing'):
+        ABC.pick({}, rng=1)
+
+
+def test_disabled_rows_are_never_picked():
+    columns = {"Asset": ["a", "b"], "On": ["False", "True"], "x": ["Any", "Any"]}
+    table = Table.from_columns(columns, {"x": {"type": "bool"}}, TableSettings("t", enabled="On")).compile()
+    assert {table.pick({"x": True}, rng=seed) for seed in range(10)} == {"b"}

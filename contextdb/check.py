@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from contextdb import intervals
-from contextdb.cells import Cell, NumberSet
+from contextdb.cells import Cell, NumberSet, format_number
 from contextdb.domains import Domain
 from contextdb.errors import in_quotes, nearest
 from contextdb.findings import Finding, Level
 from contextdb.source import Source
 from contextdb.table import ConditionColumn, Table
 
+LINE_ENDS = {"\n": "LF", "\r\n": "CRLF", "\r": "CR"}
 MOST_ROWS = 1000
 """A rule reports at most so many rows of one column, then says how many more there are."""
 
@@ -52,9 +52,9 @@ def _whole_table(table: Table) -> Iterator[Finding]:
     if table.n_rows == 0:
         yield Finding("no-rows", "warning", "the table has no rows, so no context has an asset.", table.name, file)
     if isinstance(table.source, Source) and len(table.source.line_ends) > 1:
-        yield Finding(
-            "mixed-line-ends", "info", "some lines end in LF and some in CRLF; they are kept as they are.", table.name, file
-        )
+        ends = ", ".join(f"{n:,} in {LINE_ENDS[end]}" for end, n in table.source.line_ends.items())
+        message = f"the lines end in different ways: {ends}; they are kept as they are."
+        yield Finding("mixed-line-ends", "info", message, table.name, file)
     for column in table.conditions:
         if not column.condition.is_declared:
             yield _undeclared(table, column, file)
@@ -92,18 +92,29 @@ def _cells(table: Table) -> Iterator[Finding]:
 def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
     """The rule that a cell breaks, its level and why."""
     if cell.is_empty:
-        return "empty-cell", "error", "accepts no value at all, so the row never matches."
+        so = "its penalty always counts" if cell.is_soft else "the row never matches"
+        return "empty-cell", "error", f"accepts no value at all, so {so}."
     if not isinstance(cell.accepts, NumberSet) or domain.kind == "angle":
         return None
     low, high = domain.minimum, domain.maximum
     spans = cell.accepts.spans
-    bounds = f"the declared {low:g} to {high:g}"
+    bounds = _declared(low, high)
     if spans[-1][1] < low or spans[0][0] > high:
         return "outside-domain", "warning", f"lies wholly outside {bounds}, so the row matches no expected value."
     ends = [e for span in spans for e in span if np.isfinite(e)]
-    if ends and (intervals.above(max(ends)) < low or min(ends) < low or max(ends) > high):
+    if ends and (min(ends) < low or max(ends) > high):
         return "beyond-domain", "info", f"reaches beyond {bounds}."
     return None
+
+
+def _declared(low: float, high: float) -> str:
+    if np.isinf(high):
+        return f"the declared min {format_number(low)}"
+    return (
+        f"the declared max {format_number(high)}"
+        if np.isinf(low)
+        else f"the declared {format_number(low)} to {format_number(high)}"
+    )
 
 
 def _assets(table: Table) -> Iterator[Finding]:
@@ -121,10 +132,11 @@ def _assets(table: Table) -> Iterator[Finding]:
 
 
 def _identical(table: Table) -> Iterator[Finding]:
-    """Rows whose every condition accepts the same values, whatever way it is written."""
+    """Rows whose every condition accepts the same values, whatever way it is written. A disabled row is like no other."""
     if table.n_rows < 2 or not table.conditions:
         return
-    meanings = [_meanings(column) for column in table.conditions]
+    disabled = np.where(table.enabled, -1, np.arange(table.n_rows))
+    meanings = [disabled, *(_meanings(column) for column in table.conditions)]
     _, first, group = np.unique(np.stack(meanings, axis=1), axis=0, return_index=True, return_inverse=True)
     origin = first[group.reshape(-1)]
     for row in np.flatnonzero(origin != np.arange(table.n_rows)).tolist():

@@ -42,10 +42,16 @@ def infer_condition(column: TextColumn) -> Condition:
     counts = np.bincount(column.codes, minlength=len(column.texts))
     said = {t: int(n) for t, n in zip(column.texts, counts, strict=True) if t.strip().casefold() not in _ANY_WORDS}
     domains = [BOOL, NUMBER, TAGS] if {t.strip() for t in said} - _DIGITS else [NUMBER]
-    domain = next((d for d in domains if _readable_share(said, d) >= READABLE_SHARE), TEXT)
+    domain = next((d for d in domains if said and _mostly_reads(said, d)), TEXT)
     return Condition(column.name, domain, is_declared=False)
 
 
-def _readable_share(said: dict[str, int], domain: Domain) -> float:
+def _mostly_reads(said: dict[str, int], domain: Domain) -> bool:
+    """Whether most rows read as a domain, the commonest texts first; stops at the row that decides it is not so."""
     total = sum(said.values())
-    return sum(n for t, n in said.items() if reads(t, domain)) / total if total else 0.0
+    may_fail = total - READABLE_SHARE * total
+    for text, n_rows in sorted(said.items(), key=lambda item: -item[1]):
+        may_fail -= 0 if reads(text, domain) else n_rows
+        if may_fail < 0:
+            return False
+    return True

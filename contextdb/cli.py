@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
+import textwrap
 from collections.abc import Sequence
 from importlib import import_module
-from typing import NoReturn
+from types import ModuleType
+from typing import Any, NoReturn
 
-from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
+from contextdb.console import drop_output, printable
+from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
 from contextdb.exit_codes import ExitCode
 
 COMMANDS = {
@@ -24,11 +26,36 @@ COMMANDS = {
 class Parser(argparse.ArgumentParser):
     """An argument parser whose errors name the nearest thing that would have been right."""
 
+    def parse(self, given: Sequence[str]) -> argparse.Namespace:
+        """The arguments; options may stand anywhere between the others."""
+        arguments, rest = self.parse_known_intermixed_args(given)
+        for text in rest:
+            if not text.startswith("-"):
+                self.error(f"{in_quotes(text)} is one argument too many.")
+            near = nearest(text.partition("=")[0], self._option_string_actions)
+            self.error(Fault(f"there is no option {in_quotes(text)}.", mend=in_quotes(near) if near else "").message)
+        return arguments
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            known = [str(c) for c in action.choices]
+            near = nearest(str(value), known)
+            fault = Fault(f"there is no {in_quotes(str(value))}.", some(known, len(known)), in_quotes(near) if near else "")
+            raise argparse.ArgumentError(action, fault.message)
+
     def error(self, message: str) -> NoReturn:
         """Print what is wrong and how to see the help, and leave with code 2."""
-        print(f"{self.prog}: {message}", file=sys.stderr)
+        print(printable(f"{self.prog}: {message}"), file=sys.stderr)
         print(f'Try "{self.prog} --help".', file=sys.stderr)
         sys.exit(ExitCode.BAD_USE)
+
+
+class Help(argparse.HelpFormatter):
+    """Help whose paragraphs are wrapped to the terminal, and whose indented lines stay as they are."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        paragraphs = text.strip().split("\n\n")
+        return "\n\n".join(p if p.startswith(" ") else textwrap.fill(" ".join(p.split()), width) for p in paragraphs)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,36 +63,59 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     _use_utf8()
     try:
-        return _run(given)
+        code = _run(given)
+        sys.stdout.flush()
+        return code
     except ContextDBError as error:
-        for fault in error.faults:
-            print(f"contextdb: {fault}", file=sys.stderr)
-        return ExitCode.BAD_USE
+        return _failed(*error.faults)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        drop_output()
         return ExitCode.OK
+    except OSError as error:
+        drop_output()
+        place = Place(str(error.filename)) if error.filename else Place("standard output")
+        return _failed(Fault(f"{error.strerror or error}.", place=place))
     except KeyboardInterrupt:
         print("contextdb: interrupted", file=sys.stderr)
         return ExitCode.INTERRUPTED
 
 
+def _failed(*faults: Fault) -> ExitCode:
+    for fault in faults:
+        print(printable(f"contextdb: {fault}"), file=sys.stderr)
+    return ExitCode.BAD_USE
+
+
 def _run(given: Sequence[str]) -> int:
-    if not given or given[0] in ("-h", "--help", "help"):
-        print(_overview(), end="")
+    if not given or given[0] in ("-h", "--help"):
+        print(_overview(), end="", file=sys.stdout if given else sys.stderr)
         return ExitCode.OK if given else ExitCode.BAD_USE
     if given[0] == "--version":
         from contextdb import __version__
 
         print(f"contextdb {__version__}")
         return ExitCode.OK
-    name = given[0]
+    if given[0] == "help":
+        return _run([*given[1:2], "--help"])
+    command = _command(given[0])
+    try:
+        return int(command.run(_parser(given[0], command).parse(given[1:])))
+    except SystemExit as leaving:  # how argparse ends after --help and after an error
+        sys.stdout.flush()
+        return int(leaving.code or 0)
+
+
+def _command(name: str) -> ModuleType:
     if name not in COMMANDS:
         near = nearest(name, COMMANDS)
         raise ContextDBError(Fault(f"there is no command {in_quotes(name)}.", ", ".join(COMMANDS), in_quotes(near) if near else ""))
-    command = import_module(f"contextdb.commands.{name}_command")
-    own = Parser(prog=f"contextdb {name}", description=command.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    command.add_arguments(own)
-    return int(command.run(own.parse_intermixed_args(given[1:])))
+    return import_module(f"contextdb.commands.{name}_command")
+
+
+def _parser(name: str, command: ModuleType) -> Parser:
+    parser = Parser(prog=f"contextdb {name}", description=command.__doc__, formatter_class=Help, allow_abbrev=False)
+    command.add_arguments(parser)
+    return parser
 
 
 def _overview() -> str:
@@ -79,10 +129,11 @@ def _overview() -> str:
 
 
 def _use_utf8() -> None:
-    """Write UTF-8 where the terminal's encoding could not take a name; a pipe on Windows is such a place."""
+    """Write UTF-8 also where the terminal's encoding is another, and what is no character as its escape."""
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
-            stream.reconfigure(encoding="utf-8", errors="backslashreplace")
+        if hasattr(stream, "reconfigure"):
+            is_utf8 = (stream.encoding or "").lower().replace("-", "") == "utf8"
+            stream.reconfigure(encoding=None if is_utf8 else "utf-8", errors="backslashreplace")
 
 
 if __name__ == "__main__":

@@ -7,11 +7,30 @@ import shutil
 import sys
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import IO, TypeVar
 
 Item = TypeVar("Item")
 
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}
+
+
+@contextmanager
+def output() -> Iterator[None]:
+    """Print to a reader who may stop reading, as `head` does: the rest is dropped, and the command comes to its exit code."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        drop_output()
+
+
+def drop_output() -> None:
+    """Send standard output nowhere from now on, what still waits to be written included."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    with suppress(OSError, ValueError):  # a test's standard output has no number
+        os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
 
 
 def wants_colour(stream: IO[str]) -> bool:

@@ -2,39 +2,54 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
+from contextdb.artefact import SUFFIX
 from contextdb.compiled import CompiledTable
-from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest, plural, some
-from contextdb.project import SCHEMA_FILE, TABLE_SUFFIXES, load_table, read_folder_schema, table_files
+from contextdb.errors import Fault, FileError, Place, TableError, nearest, plural, shown
+from contextdb.project import SCHEMA_FILE, TABLE_SUFFIXES, load_table, path_in_quotes, read_folder_schema, table_files, twice_named
 
 FOLDERS = (Path(), Path("tables"))
+MOST_NAMED = 6
 
 
 def open_compiled(text: str) -> CompiledTable:
     """The compiled table that TABLE means: a .safetensors artefact opened, or a table read and compiled."""
-    if text.endswith(".safetensors") and Path(text).exists():
-        return CompiledTable.open(text)
-    return load_table(table_path(text)).compile()
+    path = table_path(text)
+    return CompiledTable.open(path) if path.suffix == SUFFIX else load_table(path).compile()
 
 
 def table_path(text: str) -> Path:
-    """The file of the table that TABLE means."""
+    """The file of the table that TABLE means.
+
+    Raises
+    ------
+    FileError, TableError, SchemaError
+        There is no such table (with the nearest there is), more than one is meant, or a contextdb.toml cannot be read.
+    """
     path = Path(text)
-    if path.is_file():
-        return path
-    if path.is_dir():
+    if os.path.isdir(text):  # os.path says no, where Path raises, to a name that no file can have
         return _only_table(path)
-    known = {name: file for folder in FOLDERS for name, file in _tables_in(folder)}
-    if text in known:
-        return known[text]
-    raise _no_table(path, list(known))
+    if os.path.exists(text):
+        return path
+    tables = [_tables_in(folder) for folder in FOLDERS]
+    for here in tables:
+        named = [(name, file) for name, file in here if name == text]
+        if faults := twice_named(named):
+            raise TableError(*faults)
+        if named:
+            return named[0][1]
+    raise _no_table(path, [word for here in tables for name, file in here for word in (name, str(file))])
 
 
 def _only_table(folder: Path) -> Path:
     tables = _tables_in(folder)
     if len(tables) != 1:
-        names = some(str(file) for _, file in tables) or f"a folder that holds a {' or '.join(TABLE_SUFFIXES)} file"
+        names = ", ".join(path_in_quotes(file) for _, file in tables[:MOST_NAMED])
+        if len(tables) > MOST_NAMED:
+            names += f" and {len(tables) - MOST_NAMED} more"
+        names = names or f"a folder that holds a {' or '.join(TABLE_SUFFIXES)} file"
         raise TableError(Fault(f"the folder holds {plural(len(tables), 'table')}; one is wanted.", names, place=Place(str(folder))))
     return tables[0][1]
 
@@ -45,9 +60,14 @@ def _tables_in(folder: Path) -> list[tuple[str, Path]]:
     return list(table_files(folder, read_folder_schema(folder)))
 
 
-def _no_table(path: Path, names: list[str]) -> FileError:
-    folder = path.parent
-    files = [str(folder / p.name) for p in folder.iterdir() if p.suffix in TABLE_SUFFIXES] if folder.is_dir() else []
-    near = nearest(str(path), [*files, *names]) or nearest(path.name, names)
-    accepted = "a .csv, .parquet or .safetensors file, or the name of a table of the project"
-    return FileError(Fault("there is no such table.", accepted, in_quotes(near) if near else "", Place(str(path)), "no-such-path"))
+def _no_table(path: Path, known: list[str]) -> FileError:
+    files = [str(path.parent / name) for name in _files_in(path.parent) if name.endswith((*TABLE_SUFFIXES, SUFFIX))]
+    near = nearest(str(path), [*known, *files])
+    accepted = "a file, a folder of one table, or the name of a table of the project"
+    return FileError(
+        Fault("there is no such table.", accepted, path_in_quotes(near) if near else "", Place(shown(str(path), most=4096)), "no-such-path")
+    )
+
+
+def _files_in(folder: Path) -> list[str]:
+    return sorted(os.listdir(folder)) if os.path.isdir(folder) else []

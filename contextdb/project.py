@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,11 +47,13 @@ class Project:
         schema = read_folder_schema(folder)
         tables: dict[str, Table] = {}
         faults: list[Fault] = []
-        for name, file in table_files(folder, schema):
+        found = list(table_files(folder, schema))
+        for name, file in found:
             try:
                 tables[name] = _read_table(file, schema, folder, strict)
             except ContextDBError as error:
                 faults += error.faults
+        faults += twice_named(found)
         if faults:
             raise TableError(*faults)
         return cls(folder, schema, tables)
@@ -82,8 +85,7 @@ def schema_for(path: Path) -> tuple[Path, Schema]:
     for folder in path.resolve().parent.parents:
         if (folder / SCHEMA_FILE).is_file():
             schema = read_folder_schema(folder)
-            below = path.resolve().relative_to(folder).as_posix()
-            if any(below in settings.files for settings in schema.tables.values()):
+            if any(_below(path, folder) in settings.files for settings in schema.tables.values()):
                 return folder, schema
             break
     return path.parent, EMPTY
@@ -112,28 +114,58 @@ def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
         taken.add(path)
         yield settings.name, path
     for path in sorted(folder.iterdir()):
-        if path.suffix in TABLE_SUFFIXES and path not in taken and not path.name.endswith(CASES_SUFFIX) and path.is_file():
+        if path not in taken and _is_table(path):
             yield path.stem, path
+
+
+def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
+    """A fault for every file whose table has the name of one before it: nobody could say which of the two is meant."""
+    first: dict[str, Path] = {}
+    faults = []
+    for name, path in found:
+        if first.setdefault(name, path) != path:
+            stands = f"the table {in_quotes(name)} stands in {path_in_quotes(first[name])} too."
+            faults.append(Fault(stands, "one file for each table", place=Place(str(path))))
+    return faults
+
+
+def _is_table(path: Path) -> bool:
+    name = path.name.lower()
+    is_hidden = name.startswith(".")  # what macOS and editors put beside a file
+    return name.endswith(TABLE_SUFFIXES) and not name.endswith(CASES_SUFFIX) and not is_hidden and path.is_file()
 
 
 def folder_of(path: Path) -> Path:
     """The folder that a path to a folder, or to a contextdb.toml, means."""
-    if path.is_dir():
+    if os.path.isdir(path):  # os.path says no, where Path raises, to a name that no file can have
         return path
-    if path.name == SCHEMA_FILE and path.is_file():
+    if path.name == SCHEMA_FILE and os.path.isfile(path):
         return path.parent
-    found = "it is no folder." if path.exists() else "there is no such folder."
-    siblings = [p.name for p in path.parent.iterdir() if p.is_dir()] if path.parent.is_dir() else []
+    noun = "file" if path.name == SCHEMA_FILE else "folder"
+    found = "it is no folder." if os.path.exists(path) else f"there is no such {noun}."
+    siblings = [p.name for p in path.parent.iterdir() if p.is_dir()] if os.path.isdir(path.parent) else []
     near = nearest(path.name, siblings)
-    mend = in_quotes(str(path.parent / near)) if near else ""
+    mend = path_in_quotes(path.parent / near) if near else ""
     raise FileError(Fault(found, f"a folder of tables, or its {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
 
 
+def path_in_quotes(path: str | Path) -> str:
+    """A path in quotes, in full: half a path is no help."""
+    return in_quotes(str(path), most=4096)
+
+
 def _read_table(path: Path, schema: Schema, folder: Path, strict: bool) -> Table:
-    below = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
-    settings = schema.settings_for(below)
+    settings = schema.settings_for(_below(path, folder))
     source, columns = files.read_texts(path)
     table = build_table(settings.name, columns, schema, settings, path, source)
     if strict:
         table.require_readable()
     return table
+
+
+def _below(path: Path, folder: Path) -> str:
+    """The path of a file below a folder, as contextdb.toml has it; links on the way to the file stay what they are named."""
+    if path.is_relative_to(folder):
+        return path.relative_to(folder).as_posix()
+    whole, root = path.parent.resolve() / path.name, folder.resolve()
+    return whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path.name

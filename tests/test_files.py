@@ -233,8 +233,7 @@ def fails_with(number: int) -> Callable[..., None]:
 def test_on_a_full_disk_the_old_file_is_whole_and_no_temporary_file_stays(table: Path, monkeypatch: pytest.MonkeyPatch, call: str):
     monkeypatch.setattr(os, call, fails_with(errno.ENOSPC))
     assert refused(lambda: write_atomic(table, b"x" * 1234)) == (
-        f"{table}: the disk is full. The old file is as it was. Accepted: 1,234 free bytes. "
-        "Try to free some space and save again."
+        f"{table}: the disk is full. The old file is as it was. Accepted: 1,234 free bytes. Try to free some space and save again."
     )
     assert table.read_bytes() == b"a,b\r\nx,1\r\n"
     assert os.listdir(table.parent) == [table.name]

@@ -226,8 +226,7 @@ def test_semicolons_in_quotes_or_beside_commas_are_text():
 def test_a_git_lfs_pointer_is_not_taken_for_a_table():
     raw = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
     assert (
-        fault_of(raw)
-        == 't.csv: this is a Git LFS pointer, not the table itself. Accepted: the table. Try to run "git lfs pull".'
+        fault_of(raw) == 't.csv: this is a Git LFS pointer, not the table itself. Accepted: the table. Try to run "git lfs pull".'
     )
 
 

@@ -7,16 +7,19 @@ contextdb query hit_mid_air --unknown any "heading=0 ± 90" --explain
 from __future__ import annotations
 
 import argparse
-import json
+import math
 import sys
+from collections.abc import Iterator
 
+from contextdb.commands import missing_facts_by_option
 from contextdb.compiled import CompiledTable
-from contextdb.console import aligned, styled, wants_colour
-from contextdb.errors import ContextError, Fault, plural
+from contextdb.console import aligned, output, printable, styled, terminal_width, wants_colour, width_of
+from contextdb.errors import ContextError, Fault, in_quotes, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.explain import Explanation, RowExplanation, describe_fact
 from contextdb.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
 from contextdb.places import open_compiled
+from contextdb.report.render_json import as_json
 
 N_NEAREST = 3
 N_EXPLAINED = 10
@@ -25,12 +28,14 @@ N_EXPLAINED = 10
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("table", metavar="TABLE", help="a .csv, .parquet or .safetensors file, or the name of a table")
-    parser.add_argument("facts", metavar="FACT=VALUE", nargs="*", help="a value, or a set of values written as a cell: speed=3..5")
+    parser.add_argument(
+        "facts", metavar="FACT=VALUE", nargs="*", default=[], help="a value, or a set of values written as a cell: speed=3..5"
+    )
     parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="what a missing fact does (default: error)")
     parser.add_argument(
         "--explain", action="store_true", help="for the rows nearest to valid, the cells that fail and what to change"
     )
-    parser.add_argument("--most", type=int, metavar="N", help=f"explain so many rows (default: {N_EXPLAINED})")
+    parser.add_argument("--most", type=_count, metavar="N", help=f"explain so many rows (default: {N_EXPLAINED})")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
@@ -38,12 +43,14 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Answer one context."""
     compiled = open_compiled(arguments.table)
     context = read_facts(arguments.facts, compiled)
-    explanation = compiled.explain(context, arguments.unknown)
+    with missing_facts_by_option():
+        explanation = compiled.explain(context, arguments.unknown)
     most = arguments.most if arguments.most is not None else N_EXPLAINED
-    if arguments.json:
-        print(json.dumps(_document(compiled, explanation, arguments.explain, most), ensure_ascii=False, indent=2))
-    else:
-        _print(compiled, explanation, arguments.explain, most)
+    with output():
+        if arguments.json:
+            print(as_json(_document(compiled, explanation, arguments.explain, most)), end="")
+        else:
+            print(*_lines(compiled, explanation, arguments.explain, most), sep="\n")
     return ExitCode.OK if explanation.matches else ExitCode.FOUND
 
 
@@ -55,19 +62,14 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
     ContextError
         For every argument that is no fact of the table, together.
     """
-    conditions = {c.name: c for c in compiled.conditions}
     facts: dict[str, Fact] = {}
     faults: list[Fault] = []
     for text in given:
-        name, equals, value = text.partition("=")
         try:
-            if not equals:
-                raise ContextError(Fault(f'"{text}" is no fact.', "FACT=VALUE, without spaces round the =", f'"{text}=…"'))
-            if name not in conditions:
-                raise no_condition(name, conditions)
+            name, value = _split(text, compiled)
             if name in facts:
-                raise ContextError(Fault(f'the fact "{name}" is given twice.', "each fact once"))
-            facts[name] = read_fact_text(value, conditions[name])
+                raise ContextError(Fault(f"the fact {in_quotes(name)} is given twice.", "each fact once"))
+            facts[name] = read_fact_text(value, compiled.conditions[compiled.places[name]])
         except ContextError as error:
             faults += error.faults
     if faults:
@@ -75,15 +77,28 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
     return facts
 
 
+def _split(text: str, compiled: CompiledTable) -> tuple[str, str]:
+    """Name and value of FACT=VALUE; a name may hold a "=" itself."""
+    ends = [at for at, character in enumerate(text) if character == "="]
+    for at in ends:
+        if text[:at] in compiled.places:
+            return text[:at], text[at + 1 :]
+    if ends:
+        raise no_condition(text[: ends[0]], compiled.places)
+    raise ContextError(Fault(f"{in_quotes(text)} is no fact.", "FACT=VALUE, without spaces round the =", in_quotes(f"{text}=…")))
+
+
+def _count(text: str) -> int:
+    """A number of rows."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no number of rows, such as 10.")
+    return int(text)
+
+
 def _document(compiled: CompiledTable, explanation: Explanation, explains: bool, most: int) -> dict[str, object]:
     matches = explanation.matches
     always = set(explanation.always_rows())
-    conditions = {c.name: c for c in compiled.conditions}
-    context = {
-        n: describe_fact(f, conditions[n]) if not isinstance(f, (bool, float, str)) else f
-        for n, f in explanation.facts.items()
-        if f is not None
-    }
+    context = {n: _json_fact(f, n, compiled) for n, f in explanation.facts.items() if f is not None}
     rows = [{"row": r, "asset": compiled.assets[r], "always": r in always} for r in matches]
     document: dict[str, object] = {"format": 1, "table": compiled.name, "context": context, "count": len(matches), "matches": rows}
     if explains:
@@ -91,35 +106,65 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
     return document
 
 
+def _json_fact(fact: Fact, name: str, compiled: CompiledTable) -> object:
+    """A fact as JSON has it; a set of values, tags and an infinite number as text."""
+    is_plain = isinstance(fact, (bool, str)) or (isinstance(fact, float) and math.isfinite(fact))
+    return fact if is_plain else describe_fact(fact, compiled.conditions[compiled.places[name]])
+
+
 def _explained(row: RowExplanation) -> dict[str, object]:
     failures = [{"condition": f.condition, "cell": f.cell, "fact": f.fact, "change_to": f.mend} for f in row.failures]
     return {"row": row.row, "asset": row.asset, "enabled": row.is_enabled, "failures": failures}
 
 
-def _print(compiled: CompiledTable, explanation: Explanation, explains: bool, most: int) -> None:
+def _lines(compiled: CompiledTable, explanation: Explanation, explains: bool, most: int) -> Iterator[str]:
     colour = wants_colour(sys.stdout)
     matches = explanation.matches
-    said = f"{len(matches)} of {plural(compiled.n_rows, 'row')} valid in {compiled.name}"
-    print(styled(said, "green" if matches else "yellow", colour))
+    said = f"{len(matches):,} of {plural(compiled.n_rows, 'row')} valid in {printable(compiled.name)}"
+    yield styled(said, "green" if matches else "yellow", colour)
     if matches:
-        print()
-        print(*aligned([("row", "asset"), *((str(r), compiled.assets[r]) for r in matches)], right=(0,)), sep="\n")
+        yield ""
+        yield from aligned(_matching(compiled, explanation), right=(0,))
     nearest = explanation.nearest(most if explains else 0 if matches else N_NEAREST)
     if nearest:
-        print()
-        print(styled("nearest rows that are not valid, and the cells to change", "bold", colour))
-        print()
-        print(
-            *aligned([("row", "asset", "condition", "fact", "cell", "change to"), *_failure_lines(nearest)], right=(0,)), sep="\n"
-        )
+        yield ""
+        yield styled("nearest rows that are not valid, and the cells to change", "bold", colour)
+        yield ""
+        yield from _nearest_lines(nearest, terminal_width())
 
 
-def _failure_lines(rows: list[RowExplanation]) -> list[tuple[str, ...]]:
-    lines: list[tuple[str, ...]] = []
+def _matching(compiled: CompiledTable, explanation: Explanation) -> Iterator[tuple[str, ...]]:
+    """The valid rows; where some match only for a part of a set-valued fact, with a word for how."""
+    always = set(explanation.always_rows())
+    rows = list(explanation.matches)
+    if len(always) == len(rows):
+        yield "row", "asset"
+        yield from ((str(r), compiled.assets[r]) for r in rows)
+    else:
+        yield "row", "matches", "asset"
+        yield from ((str(r), "always" if r in always else "may", compiled.assets[r]) for r in rows)
+
+
+def _nearest_lines(rows: list[RowExplanation], width: int) -> Iterator[str]:
+    """The failing cells of some rows: a table where the terminal is wide enough for it, else a few lines a row."""
+    table = list(aligned([("row", "asset", "condition", "fact", "cell", "change to"), *_failures(rows)], right=(0,)))
+    if max(map(width_of, table)) <= width:
+        yield from table
+        return
+    digits = max(len(str(row.row)) for row in rows)
+    for row in rows:
+        yield printable(f"{row.row:>{digits}}  {row.asset}")
+        for name, fact, cell, mend in ((f.condition, f.fact, f.cell, f.mend) for f in row.failures):
+            yield printable(f"{' ' * digits}  {name} is {fact}")
+            yield printable(f'{" " * digits}    change "{cell}" to "{mend}"')
+        if not row.is_enabled:
+            yield f"{' ' * digits}  the row is disabled"
+
+
+def _failures(rows: list[RowExplanation]) -> Iterator[tuple[str, ...]]:
     for row in rows:
         failures = [(f.condition, f.fact, f.cell, f.mend) for f in row.failures]
         if not row.is_enabled:
             failures.append(("(the row is disabled)", "", "", ""))
         for i, failure in enumerate(failures):
-            lines.append((*((str(row.row), row.asset) if i == 0 else ("", "")), *failure))
-    return lines
+            yield (*((str(row.row), row.asset) if i == 0 else ("", "")), *failure)

@@ -50,6 +50,7 @@ format: $(VENV)/.dev
 
 docs: $(VENV)/.dev
 	$(PY) tests/test_docs.py --update
+	$(PY) docs/pictures.py
 
 bench: $(VENV)/.bench
 	$(PY) benchmarks/query.py

@@ -1,4 +1,4 @@
-"""A context database: which animation assets are valid now, why the others are not, and what no asset covers.
+"""A context database: which animation assets are valid now, and why the others are not.
 
     import contextdb as cdb
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from contextdb import intervals
 from contextdb.cell_mends import candidates
 from contextdb.cell_words import NUMBER_TEXT, is_name, is_reserved, quoted, truth_of
-from contextdb.domains import NUMERIC, TEXT, Domain, wrap_angle
+from contextdb.domains import NUMERIC, TAGS, Domain, wrap_angle
 from contextdb.errors import CellError, Fault, in_quotes, shown, some
 from contextdb.intervals import EVERYTHING, Spans
 
@@ -160,8 +160,8 @@ def parse_cell(text: str, domain: Domain, wants_mend: bool = True) -> Cell:
 
 
 def parse_tags(text: str) -> frozenset[str]:
-    """A plain set of tags, as a fact is written: names with spaces between, odd ones in double quotes."""
-    return frozenset(sign + name for sign, name in _tokens(text.strip(), TEXT))
+    """A plain set of tags, as a fact is written: names with spaces between, odd ones in double quotes; "" is no tag at all."""
+    return frozenset(sign + name for sign, name in _tokens(text.strip(), TAGS) if name)
 
 
 def _mend(text: str, domain: Domain) -> str:
@@ -419,8 +419,15 @@ def _format_spans(spans: Spans, domain: Domain) -> str:
         return f"not {format_number(rest[0][0])}"
     first, last = spans[0], spans[-1]
     if len(spans) > 1 and first[0] == -180.0 and last[1] == intervals.CIRCLE[1]:
-        spans = (*spans[1:-1], (last[0], first[1]))
-    return " | ".join(_format_span(low, high) for low, high in spans)
+        spans = (*spans[1:-1], (last[0], _shown_end(first[1])))
+    return " | ".join(
+        _format_span(_shown_end(low) if low == high else low, _shown_end(high) if low == high else high) for low, high in spans
+    )
+
+
+def _shown_end(degrees: float) -> float:
+    """Half a turn is told as 180, not as the -180 that it is kept as."""
+    return 180.0 if degrees == -180.0 else degrees
 
 
 def _format_span(low: float, high: float) -> str:

@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Sequence
 from importlib import import_module
 from types import ModuleType
-from typing import Any, NoReturn
+from typing import IO, Any, NoReturn
 
 from contextdb.console import drop_output, printable
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
@@ -35,6 +35,10 @@ class Parser(argparse.ArgumentParser):
             near = nearest(text.partition("=")[0], self._option_string_actions)
             self.error(Fault(f"there is no option {in_quotes(text)}.", mend=in_quotes(near) if near else "").message)
         return arguments
+
+    def print_help(self, file: IO[str] | None = None) -> None:  # type: ignore[override]
+        """Print the help; where argparse would keep quiet about output that cannot be written, this does not."""
+        print(self.format_help(), end="", file=file)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:

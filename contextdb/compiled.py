@@ -13,8 +13,8 @@ SIGCOMM 1998.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
-from contextdb.cells import Cell, NumberSet, TagSet, ValueSet
+from contextdb.cells import ANY, Cell, NumberSet, TagSet, ValueSet, parse_cell, reads
 from contextdb.classes import ColumnMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
@@ -32,7 +32,7 @@ from contextdb.errors import ContextError, Fault, Place
 from contextdb.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact
 from contextdb.intervals import EVERYTHING
 from contextdb.live import LiveContext
-from contextdb.lookup import Lookup, SingleLookup, build_lookup, single_lookup
+from contextdb.lookup import SingleLookup, build_ask, single_lookup
 from contextdb.matches import Answering, Matches, SetMatches
 from contextdb.stack import MaskStack
 
@@ -67,6 +67,10 @@ class CompiledTable:
     """The cells of each condition as they are written, for explanations."""
     policy: Policy = "collect"
     fallback: str | None = None
+    _ask: Callable[[Context], Matches] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_ask", self._build_and_ask)  # a plain attribute: the way of every query
 
     @classmethod
     def of(cls, table: Table) -> CompiledTable:
@@ -116,10 +120,9 @@ class CompiledTable:
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
         try:
-            bits = self._lookup(context)
+            return self._ask(context)
         except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
             return self.matches(*self._bits_carefully(context, unknown))
-        return Matches(bits, self.answering)
 
     def query_many(
         self, contexts: Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame, unknown: Unknown = "error"
@@ -195,6 +198,17 @@ class CompiledTable:
                     costs += np.where(fails, row_penalties, 0.0)
         return costs
 
+    def cells(self, at: int) -> tuple[Cell, ...]:
+        """What the distinct texts of condition number `at` mean, read once; Any for one that cannot be read, which no row holds."""
+        if at not in self._cells_read:
+            domain = self.conditions[at].domain
+            self._cells_read[at] = tuple(parse_cell(t, domain) if reads(t, domain) else ANY for t in self.texts[at].texts)
+        return self._cells_read[at]
+
+    @cached_property
+    def _cells_read(self) -> dict[int, tuple[Cell, ...]]:
+        return {}
+
     def read_context(self, context: Context, unknown: Unknown = "error") -> dict[str, Fact]:
         """Every condition's fact in canonical form, None where it is missing; raises ContextError as `query` does."""
         check_mode(unknown)
@@ -266,10 +280,6 @@ class CompiledTable:
         return open_artefact(Path(path))
 
     @cached_property
-    def _lookup(self) -> Lookup:
-        return build_lookup(list(zip(self.conditions, self.masks, strict=True)), self.enabled_bits, self.n_rows)
-
-    @cached_property
     def memory(self) -> Memory:
         """Which asset each random generator picked last."""
         from contextdb.pick import Memory
@@ -285,6 +295,12 @@ class CompiledTable:
     def _all_bits(self) -> tuple[int, int]:
         everything = (1 << self.n_rows) - 1
         return everything, everything
+
+    def _build_and_ask(self, context: Context) -> Matches:
+        """The first question builds the function that answers all others."""
+        ask = build_ask(list(zip(self.conditions, self.masks, strict=True)), self.enabled_bits, self.answering)
+        object.__setattr__(self, "_ask", ask)
+        return ask(context)
 
     def _bits_carefully(self, context: Context, unknown: Unknown) -> tuple[int, int]:
         facts = self.read_context(context, unknown)

@@ -3,18 +3,47 @@
 from __future__ import annotations
 
 import glob
+import os
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import polars as pl
+from polars.selectors import by_name
 
+from contextdb.batch import ManyMatches
 from contextdb.cells import Cell
 from contextdb.compiled import CompiledTable
 from contextdb.conditions import Condition
 from contextdb.domains import NUMERIC
-from contextdb.errors import ContextError, Fault, FileError, Place, TableError, nearest
-from contextdb.facts import read_fact_text
-from contextdb.files import read_texts
+from contextdb.errors import ContextError, Fault, FileError, Place, TableError, in_quotes, nearest
+from contextdb.facts import Unknown, read_fact_text
+from contextdb.files import AnySource, read_texts
+from contextdb.project import path_in_quotes
+
+ONE = "one value of its type in each context"
+
+
+@dataclass(frozen=True)
+class Contexts:
+    """The contexts of one file, one row each."""
+
+    path: Path
+    facts: pl.DataFrame
+    """The facts that the table asks for, typed as `query_many` takes them, null where one is missing. Other columns are all null:
+    their names may tell of a misspelling, and a row that says nothing to the table is a context too."""
+    source: AnySource | None = None
+
+    def ask(self, compiled: CompiledTable, unknown: Unknown) -> ManyMatches:
+        """The valid rows in every context; a ContextError names file, line and fact."""
+        try:
+            return compiled.query_many(self.facts, unknown)
+        except ContextError as error:
+            raise ContextError(*(fault.at(self._place(fault.place)) for fault in error.faults)) from None
+
+    def _place(self, place: Place) -> Place:
+        line = self.source.line(place.row) if self.source is not None and place.row is not None else None
+        return Place(str(self.path), line, place.column, place.row)
 
 
 def context_files(pattern: str) -> list[Path]:
@@ -23,48 +52,45 @@ def context_files(pattern: str) -> list[Path]:
     Raises
     ------
     FileError
-        None does.
+        There is none.
     """
-    if Path(pattern).is_file():
+    if os.path.isfile(pattern):
         return [Path(pattern)]
-    found = sorted(Path(p) for p in glob.glob(pattern, recursive=True) if Path(p).is_file())
+    found = sorted(Path(p) for p in glob.glob(pattern, recursive=True) if os.path.isfile(p))
     if not found:
         folder = Path(pattern).parent
-        near = nearest(Path(pattern).name, [p.name for p in folder.iterdir()]) if folder.is_dir() else None
-        mend = f'"{folder / near}"' if near else ""
+        near = nearest(Path(pattern).name, sorted(os.listdir(folder))) if os.path.isdir(folder) else None
+        mend = path_in_quotes(folder / near) if near else ""
         raise FileError(
             Fault("no file of contexts is there.", "a .csv or .parquet file, or a glob", mend, Place(pattern), "no-such-path")
         )
     return found
 
 
-def read_contexts(path: Path, compiled: CompiledTable) -> pl.DataFrame:
-    """The facts of a file that the table asks for, typed as `query_many` takes them; null where a fact is missing.
+def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
+    """Read the contexts of a file for a table.
 
     Raises
     ------
-    TableError, ContextError
+    TableError, ContextError, FileError
         The file cannot be read, or holds facts that the table cannot be asked with; file, line and fact are named.
     """
-    if path.suffix == ".parquet":
-        return _read_parquet(path, compiled)
+    if path.suffix.lower() == ".parquet":
+        return Contexts(path, _read_parquet(path, compiled))
     source, columns = read_texts(path)
-    conditions = {c.name: c for c in compiled.conditions}
     series, faults = [], []
     for column in columns:
-        if column.name in conditions:
-            condition = conditions[column.name]
-            values, wrong = _read_column(column.texts, condition)
-            faults += [
-                f.at(Place(str(path), source.line(int((column.codes == i).argmax())), column.name))
-                for i, f in wrong
-                if (column.codes == i).any()
-            ]
-            distinct = pl.Series(column.name, values, dtype=_dtype(condition), strict=False)
-            series.append(distinct.gather(column.codes) if len(distinct) else distinct)
+        if column.name not in compiled.places:
+            series.append(_nothing(column.name, column.n_rows))
+            continue
+        condition = compiled.conditions[compiled.places[column.name]]
+        values, wrong = _read_column(column.texts, condition)
+        faults += [f.at(Place(str(path), source.line(int((column.codes == i).argmax())), column.name)) for i, f in wrong]
+        distinct = pl.Series(column.name, values, dtype=_dtype(condition), strict=False)
+        series.append(distinct.gather(column.codes) if len(distinct) else distinct)
     if faults:
-        raise ContextError(*faults)
-    return pl.DataFrame(series)
+        raise ContextError(*sorted(faults, key=lambda fault: fault.place.line or 0))
+    return Contexts(path, pl.DataFrame(series), source)
 
 
 def _read_column(texts: Sequence[str], condition: Condition) -> tuple[list[object], list[tuple[int, Fault]]]:
@@ -74,11 +100,11 @@ def _read_column(texts: Sequence[str], condition: Condition) -> tuple[list[objec
         try:
             fact = read_fact_text(text, condition)
             if isinstance(fact, Cell):
-                raise ContextError(Fault(f'"{text}" is a set of values.', "one value in each context", rule="wrong-fact"))
+                raise ContextError(Fault(f"{in_quotes(text)} is a set of values.", ONE, rule="wrong-fact"))
             values.append(sorted(fact) if isinstance(fact, frozenset) else fact)
         except ContextError as error:
             values.append(None)
-            faults += [(i, f) for f in error.faults]
+            faults += [(i, replace(f, accepted=ONE) if f.rule == "unreadable-cell" else f) for f in error.faults]
     return values, faults
 
 
@@ -90,13 +116,18 @@ def _dtype(condition: Condition) -> pl.DataType:
 
 
 def _read_parquet(path: Path, compiled: CompiledTable) -> pl.DataFrame:
-    names = [c.name for c in compiled.conditions]
     try:
-        scan = pl.scan_parquet(path)
-        present = scan.collect_schema().names()
-        return scan.select([n for n in names if n in present]).collect()
-    except (pl.exceptions.PolarsError, OSError) as error:
-        why = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise TableError(
-            Fault(f"cannot read the file as Parquet ({why}).", "a whole Parquet file", place=Place(str(path)))
-        ) from None
+        scan = pl.scan_parquet(path, glob=False)
+        names = scan.collect_schema().names()
+        n_rows = scan.select(pl.len()).collect().item()
+        asked = [n for n in names if n in compiled.places]
+        facts = scan.select(by_name(asked)).collect().get_columns() if asked else []
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+        read_texts(path)  # says what is wrong with the file
+        raise TableError(Fault(f"cannot read the file: {error}.", "a whole Parquet file", place=Place(str(path)))) from None
+    return pl.DataFrame([*facts, *(_nothing(n, n_rows) for n in names if n not in compiled.places)])
+
+
+def _nothing(name: str, n_rows: int) -> pl.Series:
+    """A column without a fact."""
+    return pl.repeat(None, n_rows, dtype=pl.Null, eager=True).alias(name)

@@ -151,7 +151,7 @@ class Explanation:
         if not isinstance(fact, float):
             return np.ones(len(column.codes))
         held = np.bincount(column.codes, minlength=len(column.texts))  # a text that no row holds any more need not read
-        cells = [parse_cell(t, condition.domain).accepts if n else None for t, n in zip(column.texts, held, strict=True)]
+        cells = [c.accepts if n else None for c, n in zip(self.compiled.cells(at), held, strict=True)]
         width = _width(condition, cells)
         return np.array([_distance(c, fact, width) for c in cells], np.float64)[column.codes]
 
@@ -171,7 +171,9 @@ def explain(compiled: CompiledTable, context: Context, unknown: Unknown = "error
 
 def describe_fact(fact: Fact, condition: Condition) -> str:
     """A fact in canonical form as people write it; a set as a cell."""
-    return format_cell(fact, condition.domain) if isinstance(fact, Cell) else describe(fact)
+    if isinstance(fact, Cell):
+        return format_cell(fact, condition.domain)
+    return describe(180.0 if fact == -180.0 and condition.domain.kind == "angle" else fact)
 
 
 def mended(text: str, fact: Fact, domain: Domain) -> str:

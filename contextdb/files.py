@@ -26,7 +26,7 @@ AnySource = Source | ParquetSource
 """What a table's texts came from."""
 
 SUFFIXES = (".csv", ".parquet")
-_IMPORTED = (".tsv", ".xlsx", ".json")
+_OTHER_TABLES = (".tsv", ".xlsx", ".json")
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -189,7 +189,7 @@ def _suffix(path: str | Path) -> str:
     if suffix.lower() in SUFFIXES:
         return suffix.lower()
     near = nearest(suffix, SUFFIXES)
-    mend = '"contextdb import"' if suffix.lower() in _IMPORTED else _in_quotes(Path(path).with_suffix(near)) if near else ""
+    mend = "to save it as CSV" if suffix.lower() in _OTHER_TABLES else _in_quotes(Path(path).with_suffix(near)) if near else ""
     found = f"a table file does not end in {in_quotes(suffix)}." if suffix else "the name has no suffix."
     raise FileError(Fault(found, " or ".join(SUFFIXES), mend, Place(str(path))))
 

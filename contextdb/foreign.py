@@ -102,7 +102,7 @@ def _looks_utf16(raw: bytes) -> bool:
 
 def _way_out(kind: str) -> str:
     if "Excel" in kind:
-        return 'to save it as "CSV UTF-8", or to bring it in with "contextdb import"'
+        return 'to save it as "CSV UTF-8"'
     return "the suffix .parquet" if "Parquet" in kind else ""
 
 

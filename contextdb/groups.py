@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-MOST_LEAVES = 160
+MOST_LEAVES = 128
 MOST_BYTES = 256 << 10
 """A group has at most so many leaves, and their masks at most so many bytes: beyond, the caches hold less than the joining
 saves."""

@@ -23,30 +23,41 @@ from contextdb.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, Wi
 from contextdb.conditions import Condition
 from contextdb.facts import read_fact
 from contextdb.groups import groups_of
+from contextdb.matches import Answering, Matches
 
 EXACT = 2.0**53
 """Below this every whole number is a double, so an int and a double compare as two doubles do."""
 
 MOST_TAG_SETS = 4096
 
-Lookup = Callable[[Mapping[str, object]], int]
+_ASK = """
+def ask(c, {names}):
+    answer = new(Matches)
+    answer.bits = {terms}
+    answer._table = answering
+    answer._rows = None
+    return answer
+"""
+
 Column = tuple[Condition, ColumnMasks]
 SingleLookup = tuple[list[float] | None, Any]
 
 
-def build_lookup(columns: Sequence[Column], enabled: int, n_rows: int) -> Lookup:
-    """A function from a context to its rows as an integer; raises whatever it raises when a fact is unusual."""
+def build_ask(columns: Sequence[Column], enabled: int, answering: Answering) -> Callable[[Mapping[str, object]], Matches]:
+    """A function from a context to its answer; raises whatever it raises when a fact is unusual."""
+    n_rows = len(answering.assets)
     names: dict[str, Any] = {"bisect_right": bisect_right, "index": index, "ldexp": math.ldexp}
+    names |= {"new": object.__new__, "Matches": Matches, "answering": answering}
     values = _value_terms([(c, m) for c, m in columns if isinstance(m, ValueMasks)], n_rows, names)
     numbers = [_term(i, c, m, names) for i, (c, m) in enumerate(columns) if not isinstance(m, ValueMasks)]
     if enabled != (1 << n_rows) - 1 or not values:
         names["enabled"] = enabled
         values.append("enabled")
     # Every fact is looked up, also when no row is left: a missing one is an error whatever the others say.
-    source = f"def lookup(c, {', '.join(f'{n}={n}' for n in names)}):\n    return {' & '.join(values + numbers)}"
+    source = _ASK.format(names=", ".join(f"{n}={n}" for n in names), terms=" & ".join(values + numbers))
     exec(compile(source, "<contextdb lookup>", "exec"), names)
-    found: Lookup = names["lookup"]
-    return found
+    ask: Callable[[Mapping[str, object]], Matches] = names["ask"]
+    return ask
 
 
 def _value_terms(columns: Sequence[tuple[Condition, ValueMasks]], n_rows: int, names: dict[str, Any]) -> list[str]:

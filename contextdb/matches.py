@@ -9,6 +9,8 @@ import numpy as np
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words
 
+_INT64 = np.dtype(np.int64)
+
 FEW = 48
 """Up to this many rows are read off the integer bit by bit; beyond, unpacking all bits at once is faster."""
 
@@ -55,9 +57,10 @@ class Matches:
     @property
     def indices(self) -> Rows:
         """Row numbers, ascending: int64 [count]."""
-        if self._rows is None:
-            self._rows = rows_of(self.bits, self._table.row_numbers)
-        return self._rows
+        rows = self._rows
+        if rows is None:
+            rows = self._rows = rows_of(self.bits, self._table.row_numbers)
+        return rows
 
     @property
     def assets(self) -> list[str]:
@@ -129,4 +132,4 @@ def rows_of(bits: int, numbers: Rows) -> Rows:
         found.append(top)
         rest ^= 1 << top
     found.reverse()
-    return np.array(found, np.int64)
+    return np.array(found, _INT64)

@@ -64,9 +64,8 @@ def _no_table(path: Path, known: list[str]) -> FileError:
     files = [str(path.parent / name) for name in _files_in(path.parent) if name.endswith((*TABLE_SUFFIXES, SUFFIX))]
     near = nearest(str(path), [*known, *files])
     accepted = "a file, a folder of one table, or the name of a table of the project"
-    return FileError(
-        Fault("there is no such table.", accepted, path_in_quotes(near) if near else "", Place(shown(str(path), most=4096)), "no-such-path")
-    )
+    place = Place(shown(str(path), most=4096))
+    return FileError(Fault("there is no such table.", accepted, path_in_quotes(near) if near else "", place, "no-such-path"))
 
 
 def _files_in(folder: Path) -> list[str]:

@@ -64,11 +64,11 @@ def _stray_fault(raw: bytes, stray: Stray) -> Fault:
         return Fault(f"a quote stands inside the field {in_quotes(field)}.", accepted, _doubled(field))
     line = in_quotes(_line_at(raw, stray.opening))
     if stray.closing is None:
-        return Fault(f"the quoted field that opens here is never closed: {line}.", accepted, "a closing quote on this line")
+        return Fault(f"the quoted field that opens here is never closed: {line}.", accepted, "to close it on this line")
     n_lines = line_of(raw, stray.closing) - line_of(raw, stray.opening)
     if n_lines:
         found = f"the quoted field that opens here runs on for {plural(n_lines, 'line')} and past the next quote: {line}."
-        return Fault(found, accepted, "a closing quote on this line")
+        return Fault(found, accepted, "to close it on this line")
     field = raw[stray.opening : stray.closing].decode() + _line_at(raw, stray.closing).split(",", 1)[0]
     found = f"the field {in_quotes(field)} goes on after a quote that closes it."
     return Fault(found, accepted, _doubled(field[1:].removesuffix('"')))

@@ -76,7 +76,7 @@ def draw(picture: Picture) -> str:
     """The picture as SVG."""
     lines = session(picture.steps)
     width, height = round(N_COLUMNS * COLUMN_PX) + 2 * MARGIN_PX, len(lines) * LINE_PX + 2 * MARGIN_PX
-    drawn = [text for number, line in enumerate(lines) for text in _texts(line, MARGIN_PX + number * LINE_PX + FONT_PX)]
+    drawn = [text for number, line in enumerate(lines) for text in texts(line, MARGIN_PX + number * LINE_PX + FONT_PX)]
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img">'
     body = [
         f"<title>{escape(picture.title)}</title>",
@@ -96,13 +96,13 @@ def session(steps: Sequence[str | Slip]) -> list[str]:
         shutil.copytree(ROOT / "tables", Path(folder) / "tables")
         for step in steps:
             if isinstance(step, Slip):
-                _make(step, Path(folder))
+                make(step, Path(folder))
                 continue
             lines += [*([""] if lines else []), f"\x1b[2m$\x1b[0m \x1b[1m{step}\x1b[0m", *_run(step, folder).splitlines()]
     return lines
 
 
-def _make(slip: Slip, folder: Path) -> None:
+def make(slip: Slip, folder: Path) -> None:
     path = folder / slip.file
     text = path.read_bytes().decode()
     if text.count(slip.old) != 1:
@@ -125,7 +125,7 @@ def _run(command: str, folder: str) -> str:
     return done.stdout
 
 
-def _texts(line: str, y: int) -> Iterator[str]:
+def texts(line: str, y: int) -> Iterator[str]:
     """The words of a line as SVG texts; words with one space between them stay together."""
     for column, style, text in _runs(line):
         for words in _WORDS.finditer(text):

@@ -202,7 +202,7 @@ def numbers_in(texts: Iterable[str]) -> list[float]:
     """Every number that stands in the texts, and the ends of every centre and tolerance."""
     found: set[float] = set()
     for part in (part for text in texts for part in hard_part(text).split("|")):
-        given = [float(n) for n in NUMBER.findall(part)]
+        given = [float(n) for n in NUMBER.findall(part.replace("..", " "))]
         found.update(given, (-n for n in given))
         if len(given) == 2:
             signed = [given[0], -given[0]]
@@ -231,15 +231,18 @@ def _words_in(text: str) -> list[tuple[str, str]]:
 
 
 def _numbers_near(bounds: Iterable[float], domain: Domain) -> list[float]:
-    near = {math.nextafter(b, to) for b in bounds for to in (-math.inf, b, math.inf)}
     if domain.kind == "number":
-        return sorted(near)
-    finite = {n for n in near if math.isfinite(n)}
+        return sorted(_neighbours(bounds))
+    finite = [b for b in bounds if math.isfinite(b)]
     if domain.kind == "angle":
-        return sorted({wrapped(n) for n in finite | {-180.0, math.nextafter(180.0, 0.0), math.nextafter(-180.0, 0.0)}})
-    return sorted(
-        {float(step + end) for n in finite for end in (math.floor(n), math.ceil(n)) for step in (-1, 0, 1)} | {-math.inf, math.inf}
-    )
+        return sorted({wrapped(n) for n in _neighbours([*finite, *map(wrapped, finite), -180.0])})
+    ends = [end(n) for n in _neighbours(finite) if math.isfinite(n) for end in (math.floor, math.ceil)]
+    return sorted({-math.inf, math.inf, *(float(end + step) for end in ends for step in (-1, 0, 1))})
+
+
+def _neighbours(numbers: Iterable[float]) -> set[float]:
+    """The numbers, and the doubles beside them."""
+    return {math.nextafter(n, to) for n in numbers for to in (-math.inf, n, math.inf)}
 
 
 def wrapped(degrees: float) -> float:

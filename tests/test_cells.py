@@ -156,14 +156,14 @@ def test_a_cell_holds_what_the_plainest_reading_of_it_says(domain: Domain, data:
 
 
 @given(ANY_TEXT, DOMAINS)
-@strategies.examples(10)
+@strategies.examples(6)
 def test_any_text_is_read_or_refused_with_its_find_and_what_is_accepted(text: str, domain: Domain):
     found = read_or_refuse(text, domain)
     assert isinstance(found, Cell) or (found.found and found.accepted)
 
 
 @given(ANY_TEXT, DOMAINS)
-@strategies.examples(10)
+@strategies.examples(6)
 def test_a_mend_that_is_offered_can_itself_be_read(text: str, domain: Domain):
     found = read_or_refuse(text, domain)
     if isinstance(found, Fault) and found.mend.isprintable() and "\\" not in found.mend and "…" not in found.mend:

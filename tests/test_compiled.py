@@ -59,7 +59,7 @@ def found(table: CompiledTable, context: dict[str, object], unknown: str = "erro
 
 @COLUMNS
 @given(strategies.tables(), st.data())
-@strategies.examples(5)
+@strategies.examples(3)
 def test_a_query_finds_what_reading_every_cell_finds(flat_bytes, table, data):
     context, plain = data.draw(strategies.contexts(table))
     with keeping(flat_bytes):
@@ -78,7 +78,7 @@ def test_missing_facts_are_ignored_or_accepted_by_any_alone(flat_bytes, table, u
 
 @COLUMNS
 @given(strategies.tables(least_conditions=1), UNKNOWN, st.data())
-@strategies.examples(5)
+@strategies.examples(3)
 def test_sets_of_values_find_the_rows_that_may_and_that_always_match(flat_bytes, table, unknown, data):
     context, plain = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
     with keeping(flat_bytes):

@@ -107,7 +107,7 @@ def test_another_suffix_is_refused_with_the_nearest_mend(table: Path):
     )
     sheet = table.with_suffix(".xlsx")
     sheet.touch()
-    assert refused(lambda: read_texts(sheet)).endswith('Did you mean "contextdb import"?')
+    assert refused(lambda: read_texts(sheet)).endswith("Try to save it as CSV.")
     assert "the name has no suffix" in refused(lambda: write_texts(table.with_suffix(""), [], None, np.array([])))
 
 

@@ -308,7 +308,7 @@ def test_an_unclosed_quote_is_named_at_the_line_where_it_opens():
     assert fault_of('a,b\n1,2\n3,"4\n5,6\n') == (
         "t.csv, line 3: the quoted field that opens here is never closed: '\"4'. "
         "Accepted: a field in double quotes from its start to its end, each quote in it doubled. "
-        "Did you mean a closing quote on this line?"
+        "Try to close it on this line."
     )
 
 

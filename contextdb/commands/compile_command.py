@@ -1,23 +1,28 @@
 """Write the binary artefact for the game: .safetensors, opened there by memory map.
 
-contextdb compile tables/                  one artefact beside each table
-contextdb compile tables/ -o build/        all of them into a folder
-contextdb compile tables/hit_mid_air.csv -o hit_mid_air.safetensors
+Prints the path of each artefact that was written.
+
+  contextdb compile tables/                  one artefact beside each table
+  contextdb compile tables/ -o build/        all of them into a folder
+  contextdb compile tables/hit_mid_air.csv -o hit_mid_air.safetensors
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from contextdb.artefact import SUFFIX
-from contextdb.console import progress
-from contextdb.errors import ContextDBError, Fault, Place
+from contextdb.console import output, printable, progress
+from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.places import table_path
-from contextdb.project import Project, load_table
+from contextdb.project import SCHEMA_FILE, Project, load_table, path_in_quotes
 from contextdb.table import Table
+
+SEPARATORS = ("/", "\\")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,18 +38,17 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     _require_different(targets)
     for table, target in progress(list(zip(tables, targets, strict=True)), "compiling"):
         compiled = table.compile()
-        target.parent.mkdir(parents=True, exist_ok=True)
+        _make_folder(target.parent)
         compiled.save(target)
-        print(target)
-        print(
-            f"{table.name}: {table.n_rows} rows, {len(table.conditions)} conditions, {compiled.nbytes:,} bytes of masks",
-            file=sys.stderr,
-        )
+        with output():
+            print(printable(str(target)))
+        size = f"{plural(table.n_rows, 'row')}, {plural(len(table.conditions), 'condition')}, {compiled.nbytes:,} bytes of masks"
+        print(printable(f"{table.name}: {size}"), file=sys.stderr)
     return ExitCode.OK
 
 
 def _tables(text: str) -> list[Table]:
-    if Path(text).is_dir():
+    if os.path.isdir(text) or Path(text).name == SCHEMA_FILE:
         tables = list(Project.load(text).tables.values())
         if not tables:
             raise ContextDBError(Fault("the folder holds no table.", "a folder with .csv or .parquet files", place=Place(text)))
@@ -56,13 +60,24 @@ def _target(table: Table, out: str | None, n_tables: int) -> Path:
     assert table.path is not None
     if out is None:
         return table.path.with_suffix(SUFFIX)
-    if n_tables > 1 or out.endswith(("/", "\\")) or Path(out).is_dir():
-        return Path(out) / f"{table.name}{SUFFIX}"
-    if Path(out).suffix != SUFFIX:
-        raise ContextDBError(
-            Fault(f"the artefact cannot be {out}.", f"a name that ends in {SUFFIX}", f'"{Path(out).with_suffix(SUFFIX)}"')
-        )
-    return Path(out)
+    is_artefact = Path(out).suffix == SUFFIX and not out.endswith(SEPARATORS) and not os.path.isdir(out)
+    if is_artefact and n_tables > 1:
+        raise FileError(Fault(f"{n_tables} tables do not go into one artefact.", "a folder", place=Place(out)))
+    if is_artefact:
+        return Path(out)
+    if n_tables > 1 or out.endswith(SEPARATORS) or os.path.isdir(out):
+        is_file_name = PurePath(table.name).name == table.name and not any(c in table.name for c in SEPARATORS)
+        return Path(out) / f"{table.name if is_file_name else table.path.stem}{SUFFIX}"
+    mend = path_in_quotes(Path(out).with_suffix(SUFFIX))
+    raise FileError(Fault("this is no name of an artefact.", f"a name that ends in {SUFFIX}, or a folder", mend, Place(out)))
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
+        raise FileError(Fault(f"the folder cannot be made: {why}.", "a folder", place=Place(str(folder)))) from None
 
 
 def _require_different(targets: list[Path]) -> None:

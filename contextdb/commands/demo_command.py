@@ -14,7 +14,7 @@ from pathlib import Path
 
 import contextdb
 from contextdb.compiled import CompiledTable
-from contextdb.console import aligned, styled, wants_colour
+from contextdb.console import aligned, output, styled, wants_colour
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import Context
@@ -58,8 +58,9 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Print each step of the way."""
     folder = Path(arguments.tables) if arguments.tables else sample_folder()
     colour = wants_colour(sys.stdout)
-    for line in _steps(folder):
-        print(styled(line, "bold", colour) if line[:1].isdigit() else line)
+    with output():
+        for line in _steps(folder):
+            print(styled(line, "bold", colour) if line[:1].isdigit() else line)
     return ExitCode.OK
 
 

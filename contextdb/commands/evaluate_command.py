@@ -1,29 +1,36 @@
-"""Every context of a CSV or Parquet file, or of all files of a glob: how many assets are valid in each, and how often each asset
-is.
+"""Every context of a CSV or Parquet file, or of all files of a glob: in how many each asset is valid, and how many have none.
 
-contextdb evaluate tables/hit_mid_air.csv moments.csv
-contextdb evaluate hit_mid_air "telemetry/*.parquet" --unknown any --out answers.parquet
+A file of contexts has a column for each fact and a row for each moment.
+
+  contextdb evaluate tables/hit_mid_air.csv moments.csv
+  contextdb evaluate hit_mid_air "telemetry/*.parquet" --unknown any --out answers.parquet
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import io
+import os
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 
 from contextdb.batch import ManyMatches
+from contextdb.bitmask import Rows
+from contextdb.commands import missing_facts_by_option
 from contextdb.compiled import CompiledTable
-from contextdb.console import aligned, progress, styled, wants_colour
+from contextdb.console import aligned, output, printable, progress, styled, wants_colour
 from contextdb.contexts import context_files, read_contexts
-from contextdb.errors import ContextDBError, ContextError, Fault, Place, plural
+from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import UNKNOWN_MODES
 from contextdb.files import write_atomic
 from contextdb.places import open_compiled
+from contextdb.project import path_in_quotes
+from contextdb.report.render_json import as_json
 
 N_SHOWN = 15
 OUT_SUFFIXES = (".csv", ".parquet")
@@ -41,36 +48,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Evaluate the files one after the other; only sums are kept, and with --out the answers."""
-    if arguments.out is not None and Path(arguments.out).suffix not in OUT_SUFFIXES:
-        raise ContextDBError(Fault(f"cannot write answers to {arguments.out}.", f"a name that ends in {' or '.join(OUT_SUFFIXES)}"))
     compiled = open_compiled(arguments.table)
     files = context_files(arguments.contexts)
+    out = None if arguments.out is None else _out_file(Path(arguments.out), files)
     n_contexts = n_without = 0
     hits = np.zeros(compiled.n_rows, np.int64)
     answers = []
     for path in progress(files, "evaluating"):
-        many = _evaluate(compiled, path, arguments.unknown)
+        with missing_facts_by_option():
+            many = read_contexts(path, compiled).ask(compiled, arguments.unknown)
         n_without += int((many.counts == 0).sum())
         hits += many.hits
-        if arguments.out is not None:
+        if out is not None:
             answers.append(_answers(compiled, many, path, n_contexts))
         n_contexts += len(many)
-    if arguments.out is not None:
-        _write(pl.concat(answers), Path(arguments.out))
-    if arguments.json:
-        print(json.dumps(_document(compiled, n_contexts, n_without, hits), ensure_ascii=False, indent=2))
-    else:
-        _print(compiled, n_contexts, n_without, hits)
+    if out is not None:
+        _write(pl.concat(answers), out)
+    with output():
+        if arguments.json:
+            print(as_json(_document(compiled, n_contexts, n_without, hits)), end="")
+        else:
+            print(*_lines(compiled, n_contexts, n_without, hits), sep="\n")
     return ExitCode.OK
 
 
-def _evaluate(compiled: CompiledTable, path: Path, unknown: str) -> ManyMatches:
-    contexts = read_contexts(path, compiled)
-    try:
-        return compiled.query_many(contexts, unknown)  # type: ignore[arg-type]
-    except ContextError as error:
-        placed = (f.at(Place(str(path), None, f.place.column, f.place.row)) for f in error.faults)
-        raise ContextError(*placed) from None
+def _out_file(out: Path, files: Sequence[Path]) -> Path:
+    """The file to write to, refused before the work where it could only be refused after."""
+    place = Place(str(out))
+    if out.suffix not in OUT_SUFFIXES:
+        raise FileError(
+            Fault("answers cannot be written to such a file.", f"a name that ends in {' or '.join(OUT_SUFFIXES)}", place=place)
+        )
+    if not os.path.isdir(out.parent):
+        raise FileError(
+            Fault(f"there is no folder {path_in_quotes(out.parent)}.", "a folder that is there", place=place, rule="no-such-path")
+        )
+    if out.resolve() in [path.resolve() for path in files]:
+        raise FileError(Fault("the answers would be written over the contexts.", "another file", place=place))
+    return out
 
 
 def _answers(compiled: CompiledTable, many: ManyMatches, path: Path, first: int) -> pl.DataFrame:
@@ -79,7 +94,7 @@ def _answers(compiled: CompiledTable, many: ManyMatches, path: Path, first: int)
     return pl.DataFrame(
         {
             "context": np.arange(first, first + len(many)),
-            "file": [str(path)] * len(many),
+            "file": [printable(str(path))] * len(many),
             "count": many.counts,
             "rows": pl.Series([r.tolist() for r in rows], dtype=pl.List(pl.Int64)),
             "assets": pl.Series([assets[r].tolist() for r in rows], dtype=pl.List(pl.String)),
@@ -88,8 +103,6 @@ def _answers(compiled: CompiledTable, many: ManyMatches, path: Path, first: int)
 
 
 def _write(answers: pl.DataFrame, path: Path) -> None:
-    import io
-
     buffer = io.BytesIO()
     if path.suffix == ".parquet":
         answers.write_parquet(buffer)
@@ -99,29 +112,27 @@ def _write(answers: pl.DataFrame, path: Path) -> None:
     write_atomic(path, buffer.getvalue())
 
 
-def _document(
-    compiled: CompiledTable, n_contexts: int, n_without: int, hits: np.ndarray[tuple[int], np.dtype[np.int64]]
-) -> dict[str, object]:
+def _document(compiled: CompiledTable, n_contexts: int, n_without: int, hits: Rows) -> dict[str, object]:
     rows = [{"row": r, "asset": a, "hits": int(h)} for r, (a, h) in enumerate(zip(compiled.assets, hits, strict=True))]
     return {"format": 1, "table": compiled.name, "contexts": n_contexts, "without_asset": n_without, "rows": rows}
 
 
-def _print(compiled: CompiledTable, n_contexts: int, n_without: int, hits: np.ndarray[tuple[int], np.dtype[np.int64]]) -> None:
+def _lines(compiled: CompiledTable, n_contexts: int, n_without: int, hits: Rows) -> Iterator[str]:
     colour = wants_colour(sys.stdout)
-    print(f"{plural(n_contexts, 'context')} against {plural(compiled.n_rows, 'row')} of {compiled.name}")
+    yield f"{plural(n_contexts, 'context')} against {plural(compiled.n_rows, 'row')} of {printable(compiled.name)}"
     said = f"{plural(n_without, 'context')} without a valid asset" + (f" ({share(n_without, n_contexts)})" if n_contexts else "")
-    print(styled(said, "yellow" if n_without else "green", colour))
+    yield styled(said, "yellow" if n_without else "green", colour)
     order = np.argsort(-hits, kind="stable")
     used = [r for r in order.tolist() if hits[r]]
     if used:
-        lines = [(str(int(hits[r])), share(int(hits[r]), n_contexts), str(r), compiled.assets[r]) for r in used[:N_SHOWN]]
-        print()
-        print(*aligned([("contexts", "share", "row", "asset"), *lines], right=(0, 1, 2)), sep="\n")
+        lines = [(f"{int(hits[r]):,}", share(int(hits[r]), n_contexts), str(r), compiled.assets[r]) for r in used[:N_SHOWN]]
+        yield ""
+        yield from aligned([("contexts", "share", "row", "asset"), *lines], right=(0, 1, 2))
         if len(used) > N_SHOWN:
-            print(f"… and {plural(len(used) - N_SHOWN, 'more row')}")
-    never = len(hits) - len(used)
-    if never:
-        print(f"\n{plural(never, 'row')} never valid")
+            yield f"… and {plural(len(used) - N_SHOWN, 'more row')}"
+    if never := len(hits) - len(used):
+        yield ""
+        yield f"{plural(never, 'row')} never valid"
 
 
 def share(part: int, whole: int) -> str:

@@ -1,7 +1,9 @@
-"""Which assets are valid for one context. Exits with 1 when none is.
+"""Which assets are valid for one context.
 
-contextdb query tables/hit_mid_air.csv IsInMidAirAnim=False speed=3.5
-contextdb query hit_mid_air --unknown any "heading=0 ± 90" --explain
+Exits with 1 when none is.
+
+  contextdb query locomotion gait=Walk speed=1.3 direction=0 style=normal
+  contextdb query tables/locomotion.csv --unknown any "direction=0 ± 90" --explain
 """
 
 from __future__ import annotations
@@ -80,7 +82,7 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
 def _split(text: str, compiled: CompiledTable) -> tuple[str, str]:
     """Name and value of FACT=VALUE; a name may hold a "=" itself."""
     ends = [at for at, character in enumerate(text) if character == "="]
-    for at in ends:
+    for at in reversed(ends):
         if text[:at] in compiled.places:
             return text[:at], text[at + 1 :]
     if ends:
@@ -107,7 +109,9 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
 
 
 def _json_fact(fact: Fact, name: str, compiled: CompiledTable) -> object:
-    """A fact as JSON has it; a set of values, tags and an infinite number as text."""
+    """A fact as JSON has it: tags as a list, a set of values and an infinite number as text."""
+    if isinstance(fact, frozenset):
+        return sorted(fact)
     is_plain = isinstance(fact, (bool, str)) or (isinstance(fact, float) and math.isfinite(fact))
     return fact if is_plain else describe_fact(fact, compiled.conditions[compiled.places[name]])
 
@@ -124,7 +128,7 @@ def _lines(compiled: CompiledTable, explanation: Explanation, explains: bool, mo
     yield styled(said, "green" if matches else "yellow", colour)
     if matches:
         yield ""
-        yield from aligned(_matching(compiled, explanation), right=(0,))
+        yield from aligned(list(_matching(compiled, explanation)), right=(0,))
     nearest = explanation.nearest(most if explains else 0 if matches else N_NEAREST)
     if nearest:
         yield ""

@@ -1,0 +1,420 @@
+"""`contextdb evaluate`: every context of a file or a glob, with the sums that asking one context at a time gives."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import polars as pl
+import pytest
+import strategies
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from running import Result, run
+
+from contextdb.commands.evaluate_command import share
+from contextdb.contexts import read_contexts
+from contextdb.errors import ContextError
+from contextdb.facts import describe
+from contextdb.table import Table
+
+TOML = """
+[conditions.state]
+type = "enum"
+values = ["Ground", "In Air"]
+[conditions.speed]
+type = "number"
+[conditions.heading]
+type = "angle"
+[conditions.ok]
+type = "bool"
+[conditions.tags]
+type = "tags"
+"""
+TABLE = '''Asset,state,speed,heading,ok,tags
+run,Ground,3..6,"0, 45",Any,+Move
+jump,"""In Air""",0..4,Any,True,-Stunned
+fall,Any,Any,"180, 90",False,Any
+'''
+CONTEXTS = """state,speed,heading,ok,tags,frame
+Ground,4,10,True,Move.Run,1
+In Air,4,-170,yes,Half Way,2
+In Air,9.5,180,False,,3
+Ground,1e9,0,0,Stunned,4
+"""
+WHOLE = CONTEXTS.replace("False,,3", "False,Stunned,3")
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with the table `moves` and a file of four contexts."""
+    (tmp_path / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    (tmp_path / "moves.csv").write_text(TABLE, encoding="utf-8")
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "a.csv").write_text(WHOLE, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    return tmp_path
+
+
+def refused(*arguments: str) -> list[str]:
+    """The messages of a command that could not be done."""
+    result = run("evaluate", *arguments)
+    assert (result.code, result.out) == (2, "")
+    return [line.removeprefix("contextdb: ") for line in result.err.splitlines()]
+
+
+def hits(*arguments: str) -> list[int]:
+    result = run("evaluate", "moves", *arguments, "--json")
+    assert (result.code, result.err) == (0, "")
+    return [row["hits"] for row in result.json["rows"]]
+
+
+# ---- the answer
+
+
+def test_sums_stand_on_standard_output():
+    assert run("evaluate", "moves", "data/a.csv") == Result(
+        0,
+        "4 contexts against 3 rows of moves\n"
+        "1 context without a valid asset (25.0 %)\n"
+        "\n"
+        "contexts   share  row  asset\n"
+        "       1  25.0 %    0  run\n"
+        "       1  25.0 %    1  jump\n"
+        "       1  25.0 %    2  fall\n",
+        "",
+    )
+
+
+def test_rows_are_listed_by_how_often_they_are_valid_and_those_that_never_are_counted(here: Path):
+    (here / "t.csv").write_text("Asset,speed\n" + "".join(f"a{i},{i}..40\n" for i in range(20)) + "never,99\n", encoding="utf-8")
+    (here / "c.csv").write_text("speed\n5\n0\n17\n", encoding="utf-8")
+    lines = run("evaluate", "t", "c.csv").lines
+    assert lines[1] == "0 contexts without a valid asset (0.0 %)"
+    assert lines[3:6] == [
+        "contexts    share  row  asset",
+        "       3  100.0 %    0  a0",
+        "       2   66.7 %    1  a1",
+    ]
+    assert lines[-3:] == ["… and 3 more rows", "", "3 rows never valid"]
+
+
+def test_the_json_document_has_the_promised_fields():
+    assert run("evaluate", "moves", "data/a.csv", "--json").json == {
+        "format": 1,
+        "table": "moves",
+        "contexts": 4,
+        "without_asset": 1,
+        "rows": [
+            {"row": 0, "asset": "run", "hits": 1},
+            {"row": 1, "asset": "jump", "hits": 1},
+            {"row": 2, "asset": "fall", "hits": 1},
+        ],
+    }
+
+
+@pytest.mark.parametrize(
+    ("part", "whole", "said"),
+    [
+        (0, 10, "0.0 %"),
+        (10, 10, "100.0 %"),
+        (1, 3, "33.3 %"),
+        (1, 10_000, "<0.1 %"),
+        (9999, 10_000, ">99.9 %"),
+        (1, 1000, "0.1 %"),
+        (0, 0, "0.0 %"),
+    ],
+)
+def test_a_share_rounds_neither_to_nothing_nor_to_all(part: int, whole: int, said: str):
+    assert share(part, whole) == said
+
+
+@given(st.integers(0, 10**7), st.integers(1, 10**7))
+def test_a_share_says_0_or_100_only_when_it_is_exactly_that(part: int, whole: int):
+    part = min(part, whole)
+    assert (share(part, whole) == "0.0 %") is (part == 0)
+    assert (share(part, whole) == "100.0 %") is (part == whole)
+
+
+# ---- files
+
+
+def test_a_glob_means_all_its_files_in_the_order_of_their_names(here: Path):
+    (here / "data" / "deep").mkdir()
+    (here / "data" / "deep" / "b.csv").write_text("ok\nFalse\n", encoding="utf-8")
+    (here / "data" / "notes.txt").write_text("no contexts", encoding="utf-8")
+    result = run("evaluate", "moves", "data/**/*.csv", "--unknown", "any", "--out", "answers.csv", "--json")
+    assert result.json["contexts"] == 5
+    with (here / "answers.csv").open(encoding="utf-8") as file:
+        assert [row["file"] for row in csv.DictReader(file)] == ["data/a.csv"] * 4 + ["data/deep/b.csv"]
+
+
+def test_a_file_whose_name_looks_like_a_glob_is_that_file(here: Path):
+    (here / "data" / "[a].csv").write_text(WHOLE, encoding="utf-8")
+    pl.read_csv(here / "data" / "a.csv").with_columns(
+        ok=pl.Series([True, True, False, False]), tags=pl.Series([["Move"]] * 4)
+    ).write_parquet(here / "data" / "[a]*.parquet")
+    assert run("evaluate", "moves", "data/[a].csv", "--json").json["contexts"] == 4
+    assert run("evaluate", "moves", "data/[a]*.parquet", "--json").json["contexts"] == 4
+
+
+def test_a_missing_file_is_named_with_the_nearest(here: Path):
+    assert refused("moves", "data/aa.csv") == [
+        'data/aa.csv: no file of contexts is there. Accepted: a .csv or .parquet file, or a glob. Did you mean "data/a.csv"?'
+    ]
+    assert refused("moves", "none/*.csv") == [
+        "none/*.csv: no file of contexts is there. Accepted: a .csv or .parquet file, or a glob."
+    ]
+    assert refused("moves", "data")[0].startswith("data: no file of contexts is there.")
+
+
+def test_a_file_of_another_kind_is_refused(here: Path):
+    (here / "data" / "c.json").write_text("[]", encoding="utf-8")
+    assert refused("moves", "data/c.json")[0].startswith('data/c.json: a table file does not end in ".json".')
+
+
+@pytest.mark.parametrize("unknown", ["error", "any", "never"])
+def test_a_file_without_contexts_has_sums_of_nothing(here: Path, unknown: str):
+    (here / "none.csv").write_text(WHOLE.splitlines()[0] + "\n", encoding="utf-8")
+    pl.read_csv(here / "none.csv", infer_schema_length=0).write_parquet(here / "none.parquet")
+    for name in ("none.csv", "none.parquet"):
+        result = run("evaluate", "moves", name, "--unknown", unknown, "--out", "answers.parquet")
+        assert result.lines[:2] == ["0 contexts against 3 rows of moves", "0 contexts without a valid asset"]
+        assert result.lines[-1] == "3 rows never valid"
+        assert pl.read_parquet(here / "answers.parquet").height == 0
+
+
+def test_a_table_without_conditions_has_every_row_valid_in_each_context(here: Path):
+    (here / "bare.csv").write_text("Asset\nx\ny\n", encoding="utf-8")
+    result = run("evaluate", "bare", "data/a.csv", "--json")
+    assert (result.json["contexts"], result.json["without_asset"]) == (4, 0)
+    assert [row["hits"] for row in result.json["rows"]] == [4, 4]
+
+
+@pytest.mark.parametrize("name", ["c.csv", "c.parquet"])
+def test_contexts_that_say_nothing_to_the_table_are_contexts_too(here: Path, name: str):
+    frame = pl.DataFrame({"frame": [1, 2, 3]})
+    frame.write_csv(here / name) if name == "c.csv" else frame.write_parquet(here / name)
+    assert hits(name, "--unknown", "any") == [3, 3, 3]
+    assert hits(name, "--unknown", "never") == [0, 0, 0]
+    assert refused("moves", name)[0].startswith(f'{name}: the fact "state" is missing (5 facts missing:')
+
+
+# ---- CSV and Parquet
+
+
+def test_a_parquet_file_gives_what_its_csv_gives(here: Path):
+    frame = pl.DataFrame(
+        {
+            "state": pl.Series(["Ground", "In Air", "In Air", "Ground"], dtype=pl.Categorical),
+            "speed": pl.Series([4, 4, 9, 10**9], dtype=pl.Int64),
+            "heading": pl.Series([10, 190, -180, 360], dtype=pl.Float32),
+            "ok": [True, True, False, False],
+            "tags": [["Move.Run"], ["Half", "Way"], ["Stunned"], ["Stunned"]],
+        }
+    )
+    frame.write_parquet(here / "c.PARQUET")
+    assert hits("c.PARQUET") == hits("data/a.csv") == [1, 1, 1]
+
+
+def test_columns_whose_names_look_like_patterns_are_read(here: Path):
+    (here / "t.csv").write_text('Asset,"^.*$"\na,1\n', encoding="utf-8")
+    pl.DataFrame({"^.*$": [1, 2], "other": [3, 4]}).write_parquet(here / "c.parquet")
+    result = run("evaluate", "t", "c.parquet", "--json")
+    assert [row["hits"] for row in result.json["rows"]] == [1]
+
+
+@pytest.mark.parametrize("is_parquet", [False, True], ids=["csv", "parquet"])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@given(strategies.tables(least_conditions=1), st.data(), st.sampled_from(["any", "never"]))
+def test_each_context_of_a_file_is_answered_as_when_it_is_asked_alone(
+    here: Path, is_parquet: bool, table: Table, data: st.DataObject, unknown: str
+):
+    compiled = table.compile()
+    drawn = [data.draw(strategies.contexts(table, has_missing=True))[0] for _ in range(data.draw(st.integers(0, 4)))]
+    facts = [compiled.read_context(context, unknown) for context in drawn]
+    path = here / ("c.parquet" if is_parquet else "c.csv")
+    if is_parquet:
+        columns = {n: [sorted(f[n]) if isinstance(f[n], frozenset) else f[n] for f in facts] for n in compiled.places}
+        pl.DataFrame(columns).with_columns(frame=pl.lit(1)).write_parquet(path)
+    else:
+        texts = {n: [_as_text(f[n]) for f in facts] for n in compiled.places}
+        pl.DataFrame(texts, schema=dict.fromkeys(texts, pl.String)).with_columns(frame=pl.lit("1")).write_csv(path)
+        facts = [{n: None if f == frozenset() else f for n, f in fact.items()} for fact in facts]
+    many = read_contexts(path, compiled).ask(compiled, unknown)
+    alone = [compiled.query(fact, unknown).indices.tolist() for fact in facts]
+    assert [rows.tolist() for rows in many.lists()] == alone
+    assert many.counts.tolist() == [len(rows) for rows in alone]
+    assert many.hits.tolist() == [sum(row in rows for rows in alone) for row in range(table.n_rows)]
+
+
+def _as_text(fact: object) -> str:
+    """A fact as a file of contexts has it; no text says "no tags"."""
+    if fact is None:
+        return ""
+    if isinstance(fact, frozenset):
+        return " ".join('"' + tag + '"' for tag in sorted(fact))
+    return '"' + fact.replace('"', '""') + '"' if isinstance(fact, str) else describe(fact)  # type: ignore[arg-type]
+
+
+# ---- missing facts
+
+
+@pytest.mark.parametrize(("unknown", "found"), [("any", [1, 1, 2]), ("never", [1, 0, 1])])
+def test_missing_facts_are_treated_as_said(here: Path, unknown: str, found: list[int]):
+    (here / "c.csv").write_text("state,speed,heading,ok,tags\nGround,4,10,,Move\nIn Air,,,,\n,,180,False,\n", encoding="utf-8")
+    assert hits("c.csv", "--unknown", unknown) == found
+
+
+@pytest.mark.parametrize(
+    ("name", "place"), [("c.csv", 'c.csv, line 3, column "speed"'), ("c.parquet", 'c.parquet, row 1, column "speed"')]
+)
+def test_a_missing_fact_is_named_with_its_place(here: Path, name: str, place: str):
+    frame = pl.DataFrame(
+        {"state": ["Ground"] * 3, "speed": [1.0, None, None], "heading": [0.0] * 3, "ok": [True] * 3, "tags": ["a"] * 3}
+    )
+    frame.write_csv(here / name) if name == "c.csv" else frame.write_parquet(here / name)
+    assert refused("moves", name) == [
+        f"{place}: the fact is missing in 2 contexts. Accepted: a value for each condition, or --unknown any, or --unknown never."
+    ]
+
+
+@pytest.mark.parametrize("unknown", ["error", "any", "never"])
+def test_a_misspelt_column_is_never_passed_over(here: Path, unknown: str):
+    (here / "c.csv").write_text(WHOLE.replace("heading", "headin"), encoding="utf-8")
+    assert refused("moves", "c.csv", "--unknown", unknown) == [
+        'c.csv: there is no condition "headin", and "heading" is missing. '
+        'Accepted: the names of the table\'s conditions. Did you mean "heading"?'
+    ]
+
+
+# ---- wrong facts
+
+
+def test_every_wrong_fact_of_a_csv_is_named_with_its_line(here: Path):
+    rows = ["Gruond,fast,x,maybe,+Move", "Ground,1..2,1,True,a", "Ground,1,1,True,a"]
+    (here / "c.csv").write_text("state,speed,heading,ok,tags\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    told = refused("moves", "c.csv")
+    assert [line.partition(": ")[0] for line in told] == [
+        'c.csv, line 2, column "state"',
+        'c.csv, line 2, column "speed"',
+        'c.csv, line 2, column "heading"',
+        'c.csv, line 2, column "ok"',
+        'c.csv, line 2, column "tags"',
+        'c.csv, line 3, column "speed"',
+    ]
+    assert 'Did you mean "Ground"?' in told[0]
+    assert told[1].endswith('cannot read "fast" as a number. Accepted: one value of its type in each context.')
+    assert told[5].endswith('"1..2" is a set of values. Accepted: one value of its type in each context.')
+
+
+def test_a_wrong_fact_that_stands_in_many_lines_is_told_once(here: Path):
+    (here / "c.csv").write_text("speed\n1\n" + "fast\n" * 1000, encoding="utf-8")
+    (line,) = refused("moves", "c.csv", "--unknown", "any")
+    assert line.startswith('c.csv, line 3, column "speed": cannot read "fast" as a number.')
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("speed", ["1", "fast"], 'row 1, column "speed": cannot read "fast" as a number.'),
+        ("speed", ["1..2"], 'row 0, column "speed": a set of values is for one query at a time.'),
+        ("speed", [[1.0]], 'row 0, column "speed": '),
+        ("speed", [{"x": 1}], 'row 0, column "speed": '),
+        ("state", ["Ground", "Gruond"], 'row 1, column "state": "Gruond" is not a declared value.'),
+        ("state", [1], 'row 0, column "state": int "1" is not a fact of type enum.'),
+        ("ok", ["True"], 'row 0, column "ok": str "True" is not a fact of type bool.'),
+        ("ok", [2], 'row 0, column "ok": int "2" is not a fact of type bool.'),
+        ("heading", [0.0, float("inf")], 'row 1, column "heading": '),
+        ("tags", [[1]], 'row 0, column "tags": '),
+        ("tags", [b"x"], 'row 0, column "tags": '),
+    ],
+)
+def test_a_wrong_fact_of_a_parquet_file_is_named_with_its_row(here: Path, name: str, values: list[object], message: str):
+    pl.DataFrame({name: values}, strict=False).write_parquet(here / "c.parquet")
+    (line,) = refused("moves", "c.parquet", "--unknown", "any")
+    assert line.startswith("c.parquet, ")
+    assert message in line
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"PAR1" + bytes(100) + b"PAR1", b"state\nGround\n"])
+def test_a_broken_parquet_file_is_refused(here: Path, content: bytes):
+    (here / "c.parquet").write_bytes(content)
+    (line,) = refused("moves", "c.parquet")
+    assert line.startswith("c.parquet: ")
+
+
+def test_a_cut_off_parquet_file_is_refused(here: Path):
+    pl.DataFrame({"speed": [float(i) for i in range(1000)]}).write_parquet(here / "whole.parquet")
+    whole = (here / "whole.parquet").read_bytes()
+    for length in (len(whole) - 1, len(whole) // 2, 20):
+        (here / "c.parquet").write_bytes(whole[:length])
+        assert refused("moves", "c.parquet", "--unknown", "any")[0].startswith("c.parquet: ")
+
+
+def test_a_csv_that_is_no_table_is_refused_with_its_line(here: Path):
+    (here / "c.csv").write_text("speed,ok\n1\n", encoding="utf-8")
+    assert refused("moves", "c.csv")[0].startswith("c.csv, line 2: found 1 field, the header has 2.")
+
+
+# ---- writing answers
+
+
+@pytest.mark.parametrize("name", ["answers.csv", "answers.parquet"])
+def test_the_answers_of_each_context_are_written(here: Path, name: str):
+    assert run("evaluate", "moves", "data/a.csv", "--out", name).code == 0
+    if name == "answers.parquet":
+        rows = pl.read_parquet(here / name).rows()
+        assert rows[0] == (0, "data/a.csv", 1, [0], ["run"])
+        assert [row[2] for row in rows] == [1, 1, 1, 0]
+        assert rows[3] == (3, "data/a.csv", 0, [], [])
+    else:
+        assert (here / name).read_text(encoding="utf-8").splitlines() == [
+            "context,file,count,rows,assets",
+            "0,data/a.csv,1,0,run",
+            "1,data/a.csv,1,1,jump",
+            "2,data/a.csv,1,2,fall",
+            '3,data/a.csv,0,"",""',
+        ]
+
+
+def test_several_assets_of_a_context_stand_in_one_cell_of_a_csv(here: Path):
+    (here / "c.csv").write_text("ok\nTrue\n", encoding="utf-8")
+    run("evaluate", "moves", "c.csv", "--unknown", "any", "--out", "answers.csv")
+    assert (here / "answers.csv").read_text(encoding="utf-8").splitlines()[1] == "0,c.csv,2,0 1,run | jump"
+
+
+@pytest.mark.parametrize(
+    ("out", "message"),
+    [
+        ("answers.json", "answers.json: answers cannot be written to such a file. Accepted: a name that ends in .csv or .parquet."),
+        ("none/answers.csv", 'none/answers.csv: there is no folder "none". Accepted: a folder that is there.'),
+        ("data/../data/a.csv", "data/../data/a.csv: the answers would be written over the contexts. Accepted: another file."),
+    ],
+)
+def test_where_answers_cannot_go_is_said_before_the_work(here: Path, out: str, message: str):
+    assert refused("moves", "data/a.csv", "--out", out) == [message]
+    assert (here / "data" / "a.csv").read_text(encoding="utf-8") == WHOLE
+
+
+def test_nothing_is_written_when_a_context_is_wrong(here: Path):
+    (here / "data" / "b.csv").write_text("speed\nfast\n", encoding="utf-8")
+    assert refused("moves", "data/*.csv", "--out", "answers.csv", "--unknown", "any")
+    assert not (here / "answers.csv").exists()
+
+
+# ---- reading contexts
+
+
+def test_texts_of_a_csv_are_read_as_on_the_command_line():
+    compiled = Table.from_columns({"Asset": ["a"], "x": ["1"]}, {"x": {"type": "angle"}}).compile()
+    Path("c.csv").write_text('x\n370\n"20, 0"\n=5\n\n -0.0 \nnan\n', encoding="utf-8")
+    assert read_contexts(Path("c.csv"), compiled).facts["x"].to_list() == [10.0, 20.0, 5.0, 0.0, None]
+
+
+def test_a_set_in_a_file_of_contexts_is_refused():
+    compiled = Table.from_columns({"Asset": ["a"], "x": ["b"]}, {"x": {"type": "text"}}).compile()
+    Path("c.csv").write_text("x\na b\n", encoding="utf-8")
+    with pytest.raises(ContextError, match='"a b" is a set of values'):
+        read_contexts(Path("c.csv"), compiled)

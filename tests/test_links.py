@@ -1,0 +1,131 @@
+"""The pages of docs/ and README.md: links lead somewhere, and what a page lists is what there is."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import contextdb
+from contextdb import motion
+from contextdb.cells import reads
+from contextdb.domains import Domain
+from contextdb.motion import MotionConfig
+from contextdb.schema import read_schema
+from contextdb.shapes import SECTIONS
+
+ROOT = Path(__file__).parent.parent
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]
+DOMAINS = {
+    "Cells of every type": Domain("number"),
+    "bool": Domain("bool"),
+    "int and number": Domain("number"),
+    "angle": Domain("angle"),
+    "enum and text": Domain("enum", ("CB", "FS", "SS", "Half Back")),
+    "tags": Domain("tags", ("InAir", "Catching", "Stunned", "Move.Run")),
+}
+"""What the tables of cells in docs/designers.md are about, by heading."""
+
+
+def named(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def text_of(page: str) -> str:
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+def prose(text: str) -> str:
+    """A page without its fenced blocks."""
+    return re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S)
+
+
+def links(text: str) -> list[str]:
+    """The targets of all links and pictures that stay inside the repository."""
+    found = re.findall(r"\]\(([^)\s]+)\)", prose(text))
+    return [target for target in found if not re.match(r"[a-z]+:", target)]
+
+
+def anchors(text: str) -> set[str]:
+    """What GitHub calls the headings of a page."""
+    headings = re.findall(r"^#+ (.+)$", prose(text), re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def sections(text: str) -> dict[str, str]:
+    """The text under each heading."""
+    parts = re.split(r"^#+ (.+)$", text, flags=re.M)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def first_column(section: str) -> Iterator[str]:
+    """Everything between backticks in the first column of a section's tables."""
+    for row in re.findall(r"^\| ((?:[^|\\]|\\.)+) \|", section, re.M):
+        yield from (code.replace("\\|", "|") for code in re.findall(r"`([^`]+)`", row))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_every_link_inside_the_repository_leads_somewhere(page: Path):
+    for target in links(page.read_text(encoding="utf-8")):
+        path, _, anchor = target.partition("#")
+        file = page.parent / path if path else page
+        assert file.exists(), f"{target}: there is no such file"
+        if anchor:
+            assert anchor in anchors(file.read_text(encoding="utf-8")), f"{target}: there is no such heading"
+
+
+def test_every_page_can_be_reached_from_the_index():
+    linked = {target.partition("#")[0] for target in links(text_of("docs/index.md"))}
+    assert {page.name for page in (ROOT / "docs").glob("*.md")} - {"index.md"} <= linked
+
+
+def test_the_api_page_lists_every_public_name():
+    listed = set(re.findall(r"`(\w+)", text_of("docs/api.md")))
+    assert set(contextdb.__all__) <= listed
+
+
+def test_every_method_and_attribute_on_the_api_page_is_there():
+    for name, attribute in re.findall(r"`([A-Z]\w+)\.(\w+)", text_of("docs/api.md")):
+        owner = getattr(contextdb, name)
+        assert hasattr(owner, attribute) or attribute in attributes_of(owner), f"{name}.{attribute}"
+
+
+def test_every_motion_name_on_the_api_page_is_there():
+    for name, attribute in re.findall(r"`motion\.(\w+)(?:\.(\w+))?", text_of("docs/api.md")):
+        owner = getattr(motion, name)
+        assert not attribute or hasattr(owner, attribute), f"motion.{name}.{attribute}"
+
+
+def attributes_of(owner: type) -> set[str]:
+    """The names that its objects have: fields, and what they are given when they are made."""
+    fields = {name for one in owner.__mro__ for name in getattr(one, "__annotations__", {})}
+    return fields | set(re.findall(r"self\.(\w+)(?:: [^=]+)? = ", inspect.getsource(owner)))
+
+
+def test_every_example_of_a_cell_in_the_designers_page_can_be_read():
+    found = sections(text_of("docs/designers.md"))
+    for heading, domain in DOMAINS.items():
+        cells = list(first_column(found[heading]))
+        assert cells, f"{heading} has no examples"
+        for cell in cells:
+            assert reads(cell, domain), f"{heading}: {cell}"
+
+
+def test_every_example_of_a_contextdb_toml_is_accepted():
+    examples = re.findall(r"^```toml\n(.*?)^```$", text_of("docs/format.md"), re.M | re.S)
+    assert examples
+    for example in examples:
+        schema = read_schema(example, "contextdb.toml")
+        parts = {"features": schema.features, "databases": schema.databases, "selectors": schema.selectors}
+        MotionConfig.from_dict(parts, file="contextdb.toml")
+
+
+def test_the_format_page_names_every_section_and_key_of_contextdb_toml():
+    page = text_of("docs/format.md")
+    for section, keys in SECTIONS.items():
+        assert f"[{section}" in page
+        for key in keys or ():
+            assert f"`{key}`" in page or f"\n{key} = " in page, f"{section}.{key}"

@@ -29,6 +29,9 @@ class Parser(argparse.ArgumentParser):
     def parse(self, given: Sequence[str]) -> argparse.Namespace:
         """The arguments; options may stand anywhere between the others."""
         arguments, rest = self.parse_known_intermixed_args(given)
+        for action in self._get_positional_actions():
+            if action.nargs is None and not isinstance(getattr(arguments, action.dest), str):  # what "--" makes of none
+                self.error(f"the following arguments are required: {action.metavar}")
         for text in rest:
             if not text.startswith("-"):
                 self.error(f"{in_quotes(text)} is one argument too many.")

@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask, intervals
+from contextdb.bitmask import Rows
 from contextdb.cell_words import NUMBER_TEXT
 from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, format_cell, format_number, parse_cell, reads
+from contextdb.classes import ColumnMasks, NumberMasks, WideMasks
 from contextdb.conditions import Condition
 from contextdb.domains import Domain
 from contextdb.errors import plural
@@ -30,6 +32,9 @@ if TYPE_CHECKING:
 
 FEW_DIGITS = 12
 """A number of more characters than this is the work of rounding, not of a person: 29.990000000000002."""
+
+ONE_BOUND = 1e-12
+"""Bounds that are closer than this share of their size are those of one number: it and the double after it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,23 +105,28 @@ class Explanation:
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
         """The rows that are not valid but nearest to it: fewest failing cells, then least far off."""
-        n_valid = len(self.matches)
-        return [self.row(r) for r in self.order[n_valid : n_valid + most].tolist()]
+        rows = np.flatnonzero(self.n_failures)
+        if most <= 0:
+            return []
+        if most < len(rows):  # how far off a row is need be known only of those that may be among the nearest
+            limit = np.partition(self.n_failures[rows], most - 1)[most - 1]
+            rows = rows[self.n_failures[rows] <= limit]
+        return [self.row(r) for r in self._sorted(rows)[:most].tolist()]
 
     def always_rows(self) -> list[int]:
         """The rows that match for every value of set-valued facts."""
         return [int(r) for r in bitmask.rows(self.matches.always)]
 
-    @property
+    @cached_property
     def n_failures(self) -> NDArray[np.int64]:
         """How many cells of each row fail: int64 [n_rows]; a disabled row counts one more."""
         return np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + ~self._enabled
 
     @cached_property
-    def order(self) -> NDArray[np.int64]:
+    def order(self) -> Rows:
         """Row numbers, valid ones first, then by failing cells, how far the facts are off, and place in the file: int64
         [n_rows]."""
-        return np.lexsort((self._distances, self.n_failures))
+        return self._sorted(np.arange(self.compiled.n_rows))
 
     def __str__(self) -> str:
         lines = [f"{len(self.matches)} of {plural(self.compiled.n_rows, 'row')} valid"]
@@ -136,24 +146,25 @@ class Explanation:
             fails[at] = ~bitmask.unpack(bitmask.from_int(bits, compiled.n_rows), compiled.n_rows)
         return fails
 
-    @cached_property
-    def _distances(self) -> NDArray[np.float64]:
-        """How far the failing facts are off, summed: float64 [n_rows]; a number by its share of the domain, at most 1; others 1."""
-        far = np.zeros(self.compiled.n_rows)
-        for at, condition in enumerate(self.compiled.conditions):
-            if self._fails[at].any():
-                far += np.where(self._fails[at], self._column_distances(at, condition), 0.0)
+    def _sorted(self, rows: Rows) -> Rows:
+        return rows[np.lexsort((self._distances(rows), self.n_failures[rows]))]
+
+    def _distances(self, rows: Rows) -> NDArray[np.float64]:
+        """How far the failing facts are off, summed: float64 [len(rows)]; a number by its share of the domain, at most 1; others
+        1."""
+        far = np.zeros(len(rows))
+        for at, fact in enumerate(self.facts.values()):
+            fails = self._fails[at, rows]
+            if fails.any():
+                far[fails] += self._column_distances(at, fact, rows[fails]) if isinstance(fact, float) else 1.0
         return far
 
-    def _column_distances(self, at: int, condition: Condition) -> NDArray[np.float64]:
-        column = self.compiled.texts[at]
-        fact = self.facts[condition.name]
-        if not isinstance(fact, float):
-            return np.ones(len(column.codes))
-        held = np.bincount(column.codes, minlength=len(column.texts))  # a text that no row holds any more need not read
-        cells = [c.accepts if n else None for c, n in zip(self.compiled.cells(at), held, strict=True)]
-        width = _width(condition, cells)
-        return np.array([_distance(c, fact, width) for c in cells], np.float64)[column.codes]
+    def _column_distances(self, at: int, fact: float, rows: Rows) -> NDArray[np.float64]:
+        column, condition = self.compiled.texts[at], self.compiled.conditions[at]
+        width = _width(condition, self.compiled.masks[at])
+        codes, which = np.unique(column.codes[rows], return_inverse=True)
+        cells = [parse_cell(column.texts[c], condition.domain) for c in codes.tolist()]
+        return np.array([_distance(c.accepts, fact, width) for c in cells], np.float64)[which]
 
     def _failure(self, at: int, row: int) -> Failure:
         condition = self.compiled.conditions[at]
@@ -243,15 +254,16 @@ def _gap(end: float, fact: float, is_circular: bool) -> float:
     return min(gap, 360.0 - gap) if is_circular else gap
 
 
-def _width(condition: Condition, cells: list[Accepted | None]) -> float:
+def _width(condition: Condition, masks: ColumnMasks) -> float:
     """What a number's distance is measured by: its domain, else the spread of the column's bounds."""
     domain = condition.domain
     if domain.kind == "angle":
         return 180.0
     if np.isfinite(domain.maximum - domain.minimum):
         return domain.maximum - domain.minimum or 1.0
-    ends = [e for c in cells if isinstance(c, NumberSet) for span in c.spans for e in span if np.isfinite(e)]
-    return min(max(ends) - min(ends), sys.float_info.max) if len(set(ends)) > 1 else 1.0
+    bounds = masks.bound_list if isinstance(masks, (NumberMasks, WideMasks)) else []
+    spread = min(bounds[-1] - bounds[0], sys.float_info.max) if bounds else 0.0
+    return spread if bounds and spread > abs(bounds[0]) * ONE_BOUND else 1.0
 
 
 def _distance(accepts: Accepted | None, fact: float, width: float) -> float:

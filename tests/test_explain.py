@@ -13,7 +13,8 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.cells import NumberSet, parse_cell
+from contextdb.cells import parse_cell
+from contextdb.classes import ColumnMasks
 from contextdb.compiled import CompiledTable
 from contextdb.domains import Domain
 from contextdb.errors import ContextError
@@ -57,25 +58,26 @@ def gap(text: str, domain: Domain, fact: float) -> float:
     return min([min(g, 360.0 - g) if domain.kind == "angle" else g for g in gaps], default=math.inf)
 
 
-def distance(table: Table, context: dict[str, object], row: int, unknown: str) -> float:
+def distance(compiled: CompiledTable, table: Table, context: dict[str, object], row: int, unknown: str) -> float:
     """What the failing facts of a row add up to: a number by its share of the domain's width, anything else 1."""
     far = 0.0
-    for name, domain, texts in oracles.columns(table):
+    for at, (name, domain, texts) in enumerate(oracles.columns(table)):
         fact = context.get(name)
         if name in failing(table, context, row, unknown):
             is_number = isinstance(fact, float) and math.isfinite(fact)
-            far += min(gap(texts[row], domain, fact) / width(domain, texts), 1.0) if is_number else 1.0
+            far += min(gap(texts[row], domain, fact) / width(domain, compiled.masks[at]), 1.0) if is_number else 1.0
     return far
 
 
-def width(domain: Domain, texts: list[str]) -> float:
+def width(domain: Domain, masks: ColumnMasks) -> float:
+    """The declared width of a domain, or from the first to the last number where the column's answers change."""
     if domain.kind == "angle":
         return 180.0
     if math.isfinite(domain.maximum - domain.minimum):
         return domain.maximum - domain.minimum
-    sets = [parse_cell(t, domain).accepts for t in texts]
-    ends = [e for s in sets if isinstance(s, NumberSet) for span in s.spans for e in span if math.isfinite(e)]
-    return max(ends, default=1.0) - min(ends, default=0.0) or 1.0
+    spread = np.ptp(masks.bounds) if masks.bounds.size else 0.0
+    is_one_number = masks.bounds.size == 2 and masks.bounds[1] == np.nextafter(masks.bounds[0], np.inf)
+    return 1.0 if is_one_number or not spread else min(float(spread), 1.7976931348623157e308)
 
 
 @given(strategies.tables(), st.data(), UNKNOWN)
@@ -96,15 +98,18 @@ def test_each_row_fails_with_the_cells_that_reading_them_finds(table: Table, dat
 @given(strategies.tables(), st.data(), UNKNOWN)
 def test_rows_come_valid_first_then_with_fewest_failures_then_the_least_far_off(table: Table, data: st.DataObject, unknown: str):
     context, plain = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
-    explanation = table.compile().explain(context, unknown)
+    compiled = table.compile()
+    explanation = compiled.explain(context, unknown)
     order = explanation.order.tolist()
     assert sorted(order) == list(range(table.n_rows))
     n_failures = [len(failing(table, plain, r, unknown)) + (not oracles.is_enabled(table, r)) for r in range(table.n_rows)]
     assert explanation.n_failures.tolist() == n_failures
     assert order[: len(explanation.matches)] == explanation.matches.indices.tolist()
-    told = [(n_failures[r], distance(table, plain, r, unknown)) for r in order]
+    told = [(n_failures[r], distance(compiled, table, plain, r, unknown)) for r in order]
     for (n, far), (next_n, next_far) in pairwise(told):
         assert n < next_n or (n == next_n and far <= next_far + 1e-9)
+    most = data.draw(st.integers(0, 6))
+    assert [r.row for r in explanation.nearest(most)] == order[len(explanation.matches) :][:most]
 
 
 @given(strategies.tables(), st.data(), UNKNOWN)
@@ -325,15 +330,29 @@ def test_numbers_at_the_end_of_the_doubles_are_ordered_by_distance():
 
 def test_details_are_worked_out_only_for_the_rows_that_are_asked_for():
     n_rows = 10_000
-    texts = [f"{i % 50}..{i % 50 + 1}" for i in range(n_rows)]
-    columns = {"Asset": [f"a{i}" for i in range(n_rows)], "x": texts, "y": texts[::-1]}
-    compiled = Table.from_columns(columns, {"x": {"type": "number"}, "y": {"type": "number"}}).compile()
+    texts = [f"{i}..{i + 1}" for i in range(n_rows)]
+    columns = {"Asset": [f"a{i}" for i in range(n_rows)], "x": texts}
+    compiled = Table.from_columns(columns, {"x": {"type": "number"}}).compile()
     with (
         mock.patch.object(Explanation, "_failure", autospec=True, side_effect=Explanation._failure) as told,
         mock.patch("contextdb.explain.parse_cell", side_effect=parse_cell) as read,
     ):
-        explanation = compiled.explain({"x": 200.0, "y": -3.0})
+        explanation = compiled.explain({"x": 20_000.0})
         assert read.call_count == told.call_count == 0
-        assert len(explanation.nearest(3)) == 3
-        assert told.call_count == 6
-        assert read.call_count <= 2 * 50 + 6
+        assert [r.row for r in explanation.asset("a9993")] == [9993]
+        assert told.call_count == 1
+        assert read.call_count == 1
+
+
+def test_the_nearest_of_many_rows_are_found_without_reading_those_that_fail_more():
+    n_rows = 5_000
+    columns = {
+        "Asset": [f"a{i}" for i in range(n_rows)],
+        "x": [f"{i}" for i in range(n_rows)],
+        "y": ["1" if i % 100 else "2" for i in range(n_rows)],
+    }
+    compiled = Table.from_columns(columns, {"x": {"type": "number"}, "y": {"type": "number"}}).compile()
+    with mock.patch("contextdb.explain.parse_cell", side_effect=parse_cell) as read:
+        explanation = compiled.explain({"x": 2_049.5, "y": 2})
+        assert [r.row for r in explanation.nearest(2)] == [2_000, 2_100]
+    assert read.call_count <= n_rows / 100 + 4

@@ -6,11 +6,15 @@ import os
 import shutil
 import sys
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from time import monotonic
 from typing import IO, TypeVar
 
 Item = TypeVar("Item")
+
+PATIENCE_S = 0.5
+"""Work that is done sooner has no progress bar."""
 
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}
 
@@ -76,12 +80,17 @@ def terminal_width() -> int:
     return shutil.get_terminal_size((100, 24)).columns
 
 
-def progress(items: Iterable[Item], label: str, total: int | None = None) -> Iterator[Item]:
-    """Pass the items on, with a progress bar on standard error when that is a terminal."""
-    if not sys.stderr.isatty():
-        yield from items
-        return
+def progress(items: Sequence[Item], label: str) -> Iterator[Item]:
+    """Pass the items on; when that takes long, with a progress bar on standard error where that is a terminal."""
+    start, rest = monotonic(), iter(items)
+    for done, item in enumerate(rest, 1):
+        yield item
+        if done < len(items) and monotonic() - start > PATIENCE_S and sys.stderr.isatty():
+            yield from _with_bar(rest, label, len(items) - done)
+
+
+def _with_bar(rest: Iterator[Item], label: str, total: int) -> Iterator[Item]:
     from rich.console import Console
     from rich.progress import track
 
-    yield from track(items, description=label, total=total, console=Console(stderr=True), transient=True)
+    yield from track(rest, label, total, console=Console(stderr=True), transient=True)

@@ -61,7 +61,8 @@ def _tables_in(folder: Path) -> list[tuple[str, Path]]:
 
 
 def _no_table(path: Path, known: list[str]) -> FileError:
-    files = [str(path.parent / name) for name in _files_in(path.parent) if name.endswith((*TABLE_SUFFIXES, SUFFIX))]
+    beside = [path.parent / name for name in _files_in(path.parent)]
+    files = [str(p) for p in beside if p.name.endswith((*TABLE_SUFFIXES, SUFFIX)) or (p / SCHEMA_FILE).is_file()]
     near = nearest(str(path), [*known, *files])
     accepted = "a file, a folder of one table, or the name of a table of the project"
     place = Place(shown(str(path), most=4096))

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from contextdb import console
 from contextdb.console import aligned, output, printable, progress, styled, terminal_width, wants_colour, width_of
 
 
@@ -139,14 +140,43 @@ def test_output_lets_other_errors_through():
         raise ZeroDivisionError
 
 
-def test_progress_passes_everything_on_and_prints_nothing_where_no_terminal_is(capsys: pytest.CaptureFixture[str]):
-    assert list(progress(iter(range(5)), "counting")) == [0, 1, 2, 3, 4]
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The seconds that go by between two looks at the clock."""
+    now, step = [0.0], [0.1]
+
+    def look() -> float:
+        now[0] += step[0]
+        return now[0]
+
+    monkeypatch.setattr(console, "monotonic", look)
+    return step
+
+
+def test_progress_passes_everything_on_and_prints_nothing_where_no_terminal_is(
+    capsys: pytest.CaptureFixture[str], clock: list[float]
+):
+    clock[0] = 10.0
+    assert list(progress(range(5), "counting")) == [0, 1, 2, 3, 4]
     assert capsys.readouterr() == ("", "")
 
 
-def test_progress_on_a_terminal_goes_to_standard_error_alone(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+def test_work_that_is_soon_done_has_no_progress_bar(monkeypatch: pytest.MonkeyPatch, clock: list[float]):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    assert list(progress([1, 2, 3], "counting")) == [1, 2, 3]
+    assert list(progress(range(4), "counting")) == [0, 1, 2, 3]
+    assert terminal.getvalue() == ""
+
+
+@pytest.mark.parametrize("seconds", [0.2, 10.0])
+def test_progress_of_long_work_goes_to_standard_error_alone(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, clock: list[float], seconds: float
+):
+    clock[0] = seconds
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    assert list(progress(range(7), "counting")) == list(range(7))
+    assert list(progress([], "counting")) == []
     assert capsys.readouterr().out == ""
     assert "counting" in terminal.getvalue()
+    assert "100%" in terminal.getvalue()

@@ -131,3 +131,11 @@ def test_a_schema_that_cannot_be_read_is_told_when_a_name_is_looked_up(here: Pat
 @pytest.mark.parametrize("text", ["a\0b", "x" * 5000, "x" * 300 + "/" + "y" * 300, "\n", "~nobody/t.csv", "../" * 50 + "t"])
 def test_odd_texts_are_no_tables(here: Path, text: str):
     assert "there is no such table" in refused(text)
+
+
+def test_a_misspelt_folder_of_tables_is_offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "contextdb.toml").write_text("", "utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FileError, match=r'Did you mean "tables"\?'):
+        table_path("tabels")

@@ -32,9 +32,9 @@ from contextdb.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, Wi
 from contextdb.columns import TextColumn
 from contextdb.compiled import CompiledTable, SoftMasks
 from contextdb.conditions import Condition
+from contextdb.disk import read_bytes, write_atomic
 from contextdb.domains import Domain
 from contextdb.errors import ArtefactError, Fault, Place
-from contextdb.files import read_bytes, write_atomic
 
 LAYOUT = 1
 SUFFIX = ".safetensors"

@@ -15,11 +15,11 @@ from contextdb.batch import ManyMatches
 from contextdb.cells import Cell
 from contextdb.compiled import CompiledTable
 from contextdb.conditions import Condition
+from contextdb.disk import path_in_quotes
 from contextdb.domains import NUMERIC
 from contextdb.errors import ContextError, Fault, FileError, Place, TableError, in_quotes, nearest
 from contextdb.facts import Unknown, read_fact_text
 from contextdb.files import AnySource, read_texts
-from contextdb.project import path_in_quotes
 
 ONE = "one value of its type in each context"
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from contextdb.artefact import SUFFIX
 from contextdb.compiled import CompiledTable
+from contextdb.disk import TABLE_SUFFIXES, path_in_quotes
 from contextdb.errors import Fault, FileError, Place, TableError, nearest, plural, shown
-from contextdb.project import SCHEMA_FILE, TABLE_SUFFIXES, load_table, path_in_quotes, read_folder_schema, table_files, twice_named
+from contextdb.project import SCHEMA_FILE, load_table, read_folder_schema, table_files, twice_named
 
 FOLDERS = (Path(), Path("tables"))
 MOST_NAMED = 6

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb import files
+from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, nearest, some
 from contextdb.schema import EMPTY, Schema, read_schema
 from contextdb.table import Table, build_table
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
 
 SCHEMA_FILE = "contextdb.toml"
-TABLE_SUFFIXES = (".csv", ".parquet")
 CASES_SUFFIX = ".cases.csv"
 
 
@@ -96,7 +96,7 @@ def read_folder_schema(folder: Path) -> Schema:
     path = folder / SCHEMA_FILE
     if not path.is_file():
         return EMPTY
-    raw = files.read_bytes(path)
+    raw = read_bytes(path)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -147,11 +147,6 @@ def folder_of(path: Path) -> Path:
     near = nearest(path.name, siblings)
     mend = path_in_quotes(path.parent / near) if near else ""
     raise FileError(Fault(found, f"a folder of tables, or its {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
-
-
-def path_in_quotes(path: str | Path) -> str:
-    """A path in quotes, in full: half a path is no help."""
-    return in_quotes(str(path), most=4096)
 
 
 def _read_table(path: Path, schema: Schema, folder: Path, strict: bool) -> Table:

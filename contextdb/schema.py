@@ -14,9 +14,10 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from contextdb.conditions import Condition
+from contextdb.disk import TABLE_SUFFIXES
 from contextdb.domains import Domain
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
-from contextdb.shapes import KEY_SYNONYMS, SECTIONS, SUFFIXES, Policy, Shape, as_toml, what, wrong_name
+from contextdb.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
 from contextdb.toml_lines import Path, key_lines, line_of, read_toml
 
 Found = tuple[Path, Fault]
@@ -56,7 +57,7 @@ class TableSettings:
     @property
     def files(self) -> tuple[str, ...]:
         """The files that may hold the table, the most wanted first."""
-        names = [self.name + suffix for suffix in SUFFIXES] if self.file is None else [self.file]
+        names = [self.name + suffix for suffix in TABLE_SUFFIXES] if self.file is None else [self.file]
         return tuple(str(PurePosixPath(name)) for name in names)
 
 
@@ -241,7 +242,7 @@ def _file_faults(tables: Mapping[str, Section]) -> Iterator[Found]:
     owners: dict[str, str] = {}
     for name, part in tables.items():
         path, file = ("tables", name), part.get("file")
-        wrong = wrong_name(name) or wrong_file(name + SUFFIXES[0] if file is None else file)
+        wrong = wrong_name(name) or wrong_file(name + TABLE_SUFFIXES[0] if file is None else file)
         if wrong and file is None:
             yield path, Fault(f"{_header(path)} has no file, and its name cannot be that of one: {wrong}.", 'file = "NAME.csv"')
         if wrong:

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Literal, get_args
 
+from contextdb.disk import TABLE_SUFFIXES
 from contextdb.domains import KINDS
 from contextdb.errors import in_quotes, nearest, some
 
 Policy = Literal["collect", "first", "unique", "priority"]
 POLICIES: tuple[Policy, ...] = get_args(Policy)
-SUFFIXES = (".csv", ".parquet")
 
 KIND_SYNONYMS = {
     **dict.fromkeys(("boolean", "flag", "logical", "truth"), "bool"),
@@ -120,7 +120,7 @@ def _wrong_file(value: object) -> str | None:
         return "it leaves the folder of contextdb.toml"
     if "\\" in value:
         return 'folders are separated by "/" on every system'
-    return None if path.suffix.casefold() in SUFFIXES else "its ending is that of no table file"
+    return None if path.suffix.casefold() in TABLE_SUFFIXES else "its ending is that of no table file"
 
 
 def _meant_file(value: object) -> object:

@@ -16,8 +16,9 @@ import polars as pl
 import pytest
 
 from contextdb.columns import TextColumn
+from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import FileError, TableError
-from contextdb.files import read_bytes, read_texts, write_atomic, write_texts
+from contextdb.files import read_texts, write_texts
 from contextdb.parquet import ParquetSource
 from contextdb.source import Source
 
@@ -309,7 +310,7 @@ def test_an_interrupt_leaves_the_old_file_and_nothing_else(table: Path, monkeypa
 
 KILLED_AT_A_CALL = """
 import os, signal, sys
-from contextdb.files import write_atomic
+from contextdb.disk import write_atomic
 
 def die_at(call, number):
     system, calls = getattr(os, call), []
@@ -338,7 +339,7 @@ for call, number in [line.split() for line in sys.argv[2:]]:
 
 SAVING_FOR_EVER = """
 import sys
-from contextdb.files import write_atomic
+from contextdb.disk import write_atomic
 
 while True:
     for letter in b"ab":

@@ -16,10 +16,11 @@ from pathlib import Path, PurePath
 
 from contextdb.artefact import SUFFIX
 from contextdb.console import output, printable, progress
+from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.places import table_path
-from contextdb.project import SCHEMA_FILE, Project, load_table, path_in_quotes
+from contextdb.project import SCHEMA_FILE, Project, load_table
 from contextdb.table import Table
 
 SEPARATORS = ("/", "\\")

@@ -24,12 +24,11 @@ from contextdb.commands import missing_facts_by_option
 from contextdb.compiled import CompiledTable
 from contextdb.console import aligned, output, printable, progress, styled, wants_colour
 from contextdb.contexts import context_files, read_contexts
+from contextdb.disk import path_in_quotes, write_atomic
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import UNKNOWN_MODES
-from contextdb.files import write_atomic
 from contextdb.places import open_compiled
-from contextdb.project import path_in_quotes
 from contextdb.report.render_json import as_json
 
 N_SHOWN = 15

@@ -17,41 +17,33 @@ column) and `digest`, BLAKE2b-128 of `about` and of all tensors in the order of 
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
-import mmap
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from contextdb.cells import TagSet
 from contextdb.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.columns import TextColumn
 from contextdb.compiled import CompiledTable, SoftMasks
 from contextdb.conditions import Condition
-from contextdb.disk import read_bytes, write_atomic
 from contextdb.domains import Domain
-from contextdb.errors import ArtefactError, Fault, Place
+from contextdb.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
 
-LAYOUT = 1
-SUFFIX = ".safetensors"
+__all__ = ["SUFFIX", "open_artefact", "save"]
 
-Tensors = dict[str, NDArray[Any]]
-_DTYPES = {"U64": "<u8", "I64": "<i8", "F64": "<f8", "I32": "<i4", "U8": "u1"}
+COMPILED = FileKind(
+    "contextdb", 1, "one that contextdb compiled", "a file that this version of contextdb compiled", "to compile the table again"
+)
 
 
 def save(compiled: CompiledTable, path: Path) -> None:
     """Write a compiled table; the old file is whole until the new one is."""
-    from safetensors.numpy import save as to_bytes
-
     tensors: Tensors = {
         "enabled": compiled.enabled,
         "priorities": compiled.priorities,
         "row_weights": compiled.row_weights,
-        "assets": _as_json(list(compiled.assets)),
+        "assets": texts_to_array(list(compiled.assets)),
     }
     kinds = []
     for at, (masks, soft, texts) in enumerate(zip(compiled.masks, compiled.soft, compiled.texts, strict=True)):
@@ -59,7 +51,7 @@ def save(compiled: CompiledTable, path: Path) -> None:
             {"masks": _add(tensors, f"{at:03d}", masks), "soft": None if soft is None else _add(tensors, f"{at:03d}.soft", soft[0])}
         )
         tensors[f"{at:03d}.codes"] = texts.codes
-        tensors[f"{at:03d}.texts"] = _as_json(list(texts.texts))
+        tensors[f"{at:03d}.texts"] = texts_to_array(list(texts.texts))
         if soft is not None:
             tensors[f"{at:03d}.soft.penalties"] = soft[1]
     about = json.dumps(
@@ -72,17 +64,7 @@ def save(compiled: CompiledTable, path: Path) -> None:
             "columns": kinds,
         }
     )
-    tensors = {name: np.ascontiguousarray(array) for name, array in tensors.items()}
-    metadata = {"contextdb": str(LAYOUT), "about": about, "digest": _digest(about, tensors)}
-    write_atomic(path, _with_metadata(to_bytes(tensors), metadata))
-
-
-def _with_metadata(raw: bytes, metadata: dict[str, str]) -> bytes:
-    """A .safetensors file with metadata; the library itself would put them in another order each time."""
-    start = 8 + int.from_bytes(raw[:8], "little")
-    header = json.dumps({"__metadata__": metadata, **json.loads(raw[8:start])}, separators=(",", ":")).encode()
-    header += b" " * (-len(header) % 8)
-    return len(header).to_bytes(8, "little") + header + raw[start:]
+    write_tensors(path, COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about)})
 
 
 def open_artefact(path: Path) -> CompiledTable:
@@ -95,25 +77,21 @@ def open_artefact(path: Path) -> CompiledTable:
     FileError
         The file cannot be read.
     """
-    try:
-        return _open(path)
-    except (ValueError, KeyError, TypeError, IndexError, UnicodeDecodeError, AttributeError) as error:
-        raise _refused(path, f"the file does not hold what its header says ({type(error).__name__}).") from error
+    tensors, metadata = read_tensors(path, COMPILED)
+    with COMPILED.reading(path):
+        about = metadata["about"]
+        if digest_of(tensors, about) != metadata.get("digest"):
+            raise COMPILED.refused(path, "the file was altered: its contents do not give its digest.")
+        return _table(json.loads(about), tensors)
 
 
-def _open(path: Path) -> CompiledTable:
-    tensors, metadata = _read_tensors(path)
-    if metadata["contextdb"] != str(LAYOUT):
-        raise _refused(path, f"layout {metadata['contextdb']}; this version reads layout {LAYOUT}.")
-    if _digest(metadata["about"], tensors) != metadata.get("digest"):
-        raise _refused(path, "the file was altered: its contents do not give its digest.")
-    about = json.loads(metadata["about"])
+def _table(about: dict[str, Any], tensors: Tensors) -> CompiledTable:
     conditions = tuple(_condition_from_json(c) for c in about["conditions"])
     n_rows = about["rows"]
     numbered = [(f"{at:03d}", kinds) for at, kinds in enumerate(about["columns"])]
     return CompiledTable(
         name=about["name"],
-        assets=_from_json(tensors["assets"]),
+        assets=texts_from_array(tensors["assets"]),
         conditions=conditions,
         masks=tuple(_column(tensors, prefix, kinds["masks"], n_rows) for prefix, kinds in numbered),
         enabled=tensors["enabled"],
@@ -121,51 +99,12 @@ def _open(path: Path) -> CompiledTable:
         priorities=tensors["priorities"],
         row_weights=tensors["row_weights"],
         texts=tuple(
-            TextColumn(c.name, tuple(_from_json(tensors[f"{prefix}.texts"])), tensors[f"{prefix}.codes"])
+            TextColumn(c.name, tuple(texts_from_array(tensors[f"{prefix}.texts"])), tensors[f"{prefix}.codes"])
             for c, (prefix, _) in zip(conditions, numbered, strict=True)
         ),
         policy=about["policy"],
         fallback=about["fallback"],
     )
-
-
-def _read_tensors(path: Path) -> tuple[Tensors, dict[str, str]]:
-    """Every tensor as a view of the mapped file, and the metadata; the file's frame is checked first."""
-    from safetensors import SafetensorError, safe_open
-
-    if not path.is_file() or path.stat().st_size < 8:
-        size = len(read_bytes(path))
-        raise _refused(path, f"the file has {size} bytes, too few for any artefact.")
-    try:
-        with safe_open(path, framework="numpy") as frame:
-            metadata = dict(frame.metadata() or {})
-    except (SafetensorError, OSError) as error:
-        read_bytes(path)  # raises FileError where it is the disk that refuses
-        raise _refused(path, f"not a whole .safetensors file ({error}).") from None
-    if "contextdb" not in metadata:
-        raise _refused(path, "a .safetensors file, but not one that contextdb compiled.")
-    with path.open("rb") as file:
-        mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    start = 8 + int.from_bytes(mapped[:8], "little")
-    header = json.loads(mapped[8:start])
-    tensors: Tensors = {}
-    for name, entry in header.items():
-        if name != "__metadata__":
-            first, last = entry["data_offsets"]
-            dtype = np.dtype(_DTYPES[entry["dtype"]])
-            count = math.prod(entry["shape"])
-            view = np.frombuffer(mapped, dtype, count, start + first) if last > first else np.empty(0, dtype)
-            tensors[name] = view.reshape(entry["shape"])
-    return tensors, metadata
-
-
-def _digest(about: str, tensors: Tensors) -> str:
-    digest = hashlib.blake2b(about.encode(), digest_size=16)
-    for name in sorted(tensors):
-        array = tensors[name]
-        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
-        digest.update(array.tobytes() if not array.flags.c_contiguous else array.data)
-    return digest.hexdigest()
 
 
 def _add(tensors: Tensors, prefix: str, masks: ColumnMasks) -> dict[str, object]:
@@ -226,18 +165,3 @@ def _condition_from_json(about: dict[str, Any]) -> Condition:
     values = None if about["values"] is None else tuple(about["values"])
     domain = Domain(about["type"], values, -math.inf if low is None else low, math.inf if high is None else high)
     return Condition(about["name"], domain, about["unit"], about["description"], about["expr"], about["is_declared"])
-
-
-def _as_json(texts: list[str]) -> NDArray[np.uint8]:
-    return np.frombuffer(json.dumps(texts, ensure_ascii=False).encode("utf-8", "surrogatepass"), np.uint8)
-
-
-def _from_json(octets: NDArray[np.uint8]) -> list[str]:
-    texts: list[str] = json.loads(octets.tobytes().decode("utf-8", "surrogatepass"))
-    return texts
-
-
-def _refused(path: Path, why: str) -> ArtefactError:
-    return ArtefactError(
-        Fault(why, "a file that this version of contextdb compiled", "to compile the table again", Place(str(path)), "bad-artefact")
-    )

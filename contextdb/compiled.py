@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,7 @@ from contextdb.conditions import Condition
 from contextdb.errors import ContextError, Fault, Place
 from contextdb.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact
 from contextdb.intervals import EVERYTHING
-from contextdb.live import LiveContext
+from contextdb.live import LiveContext, SoftLiveContext
 from contextdb.lookup import SingleLookup, build_ask, single_lookup
 from contextdb.matches import Answering, Matches, SetMatches
 from contextdb.stack import MaskStack
@@ -122,7 +122,7 @@ class CompiledTable:
         try:
             return self._ask(context)
         except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
-            return self.matches(*self._bits_carefully(context, unknown))
+            return self.with_penalties(self.matches(*self._bits_carefully(context, unknown)), context, unknown)
 
     def query_many(
         self, contexts: Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame, unknown: Unknown = "error"
@@ -146,7 +146,7 @@ class CompiledTable:
     def live(self, facts: Context | None = None, unknown: Unknown = "error") -> LiveContext:
         """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`."""
         check_mode(unknown)
-        live = LiveContext(self, unknown)
+        live = SoftLiveContext(self, unknown) if any(self.soft) else LiveContext(self, unknown)
         live.update(facts or {})
         return live
 
@@ -197,6 +197,10 @@ class CompiledTable:
                     fails = ~bitmask.unpack(bitmask.from_int(_bits_of(masks, fact)[0], self.n_rows), self.n_rows)
                     costs += np.where(fails, row_penalties, 0.0)
         return costs
+
+    def with_penalties(self, matches: Matches, context: Context, unknown: Unknown = "error") -> Matches:
+        """An answer that knows what the soft cells cost in its context, if the table has any."""
+        return matches.with_penalties(partial(self.penalties, dict(context), unknown)) if any(self.soft) else matches
 
     def cells(self, at: int) -> tuple[Cell, ...]:
         """What the distinct texts of condition number `at` mean, read once; Any for one that cannot be read, which no row holds."""
@@ -298,7 +302,8 @@ class CompiledTable:
 
     def _build_and_ask(self, context: Context) -> Matches:
         """The first question builds the function that answers all others."""
-        ask = build_ask(list(zip(self.conditions, self.masks, strict=True)), self.enabled_bits, self.answering)
+        plain = build_ask(list(zip(self.conditions, self.masks, strict=True)), self.enabled_bits, self.answering)
+        ask = (lambda context: self.with_penalties(plain(context), context)) if any(self.soft) else plain
         object.__setattr__(self, "_ask", ask)
         return ask(context)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping
+from copy import copy
 from functools import reduce
 from math import ldexp
 from operator import and_
@@ -153,3 +154,13 @@ class LiveContext:
         masks = {**self._masks, **self._moving}
         every = (self._odd[n][0] if n in self._odd else m for n, m in masks.items())
         return self._compiled.matches(bits, reduce(and_, every, self._compiled.enabled_bits))
+
+
+class SoftLiveContext(LiveContext):
+    """The same for a table with soft cells: every answer knows what they cost in the context of its moment."""
+
+    __slots__ = ()
+
+    def matches(self) -> Matches:
+        """The valid rows for the facts as they are now."""
+        return self._compiled.with_penalties(copy(super().matches()), self._facts, self._unknown)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.bitmask import Rows, Words
+from contextdb.bitmask import Flags, Rows, Words
 
 _INT64 = np.dtype(np.int64)
 
@@ -41,7 +42,10 @@ class Matches:
         The rows that hold *all* values of the facts that were given as sets; the same as `mask` when none was.
     """
 
-    __slots__ = ("_rows", "_table", "bits")
+    __slots__ = ("_penalties", "_rows", "_table", "bits")
+
+    _penalties: Callable[[], NDArray[np.float64]]
+    """Set for tables with soft cells only: a plain answer has nothing to pay for."""
 
     def __init__(self, bits: int, table: Answering) -> None:
         self.bits = bits
@@ -77,6 +81,31 @@ class Matches:
     def always(self) -> Words:
         """The rows that hold all values of set-valued facts: uint64 [W]."""
         return self.mask
+
+    @property
+    def flags(self) -> Flags:
+        """Whether each row of the table is valid: bool [n_rows]."""
+        return bitmask.unpack(self.mask, self.n_rows)
+
+    @property
+    def table_assets(self) -> Sequence[str]:
+        """The assets of all rows of the table, valid or not; the same object in every answer of a compiled table."""
+        return self._table.assets
+
+    @property
+    def has_penalties(self) -> bool:
+        """Whether the table has soft cells."""
+        return hasattr(self, "_penalties")
+
+    @property
+    def penalties(self) -> NDArray[np.float64]:
+        """What each row's soft cells cost in a search with this context: float64 [n_rows]; see `CompiledTable.penalties`."""
+        return self._penalties() if self.has_penalties else np.zeros(self.n_rows)
+
+    def with_penalties(self, penalties: Callable[[], NDArray[np.float64]]) -> Matches:
+        """The same answer of a table with soft cells; what they cost is worked out when it is asked for."""
+        self._penalties = penalties
+        return self
 
     def __len__(self) -> int:
         return self.bits.bit_count()

@@ -1,8 +1,8 @@
 """What contextdb.toml says, as frozen data.
 
 `contextdb.shapes` describes what each key accepts; here stands how keys and sections go together. All is checked before anything is
-used, so that every fault of the file is reported at once. `features`, `databases` and `selectors` are kept as plain data, for
-`contextdb.motion` to read. Nothing here reads a file.
+used, so that every fault of the file is reported at once. `features`, `databases`, `selectors` and `controllers` are kept as plain
+data, for `contextdb.motion` to read. Nothing here reads a file.
 """
 
 from __future__ import annotations
@@ -72,7 +72,18 @@ class Schema:
     features: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     databases: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     selectors: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    controllers: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     file: str | None = None
+
+    @property
+    def motion(self) -> dict[str, Mapping[str, object]]:
+        """The sections that `MotionConfig.from_dict` reads."""
+        return {
+            "features": self.features,
+            "databases": self.databases,
+            "selectors": self.selectors,
+            "controllers": self.controllers,
+        }
 
     def settings_for(self, file: str) -> TableSettings:
         """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as name."""
@@ -311,6 +322,7 @@ def _schema(document: Section, file: str) -> Schema:
         _parts(document, "features"),
         _parts(document, "databases"),
         _parts(document, "selectors"),
+        _parts(document, "controllers"),
         file,
     )
 

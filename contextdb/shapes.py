@@ -204,5 +204,6 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
     "features": None,
     "databases": None,
     "selectors": None,
+    "controllers": None,
 }
 """The sections and their keys; None: kept as they are. All but `project` hold named tables."""

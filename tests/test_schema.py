@@ -69,6 +69,9 @@ table = "hit"
 
 [selectors.loco]
 order = [{ database = "jog" }]
+
+[controllers.player]
+selector = "loco"
 """
 
 
@@ -113,6 +116,8 @@ def test_a_whole_file_is_read_as_it_says():
     assert schema.features == {"loco": {"rate": 30.0, "channels": [{"type": "position", "bone": "LeftFoot"}]}}
     assert schema.databases == {"jog": {"table": "hit"}}
     assert schema.selectors == {"loco": {"order": [{"database": "jog"}]}}
+    assert schema.controllers == {"player": {"selector": "loco"}}
+    assert schema.motion == {name: getattr(schema, name) for name in ("features", "databases", "selectors", "controllers")}
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "\ufeff", "[conditions]\n[tables]\n"])
@@ -307,7 +312,8 @@ def test_a_wrong_value_in_a_table_is_said(line: str, message: str):
 
 
 SECTIONS_SAID = (
-    "[project], [conditions.NAME], [tables.NAME], [blueprints.NAME], [features.NAME], [databases.NAME], [selectors.NAME]"
+    "[project], [conditions.NAME], [tables.NAME], [blueprints.NAME], [features.NAME], [databases.NAME], [selectors.NAME], "
+    "[controllers.NAME]"
 )
 
 

@@ -13,6 +13,7 @@ from contextdb.errors import Fault, MotionError, QueryError, in_quotes, plural, 
 from contextdb.motion.quaternions import Floats
 
 Flags = NDArray[np.bool_]
+NO_BIASES: Floats = np.empty(0)
 
 
 class HasAssets(Protocol):
@@ -83,16 +84,18 @@ def frame_of(frame: object, n_frames: int, what: str) -> int:
     return int(frame)
 
 
-def current_of(current: object, n_frames: int) -> int | None:
-    """The current frame; None and -1, the frame of a miss, are none."""
-    is_none = current is None or (isinstance(current, numbers.Integral) and not isinstance(current, bool) and current == -1)
-    return None if is_none else frame_of(current, n_frames, "current frame")
+def current_of(current: object, n_frames: int) -> int:
+    """The current frame, -1 for none: None, or -1, the frame of a miss."""
+    if current is None or (type(current) is int and current == -1):
+        return -1
+    is_none = isinstance(current, numbers.Integral) and not isinstance(current, bool) and current == -1
+    return -1 if is_none else frame_of(current, n_frames, "current frame")
 
 
-def bias_of(bias: object, n_frames: int) -> Floats | None:
-    """The bias of each frame, without NaN and without negative infinity."""
+def bias_of(bias: object, n_frames: int) -> Floats:
+    """The bias of each frame, without NaN and without negative infinity; empty where none is given."""
     if bias is None:
-        return None
+        return NO_BIASES
     array = numbers_of(bias, "the bias")
     if array.shape != (n_frames,):
         raise QueryError(Fault(f"the bias has shape {array.shape}.", f"one number for each of {plural(n_frames, 'frame')}"))

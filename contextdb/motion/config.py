@@ -4,54 +4,31 @@
     [databases.NAME]    which clips, by which features; `table` names the table whose assets it holds
     [selectors.NAME]    databases in order: all but the last with the threshold under which they win outright
 
-Reading touches no file; only `load_clips` and what calls it do.
+Reading touches no file; only `load_clips` and what builds do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path, PureWindowsPath
-from typing import TypeVar, cast
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TypeVar
 
-from contextdb.errors import Fault, MotionError, Place, SchemaError, in_quotes, nearest, some
-from contextdb.motion import clips
-from contextdb.motion.clips import CENTIMETRE, UPS, Clip, Up
-from contextdb.motion.database import MotionDatabase, build_databases
-from contextdb.motion.features import FeatureSchema
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, some
+from contextdb.motion import building, clips
+from contextdb.motion.building import Assets, Progress
+from contextdb.motion.clip_files import clip_files
+from contextdb.motion.clips import Clip
+from contextdb.motion.database import MotionDatabase
+from contextdb.motion.database_settings import DatabaseSettings, read_databases
+from contextdb.motion.features import CustomFunction, FeatureSchema
 from contextdb.motion.reading import Mapped, Section, as_toml, what_is
 from contextdb.motion.selector import Entry, Selector
 
-DATABASE_KEYS = ("table", "clips", "features", "metres_per_unit", "up")
 STEP_KEYS = ("database", "threshold")
 MOST_COST = 1e30
 
 Part = TypeVar("Part")
-
-
-@dataclass(frozen=True)
-class DatabaseSettings:
-    """What `[databases.NAME]` says.
-
-    Attributes
-    ----------
-    name : str
-    clips : str
-        A pattern of files below the folder of contextdb.toml, such as "clips/jog/*.bvh".
-    features : str
-        The name of a feature schema.
-    table : str, optional
-        The table whose assets it holds: other clips are left out. Default: all clips of the pattern.
-    metres_per_unit, up
-        What the clips' files leave open; see `load_bvh`.
-    """
-
-    name: str
-    clips: str
-    features: str
-    table: str | None = None
-    metres_per_unit: float = CENTIMETRE
-    up: Up = "y"
 
 
 @dataclass(frozen=True)
@@ -92,11 +69,18 @@ class MotionConfig:
         faults: list[Fault] = []
         parts = {section: _named_parts(mapping, section, faults, file) for section in ("features", "databases", "selectors")}
         schemas = dict(_read_schemas(parts["features"], faults, file))
-        databases = dict(_read_databases(parts, tables, faults, file))
+        databases = {
+            settings.name: settings
+            for settings in read_databases(parts["databases"], parts["features"], schemas, tables, faults, file)
+        }
         selectors = dict(_read_selectors(parts, faults, file))
         if faults:
             raise SchemaError(*faults)
         return cls(schemas, databases, selectors, file)
+
+    def database(self, name: str) -> DatabaseSettings:
+        """The settings of the database of a name; an unknown name raises SchemaError with the nearest."""
+        return _known("databases", name, self.databases, self.file)
 
     def load_clips(self, name: str, folder: str | Path, assets: Collection[str] | None = None) -> list[Clip]:
         """Read the clips of a database, in the order of their names.
@@ -104,27 +88,39 @@ class MotionConfig:
         `folder` is that of contextdb.toml. With `assets`, clips of these names alone are read; an asset without a clip is not
         missed.
         """
-        settings = _known("databases", name, self.databases, self.file)
-        paths = sorted(Path(folder).glob(settings.clips))
-        if not paths:
-            place = Place(self.file)
-            raise MotionError(
-                Fault(f"[databases.{name}] no file fits clips = {as_toml(settings.clips)}.", place=place, rule="file")
-            )
-        wanted = [path for path in paths if assets is None or path.stem in assets]
-        return clips.load_clips(wanted, metres_per_unit=settings.metres_per_unit, up=settings.up)
+        settings = self.database(name)
+        files = clip_files(settings, self.features[settings.features], Path(folder), assets, self.file)
+        return clips.load_clips([each.path for each in files], metres_per_unit=settings.metres_per_unit, up=settings.up)
 
-    def build(self, folder: str | Path, assets: Mapping[str, Collection[str]] | None = None) -> dict[str, MotionDatabase]:
-        """Build all databases from the clips in a folder; those of one feature schema share a normalisation.
+    def with_functions(self, functions: Mapping[str, CustomFunction]) -> MotionConfig:
+        """The same with functions for custom channels, by the names that the channels of any schema give.
+
+        Raises
+        ------
+        SchemaError
+            No channel asks for a name.
+        """
+        asked = {name: {channel.function for channel in schema.channels} for name, schema in self.features.items()}
+        every = {function for names in asked.values() for function in names if function is not None}
+        for unknown in (function for function in functions if function not in every):
+            near = nearest(unknown, every)
+            found = f"no channel has function = {in_quotes(unknown)}."
+            raise SchemaError(Fault(found, some(sorted(every)), in_quotes(near) if near else "", Place(self.file)))
+        given = {
+            name: schema.with_functions({each: functions[each] for each in functions if each in asked[name]})
+            for name, schema in self.features.items()
+        }
+        return replace(self, features=given)
+
+    def build(
+        self, folder: str | Path, assets: Assets | None = None, progress: Progress | None = None
+    ) -> dict[str, MotionDatabase]:
+        """Build all databases from the clips in a folder, in memory; those of one feature schema share a normalisation.
 
         `assets` gives for a table's name the assets in it: a database of that table holds the clips of these alone.
+        `contextdb.motion.building.build` keeps on the disk what it computes.
         """
-        built: dict[str, MotionDatabase] = {}
-        for schema in self.features.values():
-            members = [settings for settings in self.databases.values() if settings.features == schema.name]
-            loaded = {s.name: self.load_clips(s.name, folder, (assets or {}).get(s.table or "")) for s in members}
-            built.update(build_databases(loaded, schema))
-        return {name: built[name] for name in self.databases}
+        return building.build(self, folder, assets, progress, cache=None)
 
     def selector(self, name: str, databases: Mapping[str, MotionDatabase]) -> Selector:
         """The selector of a name over built databases; one that is not among them counts as not loaded."""
@@ -160,40 +156,6 @@ def _read_schemas(parts: Mapping[str, Mapped], faults: list[Fault], file: str | 
             yield name, FeatureSchema.from_dict(name, part, file=file)
         except SchemaError as error:
             faults.extend(error.faults)
-
-
-def _read_databases(
-    parts: Mapping[str, Mapping[str, Mapped]], tables: Collection[str] | None, faults: list[Fault], file: str | None
-) -> Iterator[tuple[str, DatabaseSettings]]:
-    for name, part in parts["databases"].items():
-        section = Section(f"[databases.{name}]", part, DATABASE_KEYS, faults, file)
-        pattern = _read_pattern(section)
-        has_features = section.has("features", some(parts["features"]) or "the name of a [features.NAME]")
-        features = section.one_of("features", list(parts["features"]), "feature schema") if has_features else None
-        table = _read_table(section, tables) if "table" in part else None
-        unit = section.number("metres_per_unit", "metres, such as 0.01", 1e-9, 1e9) if "metres_per_unit" in part else CENTIMETRE
-        up = section.one_of("up", UPS, "axis") if "up" in part else "y"
-        if pattern is not None and features is not None and unit is not None and up is not None:
-            yield name, DatabaseSettings(name, pattern, features, table, unit, cast(Up, up))
-
-
-def _read_table(section: Section, tables: Collection[str] | None) -> str | None:
-    return section.text("table", "the name of a table") if tables is None else section.one_of("table", list(tables), "table")
-
-
-def _read_pattern(section: Section) -> str | None:
-    accepted = 'a pattern of files in the folder of contextdb.toml or below it, such as "clips/*.bvh"'
-    pattern = section.text("clips", accepted) if section.has("clips", accepted) else None
-    if pattern is None:
-        return None
-    windows = PureWindowsPath(pattern)
-    if windows.drive or windows.root or ".." in windows.parts or "\\" in pattern:
-        section.wrong("clips", "this leaves the folder, or is a place on one machine", accepted)
-        return None
-    if windows.suffix.casefold() != ".bvh":
-        section.wrong("clips", "these are no BVH files", accepted)
-        return None
-    return pattern
 
 
 def _read_selectors(

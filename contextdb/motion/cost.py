@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contextdb.motion.extraction import Features
+from contextdb.motion.layout import Layout
 from contextdb.motion.quaternions import Floats
 from contextdb.motion.skeleton import Ints
 
@@ -18,20 +18,20 @@ FRAMES_AT_ONCE = 8192
 """Frames are gathered in blocks of this many, so that memory stays small and a block stays in the processor's cache."""
 
 
-def channel_costs(features: Features, frames: Ints, query: Floats, slices: Sequence[slice], weights: Floats) -> Floats:
+def channel_costs(layout: Layout, frames: Ints, query: Floats, slices: Sequence[slice], weights: Floats) -> Floats:
     """Each channel's weight times its squared differences: [C, len(frames)]; `query` is normalised."""
-    block = features[frames].T.astype(np.float64, order="C")
+    block = layout.take(frames).T.astype(np.float64, order="C")
     block -= query[:, None]
     block *= block
     return np.stack([weight * _sum(block[columns]) for columns, weight in zip(slices, weights, strict=True)])
 
 
-def costs(features: Features, frames: Ints, query: Floats, slices: Sequence[slice], weights: Floats) -> Floats:
+def costs(layout: Layout, frames: Ints, query: Floats, slices: Sequence[slice], weights: Floats) -> Floats:
     """The cost of each frame without its bias: [len(frames)]."""
     total = np.empty(len(frames))
     for start in range(0, len(frames), FRAMES_AT_ONCE):
         block = slice(start, start + FRAMES_AT_ONCE)
-        total[block] = _sum(channel_costs(features, frames[block], query, slices, weights))
+        total[block] = _sum(channel_costs(layout, frames[block], query, slices, weights))
     return total
 
 

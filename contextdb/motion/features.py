@@ -1,104 +1,35 @@
 """The feature schema: which numbers of a frame a search compares, how often they are sampled, and how much each channel weighs.
 
-A schema is data, read from `[features.NAME]` of contextdb.toml. Each channel is a block of features in the body's own frame, whose
-origin is the body's place on the ground and which looks where the body faces: metres to the left, up, ahead.
-
-    type          features   of
-    position      3          a bone, m
-    velocity      3          a bone, m/s over the ground, not less the body's own
-    trajectory    2 a point  what = "position" (m: left, ahead), "direction" (unit vector of the facing), "velocity" (m/s)
-                  1 a point  what = "speed" (m/s)
-
-Points of a trajectory stand `at` seconds after the frame or `along` metres further on the path; negative ones before and behind.
+A schema is data, read from `[features.NAME]` of contextdb.toml; `contextdb.motion.channels` says what each type of channel holds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, cast
 
 import numpy as np
 
-from contextdb.errors import Fault, SchemaError, in_quotes
+from contextdb.errors import Fault, SchemaError, in_quotes, nearest, some
+from contextdb.motion.channels import Channel, check_together, is_pair, read_channel, read_pair
+from contextdb.motion.mirror import Pairs, pattern_fault
+from contextdb.motion.poses import Poses
 from contextdb.motion.quaternions import Floats
 from contextdb.motion.reading import Mapped, Section, as_toml, what_is
 from contextdb.motion.skeleton import Skeleton
+from contextdb.motion.trajectory import Trajectory
 
-ChannelType = Literal["position", "velocity", "trajectory"]
-What = Literal["position", "direction", "velocity", "speed"]
+__all__ = ["Channel", "CustomFunction", "FeatureSchema"]
 
-TYPES = ("position", "velocity", "trajectory")
-WHATS = ("position", "direction", "velocity", "speed")
-KEYS = {
-    "position": ("type", "bone", "weight", "group"),
-    "velocity": ("type", "bone", "weight", "group"),
-    "trajectory": ("type", "what", "at", "along", "weight", "group"),
-}
-ANY_KEY = ("type", "bone", "what", "at", "along", "weight", "group")
-SCHEMA_KEYS = ("rate", "channels", "root", "facing")
-TYPE_SYNONYMS = {"pos": "position", "vel": "velocity", "traj": "trajectory", "path": "trajectory"}
-WHAT_SYNONYMS = {"facing": "direction", "heading": "direction", "dir": "direction", "pos": "position", "vel": "velocity"}
+CustomFunction = Callable[[Poses, Trajectory], Floats]
+"""Makes the features of a custom channel, [F, size], of a body's poses and its path, both F frames at the schema's rate."""
 
-MOST_WEIGHT = 1e6
+SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror")
 MOST_RATE = 1000.0
-MOST_SECONDS = 60.0
-MOST_METRES = 1000.0
-BODY_AXES = ("left", "up", "ahead")
-GROUND_AXES = ("left", "ahead")
-
-
-@dataclass(frozen=True)
-class Channel:
-    """A block of features that are weighed together.
-
-    Attributes
-    ----------
-    type : "position", "velocity" or "trajectory"
-    weight : float
-        Multiplies the squared differences of this channel's normalised features.
-    bone : str, optional
-        Whose position or velocity.
-    what : "position", "direction", "velocity" or "speed", optional
-        What of a trajectory.
-    at : tuple of float
-        Seconds after the frame, for a trajectory sampled by time.
-    along : tuple of float
-        Metres along the path, for a trajectory sampled by distance.
-    group : str, optional
-        Channels of one group share a scale of normalisation. Default: each its own.
-    """
-
-    type: ChannelType
-    weight: float = 1.0
-    bone: str | None = None
-    what: What | None = None
-    at: tuple[float, ...] = ()
-    along: tuple[float, ...] = ()
-    group: str | None = None
-
-    @property
-    def name(self) -> str:
-        """What the channel is called in costs and messages; unique in a schema."""
-        if self.type != "trajectory":
-            return f"{self.bone} {self.type}"
-        points = " ".join(f"{point:g}" for point in self.at or self.along)
-        return f"trajectory {self.what} {'at' if self.at else 'along'} {points} {'s' if self.at else 'm'}"
-
-    @property
-    def feature_names(self) -> tuple[str, ...]:
-        """The names of its features, in order."""
-        if self.type != "trajectory":
-            return tuple(f"{self.name} {axis}" for axis in BODY_AXES)
-        axes = ("",) if self.what == "speed" else tuple(f" {axis}" for axis in GROUND_AXES)
-        points = [f"at {seconds:g} s" for seconds in self.at] + [f"along {metres:g} m" for metres in self.along]
-        return tuple(f"trajectory {self.what} {point}{axis}" for point in points for axis in axes)
-
-    @property
-    def n_features(self) -> int:
-        """How many features it has."""
-        return len(self.feature_names)
+MOST_SMOOTH_S = 2.0
+A_FACING = 'the left and the right bone, such as ["LeftUpLeg", "RightUpLeg"]'
+A_MIRROR = 'pairs of a left and a right bone, such as [["Left*", "Right*"]]'
 
 
 @dataclass(frozen=True)
@@ -115,6 +46,13 @@ class FeatureSchema:
         The bone whose place on the ground is the body's. Default: the one above both thighs.
     facing : (left bone, right bone), optional
         The body faces across the line between them. Default: the sided pair of bones nearest the root, as a rule the thighs.
+    facing_smooth_s : float
+        Evens out the facing's sway with each step: the standard deviation in seconds of a Gaussian about each frame, which shifts
+        nothing in time. Default: 0, the facing as it is.
+    mirror : tuple of (left, right)
+        Pairs of bones that change places when a clip is mirrored; a `*` on both sides stands for the same rest of the name.
+    functions : mapping of name to function
+        What custom channels are computed by. Not compared, and not part of contextdb.toml: see `with_functions`.
     """
 
     name: str
@@ -122,6 +60,9 @@ class FeatureSchema:
     channels: tuple[Channel, ...]
     root: str | None = None
     facing: tuple[str, str] | None = None
+    facing_smooth_s: float = 0.0
+    mirror: Pairs = ()
+    functions: Mapping[str, CustomFunction] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
     def feature_names(self) -> tuple[str, ...]:
@@ -146,13 +87,31 @@ class FeatureSchema:
 
     @property
     def bones(self) -> tuple[str, ...]:
-        """Every bone that the schema names, once."""
-        named = [channel.bone for channel in self.channels] + [self.root, *(self.facing or ())]
+        """Every bone that the channels, `root` and `facing` name, once."""
+        named = [bone for channel in self.channels for bone in channel.bones] + [self.root, *(self.facing or ())]
         return tuple(dict.fromkeys(bone for bone in named if bone is not None))
 
     def bone_faults(self, skeleton: Skeleton) -> list[Fault]:
         """What is wrong with using the schema on a skeleton: a fault for each bone that it lacks, with the nearest one."""
         return [skeleton.missing_bone(bone) for bone in self.bones if bone not in skeleton]
+
+    def with_functions(self, functions: Mapping[str, CustomFunction]) -> FeatureSchema:
+        """The same schema with functions for its custom channels, by the names that the channels give.
+
+        A function takes `(poses, path)`: the `Poses` of all frames and the `Trajectory` of the body, at the schema's rate. It gives
+        a float array [F, size], for each frame what the frame itself and its neighbours tell; it must not change what it is given.
+        It is called on the mirrored poses and path for a mirrored clip, and for a query on those of the query's clip.
+
+        Raises
+        ------
+        SchemaError
+            No channel asks for a name; the nearest that one does ask for is told.
+        """
+        asked = [channel.function for channel in self.channels if channel.function is not None]
+        faults = [_unasked(name, asked, self.name) for name in functions if name not in asked]
+        if faults:
+            raise SchemaError(*faults)
+        return replace(self, functions={**self.functions, **functions})
 
     @classmethod
     def from_dict(cls, name: str, mapping: Mapped, *, file: str | None = None) -> FeatureSchema:
@@ -172,6 +131,12 @@ class FeatureSchema:
         return schema
 
 
+def _unasked(name: str, asked: list[str], schema: str) -> Fault:
+    near = nearest(name, asked)
+    accepted = some(asked) or 'the name in a channel { type = "custom", function = "…" }'
+    return Fault(f"no channel of [features.{schema}] has function = {in_quotes(name)}.", accepted, in_quotes(near) if near else "")
+
+
 def _read_schema(
     cls: type[FeatureSchema], name: str, mapping: Mapped, faults: list[Fault], file: str | None
 ) -> FeatureSchema | None:
@@ -179,10 +144,12 @@ def _read_schema(
     rate = _read_rate(section)
     channels = _read_channels(section)
     root = section.text("root", 'a bone, such as "Hips"') if "root" in mapping else None
-    facing = _read_facing(section) if "facing" in mapping else None
-    if faults or rate is None:
+    facing = read_pair(section, "facing", A_FACING) if "facing" in mapping else None
+    smooth_s = _read_smooth(section) if "facing_smooth_s" in mapping else 0.0
+    mirror = _read_mirror(section) if "mirror" in mapping else ()
+    if faults or rate is None or smooth_s is None:
         return None
-    return cls(name, rate, tuple(channels), root, facing)
+    return cls(name, rate, tuple(channels), root, facing, smooth_s, mirror)
 
 
 def _read_rate(section: Section) -> float | None:
@@ -190,17 +157,22 @@ def _read_rate(section: Section) -> float | None:
     return section.number("rate", accepted, 1.0, MOST_RATE) if section.has("rate", accepted) else None
 
 
-def _read_facing(section: Section) -> tuple[str, str] | None:
-    value = section.part["facing"]
-    if (
-        isinstance(value, (list, tuple))
-        and len(value) == 2
-        and all(isinstance(bone, str) and bone for bone in value)
-        and value[0] != value[1]
-    ):
-        return value[0], value[1]
-    section.wrong("facing", "this is no pair of bones", 'the left and the right bone, such as ["LeftUpLeg", "RightUpLeg"]')
-    return None
+def _read_smooth(section: Section) -> float | None:
+    return section.number("facing_smooth_s", f"seconds, from 0 to {MOST_SMOOTH_S:g}, such as 0.2", 0.0, MOST_SMOOTH_S)
+
+
+def _read_mirror(section: Section) -> Pairs:
+    """The pairs of names or patterns; whether a skeleton has the bones is asked when a clip is mirrored."""
+    value = section.part["mirror"]
+    if not isinstance(value, (list, tuple)) or not value:
+        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what_is(value)}, not a list"
+        section.wrong("mirror", why, A_MIRROR)
+        return ()
+    for i, item in enumerate(value):
+        why = pattern_fault(item[0], item[1]) if is_pair(item) else "this is no pair of different names"
+        if why:
+            section.add(f"{section.where} mirror pair {i + 1} is {as_toml(item)}: {why}.", A_MIRROR)
+    return tuple((item[0], item[1]) for item in value if is_pair(item))
 
 
 def _read_channels(section: Section) -> list[Channel]:
@@ -212,74 +184,7 @@ def _read_channels(section: Section) -> list[Channel]:
         why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what_is(value)}, not a list"
         section.wrong("channels", why, accepted)
         return []
-    read = [_read_channel(section, i, item) for i, item in enumerate(value)]
+    read = [read_channel(section, i, item) for i, item in enumerate(value)]
     channels = [channel for channel in read if channel is not None]
-    _check_together(section, channels, is_whole=len(channels) == len(value))
+    check_together(section, channels, is_whole=len(channels) == len(value))
     return channels
-
-
-def _read_channel(section: Section, i: int, item: object) -> Channel | None:
-    where = f"{section.where} channel {i + 1}"
-    if not isinstance(item, Mapping):
-        section.add(
-            f"{where} is {as_toml(item)}: this is {what_is(item)}, not a table.", '{ type = "position", bone = "LeftFoot" }'
-        )
-        return None
-    n_faults = len(section.faults)
-    kind = item.get("type")
-    part = Section(where, item, KEYS.get(kind, ANY_KEY) if isinstance(kind, str) else ANY_KEY, section.faults, section.file)
-    known = (
-        part.one_of("type", TYPES, "type", TYPE_SYNONYMS) if part.has("type", '"position", "velocity" or "trajectory"') else None
-    )
-    channel = _trajectory_channel(part) if known == "trajectory" else _bone_channel(part, known)
-    return channel if len(section.faults) == n_faults else None
-
-
-def _bone_channel(part: Section, kind: str | None) -> Channel | None:
-    weight, group = _read_weight(part), _read_group(part)
-    accepted = 'a bone of the clips, such as "LeftFoot"'
-    bone = part.text("bone", accepted) if kind and part.has("bone", accepted) else None
-    return None if bone is None or weight is None else Channel(cast(ChannelType, kind), weight, bone, group=group)
-
-
-def _trajectory_channel(part: Section) -> Channel | None:
-    weight, group = _read_weight(part), _read_group(part)
-    what = (
-        part.one_of("what", WHATS, "feature of a trajectory", WHAT_SYNONYMS)
-        if part.has("what", ", ".join(map(in_quotes, WHATS)))
-        else None
-    )
-    if ("at" in part.part) == ("along" in part.part):
-        both = "at" in part.part
-        found = f'{part.where} has both "at" and "along".' if both else f'{part.where} has neither "at" nor "along".'
-        part.add(found, "at = [seconds] or along = [metres], one of them")
-        return None
-    at = _read_points(part, "at", f"seconds, at most {MOST_SECONDS:g} away, such as [0.33, 0.67, 1.0]", MOST_SECONDS)
-    along = _read_points(
-        part, "along", f"metres along the path, at most {MOST_METRES:g} away, such as [0.5, 1.0, 2.0]", MOST_METRES
-    )
-    if weight is None or what is None or at is None or along is None:
-        return None
-    return Channel("trajectory", weight, None, cast(What, what), at, along, group)
-
-
-def _read_points(part: Section, key: str, accepted: str, most: float) -> tuple[float, ...] | None:
-    return part.numbers(key, accepted, most) if key in part.part else ()
-
-
-def _read_weight(part: Section) -> float | None:
-    return part.number("weight", f"from 0 to {MOST_WEIGHT:g}, such as 1.0", 0.0, MOST_WEIGHT) if "weight" in part.part else 1.0
-
-
-def _read_group(part: Section) -> str | None:
-    return part.text("group", 'a name, such as "feet"') if "group" in part.part else None
-
-
-def _check_together(section: Section, channels: Sequence[Channel], *, is_whole: bool) -> None:
-    """Faults that no channel has alone."""
-    names = [channel.name for channel in channels]
-    for name in dict.fromkeys(names):
-        if names.count(name) > 1:
-            section.add(f"{section.where} has the channel {in_quotes(name)} {names.count(name)} times.", "each channel once")
-    if is_whole and not any(channel.weight for channel in channels):
-        section.add(f"{section.where}: the weight of every channel is 0.", "at least one above 0, else all frames are alike")

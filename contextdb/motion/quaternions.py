@@ -95,6 +95,14 @@ def blend(first: Floats, second: Floats, shares: Floats) -> Floats:
     return np.asarray(mixed / np.linalg.norm(mixed, axis=-1, keepdims=True))
 
 
+def rotation_vectors(rotations: Floats) -> Floats:
+    """The axis times the angle [..., 3] of rotations, the shorter way round: at most π long."""
+    axes = rotations[..., 1:] * np.where(rotations[..., :1] < 0.0, -1.0, 1.0)
+    sines = np.linalg.norm(axes, axis=-1, keepdims=True)
+    angles = 2.0 * np.arctan2(sines, np.abs(rotations[..., :1]))
+    return np.asarray(axes * np.where(sines > 1e-12, angles / np.maximum(sines, 1e-12), 2.0))
+
+
 def from_matrices(turned: Floats) -> Floats:
     """Rotations from matrices [..., 3, 3] whose columns are the turned axes."""
     m = turned

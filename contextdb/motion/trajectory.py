@@ -8,6 +8,7 @@ In the body's own frame the first coordinate is metres to its left, the second m
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +20,8 @@ from contextdb.motion.quaternions import Floats
 
 STANDING_MPS = 0.05
 """Slower than this at its end, a path is taken to end there; faster, to go straight on."""
+LEAST_DEVIATION = 0.1
+"""In frames: under a narrower Gaussian the neighbours' weight is lost in rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +66,9 @@ class PathPoints:
     velocities: Floats
 
 
-def root_trajectory(poses: Poses, root: str | None = None, facing: tuple[str, str] | None = None) -> Trajectory:
+def root_trajectory(
+    poses: Poses, root: str | None = None, facing: tuple[str, str] | None = None, facing_smooth_s: float = 0.0
+) -> Trajectory:
     """The path of a body: its hips put on the ground, facing at right angles to the line from its right to its left thigh.
 
     Parameters
@@ -75,6 +80,9 @@ def root_trajectory(poses: Poses, root: str | None = None, facing: tuple[str, st
     facing : (left bone, right bone), optional
         The line to face across. Default: the sided pair of bones nearest the root. A skeleton without sides faces where its root
         bone's own z axis points.
+    facing_smooth_s : float
+        The standard deviation, in seconds, of a Gaussian over the headings of each frame's neighbours on both sides alike: it evens
+        out the sway of each step and delays no turn, but begins and ends one sooner and later. Default: 0, none.
     """
     skeleton = poses.skeleton
     hips = skeleton.hips if root is None else skeleton.index(root)
@@ -84,7 +92,8 @@ def root_trajectory(poses: Poses, root: str | None = None, facing: tuple[str, st
     else:
         left = poses.positions[:, pair[0]] - poses.positions[:, pair[1]]
         ahead = np.stack((-left[:, 2], left[:, 0]), axis=-1)
-    return Trajectory(poses.rate, poses.positions[:, hips][:, [0, 2]], _headings(ahead))
+    headings = smoothed(_headings(ahead), facing_smooth_s * poses.rate)
+    return Trajectory(poses.rate, poses.positions[:, hips][:, [0, 2]], headings)
 
 
 def steady_path(
@@ -133,6 +142,8 @@ def along_path(path: Trajectory, frames: Floats, metres: float) -> PathPoints:
     wanted = np.interp(frames, every, lengths) + metres
     inside = np.interp(wanted, lengths, every)
     beyond = np.clip(wanted - lengths[-1], 0.0, None), np.clip(wanted, None, 0.0)
+    if metres == 0.0:  # where a body stands, many frames have one length
+        inside = frames
     first, last = (np.linalg.norm(path.velocities[i]) for i in (0, -1))
     after = beyond[0] * path.rate / last if last > STANDING_MPS else 0.0
     before = beyond[1] * path.rate / first if first > STANDING_MPS else 0.0
@@ -149,6 +160,18 @@ def to_own_frame(vectors: Floats, headings: Floats) -> Floats:
     sines, cosines = np.sin(headings), np.cos(headings)
     x, z = vectors[..., 0], vectors[..., 1]
     return np.stack((cosines * x - sines * z, sines * x + cosines * z), axis=-1)
+
+
+def smoothed(values: Floats, deviation: float) -> Floats:
+    """Values [F] under a Gaussian of a standard deviation in frames: even about each frame, so that nothing is delayed.
+
+    At the ends the values are taken to go on as they came, turned about the end point, so that a steady change stays what it is.
+    """
+    if deviation < LEAST_DEVIATION or len(values) < 2:
+        return values
+    reach = math.ceil(3.0 * deviation)
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / deviation) ** 2)
+    return np.convolve(np.pad(values, reach, mode="reflect", reflect_type="odd"), weights / weights.sum(), mode="valid")
 
 
 def rates_of_change(values: Floats, rate: float) -> Floats:

@@ -55,3 +55,130 @@ def best_frame(features, starts, stops, query, weights=None, range_flags=None, t
             if cost < least or (cost == least < math.inf and frame == current):
                 found, least = frame, cost
     return found, least
+
+
+# ---- features: one frame and one channel at a time
+
+
+class SlowBody:
+    """A clip at the schema's rate, with every joint placed by `place_joint`; it faces across LeftUpLeg and RightUpLeg."""
+
+    def __init__(self, clip, flipped=False):
+        self.rate = clip.rate
+        self.n_frames = clip.n_frames
+        self.names = clip.skeleton.names
+        self.placed = [[place_joint(clip, f, j) for j in range(len(self.names))] for f in range(clip.n_frames)]
+        if flipped:
+            partners = [self.names.index(other_side(name)) for name in self.names]
+            flip = np.diag([-1.0, 1.0, 1.0])
+            self.placed = [[(flip @ frame[j][0], flip @ frame[j][1] @ flip) for j in partners] for frame in self.placed]
+        self.headings = []
+        for f in range(self.n_frames):
+            x, _, z = self.place(f, "LeftUpLeg") - self.place(f, "RightUpLeg")
+            heading = math.atan2(-z, x)
+            before = self.headings[-1] if self.headings else heading
+            self.headings.append(heading + 2.0 * math.pi * round((before - heading) / (2.0 * math.pi)))
+
+    def place(self, frame, bone):
+        return self.placed[frame][self.names.index(bone)][0]
+
+    def turn(self, frame, bone):
+        return self.placed[frame][self.names.index(bone)][1]
+
+    def ground(self, frame):
+        return self.place(frame, "Hips") * np.array([1.0, 0.0, 1.0])
+
+    def own(self, frame, vector):
+        return rotation_about("Y", -math.degrees(self.headings[frame])) @ vector
+
+    def around(self, frame):
+        """The frames before and behind one, as far as there are any, and the seconds between them."""
+        before, after = max(frame - 1, 0), min(frame + 1, self.n_frames - 1)
+        return before, after, (after - before) / self.rate
+
+    def velocity(self, frame, place):
+        before, after, seconds = self.around(frame)
+        return (place(after) - place(before)) / seconds if seconds else np.zeros(3)
+
+    def spin(self, frame, bone):
+        """Radians a second about the world's axes: the mean of the turns to the frame and from it."""
+        before, after, _ = self.around(frame)
+        turns = [turn_between(self.turn(f, bone), self.turn(f + 1, bone)) for f in range(before, after)]
+        return np.mean(turns, axis=0) * self.rate if turns else np.zeros(3)
+
+    def at_frame(self, frame):
+        """Place on the ground, heading and velocity at a fractional frame, going straight on beyond the ends."""
+        inside = min(max(frame, 0.0), self.n_frames - 1.0)
+        low = int(inside)
+        high = min(low + 1, self.n_frames - 1)
+        share = inside - low
+        velocity = (1 - share) * self.velocity(low, self.ground) + share * self.velocity(high, self.ground)
+        place = (1 - share) * self.ground(low) + share * self.ground(high) + velocity * (frame - inside) / self.rate
+        return place, (1 - share) * self.headings[low] + share * self.headings[high], velocity
+
+    def frame_along(self, frame, metres):
+        """The fractional frame so many metres further, by walking there step by step."""
+        left, step, here = abs(metres), 1 if metres > 0 else -1, frame
+        while left > 0.0 and 0 <= here + step < self.n_frames:
+            long = float(np.linalg.norm(self.ground(here + step) - self.ground(here)))
+            if long >= left:
+                return here + step * left / long
+            left, here = left - long, here + step
+        speed = float(np.linalg.norm(self.velocity(here, self.ground)))
+        return here + step * left / speed * self.rate if left > 0.0 and speed > 0.05 else here
+
+
+def other_side(name):
+    return name.replace("Left", "?").replace("Right", "Left").replace("?", "Right")
+
+
+def turn_between(first, second):
+    """The axis times the angle of the turn from one rotation matrix to another."""
+    turn = second @ first.T
+    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2.0
+    sine = float(np.linalg.norm(axis))
+    return axis * (math.atan2(sine, (np.trace(turn) - 1.0) / 2.0) / sine) if sine > 1e-9 else axis
+
+
+def slow_channel(body, channel, frame):
+    """One channel's features in one frame."""
+    if channel.type == "trajectory":
+        frames = [frame + seconds * body.rate for seconds in channel.at]
+        frames += [body.frame_along(frame, metres) for metres in channel.along]
+        return [x for point in frames for x in slow_point(body, channel.what, frame, point)]
+    found = []
+    for seconds in channel.at or (0.0,):
+        moment = min(max(frame + round(seconds * body.rate), 0), body.n_frames - 1)
+        found += slow_bone(body, channel, moment)
+    return found
+
+
+def slow_bone(body, channel, frame):
+    bone, other = channel.bone, channel.relative_to
+    if channel.type == "position":
+        return list(body.own(frame, body.place(frame, bone) - (body.place(frame, other) if other else body.ground(frame))))
+    if channel.type == "velocity":
+        velocities = [body.velocity(frame, lambda f, b=b: body.place(f, b)) for b in (bone, other) if b]
+        return list(body.own(frame, velocities[0] - sum(velocities[1:])))
+    if channel.type == "angular_velocity":
+        return list(body.own(frame, body.spin(frame, bone) - (body.spin(frame, other) if other else 0.0)))
+    seen = body.turn(frame, other).T @ body.turn(frame, bone) if other else body.own(frame, body.turn(frame, bone))
+    if channel.type == "orientation":
+        return [*seen[:, 0], *seen[:, 1]]
+    return list(seen[:, AXES[channel.axis[-1].upper()]] * (-1.0 if channel.axis.startswith("-") else 1.0))
+
+
+def slow_point(body, what, frame, point):
+    place, heading, velocity = body.at_frame(point)
+    left_and_ahead = [0, 2]
+    if what == "position":
+        return list(body.own(frame, place - body.ground(frame))[left_and_ahead])
+    if what == "velocity":
+        return list(body.own(frame, velocity)[left_and_ahead])
+    if what == "speed":
+        return [float(np.linalg.norm(velocity))]
+    if what == "direction":
+        return [math.sin(heading - body.headings[frame]), math.cos(heading - body.headings[frame])]
+    speed = float(np.linalg.norm(velocity))
+    turned = heading - math.atan2(velocity[0], velocity[2])
+    return [math.sin(turned) * min(1.0, speed / 0.3), math.cos(turned) * min(1.0, speed / 0.3)]

@@ -82,7 +82,8 @@ REFUSED = {
     ),
     "a misspelt key": (
         {**POINTS, "rat": 3},
-        '[features.loco] has no key "rat". Accepted: "rate", "channels", "root", "facing". Did you mean "rate"?',
+        '[features.loco] has no key "rat". Accepted: "rate", "channels", "root", "facing", "facing_smooth_s", "mirror". '
+        'Did you mean "rate"?',
     ),
     "no channels": ({"rate": 30.0}, '[features.loco] has no "channels".'),
     "an empty list": ({"rate": 30.0, "channels": []}, "[features.loco] channels = []: the list is empty."),
@@ -94,14 +95,52 @@ REFUSED = {
     "no type": (one_channel(bone="Hips"), '[features.loco] channel 1 has no "type".'),
     "a misspelt type": (
         one_channel(type="positon", bone="Hips"),
-        '[features.loco] channel 1 type = "positon": there is no such type. Accepted: "position", "velocity", "trajectory". '
+        '[features.loco] channel 1 type = "positon": there is no such type. '
+        'Accepted: "position", "velocity", "trajectory", "direction", '
+        '"orientation", "angular_velocity" and 2 more. '
         'Did you mean type = "position"?',
     ),
     "a type under another name": (one_channel(type="path", what="speed", at=[1]), 'Did you mean type = "trajectory"?'),
     "no bone": (one_channel(type="position"), '[features.loco] channel 1 has no "bone".'),
     "a bone that is no text": (one_channel(type="position", bone=3), "bone = 3: this is a number, not text."),
     "a misspelt key of a channel": (one_channel(type="position", bone="Hips", wieght=1), 'has no key "wieght".'),
-    "a key of another type": (one_channel(type="position", bone="Hips", at=[1]), '[features.loco] channel 1 has no key "at".'),
+    "a key of another type": (one_channel(type="position", bone="Hips", along=[1]), 'channel 1 has no key "along".'),
+    "an axis of a position": (one_channel(type="position", bone="Hips", axis="x"), 'channel 1 has no key "axis".'),
+    "an axis that is none": (
+        one_channel(type="direction", bone="Head", axis="w"),
+        'axis = "w": there is no such axis. Accepted: "x", "y", "z", "-x", "-y", "-z".',
+    ),
+    "an axis without its quotes": (one_channel(type="direction", bone="Head", axis=3), "axis = 3: this is a number, not text."),
+    "a bone relative to itself": (
+        one_channel(type="velocity", bone="Hips", relative_to="Hips"),
+        'relative_to = "Hips": this is the bone itself. Accepted: another bone, such as "Hips".',
+    ),
+    "a misspelt angular velocity": (
+        one_channel(type="angular velocity", bone="Hips"),
+        'Did you mean type = "angular_velocity"?',
+    ),
+    "a rotation for an orientation": (one_channel(type="rotation", bone="Hips"), 'Did you mean type = "orientation"?'),
+    "a pose a day later": (one_channel(type="orientation", bone="Hips", at=[86400]), "a number is out of range or stands twice."),
+    "feet that are no pair": (one_channel(type="phase", feet=["LeftFoot"]), 'feet = ["LeftFoot"]: this is no pair of bones.'),
+    "a phase of a bone": (one_channel(type="phase", bone="LeftFoot"), 'channel 1 has no key "bone".'),
+    "no function": (one_channel(type="custom"), 'channel 1 has no "function".'),
+    "a function that is no name": (one_channel(type="custom", function=3), "function = 3: this is a number, not text."),
+    "half a feature": (one_channel(type="custom", function="f", size=1.5), "size = 1.5: this is not whole."),
+    "a custom channel of nothing": (one_channel(type="custom", function="f", size=0), "size = 0: this is out of range."),
+    "a size in quotes": (one_channel(type="custom", function="f", size="2"), "Did you mean size = 2?"),
+    "a facing smoothed for ever": ({**POINTS, "facing_smooth_s": 1e9}, "facing_smooth_s = 1000000000.0: this is out of range."),
+    "a mirror that is no list": ({**POINTS, "mirror": "Left*"}, 'mirror = "Left*": this is text, not a list.'),
+    "a mirror of nothing": ({**POINTS, "mirror": []}, "mirror = []: the list is empty."),
+    "a mirror of one bone": (
+        {**POINTS, "mirror": [["Left*", "Left*"]]},
+        '[features.loco] mirror pair 1 is ["Left*", "Left*"]: this is no pair of different names. '
+        'Accepted: pairs of a left and a right bone, such as [["Left*", "Right*"]].',
+    ),
+    "a mirror that is one pair": ({**POINTS, "mirror": ["Left*"]}, 'mirror pair 1 is "Left*": this is no pair'),
+    "a mirror with one star": (
+        {**POINTS, "mirror": [["Left*", "Right"]]},
+        'mirror pair 1 is ["Left*", "Right"]: one name has a * and the other has none.',
+    ),
     "no what": (one_channel(type="trajectory", at=[1]), '[features.loco] channel 1 has no "what".'),
     "a misspelt what": (one_channel(type="trajectory", what="postion", at=[1]), 'Did you mean what = "position"?'),
     "a what under another name": (one_channel(type="trajectory", what="facing", at=[1]), 'Did you mean what = "direction"?'),
@@ -134,6 +173,52 @@ def test_a_fault_of_a_schema_is_told_with_what_is_accepted(mapping, message):
     assert message in found[0]
 
 
+NEW = {
+    "rate": 30.0,
+    "facing_smooth_s": 0.2,
+    "mirror": [["Left*", "Right*"], ["Tail_L", "Tail_R"]],
+    "channels": [
+        {"type": "direction", "bone": "Head"},
+        {"type": "direction", "bone": "Head", "axis": "-x", "relative_to": "Chest"},
+        {"type": "orientation", "bone": "Hips", "at": -0.1},
+        {"type": "angular_velocity", "bone": "Chest", "group": "spin"},
+        {"type": "phase"},
+        {"type": "phase", "feet": ["Foot_L", "Foot_R"]},
+        {"type": "custom", "function": "reach", "size": 2, "weight": 0.5},
+        {"type": "trajectory", "what": "direction_to_velocity", "along": [0.0, 1.0]},
+    ],
+}
+
+
+def test_every_type_of_channel_is_read_with_its_keys():
+    schema = FeatureSchema.from_dict("new", NEW)
+    assert (schema.facing_smooth_s, schema.mirror) == (0.2, (("Left*", "Right*"), ("Tail_L", "Tail_R")))
+    assert schema.channels[0] == Channel("direction", 1.0, "Head", axis="z")
+    assert schema.channels[1] == Channel("direction", 1.0, "Head", axis="-x", relative_to="Chest")
+    assert schema.channels[5].feet == ("Foot_L", "Foot_R")
+    assert schema.channels[6] == Channel("custom", 0.5, function="reach", size=2)
+    assert {name: part.stop - part.start for name, part in schema.slices.items()} == {
+        "Head direction z": 3,
+        "Head direction -x relative to Chest": 3,
+        "Hips orientation at -0.1 s": 6,
+        "Chest angular velocity": 3,
+        "phase": 4,
+        "phase Foot_L Foot_R": 4,
+        "custom reach": 2,
+        "trajectory direction_to_velocity along 0 1 m": 4,
+    }
+    assert len(set(schema.feature_names)) == schema.n_features == 29
+    assert schema.feature_names[6] == "Hips orientation at -0.1 s x axis left"
+    assert schema.bones == ("Head", "Chest", "Hips", "Foot_L", "Foot_R")
+
+
+def test_schemas_can_be_compared_whatever_their_functions():
+    schema = FeatureSchema.from_dict("new", NEW)
+    assert schema.with_functions({"reach": len}) == schema
+    assert hash(schema.with_functions({"reach": len})) == hash(schema)
+    assert "function" not in repr(FeatureSchema.from_dict("x", POINTS)).replace("function=None", "")
+
+
 def test_all_faults_of_a_schema_are_reported_together():
     channels = [{"type": "positon"}, {"type": "velocity"}, 7, {"type": "trajectory", "what": "sped"}]
     assert len(faults_of({"rate": -1, "chanels": [], "channels": channels})) == 7
@@ -148,14 +233,16 @@ def test_a_channel_twice_is_refused_but_two_with_other_points_are_not():
 JUNK = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5), lambda x: st.lists(x, max_size=3)
 )
-KEYS = st.sampled_from(["type", "bone", "what", "at", "along", "weight", "group", "x"])
-WORDS = st.sampled_from(["position", "velocity", "trajectory", "speed", "direction", "Hips"])
+KEYS = st.sampled_from(
+    ["type", "bone", "what", "at", "along", "weight", "group", "axis", "relative_to", "feet", "function", "size", "x"]
+)
+WORDS = st.sampled_from(["position", "velocity", "trajectory", "speed", "direction", "Hips", "phase", "custom", "orientation", "z"])
 
 
-@given(st.lists(st.dictionaries(KEYS, JUNK | WORDS | st.just([1.0, 2.0]), max_size=6) | JUNK, max_size=4) | JUNK, JUNK)
-def test_any_mapping_is_a_schema_or_a_schema_error(channels, rate):
+@given(st.lists(st.dictionaries(KEYS, JUNK | WORDS | st.just([1.0, 2.0]), max_size=6) | JUNK, max_size=4) | JUNK, JUNK, JUNK)
+def test_any_mapping_is_a_schema_or_a_schema_error(channels, rate, mirror):
     try:
-        schema = FeatureSchema.from_dict("any", {"rate": rate, "channels": channels})
+        schema = FeatureSchema.from_dict("any", {"rate": rate, "channels": channels, "mirror": mirror, "facing_smooth_s": rate})
     except SchemaError as refused:
         faults = refused.faults
     else:
@@ -250,6 +337,19 @@ def test_a_missing_bone_is_told_with_the_clip_and_the_nearest_bone():
     schema = FeatureSchema.from_dict("x", one_channel(type="position", bone="leftfot"))
     with pytest.raises(MotionError, match=r'walk: there is no bone "leftfot".*Did you mean "LeftFoot"\?'):
         features_of(make_clip("walk").clip, schema)
+
+
+def test_missing_bones_of_every_key_are_told_together_with_the_clip():
+    schema = FeatureSchema.from_dict("new", NEW).with_functions({"reach": len})
+    with pytest.raises(MotionError) as error:
+        features_of(make_clip("walk").clip, schema)
+    assert [fault.found for fault in error.value.faults] == ['there is no bone "Foot_L".', 'there is no bone "Foot_R".']
+
+
+def test_a_phase_of_a_body_without_feet_asks_for_them():
+    clip = Clip("snake", Skeleton(("Snake",), np.array([-1]), np.zeros((1, 3)), ((),)), 0.1, np.zeros((2, 0)))
+    with pytest.raises(MotionError, match=r"snake: no pair of bones is named like feet\."):
+        features_of(clip, FeatureSchema.from_dict("x", one_channel(type="phase")))
 
 
 def test_a_body_more_than_a_thousand_kilometres_away_is_refused():

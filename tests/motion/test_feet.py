@@ -9,6 +9,7 @@ import pytest
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, Footfalls, Skeleton, footfalls, make_clip
+from contextdb.motion.feet import phases
 
 FALLS = Footfalls(4.0, {"LeftFoot": np.array([[0.0, 1.0], [2.0, 3.0]]), "RightFoot": np.zeros((0, 2))})
 
@@ -84,3 +85,40 @@ def test_a_skeleton_without_feet_asks_for_their_names():
         footfalls(Clip("snake", skeleton, 0.1, np.zeros((2, 1))))
     with pytest.raises(MotionError, match='there is no bone "Toe"'):
         footfalls(make_clip("idle").clip, feet=("Toe", "Toe"))
+
+
+# ---- phases
+
+
+def phase_of(intervals, duration_s, times_s):
+    """The left foot's angle over π and the length of its vector; the right foot takes no step."""
+    falls = Footfalls(duration_s, {"LeftFoot": np.array(intervals).reshape(-1, 2), "RightFoot": np.zeros((0, 2))})
+    found = phases(falls, np.array(times_s))
+    assert not found[:, 2:].any()
+    return np.arctan2(found[:, 0], found[:, 1]) / math.pi % 2.0, np.hypot(found[:, 0], found[:, 1])
+
+
+def test_a_foot_s_phase_goes_from_contact_through_lift_to_the_next_contact():
+    angles, lengths = phase_of([[1.0, 1.6], [2.0, 2.6]], 3.0, [1.0, 1.3, 1.6, 1.8, 2.0 - 1e-9, 2.3])
+    assert angles == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0, 0.5], abs=1e-6)
+    assert lengths == pytest.approx(np.ones(6))
+
+
+def test_a_state_that_the_clip_cuts_is_as_long_as_the_middle_one_or_as_what_is_seen():
+    angles, _ = phase_of([[0.0, 0.3], [0.7, 1.3], [1.7, 1.9]], 1.9, [0.0, 0.3, 1.9])
+    assert angles == pytest.approx([0.5, 1.0, 1.0 / 3.0])
+    angles, _ = phase_of([[0.5, 1.5]], 2.3, [0.125, 0.25, 1.9])
+    assert angles == pytest.approx([1.25, 1.5, 1.5])
+
+
+def test_a_foot_that_stands_long_has_no_phase_but_near_its_steps():
+    angles, lengths = phase_of([[1.0, 6.0]], 6.5, [1.0, 1.375, 3.5, 5.625, 6.0])
+    assert lengths == pytest.approx([1.0, 0.5, 0.0, 0.5, 1.0])
+    assert (angles[0], angles[-1]) == pytest.approx((0.0, 1.0))
+
+
+@pytest.mark.parametrize("name", ["walk", "start_run", "stop_walk_tired", "walk_turn_left_90"])
+def test_phases_have_no_jumps(name):
+    falls = footfalls(make_clip(name).clip)
+    times_s = np.arange(0.0, falls.duration_s, 0.001)
+    assert np.abs(np.diff(phases(falls, times_s), axis=0)).max() < 0.05

@@ -40,6 +40,15 @@ def test_a_rotation_read_from_its_matrix_is_the_same_rotation(degrees):
     assert np.allclose(abs((again * rotation).sum()), 1.0, atol=1e-12)
 
 
+@given(st.sampled_from("xyz"), ANGLES)
+def test_a_rotation_vector_is_axis_times_angle_the_shorter_way_round(axis, degrees):
+    found = quaternions.rotation_vectors(quaternions.about_axis(axis, np.deg2rad(degrees)))
+    short = np.deg2rad((degrees + 180.0) % 360.0 - 180.0)
+    assert np.allclose(np.delete(found, "xyz".index(axis)), 0.0, atol=1e-9)
+    assert abs(found["xyz".index(axis)]) == pytest.approx(abs(short), abs=1e-9)
+    assert np.allclose(np.sin(found["xyz".index(axis)]), np.sin(short), atol=1e-9)
+
+
 @given(st.tuples(ANGLES, ANGLES, ANGLES), st.tuples(ANGLES, ANGLES, ANGLES))
 def test_a_product_turns_by_the_right_factor_first_and_an_inverse_turns_back(first, second):
     a, b = (quaternions.from_euler("xyz", np.deg2rad(degrees)) for degrees in (first, second))

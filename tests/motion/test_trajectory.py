@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.motion import Clip, Skeleton, Trajectory, make_clip, poses_of, root_trajectory, steady_path
-from contextdb.motion.trajectory import after_seconds, along_path, heading_vectors, to_own_frame
+from contextdb.motion.trajectory import after_seconds, along_path, heading_vectors, smoothed, to_own_frame
 
 EVERY = np.arange(61.0)
 
@@ -118,3 +118,22 @@ def test_a_strafing_path_travels_beside_its_facing():
     path = steady_path(1.0, strafe_deg=90.0)
     assert np.allclose(path.velocities, [1.0, 0.0])
     assert np.allclose(path.headings, 0.0)
+
+
+def test_smoothing_keeps_steady_turns_and_lowers_what_sways():
+    steady = np.linspace(-1.0, 2.0, 40)
+    assert np.allclose(smoothed(steady, 6.0), steady)
+    sway = np.sin(np.arange(90) * 2.0 * np.pi / 30.0)
+    assert np.abs(smoothed(sway, 6.0)[30:60]).max() == pytest.approx(np.exp(-0.5 * (2.0 * np.pi * 6.0 / 30.0) ** 2), abs=0.01)
+
+
+@given(st.lists(st.floats(-10.0, 10.0), max_size=12), st.floats(0.0, 200.0))
+def test_smoothing_the_values_backwards_gives_the_same_backwards(values, deviation):
+    found = smoothed(np.array(values), deviation)
+    assert found.shape == (len(values),)
+    assert np.allclose(smoothed(np.array(values)[::-1], deviation)[::-1], found, atol=1e-9)
+
+
+def test_smoothing_by_nothing_changes_nothing():
+    values = np.array([1.0, 5.0, 2.0])
+    assert np.array_equal(smoothed(values, 0.0), values)

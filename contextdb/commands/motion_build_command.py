@@ -1,0 +1,176 @@
+"""Build the motion databases that contextdb.toml declares from their clips, and save them.
+
+Each becomes a file NAME.motion.safetensors, opened by memory map. What is computed of a clip is kept in .contextdb-cache, so that
+the next build computes only the clips that changed.
+
+  contextdb motion build tables/                       all databases, beside contextdb.toml
+  contextdb motion build tables/ --out build/ --database jog
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from contextdb.console import aligned, output, printable
+from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
+from contextdb.exit_codes import ExitCode
+from contextdb.motion import building
+from contextdb.motion.building import Built, Progress, saved_path
+from contextdb.motion.clip_files import unmatched
+from contextdb.motion.config import MotionConfig
+from contextdb.motion.stored import save_database
+from contextdb.project import SCHEMA_FILE, Project
+
+HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed", "cached", "file")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
+    parser.add_argument("--out", metavar="FOLDER", help=f"where the databases are saved (default: beside {SCHEMA_FILE})")
+    parser.add_argument("--database", metavar="NAME", action="append", help="only this one; may be given several times")
+    parser.add_argument("--no-cache", action="store_true", help="compute every clip, and keep nothing")
+    parser.add_argument("--json", action="store_true", help="print a JSON document instead of a table")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Build and save; prints a line for each database."""
+    project = MotionProject.load(arguments.path)
+    targets = project.targets(arguments.out, arguments.database)
+    with _bar() as progress:
+        built = building.build_all(
+            project.config,
+            project.folder,
+            project.assets,
+            progress,
+            names=arguments.database,
+            cache=None if arguments.no_cache else building.CACHE_FOLDER,
+        )
+    for name, target in targets.items():
+        _make_folder(target.parent)
+        save_database(built[name].database, target, inputs=built[name].digest)
+    for warning in project.warnings(built):
+        print(printable(f"contextdb: warning: {warning}"), file=sys.stderr)
+    with output():
+        if arguments.json:
+            rows = [_as_json(project, name, built[name], target) for name, target in targets.items()]
+            print(json.dumps({"format": 1, "databases": rows}, ensure_ascii=False))
+        else:
+            cells = [_cells(project, name, built[name], target) for name, target in targets.items()]
+            print("\n".join(aligned([HEADER, *cells], right=range(1, 8))))
+    return ExitCode.OK
+
+
+@dataclass(frozen=True)
+class MotionProject:
+    """What a folder of tables says of motion, and which assets each table has."""
+
+    folder: Path
+    config: MotionConfig
+    assets: Mapping[str, list[str]]
+
+    @classmethod
+    def load(cls, path: str) -> MotionProject:
+        """Read contextdb.toml and the tables.
+
+        Raises
+        ------
+        ContextDBError
+            With every fault; also when no database is declared.
+        """
+        project = Project.load(path)
+        config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
+        if not config.databases:
+            place = Place(str(project.folder / SCHEMA_FILE))
+            accepted = 'a section such as [databases.jog] with features and clips = "clips/*.bvh"'
+            raise ContextDBError(Fault("no motion database is declared.", accepted, place=place))
+        return cls(project.folder, config, {name: table.assets for name, table in project.tables.items()})
+
+    def targets(self, out: str | None, names: list[str] | None) -> dict[str, Path]:
+        """Where the databases of some names, or all, are saved."""
+        asked = None if names is None else {self.config.database(name).name for name in names}
+        wanted = [name for name in self.config.databases if asked is None or name in asked]
+        folder = self.folder if out is None else Path(out)
+        targets = {name: saved_path(folder, name) for name in wanted}
+        taken: dict[str, str] = {}
+        for name, path in targets.items():
+            other = taken.setdefault(path.name.casefold(), name)
+            if other != name:
+                found = "two databases would be written to one file, on a disk that does not tell capitals."
+                raise FileError(Fault(found, f"another name for {some([other, name])}", place=Place(str(path))))
+        return targets
+
+    def warnings(self, built: Mapping[str, Built]) -> Iterator[str]:
+        """What a build passed over: assets without a clip, clips without a row, markup that does nothing."""
+        for name in built:
+            settings = self.config.databases[name]
+            if settings.table is None:
+                continue
+            missing, unlisted = unmatched(settings, self.folder, self.assets[settings.table])
+            if missing:
+                yield f"[databases.{name}] {plural(len(missing), 'asset')} of {settings.table} without a clip: {some(missing)}"
+            if unlisted:
+                yield f"[databases.{name}] {plural(len(unlisted), 'clip')} without a row in {settings.table}: {some(unlisted)}"
+        yield from dict.fromkeys(str(fault) for each in built.values() for fault in each.markup_faults)
+
+
+def _as_json(project: MotionProject, name: str, built: Built, target: Path) -> dict[str, object]:
+    table, database = project.config.databases[name].table, built.database
+    return {
+        "database": name,
+        "file": str(target),
+        "bytes": target.stat().st_size,
+        "table": table,
+        "assets": None if table is None else len(set(project.assets[table])),
+        "clips": len(built.computed) + len(built.cached),
+        "ranges": len(database.assets),
+        "frames": database.n_frames,
+        "features": database.n_features,
+        "computed": list(built.computed),
+        "cached": list(built.cached),
+    }
+
+
+def _cells(project: MotionProject, name: str, built: Built, target: Path) -> list[str]:
+    told = _as_json(project, name, built, target)
+    numbers = [told[key] for key in ("assets", "clips", "frames", "features")]
+    counts = ["" if number is None else f"{number:,}" for number in numbers]
+    return [
+        name,
+        *counts,
+        f"{target.stat().st_size / 1e6:.1f}",
+        f"{len(built.computed):,}",
+        f"{len(built.cached):,}",
+        str(target),
+    ]
+
+
+@contextmanager
+def _bar() -> Iterator[Progress | None]:
+    """What shows the progress on standard error, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    name = TextColumn("{task.description}", markup=False)
+    columns = (TextColumn("building"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), name)
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda done, total, clip: bar.update(task, completed=done, total=total, description=printable(clip))
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
+        raise FileError(Fault(f"the folder cannot be made: {why}.", "a folder", place=Place(str(folder)))) from None

@@ -1,0 +1,310 @@
+"""Build the databases of a project from its clips: only what changed is computed, the rest comes from the cache.
+
+    clip files ─► features of each, or the cache ─► one normalisation for all databases of a feature schema ─► MotionDatabase
+
+With the cache a build gives bit for bit what it gives without. Each database has a digest of all that it is made of: its clips and,
+as they share its normalisation, those of all databases of its schema; its markup; its settings. A saved database that holds the
+digest of its inputs is up to date. An edge: this touches the disk.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contextdb.disk import read_bytes
+from contextdb.errors import ArtefactError, ClipError, ContextDBError, Fault, FileError, MotionError
+from contextdb.motion import stored
+from contextdb.motion.clip_files import ClipFile, Extracted, clip_files, extract
+from contextdb.motion.database import Biases, MotionDatabase
+from contextdb.motion.database_settings import DatabaseSettings
+from contextdb.motion.feature_cache import FeatureCache, file_name
+from contextdb.motion.markup import Markup
+from contextdb.motion.normalisation import Normalisation
+from contextdb.motion.schema_dict import schema_to_dict
+
+if TYPE_CHECKING:
+    from contextdb.motion.config import MotionConfig
+
+CACHE_FOLDER = ".contextdb-cache"
+SAVED_SUFFIX = ".motion.safetensors"
+
+Progress = Callable[[int, int, str], None]
+"""Called with how many clips are done, how many there are, and the name of the one done last."""
+
+Assets = Mapping[str, Collection[str]]
+"""For a table's name the assets in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A database and how it came about.
+
+    Attributes
+    ----------
+    database : MotionDatabase
+    digest : str
+        Of all that it was made of; empty for a schema with functions, of which that cannot be told.
+    computed, cached : tuple of str
+        The clips whose features were computed, and those whose features came from the cache.
+    markup_faults : tuple of Fault
+        What of its markup does nothing; see `Markup.faults_for`.
+    """
+
+    database: MotionDatabase
+    digest: str
+    computed: tuple[str, ...]
+    cached: tuple[str, ...]
+    markup_faults: tuple[Fault, ...] = ()
+
+
+def build(
+    config: MotionConfig,
+    folder: str | PathLike[str],
+    assets: Assets | None = None,
+    progress: Progress | None = None,
+    *,
+    names: Collection[str] | None = None,
+    cache: str | PathLike[str] | None = CACHE_FOLDER,
+) -> dict[str, MotionDatabase]:
+    """Build the databases of a project; those of one feature schema share a normalisation.
+
+    Parameters
+    ----------
+    config : MotionConfig
+    folder : path
+        That of contextdb.toml, where the paths of the settings begin.
+    assets : mapping of str to collection of str, optional
+        For a table's name the assets in it: a database of that table holds the clips of these alone. Default: all clips.
+    progress : function of (done, total, clip name), optional
+    names : collection of str, optional
+        Which databases to give. Default: all.
+    cache : path, optional
+        The folder of the cache; a relative one lies in `folder`. None: nothing is kept.
+
+    Raises
+    ------
+    MotionError, FileError
+        With every fault of all clips and of all markup.
+    """
+    built = build_all(config, folder, assets, progress, names=names, cache=cache)
+    return {name: each.database for name, each in built.items()}
+
+
+def build_all(
+    config: MotionConfig,
+    folder: str | PathLike[str],
+    assets: Assets | None = None,
+    progress: Progress | None = None,
+    *,
+    names: Collection[str] | None = None,
+    cache: str | PathLike[str] | None = CACHE_FOLDER,
+) -> dict[str, Built]:
+    """Build as `build` does, and tell of each database what it was made of."""
+    root = Path(folder)
+    kept = None if cache is None else FeatureCache(root / cache)
+    inputs = _Inputs.of(config, root, assets or {}, names)
+    extracted = _extract_all(inputs.files, kept, progress)
+    digests = inputs.digests({name: [each.keys for each in found] for name, found in extracted.items()})
+    shared = {schema: _shared_normalisation(config, schema, extracted) for schema in inputs.schemas}
+    faults, built = _Faults(), {}
+    for name in inputs.wanted:
+        with faults:
+            built[name] = _built(inputs, name, extracted[name], shared, digests[name])
+    faults.tell()
+    if kept is not None:
+        _prune(kept, config, extracted)
+    return built
+
+
+def open_or_build(
+    config: MotionConfig,
+    folder: str | PathLike[str],
+    assets: Assets | None = None,
+    progress: Progress | None = None,
+    *,
+    saved: str | PathLike[str] | None = None,
+    cache: str | PathLike[str] | None = CACHE_FOLDER,
+) -> dict[str, MotionDatabase]:
+    """Open the saved databases that are up to date, and build the others in memory.
+
+    Parameters
+    ----------
+    saved : path, optional
+        Where `contextdb motion build` has put them; a relative one lies in `folder`. Default: `folder`.
+    config, folder, assets, progress, cache
+        As for `build`. All clips are read, as their contents say whether a saved database is up to date.
+    """
+    root = Path(folder)
+    inputs = _Inputs.of(config, root, assets or {})
+    digests = inputs.digests({name: [file.keys(read_bytes(file.path)) for file in files] for name, files in inputs.files.items()})
+    opened = {name: _open(saved_path(root / (saved or ""), name), digest) for name, digest in digests.items()}
+    missing = [name for name, database in opened.items() if database is None]
+    built = build(config, root, assets, progress, names=missing, cache=cache) if missing else {}
+    return {name: built[name] if database is None else database for name, database in opened.items()}
+
+
+def saved_path(folder: Path, name: str) -> Path:
+    """Where a database of a name is saved."""
+    return folder / file_name(name, SAVED_SUFFIX)
+
+
+def _open(path: Path, digest: str) -> MotionDatabase | None:
+    """The saved database of a digest, or None."""
+    try:
+        return stored.open_database(path) if digest and stored.inputs_of(path) == digest else None
+    except (ArtefactError, FileError):
+        return None
+
+
+# ---- what databases are made of
+
+
+@dataclass(frozen=True, eq=False)
+class _Inputs:
+    """What some databases are made of: the files of all databases of their schemas, and the markup of all of these."""
+
+    config: MotionConfig
+    root: Path
+    wanted: list[str]
+    files: dict[str, list[ClipFile]]
+    markups: dict[str, Markup]
+
+    @classmethod
+    def of(cls, config: MotionConfig, root: Path, assets: Assets, names: Collection[str] | None = None) -> _Inputs:
+        """Find the files and read the markup; all faults together."""
+        asked = config.databases if names is None else [config.database(name).name for name in names]
+        wanted = [name for name in config.databases if name in asked]
+        schemas = {config.databases[name].features for name in wanted}
+        faults = _Faults()
+        files, markups = {}, {}
+        for name, settings in config.databases.items():
+            if settings.features in schemas:
+                with faults:
+                    found = assets.get(settings.table or "")
+                    files[name] = clip_files(settings, config.features[settings.features], root, found, config.file)
+            if settings.markup is not None and name in wanted:
+                with faults:
+                    markups[name] = Markup.load(root / settings.markup)
+        faults.tell()
+        return cls(config, root, wanted, files, markups)
+
+    @property
+    def schemas(self) -> list[str]:
+        """The names of their feature schemas."""
+        return list(dict.fromkeys(self.config.databases[name].features for name in self.wanted))
+
+    def digests(self, keys: Mapping[str, list[list[str]]]) -> dict[str, str]:
+        """The digest of each wanted database, from the keys of the features of all clips."""
+        clips = {name: [[file.asset, *each] for file, each in zip(self.files[name], keys[name], strict=True)] for name in keys}
+        return {name: self._digest(self.config.databases[name], clips) for name in self.wanted}
+
+    def _digest(self, settings: DatabaseSettings, clips: Mapping[str, object]) -> str:
+        schema, markup = self.config.features[settings.features], self.markups.get(settings.name)
+        if schema.functions:
+            return ""
+        about = {
+            "layout": stored.STORED.layout,
+            "features": schema_to_dict(schema),
+            "clips": {name: each for name, each in clips.items() if self.config.databases[name].features == settings.features},
+            "markup": None if markup is None else [[s.asset, s.tag, s.from_s, s.to_s, s.value] for s in markup.spans],
+            "settings": asdict(settings),
+        }
+        return hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16).hexdigest()
+
+
+# ---- steps of a build
+
+
+def _extract_all(
+    files: Mapping[str, list[ClipFile]], cache: FeatureCache | None, progress: Progress | None
+) -> dict[str, list[Extracted]]:
+    """The features of all clips; the faults of all broken ones together."""
+    total, done = sum(map(len, files.values())), 0
+    found: dict[str, list[Extracted]] = {name: [] for name in files}
+    faults = _Faults()
+    for name, listed in files.items():
+        for file in listed:
+            with faults:
+                found[name].append(extract(file, cache))
+            done += 1
+            if progress is not None:
+                progress(done, total, file.asset)
+    faults.tell()
+    return found
+
+
+def _shared_normalisation(config: MotionConfig, schema: str, extracted: Mapping[str, list[Extracted]]) -> Normalisation:
+    members = [name for name in extracted if config.databases[name].features == schema]
+    blocks = [part.features for name in members for each in extracted[name] for part in each.parts]
+    return Normalisation.of(blocks, config.features[schema])
+
+
+def _built(inputs: _Inputs, name: str, found: list[Extracted], shared: Mapping[str, Normalisation], digest: str) -> Built:
+    settings, markup = inputs.config.databases[name], inputs.markups.get(name)
+    database = MotionDatabase.from_parts(
+        [part for each in found for part in each.parts],
+        inputs.config.features[settings.features],
+        normalisation=shared[settings.features],
+        markup=markup,
+        biases=Biases(settings.base_bias, settings.looping_bias, settings.continuing_bias),
+        end_s=settings.end_s,
+    )
+    return Built(
+        database.with_weights(settings.weights) if settings.weights else database,
+        digest,
+        tuple(each.file.asset for each in found if each.is_computed),
+        tuple(each.file.asset for each in found if not each.is_computed),
+        () if markup is None else tuple(_markup_faults(inputs, markup, settings, database)),
+    )
+
+
+def _markup_faults(inputs: _Inputs, markup: Markup, settings: DatabaseSettings, database: MotionDatabase) -> list[Fault]:
+    """What of a markup does nothing: for no clip of the databases that share it, or for no frame of this one's."""
+    sharing = [each for each in inputs.config.databases.values() if each.markup == settings.markup]
+    known = {path.stem for each in sharing for path in inputs.root.glob(each.clips)}
+    rate = inputs.config.features[settings.features].rate
+    lengths = (database.stops - database.starts).tolist()
+    durations_s = {asset: max(0, length - 1) / rate for asset, length in zip(database.assets, lengths, strict=True)}
+    return markup.faults_for(known, durations_s, rate=rate)
+
+
+def _prune(cache: FeatureCache, config: MotionConfig, extracted: Mapping[str, list[Extracted]]) -> None:
+    """Forget clips that changed or are gone."""
+    for name, found in extracted.items():
+        cache.prune(name, {key for each in found for key in each.keys})
+    cache.prune_databases(config.databases)
+
+
+class _Faults:
+    """Collects the faults of several things that are tried, to tell them together."""
+
+    def __init__(self) -> None:
+        self.errors: list[ContextDBError] = []
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        if isinstance(error, (MotionError, FileError)):
+            self.errors.append(error)
+            return True
+        return False
+
+    def tell(self) -> None:
+        """Raise what was collected, if anything."""
+        if not self.errors:
+            return
+        faults = _once(fault for error in self.errors for fault in error.faults)
+        kinds = {type(error) for error in self.errors}
+        raise (kinds.pop() if len(kinds) == 1 else ClipError if ClipError in kinds else MotionError)(*faults)
+
+
+def _once(faults: Iterable[Fault]) -> list[Fault]:
+    """Each fault once: a broken clip may be in several databases."""
+    return list(dict.fromkeys(faults))

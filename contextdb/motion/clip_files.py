@@ -1,0 +1,126 @@
+"""The files of a database's clips, and their features: computed, or from the cache.
+
+A file is read once, and what is computed from it is kept under the digest of just these bytes, so that a file that changes
+meanwhile does no harm. An edge: this touches the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from contextdb.disk import path_in_quotes, read_bytes
+from contextdb.errors import Fault, MotionError, Place, in_quotes
+from contextdb.motion import clips
+from contextdb.motion.database_settings import DatabaseSettings
+from contextdb.motion.extraction import ClipFeatures, clip_features
+from contextdb.motion.feature_cache import FeatureCache, key_of
+from contextdb.motion.features import FeatureSchema
+from contextdb.motion.reading import as_toml
+
+
+@dataclass(frozen=True)
+class ClipFile:
+    """A clip of a database: its file, and what its features depend on beside the file's bytes."""
+
+    path: Path
+    settings: DatabaseSettings
+    schema: FeatureSchema
+
+    @property
+    def asset(self) -> str:
+        """The clip's name."""
+        return self.path.stem
+
+    @property
+    def sides(self) -> tuple[bool, ...]:
+        """For each range of the clip whether it is mirrored."""
+        return (False, True) if self.settings.mirror else (False,)
+
+    def keys(self, content: bytes) -> list[str]:
+        """For each range the key of its features."""
+        unit, up = self.settings.metres_per_unit, self.settings.up
+        return [key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side) for side in self.sides]
+
+
+@dataclass(frozen=True, eq=False)
+class Extracted:
+    """The features of a clip's ranges, with their keys, and whether any had to be computed."""
+
+    file: ClipFile
+    parts: list[ClipFeatures]
+    keys: list[str]
+    is_computed: bool
+
+
+def clip_files(
+    settings: DatabaseSettings, schema: FeatureSchema, folder: Path, assets: Collection[str] | None = None, file: str | None = None
+) -> list[ClipFile]:
+    """The clips of a database in the order of their paths; with `assets` those of these names alone.
+
+    Raises
+    ------
+    MotionError
+        No file fits the pattern, or two of the files have one name; `file` is that of the settings in messages.
+    """
+    paths = sorted(folder.glob(settings.clips))
+    if not paths:
+        found = f"[databases.{settings.name}] no file fits clips = {as_toml(settings.clips)}."
+        raise MotionError(Fault(found, place=Place(file), rule="file"))
+    wanted = [path for path in paths if assets is None or path.stem in assets]
+    faults = list(_twice_named(settings.name, wanted, file))
+    if faults:
+        raise MotionError(*faults)
+    return [ClipFile(path, settings, schema) for path in wanted]
+
+
+def unmatched(settings: DatabaseSettings, folder: Path, assets: Collection[str]) -> tuple[list[str], list[str]]:
+    """The assets of a database's table that have no clip, and the clips that have no row."""
+    stems = {path.stem for path in folder.glob(settings.clips)}
+    return [asset for asset in dict.fromkeys(assets) if asset not in stems], sorted(stems - set(assets))
+
+
+def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
+    """The features of a clip's ranges: from the cache, or computed and then kept in it.
+
+    Nothing is kept of a schema with functions: whether they still are what they were cannot be told.
+
+    Raises
+    ------
+    MotionError, FileError
+        The clip cannot be read, or lacks a bone of the schema.
+    """
+    content = read_bytes(file.path)
+    keys = file.keys(content)
+    cache = None if file.schema.functions else cache
+    kept = [_kept(file, key, side, cache) for key, side in zip(keys, file.sides, strict=True)]
+    parts = [part for part in kept if part is not None]
+    if len(parts) == len(kept):
+        return Extracted(file, parts, keys, is_computed=False)
+    clip = _parsed(file, content)
+    computed = [clip_features(clip, file.schema, mirrored=side) for side in file.sides]
+    if cache is not None:
+        for key, part in zip(keys, computed, strict=True):
+            cache.write(file.settings.name, key, part)
+    return Extracted(file, computed, keys, is_computed=True)
+
+
+def _kept(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | None) -> ClipFeatures | None:
+    return None if cache is None else cache.read(file.settings.name, key, file.asset, mirrored=is_mirrored)
+
+
+def _parsed(file: ClipFile, content: bytes) -> clips.Clip:
+    place = str(file.path)
+    text = clips._text(content, place)
+    return clips.parse_bvh(text, file.asset, file=place, metres_per_unit=file.settings.metres_per_unit, up=file.settings.up)
+
+
+def _twice_named(database: str, paths: Sequence[Path], file: str | None) -> Iterator[Fault]:
+    first: dict[str, Path] = {}
+    for path in paths:
+        other = first.setdefault(path.stem, path)
+        if other is not path:
+            both = f"{path_in_quotes(other)} and {path_in_quotes(path)}"
+            found = f"[databases.{database}] two clips are named {in_quotes(path.stem)}: {both}."
+            yield Fault(found, "a different name for each asset", place=Place(file), rule="duplicate")

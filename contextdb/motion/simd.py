@@ -1,0 +1,116 @@
+"""Two steps of the search on 16 numbers at once, as numba intrinsics.
+
+Written as vector instructions, because the compiler makes none of loops over 16 numbers that may overlap in memory; a machine
+without registers of that width works on them in parts. Both work in float32 and answer with a mask: bit i says whether lane i is at
+most the limit. Rounding is the caller's concern: a limit has to be so much higher that no lane is missed.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+LANES = 16
+_I32, _I64 = ir.IntType(32), ir.IntType(64)
+_LANES = ir.VectorType(ir.FloatType(), LANES)
+_ZEROS = ir.Constant(_LANES, [0.0] * LANES)
+_ROUNDING = ("contract", "nsz")
+"""Multiply and add may be one instruction."""
+
+
+@intrinsic
+def costs_at_most(typing, blocks, box, query, weights, limit):
+    """Which frames of a box cost at most `limit`: an int64 mask.
+
+    blocks float32 [B, F, 16], query and weights float32 [F].
+    """
+
+    def generate(context, builder, signature, arguments):
+        lanes = _Lanes(context, builder, signature, arguments)
+        n_features = lanes.size(0, 1)
+        base = builder.mul(builder.mul(arguments[1], n_features), _I64(LANES))
+        total = cgutils.alloca_once_value(builder, _ZEROS)
+        with cgutils.for_range(builder, n_features) as loop:
+            values = lanes.load(0, builder.add(base, builder.mul(loop.index, _I64(LANES))))
+            lanes.add_square(total, lanes.everywhere(3, loop.index), builder.fsub(values, lanes.everywhere(2, loop.index)))
+        return lanes.at_most(builder.load(total), arguments[4])
+
+    return types.int64(blocks, types.int64, query, weights, types.float32), generate
+
+
+@intrinsic
+def bounds_at_most(typing, lows, highs, group, query, weights, start, stop, totals, limit):
+    """Which boxes of a group may hold a frame that costs at most `limit`: an int64 mask.
+
+    lows, highs float32 [G, F, 16]; query, weights float32 [F] in their order. Adds features start … stop - 1 to `totals` float32
+    [16], so that a group can be given up after the first features.
+    """
+
+    def generate(context, builder, signature, arguments):
+        lanes = _Lanes(context, builder, signature, arguments)
+        base = builder.mul(builder.mul(arguments[2], lanes.size(0, 1)), _I64(LANES))
+        total = cgutils.alloca_once_value(builder, lanes.load(7, _I64(0)))
+        with cgutils.for_range_slice(builder, arguments[5], arguments[6], _I64(1), _I64) as (feature, _):
+            offset = builder.add(base, builder.mul(feature, _I64(LANES)))
+            wanted = lanes.everywhere(3, feature)
+            below = builder.fsub(lanes.load(0, offset), wanted)
+            above = builder.fsub(wanted, lanes.load(1, offset))
+            lanes.add_square(total, lanes.everywhere(4, feature), lanes.greater(lanes.greater(below, above), _ZEROS))
+        found = builder.load(total)
+        builder.store(found, builder.bitcast(lanes.start(7), _LANES.as_pointer())).align = 4
+        return lanes.at_most(found, arguments[8])
+
+    integer = types.int64
+    return integer(lows, highs, integer, query, weights, integer, integer, totals, types.float32), generate
+
+
+class _Lanes:
+    """Instructions on 16 float32 for one call of an intrinsic; arrays are told by the number of the argument."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
+        self.builder = builder
+        self.arrays = {
+            i: context.make_array(kind)(context, builder, argument)
+            for i, (kind, argument) in enumerate(zip(signature.args, arguments, strict=True))
+            if isinstance(kind, types.Array)
+        }
+
+    def start(self, array: int) -> Any:
+        return self.arrays[array].data
+
+    def size(self, array: int, axis: int) -> Any:
+        return self.builder.extract_value(self.arrays[array].shape, axis)
+
+    def load(self, array: int, offset: Any) -> Any:
+        """The 16 numbers from an offset on; arrays are aligned to 4 bytes only."""
+        place = self.builder.bitcast(self.builder.gep(self.start(array), [offset]), _LANES.as_pointer())
+        loaded = self.builder.load(place)
+        loaded.align = 4
+        return loaded
+
+    def everywhere(self, array: int, at: Any) -> Any:
+        """One number in all lanes."""
+        return self.spread(self.builder.load(self.builder.gep(self.start(array), [at])))
+
+    def spread(self, number: Any) -> Any:
+        nothing = ir.Constant(_LANES, ir.Undefined)
+        first = self.builder.insert_element(nothing, number, _I32(0))
+        return self.builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(_I32, LANES), [0] * LANES))
+
+    def greater(self, left: Any, right: Any) -> Any:
+        return self.builder.select(self.builder.fcmp_ordered(">", left, right), left, right)
+
+    def add_square(self, total: Any, weight: Any, values: Any) -> None:
+        """Add weight x values² to what `total` points to."""
+        builder = self.builder
+        weighted = builder.fmul(weight, values, flags=_ROUNDING)
+        square = builder.fmul(weighted, values, flags=_ROUNDING)
+        builder.store(builder.fadd(builder.load(total), square, flags=_ROUNDING), total)
+
+    def at_most(self, values: Any, limit: Any) -> Any:
+        passes = self.builder.fcmp_unordered("<=", values, self.spread(limit))  # true of NaN: 0 x inf, where float32 ends
+        return self.builder.zext(self.builder.bitcast(passes, ir.IntType(LANES)), _I64)

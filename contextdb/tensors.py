@@ -1,0 +1,186 @@
+"""Arrays in a .safetensors file: written with metadata in one order, read by memory map, never pickle.
+
+The format is eight bytes with the length of a JSON header, the header, and the arrays one after another, little-endian. A
+`FileKind` says which sort of file is meant: the key that its metadata must hold, with the version of the layout, and what to do
+about a file that cannot be used. An edge: this touches the disk.
+
+Source: the format's description in github.com/huggingface/safetensors, README.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import mmap
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.disk import read_bytes, write_atomic
+from contextdb.errors import ArtefactError, Fault, Place
+
+SUFFIX = ".safetensors"
+
+Tensors = dict[str, NDArray[Any]]
+
+_DTYPES = {"U64": "<u8", "I64": "<i8", "F64": "<f8", "I32": "<i4", "F32": "<f4", "U16": "<u2", "U8": "u1", "BOOL": "?"}
+_NAMES = {np.dtype(dtype): name for name, dtype in _DTYPES.items()}
+_METADATA = "__metadata__"
+_BROKEN = (ValueError, KeyError, TypeError, IndexError, UnicodeDecodeError, AttributeError, OverflowError, RecursionError)
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """A sort of file.
+
+    Attributes
+    ----------
+    key : str
+        The name under which the metadata hold the layout's version.
+    layout : int
+        The version that is written and read.
+    found : str
+        What another file is not: "one that contextdb compiled".
+    accepted, mend : str
+        For messages about a file that cannot be used.
+    """
+
+    key: str
+    layout: int
+    found: str
+    accepted: str
+    mend: str
+
+    def metadata(self, others: Mapping[str, str]) -> dict[str, str]:
+        """The metadata of a file of this kind, and others."""
+        return {**others, self.key: str(self.layout)}
+
+    def refused(self, path: Path, why: str) -> ArtefactError:
+        """The error of a file that cannot be used."""
+        return ArtefactError(Fault(why, self.accepted, self.mend, Place(str(path)), "bad-artefact"))
+
+    @contextmanager
+    def reading(self, path: Path) -> Iterator[None]:
+        """Turn what goes wrong while a file's contents are put together into the error of a file that cannot be used."""
+        try:
+            yield
+        except _BROKEN as error:
+            raise self.refused(path, f"the file does not hold what its header says ({type(error).__name__}).") from error
+
+
+def write_tensors(path: Path, kind: FileKind, tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -> None:
+    """Write arrays and metadata; the same ones give the same bytes. The old file is whole until the new one is.
+
+    Raises
+    ------
+    FileError
+        The disk refuses.
+    """
+    write_atomic(path, to_bytes(tensors, kind.metadata(metadata)))
+
+
+def to_bytes(tensors: Mapping[str, NDArray[Any]], metadata: Mapping[str, str]) -> bytes:
+    """The bytes of a file. Arrays of larger numbers stand first, so that each is aligned; then they go by name."""
+    arrays = {name: _little(array) for name, array in tensors.items()}
+    header: dict[str, object] = {_METADATA: dict(metadata)}
+    ordered = sorted(arrays, key=lambda name: (-arrays[name].itemsize, name))
+    stop = 0
+    for name in ordered:
+        array = arrays[name]
+        start, stop = stop, stop + array.nbytes
+        header[name] = {"dtype": _NAMES[array.dtype], "shape": list(array.shape), "data_offsets": [start, stop]}
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    return b"".join([len(text).to_bytes(8, "little"), text, *(_octets(arrays[name]) for name in ordered)])
+
+
+def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tuple[Tensors, dict[str, str]]:
+    """Every array as a view of the mapped file, and the metadata.
+
+    The file's frame and its layout are checked, and no array is read: a large file opens as fast as a small one.
+
+    Parameters
+    ----------
+    path : Path
+    kind : FileKind
+    writeable : bool
+        Whether the arrays may be written; the file stays as it is. A page that is written takes memory of its own.
+
+    Raises
+    ------
+    ArtefactError
+        The file is truncated, of another kind or of another layout.
+    FileError
+        The file cannot be read.
+    """
+    _check_frame(path, kind)
+    with path.open("rb") as file:
+        mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY if writeable else mmap.ACCESS_READ)
+    with kind.reading(path):
+        start = 8 + int.from_bytes(mapped[:8], "little")
+        header = json.loads(mapped[8:start])
+        metadata = header.pop(_METADATA)
+        if metadata[kind.key] != str(kind.layout):
+            raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {kind.layout}.")
+        return {name: _view(mapped, start, entry) for name, entry in header.items()}, metadata
+
+
+def digest_of(tensors: Mapping[str, NDArray[Any]], *texts: str) -> str:
+    """BLAKE2b-128 of some texts and of all arrays, in the order of their names."""
+    digest = hashlib.blake2b("\0".join(texts).encode("utf-8", "surrogatepass"), digest_size=16)
+    for name in sorted(tensors):
+        array = _little(tensors[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(_octets(array))
+    return digest.hexdigest()
+
+
+def texts_to_array(texts: list[str]) -> NDArray[np.uint8]:
+    """A list of texts as an array: its JSON in UTF-8."""
+    return np.frombuffer(json.dumps(texts, ensure_ascii=False).encode("utf-8", "surrogatepass"), np.uint8)
+
+
+def texts_from_array(octets: NDArray[np.uint8]) -> list[str]:
+    """The list of texts in an array."""
+    texts: list[str] = json.loads(octets.tobytes().decode("utf-8", "surrogatepass"))
+    return texts
+
+
+def _check_frame(path: Path, kind: FileKind) -> None:
+    """Refuse a file that is not wholly there, or not of this kind."""
+    from safetensors import SafetensorError, safe_open
+
+    if not os.path.isfile(path) or path.stat().st_size < 8:  # Path raises, where this says no, to a name that no file can have
+        raise kind.refused(path, f"the file has {len(read_bytes(path))} bytes, too few for any artefact.")
+    try:
+        with safe_open(path, framework="numpy") as frame:
+            metadata = frame.metadata() or {}
+    except (SafetensorError, OSError) as error:
+        read_bytes(path)  # raises FileError where it is the disk that refuses
+        raise kind.refused(path, f"not a whole .safetensors file ({error}).") from None
+    if kind.key not in metadata:
+        raise kind.refused(path, f"a .safetensors file, but not {kind.found}.")
+
+
+def _view(mapped: mmap.mmap, start: int, entry: Mapping[str, Any]) -> NDArray[Any]:
+    first, last = entry["data_offsets"]
+    dtype = np.dtype(_DTYPES[entry["dtype"]])
+    count = math.prod(entry["shape"])
+    view = np.frombuffer(mapped, dtype, count, start + first) if last > first else np.empty(0, dtype)
+    return view.reshape(entry["shape"])
+
+
+def _little(array: NDArray[Any]) -> NDArray[Any]:
+    """The array as a file holds it: one piece, little-endian."""
+    return np.ascontiguousarray(array, array.dtype.newbyteorder("<")).reshape(array.shape)
+
+
+def _octets(array: NDArray[Any]) -> memoryview:
+    return array.reshape(-1).view(np.uint8).data

@@ -1,0 +1,181 @@
+"""Mirroring poses, paths and clips by declared bone pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from test_mocap import FOLDER, listed, load
+
+from contextdb.errors import MotionError
+from contextdb.motion import Clip, FeatureSchema, LocalPoses, Skeleton, forward_kinematics, local_poses, make_clip, poses_of
+from contextdb.motion.extraction import clip_features
+from contextdb.motion.features import Channel
+from contextdb.motion.feet import feet_of
+from contextdb.motion.mirror import has_even_axes, mirrored, mirrored_path, partners_of
+from contextdb.motion.quaternions import matrices
+from contextdb.motion.skeleton import sided_pairs
+from contextdb.motion.trajectory import root_trajectory
+
+MADE = make_clip("walk").clip.skeleton
+SIDES = (("Left*", "Right*"),)
+
+
+@st.composite
+def local_poses_of_some_body(draw):
+    """A body with a left and a right branch of like shape but any offsets and rest axes, in any local pose."""
+    n_spine, n_limb, n_frames = draw(st.integers(1, 3)), draw(st.integers(1, 3)), draw(st.integers(1, 3))
+    names, parents = [f"Spine{i}" for i in range(n_spine)], [i - 1 for i in range(n_spine)]
+    for side in ("Left", "Right"):
+        above = n_spine - 1
+        for i in range(n_limb):
+            names.append(f"{side}{i}")
+            parents.append(above)
+            above = len(names) - 1
+    rng = np.random.default_rng(draw(st.integers(0, 2**20)))
+    skeleton = Skeleton(tuple(names), np.array(parents), rng.normal(size=(len(names), 3)), tuple(() for _ in names))
+    rotations = rng.normal(size=(n_frames, len(names), 4))
+    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    return LocalPoses(skeleton, 30.0, rng.normal(size=(n_frames, len(names), 3)), rotations)
+
+
+@given(local_poses_of_some_body())
+def test_a_body_mirrored_twice_is_as_it_was(local):
+    again = mirrored(mirrored(local, SIDES), SIDES)
+    assert np.array_equal(again.positions, local.positions)
+    assert np.array_equal(again.rotations, local.rotations)
+
+
+@given(local_poses_of_some_body())
+def test_mirrored_local_poses_place_all_bones_where_the_mirror_shows_them(local):
+    placed, plain = forward_kinematics(mirrored(local, SIDES)), forward_kinematics(local)
+    seen = mirrored(plain, SIDES)
+    assert np.allclose(placed.positions, seen.positions, atol=1e-12)
+    assert np.allclose(placed.rotations, seen.rotations, atol=1e-12)
+
+
+@given(local_poses_of_some_body())
+def test_a_mirrored_bone_is_the_reflection_of_its_partner(local):
+    plain = forward_kinematics(local)
+    seen = mirrored(plain, SIDES)
+    flip = np.diag([-1.0, 1.0, 1.0])
+    for joint, name in enumerate(plain.skeleton.names):
+        other = plain.skeleton.index(name.replace("Left", "?").replace("Right", "Left").replace("?", "Right"))
+        assert np.allclose(seen.positions[:, joint], plain.positions[:, other] @ flip)
+        assert np.allclose(matrices(seen.rotations[:, joint]), flip @ matrices(plain.rotations[:, other]) @ flip, atol=1e-12)
+
+
+def test_a_mirrored_turn_to_the_left_is_one_to_the_right_and_keeps_its_footing():
+    poses = poses_of(make_clip("walk_turn_left_90").clip)
+    path, seen = root_trajectory(poses), root_trajectory(mirrored(poses, SIDES))
+    assert path.headings[-1] - path.headings[0] > 1.0
+    assert np.allclose(seen.headings, -path.headings)
+    assert np.allclose(seen.positions, path.positions * [-1.0, 1.0])
+    assert np.allclose(seen.velocities, mirrored_path(path).velocities)
+    assert np.array_equal(mirrored_path(mirrored_path(path)).headings, path.headings)
+
+
+def test_patterns_and_names_give_the_same_pairs():
+    by_pattern = partners_of(MADE, SIDES)
+    lefts = [name for name in MADE.names if name.startswith("Left")]
+    assert np.array_equal(by_pattern, partners_of(MADE, tuple((name, "Right" + name[4:]) for name in lefts)))
+    assert MADE.names[by_pattern[MADE.index("LeftHand")]] == "RightHand"
+    assert by_pattern[MADE.index("Head")] == MADE.index("Head")
+
+
+def test_a_star_may_stand_anywhere_in_a_name():
+    names = ("rig:Hips", "rig:Leg_L", "rig:Leg_R", "rig:lArm", "rig:rArm")
+    skeleton = Skeleton(names, np.array([-1, 0, 0, 0, 0]), np.zeros((5, 3)), tuple(() for _ in names))
+    assert partners_of(skeleton, (("*_L", "*_R"), ("rig:l*", "rig:r*"))).tolist() == [0, 2, 1, 4, 3]
+
+
+REFUSED = {
+    "a bone that is missing": (
+        (("LeftFoot", "RightFot"),),
+        r'mirror: \["LeftFoot", "RightFot"\] asks for a bone "RightFot", and there is none\..*Did you mean "RightFoot"\?',
+    ),
+    "a pattern with half its bones": ((("*Hand", "*Palm"),), r'mirror: \["\*Hand", "\*Palm"\] asks for a bone "LeftPalm"'),
+    "a pattern that fits nothing": ((("L_*", "R_*"),), r'mirror: no bone fits \["L_\*", "R_\*"\]'),
+    "a bone in two pairs": ((*SIDES, ("LeftHand", "RightFoot")), 'mirror: the bone "LeftHand" is in two pairs'),
+    "a pair twice": ((*SIDES, *SIDES), 'mirror: the bone "LeftArm" is in two pairs'),
+    "unlike parents": (
+        (("LeftHand", "RightForeArm"),),
+        'mirror: "RightForeArm" is mirrored to "LeftHand", but their parents|'
+        'mirror: "LeftHand" is mirrored to "RightForeArm", but their parents',
+    ),
+    "a limb without its end": (
+        (("LeftUpLeg", "RightUpLeg"), ("LeftLeg", "RightLeg"), ("LeftFoot", "RightFoot")),
+        'mirror: "LeftToe" is mirrored to "LeftToe", but their parents do not change places as they do. '
+        'Accepted: a bone below "RightFoot" as the partner of "LeftToe"',
+    ),
+    "a star on one side": ((("Left*", "RightFoot"),), "one name has a \\* and the other has none"),
+    "two stars": ((("L*ft*", "R*ght*"),), "a name has more than one \\*"),
+}
+
+
+@pytest.mark.parametrize(("pairs", "message"), REFUSED.values(), ids=REFUSED)
+def test_pairs_that_do_not_fit_a_skeleton_are_refused(pairs, message):
+    with pytest.raises(MotionError, match=message):
+        partners_of(MADE, pairs)
+
+
+def test_all_missing_bones_are_told_together():
+    with pytest.raises(MotionError) as error:
+        partners_of(MADE, (("LeftEar", "RightEar"), ("A*", "B*"), ("LeftHand", "RightHnd")))
+    assert len(error.value.faults) == 4
+
+
+def test_a_clip_is_mirrored_only_by_declared_pairs():
+    schema = FeatureSchema("loco", 30.0, (Channel("position", 1.0, "Head"),))
+    with pytest.raises(MotionError, match=r"walk: \[features\.loco\] declares no bone pairs to mirror by\..*LeftArm"):
+        clip_features(make_clip("walk").clip, schema, mirrored=True)
+
+
+def test_pairs_that_leave_out_the_bones_of_the_facing_are_refused():
+    arms = (("LeftArm", "RightArm"), ("LeftForeArm", "RightForeArm"), ("LeftHand", "RightHand"))
+    schema = FeatureSchema("loco", 30.0, (Channel("position", 1.0, "Head"),), mirror=arms)
+    with pytest.raises(MotionError, match='the body faces across "LeftUpLeg" and "RightUpLeg", which are no pair'):
+        clip_features(make_clip("walk").clip, schema, mirrored=True)
+
+
+def uneven_clip():
+    """A body whose right bones have axes turned about against the left ones', as some exporters write them."""
+    names = ("Hips", "LeftLeg", "LeftFoot", "RightLeg", "RightFoot")
+    offsets = np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.5, 0], [-0.1, 0, 0], [0, -0.5, 0]])
+    skeleton = Skeleton(names, np.array([-1, 0, 1, 0, 3]), offsets, tuple(() for _ in names))
+    return Clip("uneven", skeleton, 1.0 / 30.0, np.zeros((3, 0)), 1.0)
+
+
+def test_bones_with_unlike_axes_are_mirrored_in_place_but_not_in_direction():
+    clip = uneven_clip()
+    assert not has_even_axes(clip.skeleton, partners_of(clip.skeleton, SIDES))
+    assert has_even_axes(MADE, partners_of(MADE, SIDES))
+    place = FeatureSchema("loco", 30.0, (Channel("position", 1.0, "LeftFoot"),), mirror=SIDES)
+    found = clip_features(clip, place, mirrored=True).features
+    right = FeatureSchema("loco", 30.0, (Channel("position", 1.0, "RightFoot"),))
+    assert np.allclose(found, clip_features(clip, right).features * [-1.0, 1.0, 1.0])
+    for kind in ("direction", "orientation"):
+        turned = FeatureSchema("loco", 30.0, (Channel(kind, 1.0, "LeftFoot"),), mirror=SIDES)
+        with pytest.raises(MotionError, match=f'so channel "LeftFoot {kind}.*" cannot be mirrored'):
+            clip_features(clip, turned, mirrored=True)
+
+
+def test_local_poses_of_a_clip_stay_within_the_file_s_bone_lengths():
+    local = local_poses(make_clip("jog").clip)
+    lengths = np.linalg.norm(mirrored(local, SIDES).positions[:, 1:], axis=-1)
+    assert np.allclose(lengths, np.linalg.norm(local.positions[:, 1:], axis=-1))
+
+
+@pytest.mark.skipif(not (FOLDER / "assets.csv").is_file(), reason="no captured clips: set CONTEXTDB_MOCAP to their folder")
+def test_captured_bodies_are_mirrored_by_their_sided_names():
+    for row in listed()[::8]:
+        clip = load(row)
+        pairs = tuple(sided_pairs(clip.skeleton.names))
+        foot, other = feet_of(clip.skeleton)
+        channels = [Channel(kind, 1.0, foot) for kind in ("position", "velocity", "angular_velocity")]
+        across = [Channel(kind, 1.0, other) for kind in ("position", "velocity", "angular_velocity")]
+        seen = clip_features(clip, FeatureSchema("m", 30.0, (*channels, Channel("phase")), mirror=pairs), mirrored=True)
+        plain = clip_features(clip, FeatureSchema("m", 30.0, (*across, Channel("phase", feet=(other, foot)))))
+        signs = [-1, 1, 1, -1, 1, 1, 1, -1, -1, 1, 1, 1, 1]
+        assert np.allclose(seen.features, plain.features * signs, atol=1e-4), row["asset"]

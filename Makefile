@@ -54,6 +54,7 @@ docs: $(VENV)/.dev
 
 bench: $(VENV)/.bench
 	$(PY) benchmarks/query.py
+	$(PY) benchmarks/search.py
 
 clean:
 	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in '$(VENV) build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache'.split()]"

@@ -66,6 +66,21 @@ def write_atomic(path: str | Path, data: bytes) -> None:
         _sync_folder(target.parent)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, where they are not there yet.
+
+    Raises
+    ------
+    FileError
+        It is a file, or may not be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
+        raise FileError(Fault(f"the folder cannot be made: {why}.", "a folder", place=Place(str(folder)))) from None
+
+
 def _require_writable(file: Path, old: os.stat_result) -> None:
     """Refuse what a rename would replace all the same: a folder, a device, a file that is marked read-only."""
     if stat.S_ISDIR(old.st_mode):

@@ -16,7 +16,7 @@ from pathlib import Path, PurePath
 
 from contextdb.artefact import SUFFIX
 from contextdb.console import output, printable, progress
-from contextdb.disk import path_in_quotes
+from contextdb.disk import make_folder, path_in_quotes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.places import table_path
@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     _require_different(targets)
     for table, target in progress(list(zip(tables, targets, strict=True)), "compiling"):
         compiled = table.compile()
-        _make_folder(target.parent)
+        make_folder(target.parent)
         compiled.save(target)
         with output():
             print(printable(str(target)))
@@ -71,14 +71,6 @@ def _target(table: Table, out: str | None, n_tables: int) -> Path:
         return Path(out) / f"{table.name if is_file_name else table.path.stem}{SUFFIX}"
     mend = path_in_quotes(Path(out).with_suffix(SUFFIX))
     raise FileError(Fault("this is no name of an artefact.", f"a name that ends in {SUFFIX}, or a folder", mend, Place(out)))
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        why = "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
-        raise FileError(Fault(f"the folder cannot be made: {why}.", "a folder", place=Place(str(folder)))) from None
 
 
 def _require_different(targets: list[Path]) -> None:

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contextdb.console import aligned, output, printable
+from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
 from contextdb.exit_codes import ExitCode
 from contextdb.motion import building
@@ -53,7 +54,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             cache=None if arguments.no_cache else building.CACHE_FOLDER,
         )
     for name, target in targets.items():
-        _make_folder(target.parent)
+        make_folder(target.parent)
         save_database(built[name].database, target, inputs=built[name].digest)
     for warning in project.warnings(built):
         print(printable(f"contextdb: warning: {warning}"), file=sys.stderr)
@@ -108,15 +109,11 @@ class MotionProject:
 
     def warnings(self, built: Mapping[str, Built]) -> Iterator[str]:
         """What a build passed over: assets without a clip, clips without a row, markup that does nothing."""
-        for name in built:
-            settings = self.config.databases[name]
-            if settings.table is None:
-                continue
-            missing, unlisted = unmatched(settings, self.folder, self.assets[settings.table])
-            if missing:
-                yield f"[databases.{name}] {plural(len(missing), 'asset')} of {settings.table} without a clip: {some(missing)}"
-            if unlisted:
-                yield f"[databases.{name}] {plural(len(unlisted), 'clip')} without a row in {settings.table}: {some(unlisted)}"
+        missing, unlisted = unmatched(self.config.databases.values(), self.folder, self.assets)
+        for table, assets in missing.items():
+            yield f"[tables.{table}] no database has a clip of {plural(len(assets), 'asset')}: {some(assets)}"
+        if unlisted:
+            yield f"no table has a row for {plural(len(unlisted), 'clip')}: {some(unlisted)}"
         yield from dict.fromkeys(str(fault) for each in built.values() for fault in each.markup_faults)
 
 
@@ -166,11 +163,3 @@ def _bar() -> Iterator[Progress | None]:
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
         yield lambda done, total, clip: bar.update(task, completed=done, total=total, description=printable(clip))
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        why = "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
-        raise FileError(Fault(f"the folder cannot be made: {why}.", "a folder", place=Place(str(folder)))) from None

@@ -2,31 +2,28 @@
 
     clip files ─► features of each, or the cache ─► one normalisation for all databases of a feature schema ─► MotionDatabase
 
-With the cache a build gives bit for bit what it gives without. Each database has a digest of all that it is made of: its clips and,
-as they share its normalisation, those of all databases of its schema; its markup; its settings. A saved database that holds the
-digest of its inputs is up to date. An edge: this touches the disk.
+With the cache a build gives bit for bit what it gives without. A saved database that holds the digest of its inputs is up to date.
+An edge: this touches the disk.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contextdb.disk import read_bytes
-from contextdb.errors import ArtefactError, ClipError, ContextDBError, Fault, FileError, MotionError
+from contextdb.errors import ArtefactError, Fault, FileError
 from contextdb.motion import stored
-from contextdb.motion.clip_files import ClipFile, Extracted, clip_files, extract
-from contextdb.motion.database import Biases, MotionDatabase
+from contextdb.motion.build_inputs import Assets, Faults, Inputs
+from contextdb.motion.clip_files import ClipFile, Extracted, extract
+from contextdb.motion.database import MotionDatabase
 from contextdb.motion.database_settings import DatabaseSettings
 from contextdb.motion.feature_cache import FeatureCache, file_name
+from contextdb.motion.filters import Biases
 from contextdb.motion.markup import Markup
 from contextdb.motion.normalisation import Normalisation
-from contextdb.motion.schema_dict import schema_to_dict
 
 if TYPE_CHECKING:
     from contextdb.motion.config import MotionConfig
@@ -36,9 +33,6 @@ SAVED_SUFFIX = ".motion.safetensors"
 
 Progress = Callable[[int, int, str], None]
 """Called with how many clips are done, how many there are, and the name of the one done last."""
-
-Assets = Mapping[str, Collection[str]]
-"""For a table's name the assets in it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +102,11 @@ def build_all(
     """Build as `build` does, and tell of each database what it was made of."""
     root = Path(folder)
     kept = None if cache is None else FeatureCache(root / cache)
-    inputs = _Inputs.of(config, root, assets or {}, names)
+    inputs = Inputs.of(config, root, assets or {}, names)
     extracted = _extract_all(inputs.files, kept, progress)
     digests = inputs.digests({name: [each.keys for each in found] for name, found in extracted.items()})
     shared = {schema: _shared_normalisation(config, schema, extracted) for schema in inputs.schemas}
-    faults, built = _Faults(), {}
+    faults, built = Faults(), {}
     for name in inputs.wanted:
         with faults:
             built[name] = _built(inputs, name, extracted[name], shared, digests[name])
@@ -141,8 +135,8 @@ def open_or_build(
         As for `build`. All clips are read, as their contents say whether a saved database is up to date.
     """
     root = Path(folder)
-    inputs = _Inputs.of(config, root, assets or {})
-    digests = inputs.digests({name: [file.keys(read_bytes(file.path)) for file in files] for name, files in inputs.files.items()})
+    inputs = Inputs.of(config, root, assets or {})
+    digests = inputs.digests(inputs.keys())
     opened = {name: _open(saved_path(root / (saved or ""), name), digest) for name, digest in digests.items()}
     missing = [name for name, database in opened.items() if database is None]
     built = build(config, root, assets, progress, names=missing, cache=cache) if missing else {}
@@ -162,62 +156,6 @@ def _open(path: Path, digest: str) -> MotionDatabase | None:
         return None
 
 
-# ---- what databases are made of
-
-
-@dataclass(frozen=True, eq=False)
-class _Inputs:
-    """What some databases are made of: the files of all databases of their schemas, and the markup of all of these."""
-
-    config: MotionConfig
-    root: Path
-    wanted: list[str]
-    files: dict[str, list[ClipFile]]
-    markups: dict[str, Markup]
-
-    @classmethod
-    def of(cls, config: MotionConfig, root: Path, assets: Assets, names: Collection[str] | None = None) -> _Inputs:
-        """Find the files and read the markup; all faults together."""
-        asked = config.databases if names is None else [config.database(name).name for name in names]
-        wanted = [name for name in config.databases if name in asked]
-        schemas = {config.databases[name].features for name in wanted}
-        faults = _Faults()
-        files, markups = {}, {}
-        for name, settings in config.databases.items():
-            if settings.features in schemas:
-                with faults:
-                    found = assets.get(settings.table or "")
-                    files[name] = clip_files(settings, config.features[settings.features], root, found, config.file)
-            if settings.markup is not None and name in wanted:
-                with faults:
-                    markups[name] = Markup.load(root / settings.markup)
-        faults.tell()
-        return cls(config, root, wanted, files, markups)
-
-    @property
-    def schemas(self) -> list[str]:
-        """The names of their feature schemas."""
-        return list(dict.fromkeys(self.config.databases[name].features for name in self.wanted))
-
-    def digests(self, keys: Mapping[str, list[list[str]]]) -> dict[str, str]:
-        """The digest of each wanted database, from the keys of the features of all clips."""
-        clips = {name: [[file.asset, *each] for file, each in zip(self.files[name], keys[name], strict=True)] for name in keys}
-        return {name: self._digest(self.config.databases[name], clips) for name in self.wanted}
-
-    def _digest(self, settings: DatabaseSettings, clips: Mapping[str, object]) -> str:
-        schema, markup = self.config.features[settings.features], self.markups.get(settings.name)
-        if schema.functions:
-            return ""
-        about = {
-            "layout": stored.STORED.layout,
-            "features": schema_to_dict(schema),
-            "clips": {name: each for name, each in clips.items() if self.config.databases[name].features == settings.features},
-            "markup": None if markup is None else [[s.asset, s.tag, s.from_s, s.to_s, s.value] for s in markup.spans],
-            "settings": asdict(settings),
-        }
-        return hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16).hexdigest()
-
-
 # ---- steps of a build
 
 
@@ -227,7 +165,7 @@ def _extract_all(
     """The features of all clips; the faults of all broken ones together."""
     total, done = sum(map(len, files.values())), 0
     found: dict[str, list[Extracted]] = {name: [] for name in files}
-    faults = _Faults()
+    faults = Faults()
     for name, listed in files.items():
         for file in listed:
             with faults:
@@ -245,7 +183,7 @@ def _shared_normalisation(config: MotionConfig, schema: str, extracted: Mapping[
     return Normalisation.of(blocks, config.features[schema])
 
 
-def _built(inputs: _Inputs, name: str, found: list[Extracted], shared: Mapping[str, Normalisation], digest: str) -> Built:
+def _built(inputs: Inputs, name: str, found: list[Extracted], shared: Mapping[str, Normalisation], digest: str) -> Built:
     settings, markup = inputs.config.databases[name], inputs.markups.get(name)
     database = MotionDatabase.from_parts(
         [part for each in found for part in each.parts],
@@ -264,7 +202,7 @@ def _built(inputs: _Inputs, name: str, found: list[Extracted], shared: Mapping[s
     )
 
 
-def _markup_faults(inputs: _Inputs, markup: Markup, settings: DatabaseSettings, database: MotionDatabase) -> list[Fault]:
+def _markup_faults(inputs: Inputs, markup: Markup, settings: DatabaseSettings, database: MotionDatabase) -> list[Fault]:
     """What of a markup does nothing: for no clip of the databases that share it, or for no frame of this one's."""
     sharing = [each for each in inputs.config.databases.values() if each.markup == settings.markup]
     known = {path.stem for each in sharing for path in inputs.root.glob(each.clips)}
@@ -279,32 +217,3 @@ def _prune(cache: FeatureCache, config: MotionConfig, extracted: Mapping[str, li
     for name, found in extracted.items():
         cache.prune(name, {key for each in found for key in each.keys})
     cache.prune_databases(config.databases)
-
-
-class _Faults:
-    """Collects the faults of several things that are tried, to tell them together."""
-
-    def __init__(self) -> None:
-        self.errors: list[ContextDBError] = []
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
-        if isinstance(error, (MotionError, FileError)):
-            self.errors.append(error)
-            return True
-        return False
-
-    def tell(self) -> None:
-        """Raise what was collected, if anything."""
-        if not self.errors:
-            return
-        faults = _once(fault for error in self.errors for fault in error.faults)
-        kinds = {type(error) for error in self.errors}
-        raise (kinds.pop() if len(kinds) == 1 else ClipError if ClipError in kinds else MotionError)(*faults)
-
-
-def _once(faults: Iterable[Fault]) -> list[Fault]:
-    """Each fault once: a broken clip may be in several databases."""
-    return list(dict.fromkeys(faults))

@@ -88,7 +88,7 @@ def of(database: MotionDatabase, query: Floats, chosen: Filter, k: int, with_lef
     """The k best frames for a normalised query."""
     if k < 0:
         raise QueryError(Fault(f"{k} candidates were asked for.", "0 or more"))
-    lay, kinds = database.layout, database.kinds
+    lay, kinds = database.layout, database.marks.kinds
     why = chosen.why(lay.frame_ranges, kinds)
     in_ranges = lay.frames
     frames = in_ranges if with_left_out else in_ranges[why[in_ranges] == LeftOut.NO]
@@ -134,10 +134,10 @@ def _candidates(
 
 def _biases(database: MotionDatabase, chosen: Filter, frame: int, at: int) -> dict[str, float]:
     """The parts of a frame's bias that are not 0; `at` is its range."""
-    marks, kind = database.marks, int(database.kinds[frame])
+    marks, kind = database.marks, int(database.marks.kinds[frame])
     looping = database.biases.looping if marks.looping[at] else 0.0
     modifier = float(marks.kind_biases[kind])
-    is_playing = chosen.playing(database.layout.frame_ranges, database.kinds) == frame
+    is_playing = chosen.playing(database.layout.frame_ranges, database.marks.kinds) == frame
     parts = {
         "base": database.biases.base,
         "looping": looping,

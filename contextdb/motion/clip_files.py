@@ -6,7 +6,7 @@ meanwhile does no harm. An edge: this touches the disk.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,10 +75,24 @@ def clip_files(
     return [ClipFile(path, settings, schema) for path in wanted]
 
 
-def unmatched(settings: DatabaseSettings, folder: Path, assets: Collection[str]) -> tuple[list[str], list[str]]:
-    """The assets of a database's table that have no clip, and the clips that have no row."""
-    stems = {path.stem for path in folder.glob(settings.clips)}
-    return [asset for asset in dict.fromkeys(assets) if asset not in stems], sorted(stems - set(assets))
+def unmatched(
+    databases: Iterable[DatabaseSettings], folder: Path, assets: Mapping[str, Collection[str]]
+) -> tuple[dict[str, list[str]], list[str]]:
+    """What has no counterpart: for each table the assets of which no database has a clip, and the clips that no database holds.
+
+    `assets` gives for a table's name the assets in it. A table that no database names is passed over.
+    """
+    clips: dict[str, set[str]] = {}
+    found: set[str] = set()
+    held: set[str] = set()
+    for settings in databases:
+        names = {path.stem for path in folder.glob(settings.clips)}
+        found |= names
+        if settings.table is not None:
+            clips.setdefault(settings.table, set()).update(names)
+        held |= names if settings.table is None else names.intersection(assets[settings.table])
+    missing = {table: [asset for asset in dict.fromkeys(assets[table]) if asset not in names] for table, names in clips.items()}
+    return {table: names for table, names in missing.items() if names}, sorted(found - held)
 
 
 def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
@@ -112,7 +126,7 @@ def _kept(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | Non
 
 def _parsed(file: ClipFile, content: bytes) -> clips.Clip:
     place = str(file.path)
-    text = clips._text(content, place)
+    text = clips.text_of(content, place)
     return clips.parse_bvh(text, file.asset, file=place, metres_per_unit=file.settings.metres_per_unit, up=file.settings.up)
 
 

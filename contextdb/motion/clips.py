@@ -105,7 +105,7 @@ def load_bvh(path: str | PathLike[str], *, metres_per_unit: float = CENTIMETRE, 
     except OSError as error:
         raise FileError(Fault(f"the file cannot be read: {error.strerror or error}.", place=Place(file), rule="file")) from error
     stem = Path(path).stem
-    return parse_bvh(_text(raw, file), stem if name is None else name, file=file, metres_per_unit=metres_per_unit, up=up)
+    return parse_bvh(text_of(raw, file), stem if name is None else name, file=file, metres_per_unit=metres_per_unit, up=up)
 
 
 def parse_bvh(text: str, name: str, *, file: str | None = None, metres_per_unit: float = CENTIMETRE, up: Up = "y") -> Clip:
@@ -145,7 +145,7 @@ def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int =
         raise FileError(Fault(f"the file cannot be written: {error.strerror or error}.", place=place, rule="file")) from error
 
 
-def _text(raw: bytes, file: str) -> str:
+def text_of(raw: bytes, file: str) -> str:
     """The text of a file's bytes."""
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _no_text("the file is UTF-16", 1, file)

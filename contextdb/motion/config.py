@@ -16,7 +16,8 @@ from typing import TypeVar
 
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, some
 from contextdb.motion import building, clips
-from contextdb.motion.building import Assets, Progress
+from contextdb.motion.build_inputs import Assets
+from contextdb.motion.building import Progress
 from contextdb.motion.clip_files import clip_files
 from contextdb.motion.clips import Clip
 from contextdb.motion.database import MotionDatabase
@@ -24,6 +25,8 @@ from contextdb.motion.database_settings import DatabaseSettings, read_databases
 from contextdb.motion.features import CustomFunction, FeatureSchema
 from contextdb.motion.reading import Mapped, Section, as_toml, what_is
 from contextdb.motion.selector import Entry, Selector
+
+__all__ = ["DatabaseSettings", "MotionConfig", "SelectorSettings"]
 
 STEP_KEYS = ("database", "threshold")
 MOST_COST = 1e30

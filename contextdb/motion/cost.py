@@ -41,3 +41,8 @@ def _sum(rows: Floats) -> Floats:
     for row in rows:
         total += row
     return total
+
+
+def weights_of_features(slices: Sequence[slice], weights: Floats) -> Floats:
+    """The weight of each feature, from that of its channel: float64 [F]."""
+    return np.repeat(weights, [columns.stop - columns.start for columns in slices])

@@ -14,33 +14,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
-from types import ModuleType
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
-from contextdb.motion import arguments, candidates, cost, scan
+from contextdb.motion import arguments, candidates, cost
 from contextdb.motion.arguments import Flags, Valid
 from contextdb.motion.candidates import Candidates
 from contextdb.motion.clips import Clip
+from contextdb.motion.cost import weights_of_features
 from contextdb.motion.extraction import ClipFeatures, clip_features
 from contextdb.motion.features import FeatureSchema
-from contextdb.motion.filters import NO_FLAGS, Filter, Kinds
+from contextdb.motion.filtering import FilterMaker, Penalties, SearchOptions, Tags
+from contextdb.motion.filters import NO_BIAS, Biases, Filter
 from contextdb.motion.layout import Features, Layout
-from contextdb.motion.left_out import LeftOut, Skip
-from contextdb.motion.marks import ANY_TAGS, Marks, TagFilter
+from contextdb.motion.left_out import Skip
+from contextdb.motion.marks import Marks
 from contextdb.motion.markup import Markup
 from contextdb.motion.normalisation import Normalisation
 from contextdb.motion.quaternions import Floats
 from contextdb.motion.ranges import check_ranges
+from contextdb.motion.searcher import Searcher
 from contextdb.motion.skeleton import Ints
-
-Tags = TagFilter | ArrayLike
-Penalties = Mapping[str, float] | NDArray[np.floating]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,25 +67,6 @@ class Hit:
 
 
 NOTHING = Hit(None, -1, -1, math.inf)
-
-
-@dataclass(frozen=True, slots=True)
-class Biases:
-    """What is added to the cost of frames, whatever the query; negative favours them.
-
-    Attributes
-    ----------
-    base : float
-        For every frame of the database.
-    looping : float
-        For frames of looping ranges.
-    continuing : float
-        For the frame that would play on, so that a character does not jump for a trifle.
-    """
-
-    base: float = 0.0
-    looping: float = 0.0
-    continuing: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -128,11 +108,9 @@ class MotionDatabase:
     weights: Floats
     normalisation: Normalisation
     marks: Marks
-    biases: Biases = Biases()
+    biases: Biases = NO_BIAS
     root: Features | None = None
     schema: FeatureSchema | None = None
-    _filters: dict[tuple[TagFilter, bool], Kinds] = field(default_factory=dict, init=False, repr=False)
-    _rows: dict[int, tuple[Sequence[str], Ints, Ints]] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def build(
@@ -143,7 +121,7 @@ class MotionDatabase:
         normalisation: Normalisation | None = None,
         markup: Markup | None = None,
         mirror: bool | Collection[str] = False,
-        biases: Biases = Biases(),
+        biases: Biases = NO_BIAS,
         end_s: float = 0.0,
     ) -> MotionDatabase:
         """Compute the features of some clips; each clip is one range, named like it.
@@ -179,7 +157,7 @@ class MotionDatabase:
         *,
         normalisation: Normalisation | None = None,
         markup: Markup | None = None,
-        biases: Biases = Biases(),
+        biases: Biases = NO_BIAS,
         end_s: float = 0.0,
     ) -> MotionDatabase:
         """The database of some clips whose features are known, one range each."""
@@ -193,7 +171,7 @@ class MotionDatabase:
         marks = Marks.of(Markup() if markup is None else markup, assets, starts, stops, schema.rate, end_s)
         slices = tuple(schema.slices.values())
         return cls(
-            Layout.of(features, starts, stops, _feature_weights(slices, schema.weights).astype(np.float64)),
+            Layout.of(features, starts, stops, weights_of_features(slices, schema.weights)),
             starts,
             stops,
             assets,
@@ -318,22 +296,12 @@ class MotionDatabase:
         -----
         A box is skipped when its lower bound plus its least bias is above the best total so far; see `contextdb.motion.kernels`.
         """
-        chosen = self.filter(valid, tags, current, bias, skip=skip, in_match_range=in_match_range, penalties=penalties)
-        found, totals, frames = self._least(query, chosen, math.inf, 1)
-        return Hit(self.assets[found], found, int(frames[0]), float(totals[0])) if found >= 0 else NOTHING
+        chosen = self._filters.make(valid, tags, current, bias, skip, in_match_range, penalties)
+        found, totals, frames = self._searcher.least(query, chosen, math.inf, 1)
+        return self._hit(found, int(frames[0]), float(totals[0]))
 
     def best_of_ranges(
-        self,
-        query: ArrayLike,
-        within: float,
-        valid: Valid | None = None,
-        tags: Tags | None = None,
-        current: int | None = None,
-        bias: ArrayLike | None = None,
-        *,
-        skip: Sequence[Skip] = (),
-        in_match_range: bool = False,
-        penalties: Penalties | None = None,
+        self, query: ArrayLike, within: float, valid: Valid | None = None, **options: Unpack[SearchOptions]
     ) -> list[Hit]:
         """The best frame of each range that costs at most `within` more than the best of all, cheapest first.
 
@@ -341,15 +309,15 @@ class MotionDatabase:
         """
         if not within >= 0.0:
             raise QueryError(Fault(f"the costs may differ by {within!r}.", "a number, 0 or more"))
-        chosen = self.filter(valid, tags, current, bias, skip=skip, in_match_range=in_match_range, penalties=penalties)
-        best = float(self._least(query, chosen, math.inf, 1)[1][0])
+        chosen = self.filter(valid, **options)
+        best = float(self._searcher.least(query, chosen, math.inf, 1)[1][0])
         if best == math.inf:
             return []
-        _, totals, frames = self._least(query, chosen, best + within, len(self.assets))
+        _, totals, frames = self._searcher.least(query, chosen, best + within, len(self.assets))
         ranges = np.flatnonzero(frames >= 0)
         is_other = frames[ranges] != chosen.current
         order = ranges[np.lexsort((frames[ranges], is_other, totals[ranges]))]
-        return [Hit(self.assets[i], int(i), int(frames[i]), float(totals[i])) for i in order]
+        return [self._hit(i, int(frames[i]), float(totals[i])) for i in order.tolist()]
 
     def search_many(
         self,
@@ -377,23 +345,11 @@ class MotionDatabase:
         playing: Sequence[int | None] = [None] * len(wanted) if current is None else list(current)
         if len(playing) != len(wanted):
             raise QueryError(Fault(f"{plural(len(playing), 'current frame')} for {len(wanted)} queries.", "one for each query"))
-        if self._pack is None or any(getattr(mask, "has_penalties", False) for mask in masks):
-            return [self.search(query, mask, tags, frame) for query, mask, frame in zip(wanted, masks, playing, strict=True)]
-        return self._search_each(wanted, masks, playing, tags)
+        answers = zip(*self._searcher.least_of_each(wanted, self._filters.make_each(masks, playing, tags)), strict=True)
+        return [self._hit(*answer) for answer in answers]
 
     def candidates(
-        self,
-        query: ArrayLike,
-        k: int = 10,
-        valid: Valid | None = None,
-        tags: Tags | None = None,
-        current: int | None = None,
-        bias: ArrayLike | None = None,
-        *,
-        skip: Sequence[Skip] = (),
-        in_match_range: bool = False,
-        penalties: Penalties | None = None,
-        left_out: bool = False,
+        self, query: ArrayLike, k: int = 10, valid: Valid | None = None, *, left_out: bool = False, **options: Unpack[SearchOptions]
     ) -> Candidates:
         """The k frames of lowest cost, with what each channel and bias adds, and why the other frames were left out.
 
@@ -404,16 +360,16 @@ class MotionDatabase:
         k : int
         left_out : bool
             Whether frames that may not be chosen stand among the k too, each with its reason.
-        query, valid, tags, current, bias, skip, in_match_range, penalties
+        query, valid, **options
             As for `search`.
         """
-        chosen = self.filter(valid, tags, current, bias, skip=skip, in_match_range=in_match_range, penalties=penalties)
-        return candidates.of(self, self._normalised(query), chosen, k, left_out)
+        chosen = self.filter(valid, **options)
+        return candidates.of(self, self._searcher.normalised(query), chosen, k, left_out)
 
     def channel_costs(self, frame: Hit | int, query: ArrayLike) -> dict[str, float]:
         """What each channel adds to the cost of one frame. Their sum, in order, is the frame's cost without its biases."""
         frames = np.array([self._number(frame)])
-        found = cost.channel_costs(self.layout, frames, self._normalised(query), self.slices, self.weights)
+        found = cost.channel_costs(self.layout, frames, self._searcher.normalised(query), self.slices, self.weights)
         return dict(zip(self.channel_names, found[:, 0].tolist(), strict=True))
 
     def raw(self, frame: Hit | int) -> Floats:
@@ -455,244 +411,27 @@ class MotionDatabase:
         sizes = plural(len(self.assets), "range"), plural(self.n_frames, "frame"), plural(self.n_features, "feature")
         return f"<MotionDatabase: {', '.join(sizes)}>"
 
-    # ---- what may play
-
-    def filter(
-        self,
-        valid: Valid | None = None,
-        tags: Tags | None = None,
-        current: int | None = None,
-        bias: ArrayLike | None = None,
-        *,
-        skip: Sequence[Skip] = (),
-        in_match_range: bool = False,
-        penalties: Penalties | None = None,
-    ) -> Filter:
+    def filter(self, valid: Valid | None = None, **options: Unpack[SearchOptions]) -> Filter:
         """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`."""
-        ranges, range_biases = self._valid_ranges(valid)
-        if penalties is not None:
-            range_biases = range_biases + self._range_penalties(penalties)
-        filtered, frames = (tags, NO_FLAGS) if isinstance(tags, TagFilter) else (ANY_TAGS, NO_FLAGS)
-        if tags is not None and filtered is not tags:
-            frames = arguments.flags_of(tags, self.n_frames, "tags", "frame")
-        return Filter(
-            ranges,
-            ranges is self._all_ranges,
-            range_biases,
-            self._kinds_of(filtered, in_match_range),
-            frames,
-            arguments.bias_of(bias, self.n_frames),
-            tuple(skip),
-            arguments.current_of(current, self.n_frames),
-            self.biases.continuing,
-        )
+        return self._filters.make(valid, **options)
 
     @cached_property
-    def kinds(self) -> NDArray[np.integer]:
-        """The kind of each frame: integers [N]."""
-        return self.marks.kinds
-
-    def _valid_ranges(self, valid: Valid | None) -> tuple[Flags, Floats]:
-        """Which ranges may play, bool [R], and the biases of ranges, float64 [R]."""
-        if valid is None:
-            return self._all_ranges, self._range_biases
-        if type(valid) is np.ndarray and valid.dtype == np.bool_ and valid.shape == self.starts.shape:
-            return valid, self._range_biases
-        if hasattr(valid, "table_assets"):
-            return self._of_matches(valid)
-        names = getattr(valid, "assets", None)
-        if names is None:
-            return arguments.flags_of(valid, len(self.assets), "valid", "range"), self._range_biases
-        flags = np.zeros(len(self.assets), np.bool_)
-        for name in set(names):
-            flags[self._ranges_of_asset.get(name, [])] = True
-        return flags, self._range_biases
-
-    def _of_matches(self, matches: Any) -> tuple[Flags, Floats]:
-        """The same for a table's answer; which rows belong to which range is looked up once for each table."""
-        rows, ranges = self._rows_of_table(matches.table_assets)
-        valid = matches.flags[rows]
-        flags = np.zeros(len(self.assets), np.bool_)
-        flags[ranges[valid]] = True
-        if not getattr(matches, "has_penalties", False):
-            return flags, self._range_biases
-        least = np.full(len(self.assets), np.inf)
-        np.minimum.at(least, ranges[valid], matches.penalties[rows[valid]])
-        return flags, self._range_biases + np.where(flags, least, 0.0)
-
-    def _rows_of_table(self, table_assets: Sequence[str]) -> tuple[Ints, Ints]:
-        """The pairs of a table's rows and the ranges of their assets: two int64 arrays."""
-        known = self._rows.get(id(table_assets))
-        if known is None or known[0] is not table_assets:
-            pairs = [(row, i) for row, asset in enumerate(table_assets) for i in self._ranges_of_asset.get(asset, ())]
-            rows, ranges = np.array(pairs, np.int64).reshape(-1, 2).T.copy()
-            if len(self._rows) >= MOST_TABLES:
-                self._rows.clear()
-            known = self._rows[id(table_assets)] = (table_assets, rows, ranges)
-        return known[1], known[2]
-
-    def _range_penalties(self, penalties: Penalties) -> Floats:
-        if isinstance(penalties, Mapping):
-            found = np.zeros(len(self.assets))
-            for asset, penalty in penalties.items():
-                found[self._ranges_of_asset.get(asset, [])] = penalty
-        else:
-            found = arguments.numbers_of(penalties, "the penalties")
-        if found.shape != self.starts.shape or np.isnan(found).any() or np.isneginf(found).any():
-            accepted = (
-                f"a number for each of {plural(len(self.assets), 'range')}, or for some assets; positive infinity forbids one"
-            )
-            raise QueryError(Fault(f"the penalties have shape {found.shape}, or one is no number.", accepted))
-        return found
-
-    def _kinds_of(self, tags: TagFilter, in_match_range: bool) -> Kinds:
-        """What a tag filter says of each kind; kept, for a game asks with the same few filters."""
-        known = self._filters.get((tags, in_match_range))
-        if known is None:
-            left_out = self.marks.left_out(tags, in_match_range=in_match_range)
-            biases = self.marks.kind_biases + self.marks.tag_biases(tags)
-            if len(self._filters) >= MOST_FILTERS:
-                self._filters.clear()
-            known = Kinds(left_out == LeftOut.NO, biases, self.marks.playable(), left_out)
-            self._filters[tags, in_match_range] = known
-        return known
+    def _filters(self) -> FilterMaker:
+        return FilterMaker(self.n_frames, self.assets, self.marks, self.biases)
 
     @cached_property
-    def _all_ranges(self) -> Flags:
-        return np.ones(len(self.assets), np.bool_)
+    def _searcher(self) -> Searcher:
+        return Searcher(self.layout, self.marks.kinds, self.normalisation, self.slices, self.weights, self.feature_names)
 
-    @cached_property
-    def _range_biases(self) -> Floats:
-        return np.where(self.marks.looping, self.biases.base + self.biases.looping, self.biases.base)
-
-    @cached_property
-    def _ranges_of_asset(self) -> dict[str, list[int]]:
-        found: dict[str, list[int]] = {}
-        for i, asset in enumerate(self.assets):
-            found.setdefault(asset, []).append(i)
-        return found
-
-    # ---- the search itself
-
-    def _least(self, query: ArrayLike, chosen: Filter, within: float, n: int) -> tuple[int, Floats, Ints]:
-        """The lowest totals not above `within` and their frames: one of all frames (n = 1), or one for each range (n = R).
-
-        Gives the range of the best frame too, -1 for none; 0 where there is one for each range.
-        """
-        totals, frames = np.empty(n), np.empty(n, np.int64)
-        if self._pack is None:
-            wanted = self._normalised(query)
-            scan.least(self.layout, wanted, self.slices, self.weights, chosen, self.kinds, within, totals, frames)
-            return self.range_of(int(frames[0])) if n == 1 else 0, totals, frames
-        kernels, pack = self._pack
-        raw = query if type(query) is np.ndarray and query.dtype == np.float64 else arguments.numbers_of(query, "the query")
-        found = kernels.REFUSED
-        if raw.shape == self._shape:
-            kinds = chosen.kinds
-            found = kernels.search(
-                pack.numbers,
-                raw,
-                chosen.ranges,
-                chosen.is_whole,
-                chosen.range_biases,
-                kinds.allowed,
-                kinds.biases,
-                kinds.playable,
-                chosen.frames,
-                chosen.frame_biases,
-                chosen.skip_spans,
-                chosen.current,
-                chosen.continuing,
-                within,
-                totals,
-                frames,
-            )
-        if found == kernels.REFUSED:
-            self._normalised(query)  # says what is wrong
-        return found, totals, frames
-
-    def _search_each(
-        self, queries: Floats, masks: Sequence[Valid | None], playing: Sequence[int | None], tags: Tags | None
-    ) -> list[Hit]:
-        assert self._pack is not None, "the caller has looked"
-        kernels, pack = self._pack
-        different = {id(mask): mask for mask in masks}
-        places = {number: i for i, number in enumerate(different)}
-        flags = np.array([self._valid_ranges(mask)[0] for mask in different.values()], np.bool_).reshape(
-            len(different), len(self.assets)
-        )
-        which = np.array([places[id(mask)] for mask in masks], np.int64)
-        currents = np.array([arguments.current_of(frame, self.n_frames) for frame in playing], np.int64)
-        chosen = self.filter(None, tags)
-        kinds = chosen.kinds
-        totals, frames, ranges = np.empty(len(queries)), np.empty(len(queries), np.int64), np.empty(len(queries), np.int64)
-        wrong = 0
-        if queries.shape[1] == self.n_features:
-            wrong = kernels.search_each(
-                pack.numbers,
-                queries,
-                flags,
-                which,
-                chosen.range_biases,
-                kinds.allowed,
-                kinds.biases,
-                kinds.playable,
-                chosen.frames,
-                chosen.frame_biases,
-                chosen.skip_spans,
-                currents,
-                chosen.continuing,
-                totals,
-                frames,
-                ranges,
-            )
-        if len(queries) and wrong >= 0:
-            self._normalised(queries[wrong])  # says what is wrong
-        answers = zip(ranges.tolist(), frames.tolist(), totals.tolist(), strict=True)
-        return [Hit(self.assets[i], i, frame, total) if i >= 0 else NOTHING for i, frame, total in answers]
-
-    @cached_property
-    def _shape(self) -> tuple[int]:
-        return (self.n_features,)
-
-    @cached_property
-    def _pack(self) -> tuple[ModuleType, Any] | None:
-        """The kernels and what they take of the database; None where numba is not there, or the kinds of frames are too many."""
-        kernels = load_kernels()
-        if kernels is None or self.marks.n_kinds > MOST_KINDS:
-            return None
-        normalisation = (self.normalisation.offset, self.normalisation.scale)
-        return kernels, kernels.pack(
-            self.layout, self.kinds.astype(np.uint16, copy=False), *normalisation, self.slices, self.weights
-        )
+    def _hit(self, found: int, frame: int, total: float) -> Hit:
+        """The answer for a range, or for -1, none."""
+        return Hit(self.assets[found], found, frame, total) if found >= 0 else NOTHING
 
     def _number(self, frame: Hit | int) -> int:
         number = arguments.frame_of(frame.frame if isinstance(frame, Hit) else frame, self.n_frames, "frame")
         if self.range_of(number) < 0:
             raise QueryError(Fault(f"frame {number} is in no range: nothing is known of it.", "a frame of a range"))
         return number
-
-    def _normalised(self, query: ArrayLike) -> Floats:
-        """A query [F], checked and normalised: float64."""
-        raw = arguments.query_of(query, self.feature_names)
-        wanted = self.normalisation.apply(raw)
-        arguments.refuse_infinite(wanted, raw, self.feature_names)
-        return wanted
-
-
-MOST_KINDS = 65536
-MOST_FILTERS, MOST_TABLES = 64, 16
-"""What a database keeps of filters and tables that it was asked with; past that it forgets them all and begins again."""
-
-
-@cache
-def load_kernels() -> ModuleType | None:
-    """The compiled search; None where numba is not there."""
-    try:
-        from contextdb.motion import kernels
-    except ImportError:
-        return None
-    return kernels
 
 
 def build_databases(sets: Mapping[str, Iterable[Clip]], schema: FeatureSchema) -> dict[str, MotionDatabase]:
@@ -721,14 +460,6 @@ def parts_of(clips: Iterable[Clip], schema: FeatureSchema, mirror: bool | Collec
     if faults:
         raise MotionError(*faults)
     return parts
-
-
-def _feature_weights(slices: Sequence[slice], weights: Floats) -> Features:
-    """The weight of each feature: float32 [F]."""
-    found = np.zeros(slices[-1].stop if slices else 0, np.float32)
-    for columns, weight in zip(slices, weights, strict=True):
-        found[columns] = weight
-    return found
 
 
 # ---- checks

@@ -44,6 +44,8 @@ KEYS = (
     "end_s",
     "weights",
 )
+LOOPING_BIAS, CONTINUING_BIAS = -0.005, -0.01
+"""Those of Unreal's PoseSearch: as good as nothing against a cost, enough to settle what is nearly a tie."""
 END_S = 0.3
 """Seconds before the end of a range in which entering it is pointless, unless the settings say otherwise."""
 
@@ -96,8 +98,8 @@ class DatabaseSettings:
     mirror: bool = False
     markup: str | None = None
     base_bias: float = 0.0
-    looping_bias: float = 0.0
-    continuing_bias: float = 0.0
+    looping_bias: float = LOOPING_BIAS
+    continuing_bias: float = CONTINUING_BIAS
     end_s: float = END_S
     weights: Mapping[str, float] = field(default_factory=dict)
 

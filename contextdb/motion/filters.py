@@ -11,6 +11,7 @@ what the tag filter prefers; a frame's own is what the caller gives.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,28 @@ from contextdb.motion.skeleton import Ints
 
 NO_FLAGS: Flags = np.empty(0, np.bool_)
 NO_SKIPS: Ints = np.empty((0, 2), np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Biases:
+    """What is added to the cost of frames, whatever the query; negative favours them.
+
+    Attributes
+    ----------
+    base : float
+        For every frame of the database.
+    looping : float
+        For frames of looping ranges.
+    continuing : float
+        For the frame that would play on, so that a character does not jump for a trifle.
+    """
+
+    base: float = 0.0
+    looping: float = 0.0
+    continuing: float = 0.0
+
+
+NO_BIAS = Biases()
 
 
 class Kinds(NamedTuple):
@@ -55,6 +78,8 @@ class Filter(NamedTuple):
     is_whole : bool
         Whether that is all of them.
     range_biases : float64 array, shape (R,)
+    least_of_ranges : float
+        The least of them; 0 where there is no range.
     kinds : Kinds
     frames : bool array, shape (N,) or (0,)
         The frames that the caller lets pass; empty: all.
@@ -70,6 +95,7 @@ class Filter(NamedTuple):
     ranges: Flags
     is_whole: bool
     range_biases: Floats
+    least_of_ranges: float
     kinds: Kinds
     frames: Flags
     frame_biases: Floats

@@ -27,8 +27,8 @@ from contextdb.motion.skeleton import Ints
 _options: dict[str, Any] = {"cache": True, "nogil": True, "boundscheck": False, "error_model": "numpy"}
 
 LANES = 16
-FIRST = 8
-"""So many features are looked at before a group may be given up."""
+FEW = 6
+"""After so many features each, a box, group or cluster may be given up."""
 UNIT = 6e-8
 """The greatest relative rounding error of one float32 operation."""
 NEVER = 3e38
@@ -60,7 +60,10 @@ def pack(
             lay.blocks,
             lay.lows,
             lay.highs,
+            lay.cluster_lows,
+            lay.cluster_highs,
             lay.order,
+            lay.rank,
             lay.box_starts,
             lay.box_sizes,
             lay.box_ranges,
@@ -70,7 +73,7 @@ def pack(
         *(lay.kinds_of_boxes(kinds), kinds, offset, scale, channels, weights, feature_weights),
     )
     kept = tuple(np.ascontiguousarray(array) for array in arrays)
-    sizes = (lay.n_features, len(lay.box_starts), len(lay.lows), len(lay.range_boxes), len(lay.range_order))
+    sizes = (lay.n_features, len(lay.box_starts), len(lay.lows), len(lay.cluster_lows), len(lay.range_boxes), len(lay.range_order))
     numbers = [*sizes, 0 if is_one_kind else len(kinds), len(weights), *(array.ctypes.data for array in kept)]
     return Pack(np.array(numbers, np.int64), kept)
 
@@ -80,6 +83,11 @@ class Pack(NamedTuple):
 
     numbers: Ints
     arrays: tuple[NDArray[Any], ...]
+
+
+def _in(dtype: str, n_axes: int = 1) -> Any:
+    """The type of an array that is only read: also one that may not be written."""
+    return types.Array(getattr(types, dtype), n_axes, "C", readonly=True)
 
 
 @njit(**_options)
@@ -111,13 +119,13 @@ def _lowest(mask):
 
 
 @njit(inline="always", **_options)
-def _cost(blocks, box, lane, query, channels, weights):
+def _cost(blocks, box, lane, rank, query, channels, weights):
     """A frame's cost without bias, in float64 and in the order of `cost.costs`."""
     total = 0.0
     for c in range(weights.shape[0]):
         squares = 0.0
         for f in range(channels[c], channels[c + 1]):
-            apart = np.float64(blocks[box, f, lane]) - query[f]
+            apart = np.float64(blocks[box, rank[f], lane]) - query[f]
             squares += apart * apart
         total += weights[c] * squares
     return total
@@ -140,8 +148,8 @@ def _least_of(biases, start, stop):
 
 
 @njit(inline="always", **_options)
-def _prepare(raw, offset, scale, weights, order, query, narrow, ordered, ordered_weights):
-    """Normalise a query; in float64, in float32, and in float32 in the order of the bounds, with the weights.
+def _prepare(raw, offset, scale, weights, order, query, narrow, narrow_weights):
+    """Normalise a query; in float64, and in float32 in the order of the layout, with the weights.
 
     Gives the weighted square of the query, or -1 when a number is NaN or too large to be compared.
     """
@@ -150,20 +158,68 @@ def _prepare(raw, offset, scale, weights, order, query, narrow, ordered, ordered
         query[f] = (raw[f] - offset[f]) / scale[f]
         if not (abs(query[f]) <= GREATEST and abs(raw[f]) <= GREATEST):
             return -1.0
-        narrow[f] = query[f]
         size += weights[f] * query[f] * query[f]
-    for f in range(raw.shape[0]):
-        ordered[f], ordered_weights[f] = query[order[f]], weights[order[f]]
+    for i in range(raw.shape[0]):
+        narrow[i], narrow_weights[i] = query[order[i]], weights[order[i]]
     return size
 
 
-@njit(**_options)
+@njit(inline="always", **_options)
+def _bounded(lows, highs, at, query, weights, n_features, totals, limit):
+    """Which lanes of a group or cluster may hold a frame that costs at most `limit`; their bounds are left in `totals`."""
+    for lane in range(LANES):
+        totals[lane] = np.float32(0.0)
+    mask, start = -1, 0
+    while mask and start < n_features:
+        stop = min(start + FEW, n_features)
+        mask = bounds_at_most(lows, highs, at, query, weights, start, stop, totals, limit)
+        start = stop
+    return mask
+
+
+@njit(inline="always", **_options)
+def _passing(blocks, box, query, weights, n_features, totals, limit):
+    """Which frames of a box cost at most `limit`, in float32."""
+    for lane in range(LANES):
+        totals[lane] = np.float32(0.0)
+    mask, start = -1, 0
+    while mask and start < n_features:
+        stop = min(start + FEW, n_features)
+        mask = costs_at_most(blocks, box, query, weights, start, stop, totals, limit)
+        start = stop
+    return mask
+
+
+_given = {
+    "pack": _in("i8"),
+    "raw": _in("f8"),
+    "ranges": _in("b1"),
+    "is_whole": types.b1,
+    "range_biases": _in("f8"),
+    "least_of_ranges": types.f8,
+    "allowed": _in("b1"),
+    "kind_biases": _in("f8"),
+    "playable": _in("b1"),
+    "flags": _in("b1"),
+    "frame_biases": _in("f8"),
+    "skips": _in("i8", 2),
+    "current": types.i8,
+    "continuing": types.f8,
+    "within": types.f8,
+    "bests": types.f8[::1],
+    "best_frames": types.i8[::1],
+}
+"""What `search` takes. Told beforehand, so that no array of another kind has it compiled anew in the middle of a game."""
+
+
+@njit(types.i8(*_given.values()), **_options)
 def search(
     pack,
     raw,
     ranges,
     is_whole,
     range_biases,
+    least_of_ranges,
     allowed,
     kind_biases,
     playable,
@@ -185,7 +241,8 @@ def search(
         The query as the caller gives it.
     ranges, is_whole : bool array, shape (R,), bool
         The ranges that may play; whether that is all of them.
-    range_biases : float64 array, shape (R,)
+    range_biases, least_of_ranges : float64 array, shape (R,), float
+        And the least of them.
     allowed, kind_biases, playable : bool, float64 and bool arrays, shape (K,)
         See `contextdb.motion.filters.Kinds`.
     flags : bool array, shape (N,) or (0,)
@@ -202,46 +259,38 @@ def search(
     int
         The range of the best frame; NOTHING, or REFUSED for a query that cannot be compared. 0 for one for each range.
     """
-    n_features, n_boxes, n_groups, n_ranges, n_filled, n_kinds, n_channels = (
-        pack[0],
-        pack[1],
-        pack[2],
-        pack[3],
-        pack[4],
-        pack[5],
-        pack[6],
-    )
-    blocks = carray(_pointer(pack[7]), (n_boxes, n_features, LANES), np.float32)
-    lows = carray(_pointer(pack[8]), (n_groups, n_features, LANES), np.float32)
-    highs = carray(_pointer(pack[9]), (n_groups, n_features, LANES), np.float32)
-    order = carray(_pointer(pack[10]), (n_features,), np.int64)
-    box_starts = carray(_pointer(pack[11]), (n_boxes,), np.int64)
-    box_sizes = carray(_pointer(pack[12]), (n_boxes,), np.int32)
-    box_ranges = carray(_pointer(pack[13]), (n_boxes,), np.int32)
-    range_boxes = carray(_pointer(pack[14]), (n_ranges, 2), np.int64)
-    range_order = carray(_pointer(pack[15]), (n_filled,), np.int64)
-    box_kinds = carray(_pointer(pack[16]), (n_boxes,), np.int32)
-    kinds = carray(_pointer(pack[17]), (n_kinds,), np.uint16)
-    offset = carray(_pointer(pack[18]), (n_features,), np.float64)
-    scale = carray(_pointer(pack[19]), (n_features,), np.float64)
-    channels = carray(_pointer(pack[20]), (n_channels + 1,), np.int64)
-    weights = carray(_pointer(pack[21]), (n_channels,), np.float64)
-    feature_weights = carray(_pointer(pack[22]), (n_features,), np.float32)
+    n_features, n_boxes, n_groups, n_clusters = pack[0], pack[1], pack[2], pack[3]
+    n_ranges, n_filled, n_kinds, n_channels = pack[4], pack[5], pack[6], pack[7]
+    blocks = carray(_pointer(pack[8]), (n_boxes, n_features, LANES), np.float32)
+    lows = carray(_pointer(pack[9]), (n_groups, n_features, LANES), np.float32)
+    highs = carray(_pointer(pack[10]), (n_groups, n_features, LANES), np.float32)
+    cluster_lows = carray(_pointer(pack[11]), (n_clusters, n_features, LANES), np.float32)
+    cluster_highs = carray(_pointer(pack[12]), (n_clusters, n_features, LANES), np.float32)
+    order = carray(_pointer(pack[13]), (n_features,), np.int64)
+    rank = carray(_pointer(pack[14]), (n_features,), np.int64)
+    box_starts = carray(_pointer(pack[15]), (n_boxes,), np.int64)
+    box_sizes = carray(_pointer(pack[16]), (n_boxes,), np.int32)
+    box_ranges = carray(_pointer(pack[17]), (n_boxes,), np.int32)
+    range_boxes = carray(_pointer(pack[18]), (n_ranges, 2), np.int64)
+    range_order = carray(_pointer(pack[19]), (n_filled,), np.int64)
+    box_kinds = carray(_pointer(pack[20]), (n_boxes,), np.int32)
+    kinds = carray(_pointer(pack[21]), (n_kinds,), np.uint16)
+    offset = carray(_pointer(pack[22]), (n_features,), np.float64)
+    scale = carray(_pointer(pack[23]), (n_features,), np.float64)
+    channels = carray(_pointer(pack[24]), (n_channels + 1,), np.int64)
+    weights = carray(_pointer(pack[25]), (n_channels,), np.float64)
+    feature_weights = carray(_pointer(pack[26]), (n_features,), np.float32)
 
     query, scratch = np.empty(n_features), np.empty((4, max(n_features, LANES)), np.float32)
-    narrow, ordered, ordered_weights, totals = scratch[0], scratch[1], scratch[2], scratch[3]
-    size = _prepare(raw, offset, scale, feature_weights, order, query, narrow, ordered, ordered_weights)
+    narrow, narrow_weights, totals, frame_totals = scratch[0], scratch[1], scratch[2], scratch[3]
+    size = _prepare(raw, offset, scale, feature_weights, order, query, narrow, narrow_weights)
     if size < 0.0:
         return REFUSED
-    first, is_one = min(FIRST, n_features), bests.shape[0] == 1
+    is_one = bests.shape[0] == 1
     for i in range(bests.shape[0]):
         bests[i], best_frames[i] = within, -1
     least_kind = _least_of(kind_biases, 0, kind_biases.shape[0])
-    least = np.inf
-    for i in range(n_filled):
-        if is_whole or ranges[range_order[i]]:
-            least = min(least, range_biases[range_order[i]])
-    least += least_kind
+    least = least_of_ranges + least_kind
     if frame_biases.shape[0]:
         least += _least_of(frame_biases, 0, frame_biases.shape[0])
 
@@ -256,13 +305,13 @@ def search(
             bias = range_biases[box_ranges[box]] + kind_biases[kind]
             if frame_biases.shape[0]:
                 bias += frame_biases[current]
-            total = _cost(blocks, box, current - box_starts[box], query, channels, weights) + (bias + continuing)
+            total = _cost(blocks, box, current - box_starts[box], rank, query, channels, weights) + (bias + continuing)
             if total <= within and total < np.inf:
                 slot = 0 if is_one else box_ranges[box]
                 bests[slot], best_frames[slot], best_range = total, current, box_ranges[box]
 
     limit = _limit(_budget(bests[0] if is_one else within, least), size, n_features)
-    next_group = 0
+    next_group, cluster, open_groups = 0, -1, 0
     for run in range(1 if is_whole else n_filled):
         if is_whole:
             first_box, stop_box = 0, n_boxes
@@ -272,11 +321,12 @@ def search(
             continue
         for group in range(max(first_box // LANES, next_group), (stop_box + LANES - 1) // LANES):
             next_group = group + 1
-            for lane in range(LANES):
-                totals[lane] = np.float32(0.0)
-            mask = bounds_at_most(lows, highs, group, ordered, ordered_weights, 0, first, totals, limit)
-            if mask and first < n_features:
-                mask = bounds_at_most(lows, highs, group, ordered, ordered_weights, first, n_features, totals, limit)
+            if group // LANES != cluster:
+                cluster = group // LANES
+                open_groups = _bounded(cluster_lows, cluster_highs, cluster, narrow, narrow_weights, n_features, totals, limit)
+            if not (open_groups >> (group % LANES)) & 1:
+                continue
+            mask = _bounded(lows, highs, group, narrow, narrow_weights, n_features, totals, limit)
             while mask:
                 lane = _lowest(mask)
                 mask &= mask - 1
@@ -294,7 +344,7 @@ def search(
                 own_limit = _limit(_budget(bests[slot], least_of_box), size, n_features)
                 if totals[lane] > own_limit:
                     continue
-                passing = costs_at_most(blocks, box, narrow, feature_weights, own_limit)
+                passing = _passing(blocks, box, narrow, narrow_weights, n_features, frame_totals, own_limit)
                 while passing:
                     lane = _lowest(passing)
                     passing &= passing - 1
@@ -307,59 +357,9 @@ def search(
                     bias = range_bias + kind_biases[kind]
                     if frame_biases.shape[0]:
                         bias += frame_biases[frame]
-                    total = _cost(blocks, box, lane, query, channels, weights) + bias
+                    total = _cost(blocks, box, lane, rank, query, channels, weights) + bias
                     if total < bests[slot] or (total == bests[slot] < np.inf and best_frames[slot] < 0):
                         bests[slot], best_frames[slot], best_range = total, frame, box_ranges[box]
                         if is_one:
                             limit = _limit(_budget(total, least), size, n_features)
     return best_range if is_one else 0
-
-
-@njit(**_options)
-def search_each(
-    pack,
-    raw,
-    masks,
-    which,
-    range_biases,
-    allowed,
-    kind_biases,
-    playable,
-    flags,
-    frame_biases,
-    skips,
-    currents,
-    continuing,
-    bests,
-    best_frames,
-    best_ranges,
-):
-    """`search` for many queries float64 [Q, F]; query i is given the ranges masks[which[i]] bool [M, R] and its current frame.
-
-    Gives the number of the first query that has to be refused, or -1.
-    """
-    is_whole = np.empty(masks.shape[0], np.bool_)
-    for i in range(masks.shape[0]):
-        is_whole[i] = masks[i].all()
-    for i in range(raw.shape[0]):
-        best_ranges[i] = search(
-            pack,
-            raw[i],
-            masks[which[i]],
-            is_whole[which[i]],
-            range_biases,
-            allowed,
-            kind_biases,
-            playable,
-            flags,
-            frame_biases,
-            skips,
-            currents[i],
-            continuing,
-            np.inf,
-            bests[i : i + 1],
-            best_frames[i : i + 1],
-        )
-        if best_ranges[i] == REFUSED:
-            return i
-    return -1

@@ -1,12 +1,13 @@
 """Where a database keeps its features, so that a search reads as little as possible: boxes of frames, and bounds of boxes.
 
-N frames, F features, R ranges, B boxes, G groups, L = 16 lanes. A box is up to 16 frames of one range, one after another; it never
-straddles two ranges, so that a mask over ranges is a mask over boxes. Its features lie feature by feature, 16 frames beside each
-other; a box of fewer frames repeats its last one. A group is 16 boxes, which may be of several ranges; the least and greatest value
-of each feature in each box lie beside each other in the same way. So one instruction works on 16 frames, or on 16 boxes.
+N frames, F features, R ranges, B boxes, G groups, S clusters, L = 16 lanes. A box is up to 16 frames of one range, one after
+another; it never straddles two ranges, so that a mask over ranges is a mask over boxes. Its features lie feature by feature, 16
+frames beside each other; a box of fewer frames repeats its last one. A group is 16 boxes, which may be of several ranges, and a
+cluster 16 groups; the least and greatest value of each feature in each box of a group, and in each group of a cluster, lie beside
+each other in the same way. So one instruction works on 16 frames, 16 boxes or 16 groups.
 
-The features of the bounds stand in the order of `order`: those first that tell most boxes from a query, so that a group is given up
-after a few of them.
+Everywhere the features stand in the order of `order`: those first that tell most boxes from a query, so that most frames are given
+up after a few features.
 
 Source: the boxes of 16 frames of orangeduck/Motion-Matching, `database.h`; the lanes are ours.
 """
@@ -27,8 +28,8 @@ Features = NDArray[np.float32]
 
 LANES = 16
 BOXES_AT_ONCE = 4096
-N_SAMPLES = 32
-"""So many frames, spread evenly, are compared with all boxes to find the order of features."""
+N_FRAMES, N_BOXES = 32, 2048
+"""So many frames and boxes, spread evenly, are compared to find the order of features."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +43,11 @@ class Layout:
     blocks : float32 array, shape (B, F, L)
         The features of each box's frames.
     lows, highs : float32 array, shape (G, F, L)
-        The bounds of each box, features in the order of `order`. Lanes without a box hold inf and -inf.
+        The bounds of each box. Lanes without a box hold inf and -inf.
+    cluster_lows, cluster_highs : float32 array, shape (S, F, L)
+        The bounds of each group.
     order : int64 array, shape (F,)
+        Which feature stands at each place.
     box_starts : int64 array, shape (B,)
         The first frame of each box, ascending.
     box_sizes, box_ranges : int32 array, shape (B,)
@@ -58,6 +62,8 @@ class Layout:
     blocks: Features
     lows: Features
     highs: Features
+    cluster_lows: Features
+    cluster_highs: Features
     order: Ints
     box_starts: Ints
     box_sizes: NDArray[np.int32]
@@ -78,14 +84,16 @@ class Layout:
         box_sizes = np.minimum(LANES, stops[ranges][of_range] - box_starts)
         range_boxes = np.zeros((len(starts), 2), np.int64)
         range_boxes[ranges] = np.stack((ends - counts, ends), axis=1)
-        blocks = _blocks(features, box_starts, box_sizes)
-        low, high = blocks.min(axis=2), blocks.max(axis=2)
-        order = _order(low, high, blocks, feature_weights)
+        order = _order(features, box_starts, box_sizes, feature_weights)
+        blocks = _blocks(features, order, box_starts, box_sizes)
+        lows, highs = _in_lanes(blocks.min(axis=2), np.inf), _in_lanes(blocks.max(axis=2), -np.inf)
         return cls(
             len(features),
             blocks,
-            _in_lanes(low, order, np.inf),
-            _in_lanes(high, order, -np.inf),
+            lows,
+            highs,
+            _in_lanes(lows.min(axis=2), np.inf),
+            _in_lanes(highs.max(axis=2), -np.inf),
             order,
             box_starts.astype(np.int64),
             box_sizes.astype(np.int32),
@@ -107,7 +115,12 @@ class Layout:
     def take(self, frames: Ints) -> Features:
         """The features of some frames, each in a range: float32 [len(frames), F]."""
         boxes = np.searchsorted(self.box_starts, frames, side="right") - 1
-        return np.asarray(self.blocks[boxes, :, frames - self.box_starts[boxes]])
+        return np.asarray(self.blocks[boxes, :, frames - self.box_starts[boxes]][:, self.rank])
+
+    @cached_property
+    def rank(self) -> Ints:
+        """Where each feature stands: int64 [F]."""
+        return np.argsort(self.order)
 
     def range_of(self, frame: int) -> int:
         """The range that holds a frame, or -1 for a frame between ranges."""
@@ -136,12 +149,12 @@ class Layout:
         return frames_between(self.box_starts, self.box_starts + self.box_sizes)
 
 
-def _blocks(features: Features, box_starts: Ints, box_sizes: Ints) -> Features:
+def _blocks(features: Features, order: Ints, box_starts: Ints, box_sizes: Ints) -> Features:
     """The features of each box's frames, [B, F, L]; filled part by part, so that no copy of all is made."""
     blocks = np.empty((len(box_starts), features.shape[1], LANES), np.float32)
     for box in range(0, len(box_starts), BOXES_AT_ONCE):
         part = slice(box, box + BOXES_AT_ONCE)
-        blocks[part] = features[_frames_of(box_starts[part], box_sizes[part])].transpose(0, 2, 1)
+        blocks[part] = features[_frames_of(box_starts[part], box_sizes[part])].transpose(0, 2, 1)[:, order]
     return blocks
 
 
@@ -150,20 +163,24 @@ def _frames_of(box_starts: Ints, box_sizes: NDArray[np.integer]) -> Ints:
     return np.asarray(box_starts[:, None] + np.minimum(np.arange(LANES), box_sizes[:, None] - 1))
 
 
-def _order(low: Features, high: Features, blocks: Features, weights: Floats) -> Ints:
-    """The features, those first that put most weighted squared distance between a frame and the boxes."""
-    distance = np.zeros(low.shape[1])
-    for box in np.unique(np.linspace(0, len(blocks) - 1, N_SAMPLES).astype(np.int64)) if len(blocks) else ():
-        frame = blocks[box, :, 0]
+def _order(features: Features, box_starts: Ints, box_sizes: Ints, weights: Floats) -> Ints:
+    """The features, those first that put most weighted squared distance between a frame and boxes: measured on some of both."""
+    n_boxes, n_features = len(box_starts), features.shape[1]
+    some = np.unique(np.linspace(0, n_boxes - 1, min(n_boxes, N_BOXES)).astype(np.int64)) if n_boxes else np.empty(0, np.int64)
+    boxes = features[_frames_of(box_starts[some], box_sizes[some])]
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    distance = np.zeros(n_features)
+    for frame in boxes[:: max(1, len(some) // N_FRAMES), 0]:
         with np.errstate(over="ignore"):
             apart = np.maximum(np.maximum(low - frame, frame - high), np.float32(0.0))
         distance += np.einsum("bf,bf->f", apart, apart, dtype=np.float64)
     return np.argsort(-distance * weights, kind="stable").astype(np.int64)
 
 
-def _in_lanes(bounds: Features, order: Ints, nothing: float) -> Features:
-    """Bounds [B, F] in lanes, [G, F, L]."""
-    n_groups = -(-len(bounds) // LANES)
-    padded = np.full((n_groups * LANES, bounds.shape[1]), nothing, np.float32)
-    padded[: len(bounds)] = bounds[:, order]
-    return np.ascontiguousarray(padded.reshape(n_groups, LANES, bounds.shape[1]).transpose(0, 2, 1))
+def _in_lanes(bounds: Features, nothing: float) -> Features:
+    """Bounds [n, F], 16 beside each other: [ceil(n / 16), F, L]."""
+    n_features = bounds.shape[1]
+    n_rows = -(-len(bounds) // LANES)
+    padded = np.full((n_rows * LANES, n_features), nothing, np.float32)
+    padded[: len(bounds)] = bounds
+    return np.ascontiguousarray(padded.reshape(n_rows, LANES, n_features).transpose(0, 2, 1))

@@ -14,6 +14,9 @@ from contextdb.errors import Fault, Place, in_quotes, nearest, shown, some
 
 Mapped = Mapping[str, object]
 
+MOST_WORDS = 12
+"""So many words are all listed in a message; of more, some."""
+
 
 class Section:
     """One section, or one table inside it, being read."""
@@ -81,7 +84,7 @@ class Section:
 
     def one_of(self, key: str, words: Sequence[str], noun: str, synonyms: Mapping[str, str] | None = None) -> str | None:
         """One of some words; of the names of a project when `noun` says what they name."""
-        accepted = some(words) or f"the name of a {noun}; there is none"
+        accepted = some(words, MOST_WORDS) or f"the name of a {noun}; there is none"
         value = self.text(key, accepted)
         if value is None or value in words:
             return value

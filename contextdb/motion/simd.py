@@ -23,31 +23,31 @@ _ROUNDING = ("contract", "nsz")
 
 
 @intrinsic
-def costs_at_most(typing, blocks, box, query, weights, limit):
-    """Which frames of a box cost at most `limit`: an int64 mask.
+def costs_at_most(typing, blocks, box, query, weights, start, stop, totals, limit):
+    """Which frames of a box cost at most `limit` so far: an int64 mask.
 
-    blocks float32 [B, F, 16], query and weights float32 [F].
+    blocks float32 [B, F, 16]; query, weights float32 [F]. Adds features start … stop - 1 to `totals` float32 [16], so that a box
+    can be given up after the first features.
     """
 
     def generate(context, builder, signature, arguments):
         lanes = _Lanes(context, builder, signature, arguments)
-        n_features = lanes.size(0, 1)
-        base = builder.mul(builder.mul(arguments[1], n_features), _I64(LANES))
-        total = cgutils.alloca_once_value(builder, _ZEROS)
-        with cgutils.for_range(builder, n_features) as loop:
-            values = lanes.load(0, builder.add(base, builder.mul(loop.index, _I64(LANES))))
-            lanes.add_square(total, lanes.everywhere(3, loop.index), builder.fsub(values, lanes.everywhere(2, loop.index)))
-        return lanes.at_most(builder.load(total), arguments[4])
+        base = builder.mul(builder.mul(arguments[1], lanes.size(0, 1)), _I64(LANES))
+        total = cgutils.alloca_once_value(builder, lanes.load(6, _I64(0)))
+        with cgutils.for_range_slice(builder, arguments[4], arguments[5], _I64(1), _I64) as (feature, _):
+            values = lanes.load(0, builder.add(base, builder.mul(feature, _I64(LANES))))
+            lanes.add_square(total, lanes.everywhere(3, feature), builder.fsub(values, lanes.everywhere(2, feature)))
+        return lanes.keep(total, 6, arguments[7])
 
-    return types.int64(blocks, types.int64, query, weights, types.float32), generate
+    integer = types.int64
+    return integer(blocks, integer, query, weights, integer, integer, totals, types.float32), generate
 
 
 @intrinsic
 def bounds_at_most(typing, lows, highs, group, query, weights, start, stop, totals, limit):
-    """Which boxes of a group may hold a frame that costs at most `limit`: an int64 mask.
+    """Which boxes of a group may hold a frame that costs at most `limit`: an int64 mask; as `costs_at_most`.
 
-    lows, highs float32 [G, F, 16]; query, weights float32 [F] in their order. Adds features start … stop - 1 to `totals` float32
-    [16], so that a group can be given up after the first features.
+    lows, highs float32 [G, F, 16].
     """
 
     def generate(context, builder, signature, arguments):
@@ -60,9 +60,7 @@ def bounds_at_most(typing, lows, highs, group, query, weights, start, stop, tota
             below = builder.fsub(lanes.load(0, offset), wanted)
             above = builder.fsub(wanted, lanes.load(1, offset))
             lanes.add_square(total, lanes.everywhere(4, feature), lanes.greater(lanes.greater(below, above), _ZEROS))
-        found = builder.load(total)
-        builder.store(found, builder.bitcast(lanes.start(7), _LANES.as_pointer())).align = 4
-        return lanes.at_most(found, arguments[8])
+        return lanes.keep(total, 7, arguments[8])
 
     integer = types.int64
     return integer(lows, highs, integer, query, weights, integer, integer, totals, types.float32), generate
@@ -111,6 +109,9 @@ class _Lanes:
         square = builder.fmul(weighted, values, flags=_ROUNDING)
         builder.store(builder.fadd(builder.load(total), square, flags=_ROUNDING), total)
 
-    def at_most(self, values: Any, limit: Any) -> Any:
+    def keep(self, total: Any, array: int, limit: Any) -> Any:
+        """Store what `total` points to into an array; gives the mask of its lanes that are at most `limit`."""
+        values = self.builder.load(total)
+        self.builder.store(values, self.builder.bitcast(self.start(array), _LANES.as_pointer())).align = 4
         passes = self.builder.fcmp_unordered("<=", values, self.spread(limit))  # true of NaN: 0 x inf, where float32 ends
         return self.builder.zext(self.builder.bitcast(passes, ir.IntType(LANES)), _I64)

@@ -50,7 +50,8 @@ def best_frame(features, starts, stops, query, weights=None, range_flags=None, t
         for frame in range(starts[i], stops[i]):
             if tags is not None and not tags[frame]:
                 continue
-            cost = sum(w * (float(x) - float(q)) ** 2 for w, x, q in zip(weights, features[frame], query, strict=True))
+            apart = [float(x) - float(q) for x, q in zip(features[frame], query, strict=True)]
+            cost = sum(w * (d * d) for w, d in zip(weights, apart, strict=True))  # d ** 2 may round otherwise
             cost += 0.0 if bias is None else float(bias[frame])
             if cost < least or (cost == least < math.inf and frame == current):
                 found, least = frame, cost

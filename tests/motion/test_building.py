@@ -7,6 +7,8 @@ import threading
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from contextdb.errors import ClipError, FileError, MotionError, SchemaError
 from contextdb.motion import MotionConfig, MotionDatabase, building, load_bvh, make_clip, write_bvh
@@ -15,6 +17,7 @@ from contextdb.motion.clip_files import unmatched
 from contextdb.motion.database import build_databases
 from contextdb.motion.extraction import clip_features
 from contextdb.motion.feature_cache import EXTRACTION, FeatureCache, file_name, key_of
+from contextdb.motion.filters import Biases
 from contextdb.motion.stored import save_database
 
 NAMES = ("idle", "jog", "jog_tired", "walk")
@@ -88,13 +91,15 @@ def test_a_build_gives_what_the_clips_give(folder):
     schema = CONFIG.features["loco"]
     clips = {name: CONFIG.load_clips(name, folder) for name in CONFIG.databases}
     assert bits(built["jog"])[1:] == (NAMES, built["jog"].biases)
-    expected = MotionDatabase.build(clips["jog"], schema, normalisation=built["jog"].normalisation, end_s=0.3)
+    usual = Biases(looping=-0.005, continuing=-0.01)
+    expected = MotionDatabase.build(clips["jog"], schema, normalisation=built["jog"].normalisation, biases=usual, end_s=0.3)
     assert bits(built["jog"]) == bits(expected)
     assert built["jog"].normalisation is built["jog_tired"].normalisation
 
 
 def test_databases_of_one_schema_are_those_that_build_databases_makes(folder):
-    parts = {name: {"clips": part["clips"], "features": "loco", "end_s": 0} for name, part in SECTIONS["databases"].items()}
+    plain = {"features": "loco", "end_s": 0, "looping_bias": 0, "continuing_bias": 0}
+    parts = {name: {"clips": part["clips"], **plain} for name, part in SECTIONS["databases"].items()}
     config = MotionConfig.from_dict({**SECTIONS, "databases": parts})
     clips = {name: config.load_clips(name, folder) for name in parts}
     expected = build_databases(clips, config.features["loco"])
@@ -122,6 +127,46 @@ def test_only_a_clip_that_changed_is_computed(folder):
     for name, database in build(CONFIG, folder, cache=None).items():
         assert bits(after[name].database) == bits(database)
         assert bits(after[name].database) != bits(before[name].database)  # they share a normalisation
+
+
+def drop(folder, name):
+    (folder / "clips" / f"{name}.bvh").unlink(missing_ok=True)
+
+
+def add(folder, name):
+    write_bvh(make_clip(name).clip, folder / "clips" / f"{name}.bvh", digits=3)
+
+
+def spoil(folder, name):
+    entries_now = sorted((folder / ".contextdb-cache").rglob("*.safetensors"))
+    if entries_now:
+        entries_now[len(name) % len(entries_now)].write_bytes(name.encode())
+
+
+edits = st.tuples(st.sampled_from([drop, add, spoil]), st.sampled_from(["idle", "jog", "run", "walk"])) | st.fixed_dictionaries(
+    {}, optional={"up": st.sampled_from(["y", "z"]), "mirror": st.booleans(), "end_s": st.sampled_from([0.0, 0.2])}
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.lists(edits, min_size=1, max_size=3), min_size=1, max_size=4))
+def test_after_any_edits_a_build_with_the_cache_is_one_without(tmp_path_factory, rounds):
+    folder = tmp_path_factory.mktemp("edits")
+    (folder / "clips").mkdir()
+    (folder / "marks.csv").write_text("asset,tag,from,to\n", encoding="utf-8")
+    add(folder, "jog_tired")
+    changes = {}
+    for made in rounds:
+        for edit in made:
+            if isinstance(edit, dict):
+                changes |= edit
+            else:
+                edit[0](folder, edit[1])
+        config = config_of(**changes)
+        kept, full = build_all(config, folder), build_all(config, folder, cache=None)
+        for name, each in full.items():
+            assert bits(kept[name].database) == bits(each.database)
+            assert kept[name].digest == each.digest
 
 
 CHANGES = {
@@ -178,7 +223,12 @@ def test_the_settings_of_a_database_reach_it(folder):
 def test_a_database_of_a_table_holds_the_clips_of_its_assets(folder):
     built = build(CONFIG, folder, {"locomotion": ["walk", "jog", "swim"]})
     assert built["jog"].assets == ("jog", "walk")
-    assert unmatched(CONFIG.databases["jog"], folder, ["walk", "jog", "swim"]) == (["swim"], ["idle", "jog_tired"])
+
+
+def test_assets_without_a_clip_and_clips_that_no_database_holds_are_found(folder):
+    rows = {"locomotion": ["walk", "swim", "jog", "swim"], "other": ["idle"]}
+    assert unmatched(CONFIG.databases.values(), folder, rows) == ({"locomotion": ["swim"]}, ["idle"])
+    assert unmatched(CONFIG.databases.values(), folder, {"locomotion": NAMES}) == ({}, [])
 
 
 def test_one_database_alone_has_the_normalisation_of_all_of_its_features(folder):

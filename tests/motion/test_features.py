@@ -97,7 +97,7 @@ REFUSED = {
         one_channel(type="positon", bone="Hips"),
         '[features.loco] channel 1 type = "positon": there is no such type. '
         'Accepted: "position", "velocity", "trajectory", "direction", '
-        '"orientation", "angular_velocity" and 2 more. '
+        '"orientation", "angular_velocity", "phase", "custom". '
         'Did you mean type = "position"?',
     ),
     "a type under another name": (one_channel(type="path", what="speed", at=[1]), 'Did you mean type = "trajectory"?'),

@@ -7,7 +7,7 @@ import copy
 import pytest
 
 from contextdb.errors import ClipError, MotionError, SchemaError
-from contextdb.motion import MotionConfig, Reason, make_clip, query_from, steady_path, write_bvh
+from contextdb.motion import DatabaseSettings, MotionConfig, Reason, make_clip, query_from, steady_path, write_bvh
 
 SECTIONS = {
     "features": {
@@ -69,6 +69,31 @@ def test_the_unit_and_the_axis_of_clips_are_read():
     assert (config.databases["x"].metres_per_unit, config.databases["x"].up) == (0.056444, "z")
 
 
+def test_every_key_of_a_database_is_read():
+    part = {
+        "clips": "a/*.BVH",
+        "features": "loco",
+        "mirror": True,
+        "markup": "a/marks.csv",
+        "base_bias": 1,
+        "looping_bias": -0.005,
+        "continuing_bias": -0.01,
+        "end_s": 0,
+        "weights": {"Hips velocity": 2, "LeftFoot position": 0.0},
+    }
+    config = MotionConfig.from_dict({**SECTIONS, "databases": {"x": part}, "selectors": {}})
+    weights = {"Hips velocity": 2.0, "LeftFoot position": 0.0}
+    assert config.database("x") == DatabaseSettings(
+        "x", "a/*.BVH", "loco", None, 0.01, "y", True, "a/marks.csv", 1.0, -0.005, -0.01, 0.0, weights
+    )
+
+
+def test_a_database_is_not_mirrored_and_cannot_be_entered_near_the_ends_of_clips_unless_it_says_so():
+    settings = MotionConfig.from_dict(SECTIONS).database("jog")
+    assert (settings.mirror, settings.markup, settings.end_s, settings.weights) == (False, None, 0.3, {})
+    assert (settings.base_bias, settings.looping_bias, settings.continuing_bias) == (0.0, -0.005, -0.01)
+
+
 def test_nothing_is_a_config_too():
     assert MotionConfig.from_dict({}) == MotionConfig()
     assert MotionConfig().build("nowhere") == {}
@@ -104,6 +129,12 @@ def with_change(path, value):
     return sections
 
 
+CHANNEL_NAMES = (
+    "LeftFoot position",
+    "Hips velocity",
+    "trajectory position at 0.33 0.67 1 s",
+    "trajectory direction along 0.5 1 2 m",
+)
 OTHER = {"rate": 60.0, "channels": [{"type": "velocity", "bone": "Hips"}]}
 REFUSED = {
     "a section that is no table": (("databases",), 3, "databases is a number, not a table."),
@@ -120,6 +151,40 @@ REFUSED = {
         ("databases", "jog", "up"),
         "Y",
         'up = "Y": there is no such axis. Accepted: "y", "z", "x". Did you mean up = "y"?',
+    ),
+    "markup of another format": (("databases", "jog", "markup"), "marks.toml", 'markup = "marks.toml": this is no CSV file.'),
+    "markup elsewhere": (("databases", "jog", "markup"), "../marks.csv", 'Did you mean markup = "marks.csv"?'),
+    "clips below another folder": (("databases", "jog", "clips"), "..\\clips\\*.bvh", 'Did you mean clips = "clips/*.bvh"?'),
+    "a flag in quotes": (
+        ("databases", "jog", "mirror"),
+        "yes",
+        'mirror = "yes": this is text, neither true nor false. Accepted: true or false. Did you mean mirror = true?',
+    ),
+    "a flag that is a number": (("databases", "jog", "mirror"), 0, "Did you mean mirror = false?"),
+    "a list of names to mirror": (("databases", "jog", "mirror"), ["walk"], "this is a list, neither true nor false."),
+    "a bias in quotes": (("databases", "jog", "base_bias"), "0.5", "Did you mean base_bias = 0.5?"),
+    "a bias without end": (("databases", "jog", "continuing_bias"), float("-inf"), "this is a number that is not finite"),
+    "an end that is negative": (
+        ("databases", "jog", "end_s"),
+        -0.3,
+        "[databases.jog] end_s = -0.3: this is out of range. Accepted: seconds from 0 to 60, such as 0.3.",
+    ),
+    "a misspelt bias": (("databases", "jog", "looping_bais"), 1.0, 'Did you mean "looping_bias"?'),
+    "weights that are no table": (("databases", "jog", "weights"), 2.0, "weights = 2.0: this is a number, not a table."),
+    "a weight of no channel": (
+        ("databases", "jog", "weights"),
+        {"Hips velocty": 2.0},
+        '[databases.jog] weights has no key "Hips velocty". Accepted: "LeftFoot position", "Hips velocity", ',
+    ),
+    "a weight below 0": (
+        ("databases", "jog", "weights"),
+        {"Hips velocity": -1},
+        "weights Hips velocity = -1: this is out of range.",
+    ),
+    "weights that leave nothing": (
+        ("databases", "jog", "weights"),
+        dict.fromkeys(CHANNEL_NAMES, 0.0),
+        "[databases.jog] weights: the weight of every channel is 0. Accepted: at least one above 0",
     ),
     "no order": (("selectors", "locomotion", "order"), None, '[selectors.locomotion] has no "order".'),
     "an order that is no list": (("selectors", "locomotion", "order"), "jog", "this is no list, or empty."),
@@ -172,3 +237,11 @@ def test_databases_of_different_features_cannot_stand_in_one_selector():
     sections["databases"]["jog"]["features"] = "other"
     with pytest.raises(SchemaError, match='has databases of different features: "jog_tired" "loco", "jog" "other"'):
         MotionConfig.from_dict(sections)
+
+
+def test_weights_of_a_schema_with_faults_are_not_held_against_the_database():
+    sections = with_change(("features", "loco", "rate"), "fast")
+    sections["databases"]["jog"]["weights"] = {"Hips velocity": 2.0}
+    with pytest.raises(SchemaError) as error:
+        MotionConfig.from_dict(sections)
+    assert len(error.value.faults) == 1

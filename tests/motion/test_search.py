@@ -163,7 +163,7 @@ def allowed_frames(database, given):
 def by(engine, database):
     """The database as it is, or as it searches where numba cannot be installed."""
     if engine == "numpy":
-        vars(database)["_pack"] = None
+        vars(database._searcher)["_compiled"] = None
     return database
 
 
@@ -243,10 +243,10 @@ def test_many_characters_are_answered_like_each_alone(engine, data):
 def test_a_new_mask_rebuilds_nothing():
     database = MotionDatabase.from_features(np.arange(100.0)[:, None], [0, 50], [50, 100], ["a", "b"])
     database.search([10.0])
-    layout, pack = database.layout, database._pack
+    layout, searcher = database.layout, database._searcher
     assert database.search([10.0], np.array([False, True])).frame == 50
     assert database.layout is layout
-    assert database._pack is pack
+    assert database._searcher is searcher
 
 
 def test_a_weight_turned_to_zero_hides_no_frame_at_the_ends_of_float32():

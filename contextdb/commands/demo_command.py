@@ -6,6 +6,7 @@ The clips are made by formulas, not captured; they are written as BVH files and 
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -15,6 +16,7 @@ from pathlib import Path
 import contextdb
 from contextdb.compiled import CompiledTable
 from contextdb.console import aligned, output, styled, wants_colour
+from contextdb.disk import make_folder
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import Context
@@ -52,16 +54,38 @@ N_NEAREST = 2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("--tables", metavar="FOLDER", help="the sample tables (default: those that came with contextdb)")
+    parser.add_argument("--keep", metavar="FOLDER", help="a new folder for the tables and the made clips, to try things on")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Print each step of the way."""
-    folder = Path(arguments.tables) if arguments.tables else sample_folder()
-    colour = wants_colour(sys.stdout)
-    with output():
-        for line in _steps(folder):
-            print(styled(line, "bold", colour) if line[:1].isdigit() else line)
+    source = Path(arguments.tables) if arguments.tables else sample_folder()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(arguments.keep) if arguments.keep else Path(temporary) / source.name
+        make_sample(source, folder)
+        colour = wants_colour(sys.stdout)
+        with output():
+            for line in _steps(folder):
+                print(styled(line, "bold", colour) if line[:1].isdigit() else line)
     return ExitCode.OK
+
+
+def make_sample(source: Path, folder: Path) -> None:
+    """Copy the sample tables into a new folder and make their clips.
+
+    Raises
+    ------
+    FileError
+        The folder is there already, or cannot be made.
+    """
+    Project.load(source)  # says what is wrong with it
+    if folder.exists():
+        found = Fault("this is there already.", "the name of a folder that is not there yet", place=Place(str(folder)))
+        raise FileError(found)
+    make_folder(folder.parent)
+    shutil.copytree(source, folder, ignore=shutil.ignore_patterns(".*", "*.bvh", "*.safetensors"))
+    (folder / "clips").mkdir(exist_ok=True)
+    write_made_clips(folder / "clips")
 
 
 def sample_folder() -> Path:
@@ -91,8 +115,7 @@ def _steps(folder: Path) -> Iterator[str]:
     yield "2. A moment of the game: a tackler, and somebody in the air. Which animations are valid?"
     yield ""
     yield from _answer(project["hit_mid_air"].compile(), TACKLE)
-    with tempfile.TemporaryDirectory() as made:
-        yield from _motion(project, Path(made))
+    yield from _motion(project, folder)
 
 
 def _answer(compiled: CompiledTable, context: Context) -> Iterator[str]:
@@ -149,16 +172,19 @@ class Stage:
 
     @classmethod
     def of(cls, project: Project, folder: Path) -> Stage:
-        """Make the clips into a folder, read them back, and build what contextdb.toml says."""
-        schema = project.schema
-        sections = {"features": schema.features, "databases": schema.databases, "selectors": schema.selectors}
-        config = MotionConfig.from_dict(sections, tables=project.tables, file=schema.file)
+        """Read the clips of a folder, and build what contextdb.toml says."""
+        config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
         clips = folder / "clips"
-        clips.mkdir()
-        paths = write_made_clips(clips)
         table = project["locomotion"].compile()
         databases = config.build(folder, {"locomotion": table.assets})
-        return cls(table, databases, config.selector("locomotion", databases), config.features["loco"], clips, len(paths))
+        return cls(
+            table,
+            databases,
+            config.selector("locomotion", databases),
+            config.features["loco"],
+            clips,
+            len(list(clips.glob("*.bvh"))),
+        )
 
     def query(self, clip: str, frame: int, turn_dps: float = 0.0) -> Features:
         """The pose of a clip's frame, and the wish to go on at walking speed."""

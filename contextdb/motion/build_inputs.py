@@ -64,12 +64,13 @@ class Inputs:
         files, markups = {}, {}
         for name, settings in config.databases.items():
             if settings.features in schemas:
+                if settings.markup is not None:
+                    with faults:
+                        markups[name] = Markup.load(root / settings.markup)
                 with faults:
                     found = assets.get(settings.table or "")
-                    files[name] = clip_files(settings, config.features[settings.features], root, found, config.file)
-            if settings.markup is not None and name in wanted:
-                with faults:
-                    markups[name] = Markup.load(root / settings.markup)
+                    schema = config.features[settings.features]
+                    files[name] = clip_files(settings, schema, root, found, config.file, markups.get(name))
         faults.tell()
         return cls(config, root, wanted, files, markups)
 

@@ -17,6 +17,7 @@ from contextdb.motion.database_settings import DatabaseSettings
 from contextdb.motion.extraction import ClipFeatures, clip_features
 from contextdb.motion.feature_cache import FeatureCache, key_of
 from contextdb.motion.features import FeatureSchema
+from contextdb.motion.markup import Markup
 from contextdb.motion.reading import as_toml
 
 
@@ -27,6 +28,7 @@ class ClipFile:
     path: Path
     settings: DatabaseSettings
     schema: FeatureSchema
+    is_looping: bool = False
 
     @property
     def asset(self) -> str:
@@ -41,7 +43,8 @@ class ClipFile:
     def keys(self, content: bytes) -> list[str]:
         """For each range the key of its features."""
         unit, up = self.settings.metres_per_unit, self.settings.up
-        return [key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side) for side in self.sides]
+        loops = self.is_looping
+        return [key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side, looping=loops) for side in self.sides]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +58,14 @@ class Extracted:
 
 
 def clip_files(
-    settings: DatabaseSettings, schema: FeatureSchema, folder: Path, assets: Collection[str] | None = None, file: str | None = None
+    settings: DatabaseSettings,
+    schema: FeatureSchema,
+    folder: Path,
+    assets: Collection[str] | None = None,
+    file: str | None = None,
+    markup: Markup | None = None,
 ) -> list[ClipFile]:
-    """The clips of a database in the order of their paths; with `assets` those of these names alone.
+    """The clips of a database in the order of their paths; with `assets` those of these names alone. The markup says which loop.
 
     Raises
     ------
@@ -72,7 +80,8 @@ def clip_files(
     faults = list(_twice_named(settings.name, wanted, file))
     if faults:
         raise MotionError(*faults)
-    return [ClipFile(path, settings, schema) for path in wanted]
+    loops = {path.stem for path in wanted if markup is not None and markup.is_looping(path.stem)}
+    return [ClipFile(path, settings, schema, path.stem in loops) for path in wanted]
 
 
 def unmatched(
@@ -113,7 +122,7 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     if len(parts) == len(kept):
         return Extracted(file, parts, keys, is_computed=False)
     clip = _parsed(file, content)
-    computed = [clip_features(clip, file.schema, mirrored=side) for side in file.sides]
+    computed = [clip_features(clip, file.schema, mirrored=side, looping=file.is_looping) for side in file.sides]
     if cache is not None:
         for key, part in zip(keys, computed, strict=True):
             cache.write(file.settings.name, key, part)

@@ -146,7 +146,7 @@ class MotionDatabase:
         MotionError
             A bone that a skeleton lacks, two clips of one name, or numbers too large to be a body; all faults together.
         """
-        parts = parts_of(clips, schema, mirror)
+        parts = parts_of(clips, schema, mirror, markup)
         return cls.from_parts(parts, schema, normalisation=normalisation, markup=markup, biases=biases, end_s=end_s)
 
     @classmethod
@@ -441,8 +441,13 @@ def build_databases(sets: Mapping[str, Iterable[Clip]], schema: FeatureSchema) -
     return {name: MotionDatabase.from_parts(each, schema, normalisation=shared) for name, each in parts.items()}
 
 
-def parts_of(clips: Iterable[Clip], schema: FeatureSchema, mirror: bool | Collection[str] = False) -> list[ClipFeatures]:
-    """The features of each clip, and of those to be mirrored once more mirrored; the faults of all clips together."""
+def parts_of(
+    clips: Iterable[Clip], schema: FeatureSchema, mirror: bool | Collection[str] = False, markup: Markup | None = None
+) -> list[ClipFeatures]:
+    """The features of each clip, and of those to be mirrored once more mirrored; the faults of all clips together.
+
+    Clips that loop by the markup go on at their ends.
+    """
     parts = []
     faults: list[Fault] = []
     seen: set[str] = set()
@@ -454,7 +459,9 @@ def parts_of(clips: Iterable[Clip], schema: FeatureSchema, mirror: bool | Collec
         seen.add(clip.name)
         is_mirrored = mirror if isinstance(mirror, bool) else clip.name in mirror
         try:
-            parts += [clip_features(clip, schema, mirrored=way) for way in ((False, True) if is_mirrored else (False,))]
+            looping = markup is not None and markup.is_looping(clip.name)
+            ways = (False, True) if is_mirrored else (False,)
+            parts += [clip_features(clip, schema, mirrored=way, looping=looping) for way in ways]
         except MotionError as error:
             faults.extend(error.faults)
     if faults:

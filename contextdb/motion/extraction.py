@@ -17,6 +17,7 @@ from contextdb.motion.channels import DEFAULT_AXIS, Channel
 from contextdb.motion.clips import Clip
 from contextdb.motion.features import CustomFunction, FeatureSchema
 from contextdb.motion.feet import feet_of, footfalls_of, phases
+from contextdb.motion.looping import three_rounds
 from contextdb.motion.poses import Poses, poses_of
 from contextdb.motion.quaternions import Floats
 from contextdb.motion.skeleton import Ints, Skeleton
@@ -60,7 +61,7 @@ class ClipFeatures:
     root: Features
 
 
-def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False) -> ClipFeatures:
+def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, looping: bool = False) -> ClipFeatures:
     """The features of every frame of a clip, resampled to the schema's rate, and the body's path.
 
     Parameters
@@ -69,6 +70,8 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False) 
     schema : FeatureSchema
     mirrored : bool
         Take the clip in a mirror, left and right bones exchanged by the schema's `mirror`.
+    looping : bool
+        The clip goes on at its start when it ends: its path goes on too, and does not run out straight.
 
     Raises
     ------
@@ -87,9 +90,13 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False) 
     if mirrored:
         poses = mirror.mirrored(poses, schema.mirror)
     path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
-    blocks = [_channel_features(channel, poses, path, schema, clip) for channel in schema.channels]
-    features = np.concatenate(blocks, axis=1).astype(np.float32)
     root = np.column_stack((path.positions, path.headings)).astype(np.float32)
+    own = slice(None)
+    if looping:
+        poses, own = three_rounds(poses, path)
+        path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
+    blocks = [_channel_features(channel, poses, path, schema, clip)[own] for channel in schema.channels]
+    features = np.concatenate(blocks, axis=1).astype(np.float32)
     return ClipFeatures(clip.name, mirrored, features, root)
 
 

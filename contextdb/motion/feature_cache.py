@@ -40,7 +40,7 @@ FOLDER_SUFFIX = ".features"
 _ENTRY = re.compile(r"[0-9a-f]{32}\.safetensors|[0-9a-f]{16}\.tmp")
 
 
-def key_of(content: bytes, schema: FeatureSchema, *, metres_per_unit: float, up: Up, mirrored: bool) -> str:
+def key_of(content: bytes, schema: FeatureSchema, *, metres_per_unit: float, up: Up, mirrored: bool, looping: bool) -> str:
     """The key of a clip's features, from the bytes of its file and all else that they depend on."""
     about = {
         "extraction": EXTRACTION,
@@ -48,6 +48,7 @@ def key_of(content: bytes, schema: FeatureSchema, *, metres_per_unit: float, up:
         "unit": float(metres_per_unit).hex(),
         "up": up,
         "mirrored": mirrored,
+        "looping": looping,
     }
     digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
     digest.update(content)

@@ -30,7 +30,7 @@ from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plur
 from contextdb.motion import markup_file
 from contextdb.motion.bvh_words import number_fault
 from contextdb.motion.markup_file import Row
-from contextdb.motion.reserved import VALUE_RULES, reserved_of
+from contextdb.motion.reserved import VALUE_RULES, ReservedTag, reserved_of
 from contextdb.motion.span_faults import SECONDS, conflicts, faults_alone, faults_together, listed
 from contextdb.motion.spans import TOLERANCE_S, WILDCARD, Span, fits
 
@@ -98,6 +98,10 @@ class Markup:
     def spans_of(self, asset: str) -> tuple[Span, ...]:
         """The spans that hold for an asset, by its name or by a pattern, in order."""
         return tuple(self.spans[i] for i in self._indices_of(asset))
+
+    def is_looping(self, asset: str) -> bool:
+        """Whether an asset goes on at its start when it ends."""
+        return any(reserved_of(span.tag) is ReservedTag.LOOPING for span in self.spans_of(asset))
 
     def conflicts_of(self, asset: str) -> list[Fault]:
         """Where patterns that all fit an asset say different things of one frame, so that none can be followed."""

@@ -393,8 +393,8 @@ def test_the_features_of_a_made_clip_are_those_of_this_version_of_the_extraction
 
 def test_a_key_depends_on_the_contents_and_on_what_they_are_taken_for():
     schema = CONFIG.features["loco"]
-    base = {"metres_per_unit": 0.01, "up": "y", "mirrored": False}
-    others = [{"metres_per_unit": 0.1}, {"up": "z"}, {"mirrored": True}]
+    base = {"metres_per_unit": 0.01, "up": "y", "mirrored": False, "looping": False}
+    others = [{"metres_per_unit": 0.1}, {"up": "z"}, {"mirrored": True}, {"looping": True}]
     keys = [
         key_of(b"a", schema, **base),
         key_of(b"b", schema, **base),

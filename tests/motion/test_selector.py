@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from lines import line
 
+from contextdb import Table
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import Entry, MotionDatabase, Reason, Selector, Status
+from contextdb.motion.left_out import LeftOut, Skip
+from contextdb.motion.marks import TagFilter
 
 
 def database(*places, asset="clip"):
@@ -152,3 +156,120 @@ def test_an_unknown_database_is_refused_with_the_nearest(key):
         SELECTOR.search([0.0], **{key: {"jog_tird": [True]}})
     with pytest.raises(QueryError, match="the selector has no database"):
         SELECTOR.with_database("run", None)
+
+
+# ---- buckets
+
+
+START, STOP = database(1.0, 2.0, asset="start"), database(1.5, 5.0, asset="stop")
+BUCKETS = Selector([Entry("starts", START, threshold=0.3), Entry("stops", STOP, threshold=0.1), Entry("cycles", database(0.0))])
+
+
+def test_only_the_buckets_of_the_moment_are_searched():
+    choice = BUCKETS.search([1.0], among=["stops", "cycles"])
+    assert (choice.database, choice.hit.cost) == ("stops", 0.25)
+    assert [search.status for search in choice.searches] == [Status.NOT_AMONG, Status.WINNER, Status.BEATEN]
+    assert (
+        choice.why
+        == "starts: not among; stops: cost 0.25, not under its threshold 0.1; cycles: cost 1. stops has the lowest cost and wins."
+    )
+
+
+def test_a_table_whose_rows_are_databases_names_the_buckets_and_may_name_those_of_others():
+    choice = BUCKETS.search([1.0], among=SimpleNamespace(assets=["cycles", "swimming"]))
+    assert choice.database == "cycles"
+    compiled = Table.from_columns({"Database": ["starts", "stops", "cycles"], "moving": ["False", "True", "True"]}).compile()
+    assert BUCKETS.search([1.0], among=compiled.query({"moving": False})).database == "starts"
+    assert not BUCKETS.search([1.0], among=[])
+
+
+def test_one_bucket_may_be_named_without_a_list_and_an_unknown_one_is_refused():
+    assert BUCKETS.search([1.0], among="cycles").database == "cycles"
+    with pytest.raises(QueryError, match=r'the selector has no database "stop"\. .*Did you mean "stops"\?'):
+        BUCKETS.search([1.0], among=["stop"])
+
+
+def test_a_playing_frame_in_no_bucket_of_the_moment_does_not_continue_by_search():
+    choice = BUCKETS.search([1.5], among=["cycles"], current=("stops", 0))
+    assert choice.database == "cycles"
+
+
+# ---- tags, penalties and skips
+
+
+def test_one_tag_filter_serves_databases_whose_markup_does_not_know_its_tags():
+    tired, jog = line("tired,Worn,,,", tired=[0.0, 1.0]), line("jog,Fresh,,0.05,", jog=[0.0, 1.0])
+    selector = Selector([Entry("tired", tired, 0.5), Entry("jog", jog)])
+    assert selector.search([1.0], tags=TagFilter("Worn")).database == "tired"
+    fresh = selector.search([1.0], tags=TagFilter("Fresh"))
+    assert (fresh.database, fresh.hit.frame) == ("jog", 0)
+    assert fresh.searches[0].status is Status.NOTHING_VALID
+    worn_out = selector.search([1.0], tags=TagFilter(prefer={"Fresh": 4.0}))
+    assert (worn_out.database, worn_out.hit.cost) == ("jog", 1.0)
+    assert selector.search([1.0], tags={"jog": TagFilter("Fresh")}).database == "tired"
+    assert selector.with_database("jog", None).search([1.0], tags=TagFilter(exclude="Fresh")).database == "tired"
+
+
+def test_a_tag_of_a_database_that_comes_later_may_be_announced():
+    tired = line("tired,Worn,,,", tired=[0.0])
+    entries = [Entry("tired", None, 0.5), Entry("jog", line(jog=[0.0]))]
+    with pytest.raises(QueryError, match='there is no tag "Worn"'):
+        Selector(entries).search([0.0], tags=TagFilter(exclude="Worn"))
+    selector = Selector(entries, tags=["Worn"])
+    assert selector.search([0.0], tags=TagFilter(exclude="Worn")).database == "jog"
+    assert selector.with_database("tired", tired).search([0.0], tags=TagFilter("Worn")).database == "tired"
+
+
+def test_knowing_the_tags_of_another_database_copies_no_features():
+    tired, jog = line("tired,Worn,,,", tired=[0.0]), line(jog=[0.0])
+    selector = Selector([Entry("tired", tired, 0.5), Entry("jog", jog)])
+    assert selector.databases["tired"] is tired
+    assert selector.databases["jog"].layout is jog.layout
+
+
+def test_penalties_are_of_assets_or_of_databases():
+    assert SELECTOR.search([9.0], penalties={"jog_tired": 2.0}).database == "jog"
+    assert SELECTOR.search([9.0], penalties={"jog_tired": np.array([1.5])}).hit.cost == 2.5
+    assert SELECTOR.search([9.0], penalties={"jog_tired": {"jog_tired": 2.0, "walk": 9.0}}).database == "jog"
+    assert SELECTOR.search([9.0], penalties={}).database == "jog_tired"
+    with pytest.raises(QueryError, match='the selector has no database "walk"'):
+        SELECTOR.search([9.0], penalties={"walk": np.array([1.5])})
+
+
+def test_frames_are_skipped_in_the_database_that_they_are_named_for():
+    skip = {"jog_tired": [Skip(0, 1, LeftOut.HISTORY)]}
+    assert SELECTOR.search([10.0], skip=skip).database == "jog"
+    ((_, tired), (_, jog)) = SELECTOR.candidates([10.0], skip=skip)
+    assert tired.why.tolist() == [LeftOut.HISTORY, LeftOut.NO]
+    assert jog.why.tolist() == [LeftOut.NO] * 3
+
+
+# ---- candidates
+
+
+def test_candidates_are_of_the_databases_that_the_choice_looked_into():
+    assert [name for name, _ in SELECTOR.candidates([9.0])] == ["jog_tired"]
+    found = SELECTOR.candidates([15.5], 2)
+    assert [(name, [row.cost for row in rows]) for name, rows in found] == [("jog_tired", [20.25, 30.25]), ("jog", [0.25, 20.25])]
+    ((_, left),) = SELECTOR.candidates([9.0], 5, valid={"jog_tired": [True]}, skip={"jog_tired": [Skip(1, 2)]}, left_out=True)
+    assert [row.left_out for row in left] == [LeftOut.NO, LeftOut.FORBIDDEN]
+
+
+@given(st.lists(st.lists(st.integers(0, 6), min_size=1, max_size=4), min_size=1, max_size=4), st.integers(0, 6), st.data())
+def test_the_first_candidate_of_each_database_is_the_hit_of_the_choice(places, query, data):
+    thresholds = [data.draw(st.sampled_from([None, 0.5, 4.5])) for _ in places]
+    entries = [Entry(str(i), database(*each), thresholds[i]) for i, each in enumerate(places)]
+    selector, current = Selector(entries), ("0", 0) if data.draw(st.booleans()) else None
+    choice = selector.search([query], current=current)
+    searched = [(search.database, search.hit.frame, search.hit.cost) for search in choice.searches if search.hit is not None]
+    found = selector.candidates([query], 1, current=current)
+    assert [(name, rows.rows[0].frame, rows.rows[0].cost) for name, rows in found] == searched
+
+
+def test_the_best_of_each_range_is_had_of_one_database():
+    several = line(p=[0.0, 3.0], q=[0.1], r=[2.0])
+    selector = Selector([Entry("a", several), Entry("b", database(0.0))])
+    assert [hit.asset for hit in selector.best_of_ranges("a", [0.0], 0.5)] == ["p", "q"]
+    assert selector.best_of_ranges("a", [0.0], 0.5, among=["b"]) == []
+    with pytest.raises(QueryError, match='the selector has no database "c"'):
+        selector.best_of_ranges("c", [0.0], 0.5)

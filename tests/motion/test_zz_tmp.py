@@ -1,0 +1,641 @@
+"""One character: each rule as a scenario, and every update against a plain reading of all rules, frame by frame."""
+
+from __future__ import annotations
+
+import math
+import random
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lines import DT, RATE, line
+
+from contextdb.errors import MotionError, QueryError
+from contextdb.motion import Entry, Selector, Status
+from contextdb.motion.controller import Controller
+from contextdb.motion.controller_settings import ControllerSettings, read_controllers
+from contextdb.motion.controller_state import ControllerState
+from contextdb.motion.decision import Action
+from contextdb.motion.left_out import LeftOut
+from contextdb.motion.marks import Mark, TagFilter
+from contextdb.motion.variation import Variation
+
+EVERY = {"search_every_s": 0.0, "jump_threshold_s": 0.0, "history_s": 0.0, "rate": RATE}
+"""Search at every update, and leave nothing out."""
+
+
+def controller(*databases, recorder=None, rng=None, clock=None, **changes):
+    """A controller over databases "a", "b" and so on, without thresholds, that searches at every update unless told otherwise."""
+    entries = [Entry(name, database) for name, database in zip("abc", databases, strict=False)]
+    return Controller(Selector(entries), ControllerSettings(**{**EVERY, **changes}), recorder, rng, clock)
+
+
+def valid(*assets):
+    return SimpleNamespace(assets=list(assets))
+
+
+def at(decision):
+    """What plays, as (asset, time)."""
+    return None if decision.playing is None else (decision.playing.asset, round(decision.playing.time_s, 6))
+
+
+# ---- starting, playing on, jumping
+
+
+def test_the_first_update_starts_the_best_frame():
+    one = controller(line(walk=range(10)))
+    decision = one.update(DT, [4.2])
+    assert (decision.action, decision.searched, at(decision)) == (Action.START, True, ("walk", 0.4))
+    assert (decision.tick, decision.before) == (0, None)
+    assert decision.cost == pytest.approx(0.04)
+    assert decision.why == "Nothing played: walk at 0.40 s costs 0.04."
+
+
+def test_playing_on_moves_as_fast_as_time_passes_whatever_the_size_of_the_steps():
+    one, other = controller(line(walk=range(30)), search_every_s=60.0), controller(line(walk=range(30)), search_every_s=60.0)
+    for each, step in ((one, 0.01), (other, 0.25)):
+        each.update(0.0, [0.0])
+        for _ in range(round(2.0 / step)):
+            decision = each.update(step, [0.0])
+        assert decision.action is Action.CONTINUE
+        assert decision.playing.time_s == pytest.approx(2.0)
+        assert decision.playing.frame == 20
+
+
+def test_a_moment_between_two_frames_counts_as_the_nearer_one():
+    one = controller(line(walk=range(10)), search_every_s=60.0)
+    one.update(0.0, [0.0])
+    assert [one.update(0.04, [0.0]).playing.frame for _ in range(6)] == [0, 1, 1, 2, 2, 2]
+
+
+def test_the_continuing_pose_wins_though_another_frame_is_a_little_better_and_loses_when_it_is_much_better():
+    places = {"walk": [0.0, 1.0, 2.0, 3.0], "run": [5.0, 2.9, 5.0, 5.0]}
+    for bias, action in ((-0.3, Action.CONTINUE), (-0.05, Action.JUMP), (0.0, Action.JUMP)):
+        one = controller(line(continuing=bias, **places))
+        one.update(DT, [1.0])
+        decision = one.update(DT, [2.5])  # walk at 0.2 s: 0.25, run at 0.1 s: 0.16
+        assert decision.action is action
+        assert decision.continuing_cost == pytest.approx(0.25 + bias)
+    assert decision.why == "A search was due: run at 0.10 s costs 0.16, playing on 0.25."
+
+
+def test_the_cost_of_playing_on_is_to_the_last_bit_what_the_search_makes_of_it():
+    markup = "walk,CostModifier,,,0.3\nwalk,Move,,,"
+    database = line(markup, continuing=-0.01, base=0.7, walk=[0.1, 0.7, 0.3], run=[0.5, 0.2, 0.21])
+    seen = Recorder(10)
+    one = controller(database, recorder=seen)
+    asked = {"tags": TagFilter(avoid={"Move": 0.9}), "penalties": {"walk": 0.17}, "bias": {"a": np.linspace(0.1, 0.7, 6)}}
+    one.update(0.0, [0.1], valid("walk"), **asked)
+    decision = one.update(DT, [0.2], **asked)
+    assert decision.action is Action.JUMP
+    current = next(row for row in decision.candidates[0][1] if row.frame == 1)
+    assert decision.continuing_cost == current.cost
+    assert set(current.biases) == {"base", "penalty", "tags", "modifier", "given", "continuing"}
+
+
+def test_on_a_tie_the_character_plays_on():
+    one = controller(line(walk=[0, 1, 2], run=[1, 1, 1]))
+    one.update(DT, [0.0])
+    assert one.update(DT, [1.0]).action is Action.CONTINUE
+
+
+# ---- when to search
+
+
+def test_between_two_searches_it_plays_on_whatever_the_query():
+    one = controller(line(walk=range(30), run=range(100, 130)), search_every_s=0.3)
+    decisions = [one.update(DT, [place]) for place in (0.0, 100.0, 100.0, 100.0, 101.0)]
+    assert [decision.searched for decision in decisions] == [True, False, False, True, False]
+    assert [at(decision)[0] for decision in decisions] == ["walk", "walk", "walk", "run", "run"]
+    assert decisions[1].why == "The next search is due in 0.2 s."
+    assert (decisions[1].choice, decisions[1].cost, decisions[1].continuing_cost) == (None, None, None)
+
+
+def test_a_forced_search_does_not_wait_and_what_plays_may_win_it():
+    one = controller(line(walk=range(30), run=range(100, 130)), search_every_s=60.0)
+    one.update(DT, [0.0])
+    played_on = one.update(DT, [1.1], force=True)
+    assert (played_on.action, played_on.searched) == (Action.CONTINUE, True)
+    assert at(one.update(DT, [105.0], force=True)) == ("run", 0.5)
+
+
+def test_an_interruption_leaves_what_plays_though_it_would_win():
+    one = controller(line(walk=range(30), run=range(100, 130)), search_every_s=60.0)
+    one.update(DT, [0.0])
+    decision = one.update(DT, [1.0], valid("walk", "run"), interrupt=True)
+    assert (decision.action, decision.continuing_cost) == (Action.JUMP, None)
+    assert decision.why.startswith("walk was interrupted: ")
+    alone = controller(line(walk=[0.0]), search_every_s=60.0)
+    alone.update(0.0, [0.0])
+    assert alone.update(0.0, [0.0], interrupt=True).why == "walk was interrupted, but nothing else may play: walk plays on."
+
+
+def test_after_a_forced_search_the_next_one_is_due_a_whole_interval_later():
+    one = controller(line(walk=range(30)), search_every_s=0.3)
+    searched = [one.update(DT, [0.0], force=i == 2).searched for i in range(7)]
+    assert searched == [True, False, True, False, False, True, False]
+
+
+# ---- where it may not jump
+
+
+def test_frames_within_the_jump_threshold_of_the_playing_one_are_no_candidates():
+    one = controller(line(walk=range(30), run=range(30)), jump_threshold_s=0.5, recorder=Recorder(1))
+    one.update(DT, [10.0], valid("walk"))
+    candidates = one.update(0.0, [10.0]).candidates[0][1]
+    assert [frame for frame in range(60) if candidates.why[frame] == LeftOut.JUMP] == [5, 6, 7, 8, 9, 11, 12, 13, 14, 15]
+    assert at(one.update(0.0, [15.0], valid("walk"))) == ("walk", 1.6)
+    assert at(one.update(0.0, [10.0], valid("walk"))) == ("walk", 1.0)
+
+
+def test_the_jump_threshold_goes_round_the_end_of_a_looping_range():
+    one = controller(line("walk,Looping,,,", walk=[9, 1, 2, 3, 4, 5, 6, 7, 8, 9]), jump_threshold_s=0.2, recorder=Recorder(1))
+    one.update(0.0, [1.0])  # at frame 1: 9 and 0, which are the same pose, are one frame away, 8 two
+    candidates = one.update(0.0, [0.0]).candidates[0][1]
+    assert [frame for frame in range(10) if candidates.why[frame] == LeftOut.JUMP] == [0, 2, 3, 8, 9]
+    one.restore(ControllerState())
+    one.update(0.0, [8.0])  # at frame 8: 9 and 0 are one away, 1 two
+    candidates = one.update(0.0, [0.0]).candidates[0][1]
+    assert [frame for frame in range(10) if candidates.why[frame] == LeftOut.JUMP] == [0, 1, 6, 7, 9]
+
+
+def test_frames_played_just_now_are_not_entered_again_until_the_history_forgets_them():
+    one = controller(line(walk=[0, 1, 2, 3, 4, 5], run=[100] * 12), history_s=0.5)
+    one.update(DT, [0.0], valid("walk"))
+    for _ in range(4):
+        one.update(DT, [100.0], valid("run"))  # by then, walk at 0.1 s would have played
+    assert at(one.update(0.0, [0.0])) == ("walk", 0.2)
+    assert at(one.update(DT, [0.0])) == ("walk", 0.0)
+
+
+def test_the_end_of_a_turn_is_not_found_over_and_over():
+    """A stick held aside asks at every moment for a turn that then goes straight: for the end of a turning clip."""
+    turn = line(turn=[9, 9, 9, 9, 5, 6, 7, 8], walk=[0] * 20)
+    for history_s, n_entered in ((0.0, 10), (1.0, 1)):
+        one = controller(turn, history_s=history_s)
+        decisions = [one.update(DT, [5.0]) for _ in range(10)]
+        entered = [decision for decision in decisions if decision.action in (Action.START, Action.JUMP)]
+        assert [at(decision) for decision in entered].count(("turn", 0.4)) == n_entered
+
+
+def test_while_a_next_natural_frame_plays_no_other_frame_of_its_range_may_be_chosen():
+    markup = "vault,NextNaturalOnly,0.2,0.6,0.1"
+    one = controller(line(markup, vault=range(10), fall=[50] * 10), recorder=Recorder(3))
+    assert at(one.update(DT, [4.0])) == ("vault", 0.3)  # the entry zone ends there, and 0.7 s is not nearer
+    for time_s in (0.4, 0.5, 0.6):
+        decision = one.update(DT, [9.0])
+        assert (decision.action, at(decision)) == (Action.CONTINUE, ("vault", time_s))
+        assert decision.candidates[0][1].counts[LeftOut.NEXT_NATURAL] == 9
+    assert at(one.update(DT, [9.0])) == ("vault", 0.9)
+    one.restore(ControllerState())
+    one.update(DT, [3.0])
+    assert at(one.update(DT, [50.0])) == ("fall", 0.0)  # another asset may still be chosen
+
+
+def test_a_do_not_choose_frame_plays_on_but_is_not_entered():
+    one = controller(line("turn,DoNotChoose,0.3,,", turn=range(8)))
+    assert at(one.update(DT, [5.0])) == ("turn", 0.2)
+    assert [at(one.update(DT, [place])) for place in (3.0, 4.0, 5.0, 2.0)] == [("turn", t) for t in (0.3, 0.4, 0.5, 0.2)]
+
+
+def test_tags_that_no_longer_fit_let_it_play_on():
+    one = controller(line("walk,Calm,,,\nrun,Fast,,,", walk=range(10), run=range(50, 60)))
+    one.update(DT, [0.0], tags=TagFilter("Calm"))
+    assert at(one.update(DT, [1.0], tags=TagFilter("Fast"))) == ("walk", 0.1)
+    assert at(one.update(DT, [30.0], tags=TagFilter("Fast"))) == ("run", 0.0)
+
+
+# ---- ends
+
+
+def test_at_the_end_of_a_clip_it_searches_though_none_is_due_and_leaves_the_end():
+    one = controller(line(stop=[0, 1, 2, 3], walk=range(10, 40)), search_every_s=60.0)
+    one.update(DT, [0.0])
+    times = [at(one.update(DT, [3.0])) for _ in range(3)]
+    assert times == [("stop", 0.1), ("stop", 0.2), ("stop", 0.3)]
+    decision = one.update(DT, [3.0])
+    assert (decision.action, decision.searched, at(decision)) == (Action.JUMP, True, ("stop", 0.0))
+    assert decision.why == "stop has ended: stop at 0.00 s costs 9."
+    assert decision.continuing_cost is None
+
+
+def test_a_clip_that_has_ended_is_held_when_nothing_else_may_play():
+    one = controller(line("stop,DoNotChoose,0.1,,", stop=[0, 1, 2]), history_s=60.0)
+    for _ in range(3):
+        one.update(DT, [0.0])
+    for _ in range(2):
+        decision = one.update(DT, [0.0])
+        assert (decision.action, at(decision), decision.searched) == (Action.HOLD, ("stop", 0.2), True)
+        assert decision.why == "stop has ended and nothing else may play: its last frame is held."
+
+
+def test_a_looping_range_goes_on_at_its_start_without_a_search():
+    one = controller(line("walk,Looping,,,", walk=[0, 1, 2, 3, 0]), search_every_s=1e6)
+    one.update(DT, [0.0])
+    decisions = [one.update(DT, [0.0]) for _ in range(5)]
+    assert [at(decision)[1] for decision in decisions] == [0.1, 0.2, 0.3, 0.4, 0.1]
+    assert [decision.action for decision in decisions] == [Action.CONTINUE] * 4 + [Action.LOOP]
+    assert not any(decision.searched for decision in decisions)
+    assert one.update(0.4 * 1000 + 0.1, [0.0]).playing.time_s == pytest.approx(0.2)
+
+
+def test_an_excluded_frame_ahead_ends_the_clip():
+    one = controller(line("walk,Excluded,0.3,0.4,", walk=range(8)), search_every_s=60.0)
+    one.update(DT, [1.0])
+    assert at(one.update(DT, [1.0])) == ("walk", 0.2)
+    decision = one.update(DT, [1.0])
+    assert decision.why.startswith("walk has ended: ")
+    assert decision.before.frame == 2
+
+
+def test_a_looping_range_with_an_excluded_start_ends():
+    one = controller(line("walk,Looping,,,\nwalk,Excluded,,0.05,\nrun,DoNotChoose,,,", walk=range(4), run=[9]), history_s=60.0)
+    one.update(DT, [2.0])
+    one.update(DT, [2.0])
+    assert one.update(DT, [2.0], valid("run")).action is Action.HOLD
+
+
+# ---- what the table says
+
+
+def test_an_asset_that_is_no_longer_valid_is_left_at_once():
+    one = controller(line(walk=range(10), run=range(50, 60)), search_every_s=60.0)
+    one.update(DT, [0.0])
+    decision = one.update(DT, [1.0], valid("run"))
+    assert (decision.action, at(decision)) == (Action.JUMP, ("run", 0.0))
+    assert decision.why.startswith("walk is not valid any more: run at 0.00 s")
+
+
+def test_an_asset_that_is_no_longer_valid_plays_on_when_nothing_else_may_and_says_so():
+    one = controller(line(walk=range(10)), search_every_s=60.0)
+    one.update(DT, [0.0])
+    decision = one.update(DT, [1.0], valid("swim"))
+    assert (decision.action, at(decision), decision.searched) == (Action.CONTINUE, ("walk", 0.1), True)
+    assert decision.why == "walk is not valid any more, but nothing else may play: walk plays on."
+    assert not decision.choice
+
+
+def test_with_nothing_valid_nothing_plays_and_the_next_update_tries_again():
+    one = controller(line(walk=range(10)), search_every_s=60.0)
+    decision = one.update(DT, [0.0], valid("swim"))
+    assert (decision.action, decision.playing, decision.cost) == (Action.NOTHING, None, None)
+    assert decision.why == "Nothing played, and nothing may play."
+    assert one.update(DT, [0.0]).action is Action.START
+
+
+def test_soft_penalties_reach_the_search():
+    one = controller(line(walk=[0.0] * 5, run=[1.0] * 5))
+    assert at(one.update(DT, [0.0], penalties={"walk": 2.0})) == ("run", 0.0)
+    assert at(one.update(DT, [0.0], penalties={"walk": math.inf})) == ("run", 0.1)
+
+
+# ---- several databases
+
+
+def priority(threshold=2.75, **changes):
+    tired, jog = line(jog_tired=[10, 11, 12, 13, 14, 15]), line(jog=[9, 9.5, 10, 10.5, 11, 11.5])
+    selector = Selector([Entry("jog_tired", tired, threshold), Entry("jog", jog)])
+    return Controller(selector, ControllerSettings(**{**EVERY, **changes}))
+
+
+def test_a_priority_database_under_its_threshold_wins_over_the_continuing_pose():
+    one = priority()
+    assert at(one.update(DT, [9.0], among=["jog"])) == ("jog", 0.0)
+    decision = one.update(DT, [9.5])
+    assert (decision.action, at(decision)) == (Action.JUMP, ("jog_tired", 0.0))
+    assert decision.continuing_cost == 0.0
+    expected = "A search was due: jog_tired at 0.00 s costs 0.25, under the threshold 2.75 of jog_tired, playing on 0."
+    assert decision.why == expected
+
+
+def test_above_the_threshold_the_lower_of_the_two_wins():
+    one = priority(threshold=0.1)
+    one.update(DT, [9.0])
+    decision = one.update(DT, [9.5])
+    assert (decision.action, at(decision)) == (Action.CONTINUE, ("jog", 0.1))
+    assert [search.status for search in decision.choice.searches] == [Status.BEATEN, Status.WINNER]
+
+
+def test_another_bucket_is_entered_at_once():
+    one = controller(line(walk=range(10)), line(stop=range(100, 110)), search_every_s=60.0)
+    one.update(DT, [0.0], among=["a"])
+    decision = one.update(DT, [1.0], among=["b"])
+    assert (decision.action, at(decision)) == (Action.JUMP, ("stop", 0.0))
+    assert decision.why.startswith("a is not among the databases of the moment: stop at 0.00 s")
+    assert decision.choice.searches[0].status is Status.NOT_AMONG
+
+
+def test_a_bucket_without_anything_to_play_lets_what_plays_play_on():
+    one = controller(line(walk=range(10)), line(stop=range(100, 110)), search_every_s=60.0)
+    one.update(DT, [0.0])
+    decision = one.update(DT, [1.0], valid("walk"), among=valid("b", "no database"))
+    assert (decision.action, at(decision)) == (Action.CONTINUE, ("walk", 0.1))
+
+
+def test_a_database_that_is_dropped_while_it_plays_is_left_at_once():
+    one = controller(line(jog_tired=range(10)), line(jog=range(20, 30)), search_every_s=60.0)
+    one.update(DT, [0.0])
+    one.selector = one.selector.with_database("a", None)
+    decision = one.update(DT, [1.0])
+    assert (decision.action, at(decision)) == (Action.JUMP, ("jog", 0.0))
+    assert decision.before.asset == "jog_tired"
+    assert decision.why == "jog_tired is no longer loaded: jog at 0.00 s costs 361."
+    one.selector = one.selector.with_database("b", None)
+    decision = one.update(DT, [1.0])
+    assert (decision.action, decision.playing) == (Action.NOTHING, None)
+    assert decision.why == "jog is no longer loaded, and nothing may play."
+
+
+def test_in_a_database_that_was_built_anew_the_same_asset_plays_on():
+    one = controller(line(walk=range(10), run=range(50, 60)), search_every_s=60.0)
+    one.update(DT, [53.0])
+    one.selector = one.selector.with_database("a", line(crawl=[7] * 5, walk=range(10), run=range(50, 60)))
+    decision = one.update(DT, [53.0])
+    assert (decision.action, at(decision), decision.playing.range) == (Action.CONTINUE, ("run", 0.4), 2)
+
+
+# ---- variation
+
+
+def test_near_ties_vary_remember_and_never_cost_more_than_they_may():
+    assets = {name: [place] + [50.0] * 5 for name, place in zip("pqrs", (0.0, 0.1, 0.2, 1.0), strict=True)}
+    chosen = []
+    one = controller(line(**assets), variation=Variation(within=0.05, memory=1), rng=random.Random(4))
+    for _ in range(60):
+        decision = one.update(DT, [0.0])
+        chosen.append(decision.playing.asset)
+        assert decision.cost <= decision.choice.hit.cost + 0.05
+    assert set(chosen) == set("pqr")
+    assert all(asset != following for asset, following in pairwise(chosen))
+
+
+def test_what_plays_plays_on_while_it_is_a_near_tie():
+    one = controller(line(p=[0.0] * 9, q=[0.1] * 9), variation=Variation(within=0.05), rng=np.random.default_rng(1))
+    one.update(DT, [0.0], valid("q"))
+    decisions = [one.update(DT, [0.0]) for _ in range(8)]
+    assert [decision.action for decision in decisions] == [Action.CONTINUE] * 8
+    assert decisions[0].why == "A search was due: playing on costs 0.01, about as little as the best, 0."
+
+
+def test_variation_keeps_to_what_is_under_the_threshold_that_let_its_database_win():
+    tired = line(p=[0.0, 50.0], q=[0.3, 50.0])
+    selector = Selector([Entry("tired", tired, 0.05), Entry("jog", line(r=[0.2, 50.0]))])
+    for seed in range(8):
+        one = Controller(selector, ControllerSettings(**EVERY, variation=Variation(0.2)), rng=random.Random(seed))
+        assert at(one.update(DT, [0.0])) == ("p", 0.0)
+
+
+def test_variation_without_a_generator_is_refused():
+    with pytest.raises(MotionError, match=r"the settings ask for variation, and there is no generator\. Accepted: rng="):
+        controller(line(p=[0.0]), variation=Variation(0.1))
+
+
+# ---- state
+
+
+@pytest.mark.parametrize("rng", [lambda: random.Random(3), lambda: np.random.default_rng(3)])
+def test_from_a_restored_state_it_decides_the_same_again(rng):
+    stick = random.Random(5)
+    asked = [[stick.uniform(0.0, 9.0)] for _ in range(60)]
+    assets = {name: range(i, i + 10) for i, name in enumerate("pqrst")}
+    one = controller(line("p,Looping,,,", **assets), history_s=0.3, variation=Variation(0.3, 2), rng=rng())
+    for place in asked[:20]:
+        one.update(DT, place)
+    state = one.state
+    first = [told(one.update(DT, place)) for place in asked[20:]]
+    one.restore(state)
+    assert [told(one.update(DT, place)) for place in asked[20:]] == first
+    other = Controller(one.selector, one.settings, rng=rng())
+    other.restore(state)
+    assert [told(other.update(DT, place)) for place in asked[20:]] == first
+
+
+def told(decision):
+    return decision.tick, decision.time_s, decision.action, decision.why, decision.playing, decision.cost, decision.continuing_cost
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"dt_s": math.nan}, "an update of nan seconds"),
+        ({"dt_s": -0.1}, r"an update of -0\.1 seconds\. Accepted: a finite number, 0 or more"),
+        ({"dt_s": "0.1"}, "an update of '0.1' seconds"),
+        ({"query": [math.nan]}, '"feature 0" is nan'),
+        ({"query": [1.0, 2.0]}, r"the query has shape \(2,\)"),
+        ({"valid": [True]}, r"valid has shape \(1,\)"),
+        ({"valid": {"z": [True, True]}, "force": True}, r'the selector has no database "z"'),
+        ({"tags": TagFilter("Clam")}, r'there is no tag "Clam".*Did you mean "Calm"\?'),
+        ({"among": ["z"]}, r'the selector has no database "z"'),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_and_changes_nothing(given, message):
+    one = controller(line("walk,Calm,,,", walk=range(10), run=range(5)), search_every_s=60.0)
+    one.update(DT, [0.0])
+    before = one.state
+    with pytest.raises(QueryError, match=message):
+        one.update(**{"dt_s": DT, "query": [0.0], **given})
+    assert one.state == before
+
+
+# ---- recording
+
+
+class Recorder:
+    def __init__(self, n_candidates):
+        self.n_candidates = n_candidates
+        self.decisions = []
+
+    def record(self, decision):
+        self.decisions.append(decision)
+
+
+def test_a_recorder_is_handed_every_decision_with_the_candidates_it_wants():
+    seen, context = Recorder(2), {"speed": 1.0}
+    ticks = iter([1.0, 1.5, 7.0, 7.25])
+    one = controller(line("run,DoNotChoose,,,", walk=range(10), run=range(10)), recorder=seen, clock=lambda: next(ticks))
+    decisions = [one.update(DT, [place], context=context) for place in (3.0, 8.0)]
+    assert seen.decisions == decisions
+    assert [decision.context for decision in decisions] == [context, context]
+    assert [decision.search_us for decision in decisions] == [500000.0, 250000.0]
+    ((name, candidates),) = decisions[1].candidates
+    assert name == "a"
+    assert [(row.asset, row.cost, row.left_out) for row in candidates] == [
+        ("walk", 0.0, LeftOut.NO),
+        ("run", 0.0, LeftOut.DO_NOT_CHOOSE),
+        ("walk", 1.0, LeftOut.NO),
+    ]
+    assert candidates.rows[0].cost == decisions[1].cost
+
+
+def test_recording_changes_no_decision():
+    asked = [[math.sin(i) * 5.0 + 5.0] for i in range(40)]
+    database = line(walk=range(10), run=range(2, 12))
+    plain, recorded = controller(database), controller(database, recorder=Recorder(3))
+    assert [told(plain.update(DT, place)) for place in asked] == [told(recorded.update(DT, place)) for place in asked]
+
+
+# ---- every update against a plain reading of the rules
+
+
+@st.composite
+def scenes(draw):
+    """A database of a few short assets with markup, settings, and what is asked at each of some updates of one frame."""
+    names = "pqr"[: draw(st.integers(1, 3))]
+    assets = {name: draw(st.lists(st.integers(0, 6), min_size=1, max_size=9)) for name in names}
+    rows = []
+    for name in names:
+        if draw(st.booleans()):
+            rows.append(f"{name},Looping,,,")
+        if draw(st.booleans()):
+            start, length = draw(st.integers(0, 6)) / RATE, draw(st.integers(0, 3)) / RATE
+            tag = draw(st.sampled_from(["DoNotChoose", "Excluded", "NextNaturalOnly"]))
+            rows.append(f"{name},{tag},{start},{start + length},{0.1 if length and tag == 'NextNaturalOnly' else ''}")
+    made = line("\n".join(rows), continuing=draw(st.sampled_from([0.0, -0.5, -3.0])), **assets)
+    seconds = st.sampled_from([0.0, 0.1, 0.2, 0.3])
+    rules = {key: draw(seconds) for key in ("search_every_s", "jump_threshold_s", "history_s")}
+    masks = st.one_of(st.none(), st.lists(st.booleans(), min_size=len(names), max_size=len(names)))
+    asked = draw(st.lists(st.tuples(st.integers(0, 6), masks), min_size=1, max_size=25))
+    return made, rules, asked
+
+
+@settings(max_examples=8000)
+@given(scenes())
+def test_every_update_follows_from_the_rules_read_frame_by_frame(scene):
+    database, rules, asked = scene
+    one = controller(database, **rules)
+    oracle = Oracle(database, rules)
+    for place, mask in asked:
+        decision = one.update(DT, [float(place)], None if mask is None else np.array(mask))
+        expected = oracle.update(float(place), mask)
+        assert (decision.action, decision.searched, decision.playing and decision.playing.frame) == expected
+
+
+class Oracle:
+    """A character at one frame an update; every rule asked of every frame, one by one."""
+
+    def __init__(self, database, rules):
+        self.database = database
+        self.n = {key: round(seconds * RATE) for key, seconds in rules.items()}
+        self.frame, self.tick, self.searched_at, self.played = None, 0, 0, {}
+
+    def update(self, place, mask):
+        self.tick += 1
+        following, passed, is_looped = self._following()
+        searched = self._must_search(following, mask)
+        may_continue = following is not None and self._is_valid(following, mask)
+        before, here = self.frame, (passed or [self.frame])[-1]
+        self.played.update(dict.fromkeys(passed, self.tick))
+        chosen = self._best(place, mask, here, may_continue, following is None) if searched else following
+        if searched:
+            self.searched_at = self.tick
+        self.frame = here if chosen is None else chosen
+        if self.frame is not None and chosen is not None:
+            self.played[chosen] = self.tick
+        onward = Action.LOOP if is_looped else Action.CONTINUE
+        if self.frame is None:
+            return Action.NOTHING, True, None
+        if chosen is None:
+            return Action.HOLD if following is None else onward, True, self.frame
+        if chosen == following and (may_continue or not searched):
+            return onward, searched, chosen
+        return Action.START if before is None else Action.JUMP, True, chosen
+
+    def _following(self):
+        """The frame one on, None for none; the frames that are passed on the way; and whether the end was passed."""
+        if self.frame is None:
+            return None, [], False
+        i = self.database.range_of(self.frame)
+        start, stop = int(self.database.starts[i]), int(self.database.stops[i])
+        is_excluded = [bool(self.database.marks.mark_of(frame) & Mark.EXCLUDED) for frame in range(stop)]
+        if self.frame + 1 < stop:
+            return (None, [], False) if is_excluded[self.frame + 1] else (self.frame + 1, [self.frame + 1], False)
+        if not self.database.marks.looping[i] or stop - start < 2 or is_excluded[start]:
+            return None, [], False
+        if is_excluded[start + 1]:  # the last frame is the first once more
+            return None, [start], True
+        return start + 1, [start, start + 1], True
+
+    def _must_search(self, following, mask):
+        if following is None or not self._is_valid(following, mask):
+            return True
+        return self.tick - self.searched_at >= self.n["search_every_s"]
+
+    def _is_valid(self, frame, mask):
+        return mask is None or mask[self.database.range_of(frame)]
+
+    def _best(self, place, mask, here, may_continue, is_ended):
+        found, least = None, math.inf
+        for frame in range(self.database.n_frames):
+            is_current = may_continue and frame == here
+            if not is_current and not self._may_enter(frame, mask, here, is_ended):
+                continue
+            cost = float(self.database.features[frame, 0] - place) ** 2
+            cost += self.database.biases.continuing if is_current else 0.0
+            if cost < least or (cost == least and is_current):
+                found, least = frame, cost
+        return found
+
+    def _may_enter(self, frame, mask, here, is_ended):
+        mark = self.database.marks.mark_of(frame)
+        if mark & (Mark.EXCLUDED | Mark.DO_NOT_CHOOSE | Mark.PAST_ENTRY) or not self._is_valid(frame, mask):
+            return False
+        if self.tick - self.played.get(frame, -99) < self.n["history_s"]:
+            return False
+        if here is None or self.database.range_of(frame) != self.database.range_of(here):
+            return True
+        i = self.database.range_of(here)
+        start, stop = int(self.database.starts[i]), int(self.database.stops[i])
+        if is_ended:
+            near = max(self.n["jump_threshold_s"], self.n["search_every_s"])
+            return frame == start or frame < here - near
+        if self.database.marks.mark_of(here) & Mark.NEXT_NATURAL:
+            return False
+        apart = abs(frame - here)
+        if self.database.marks.looping[i] and stop - start > 1:
+            apart = min(apart, stop - start - 1 - apart)
+        return apart > self.n["jump_threshold_s"]
+
+
+# ---- settings
+
+
+def read(**part):
+    faults = []
+    found = list(read_controllers({"player": {"selector": "loco", **part}}, ["loco"], faults, "contextdb.toml"))
+    return found, [str(fault) for fault in faults]
+
+
+def test_settings_are_read_from_the_project():
+    keys = {"search_every_s": 0.0, "jump_threshold_s": 0.5, "history_s": 1, "variation_within": 0.05, "variation_memory": 2}
+    found, faults = read(**keys)
+    assert found == [("player", "loco", ControllerSettings(0.0, 0.5, 1.0, Variation(0.05, 2)))]
+    assert faults == []
+    assert read()[0] == [("player", "loco", ControllerSettings())]
+
+
+@pytest.mark.parametrize(
+    ("part", "message"),
+    [
+        ({"selector": "locos"}, 'there is no such selector. Accepted: "loco". Did you mean selector = "loco"?'),
+        ({"search_every": 0.1}, 'has no key "search_every"'),
+        ({"history_s": "0.3"}, 'history_s = "0.3": this is text, not a number'),
+        ({"jump_threshold_s": -1}, "jump_threshold_s = -1: this is out of range"),
+        ({"variation_memory": 2}, 'has "variation_memory", but without "variation_within" nothing varies'),
+        ({"variation_within": 0.1, "variation_memory": 1.5}, "this is no whole number. Accepted: a whole number from 0 to 1000"),
+        ({"variation_within": True}, "variation_within = true: this is true or false, not a number"),
+    ],
+)
+def test_settings_that_cannot_be_meant_are_told_with_the_nearest_mend(part, message):
+    found, faults = read(**part)
+    assert found == []
+    assert len(faults) == 1
+    assert message in faults[0]
+    assert faults[0].startswith("contextdb.toml: [controllers.player]")
+
+
+def test_settings_made_in_python_are_checked_too():
+    with pytest.raises(MotionError, match=r"search_every_s is -1\.0\. Accepted: a number, 0 or more\.\nrate is 0\.0\."):
+        ControllerSettings(search_every_s=-1.0, rate=0.0)

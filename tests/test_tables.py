@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from contextdb.cells import Cell, parse_cell
+from contextdb.commands.demo_command import make_sample
 from contextdb.motion import made
 from contextdb.motion.config import MotionConfig
 from contextdb.motion.database import MotionDatabase
@@ -147,11 +148,9 @@ def test_a_fresh_character_plays_no_tired_clip_and_a_tired_one_plays_all():
 @pytest.fixture(scope="module")
 def searched(tmp_path_factory: pytest.TempPathFactory) -> tuple[MotionDatabase, Selector]:
     """The database of all clips, and the selector, as contextdb.toml says."""
-    folder = tmp_path_factory.mktemp("tables")
-    (folder / "clips").mkdir()
-    made.write_made_clips(folder / "clips")
-    sections = {"features": SCHEMA.features, "databases": SCHEMA.databases, "selectors": SCHEMA.selectors}
-    config = MotionConfig.from_dict(sections, tables=SCHEMA.tables)
+    folder = tmp_path_factory.mktemp("tables") / "sample"
+    make_sample(FOLDER, folder)
+    config = MotionConfig.from_dict(SCHEMA.motion, tables=SCHEMA.tables)
     databases = config.build(folder)
     return databases["loco"], config.selector("locomotion", databases)
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Unpack
 
@@ -406,6 +406,10 @@ class MotionDatabase:
                 raise MotionError(Fault(f"the weight of channel {in_quotes(name)} is {weight!r}.", "a finite number, 0 or more"))
             changed[self.channel_names.index(name)] = weight
         return replace(self, weights=changed)
+
+    def __getstate__(self) -> dict[str, object]:
+        """The fields alone: what a search has prepared is prepared anew where the database is unpickled."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def __repr__(self) -> str:
         sizes = plural(len(self.assets), "range"), plural(self.n_frames, "frame"), plural(self.n_features, "feature")

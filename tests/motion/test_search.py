@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from dataclasses import replace
 from itertools import pairwise
 
@@ -297,3 +298,10 @@ def test_the_memory_of_a_search_is_a_fifth_more_than_the_features_at_most():
     features = rng.normal(size=(int(stops[-1]), 27)).astype(np.float32)
     database = MotionDatabase.from_features(features, stops - lengths, stops, [f"a{i}" for i in range(60)])
     assert database.layout.n_bytes <= 1.2 * features.nbytes
+
+
+def test_a_database_that_has_searched_can_be_sent_to_another_process():
+    database = MotionDatabase.from_features(np.arange(40.0)[:, None], [0, 20], [20, 40], ["a", "b"])
+    hit = database.search([30.2])
+    copied = pickle.loads(pickle.dumps(database))
+    assert copied.search([30.2]) == hit

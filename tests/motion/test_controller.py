@@ -501,7 +501,7 @@ def scenes(draw):
     return made, rules, asked
 
 
-@settings(max_examples=8000)
+@settings(max_examples=300)
 @given(scenes())
 def test_every_update_follows_from_the_rules_read_frame_by_frame(scene):
     database, rules, asked = scene

@@ -1,8 +1,9 @@
-"""What contextdb.toml says of motion: feature schemas, databases and selectors, and how they are built from a folder.
+"""What contextdb.toml says of motion: feature schemas, databases, selectors and controllers, and how they are built from a folder.
 
     [features.NAME]     what a search compares
     [databases.NAME]    which clips, by which features; `table` names the table whose assets it holds
     [selectors.NAME]    databases in order: all but the last with the threshold under which they win outright
+    [controllers.NAME]  a selector, and how often and how a character may jump with it
 
 Reading touches no file; only `load_clips` and what builds do.
 """
@@ -12,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import TypedDict, TypeVar, Unpack
 
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, some
 from contextdb.motion import building, clips
@@ -20,14 +21,19 @@ from contextdb.motion.build_inputs import Assets
 from contextdb.motion.building import Progress
 from contextdb.motion.clip_files import clip_files
 from contextdb.motion.clips import Clip
+from contextdb.motion.controller import Clock, Controller
+from contextdb.motion.controller_settings import ControllerSettings, read_controllers
 from contextdb.motion.database import MotionDatabase
 from contextdb.motion.database_settings import DatabaseSettings, read_databases
+from contextdb.motion.decision import Recorder
 from contextdb.motion.features import CustomFunction, FeatureSchema
 from contextdb.motion.reading import Mapped, Section, as_toml, what_is
 from contextdb.motion.selector import Entry, Selector
+from contextdb.motion.variation import Rng
 
 __all__ = ["DatabaseSettings", "MotionConfig", "SelectorSettings"]
 
+SECTIONS = ("features", "databases", "selectors", "controllers")
 STEP_KEYS = ("database", "threshold")
 MOST_COST = 1e30
 
@@ -44,21 +50,26 @@ class SelectorSettings:
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """The sections `features`, `databases` and `selectors` of a contextdb.toml."""
+    """The sections `features`, `databases`, `selectors` and `controllers` of a contextdb.toml.
+
+    A controller is the name of its selector and its settings.
+    """
 
     features: Mapping[str, FeatureSchema] = field(default_factory=dict)
     databases: Mapping[str, DatabaseSettings] = field(default_factory=dict)
     selectors: Mapping[str, SelectorSettings] = field(default_factory=dict)
+    controllers: Mapping[str, tuple[str, ControllerSettings]] = field(default_factory=dict)
     file: str | None = None
 
     @classmethod
     def from_dict(cls, mapping: Mapped, *, tables: Collection[str] | None = None, file: str | None = None) -> MotionConfig:
-        """Read the three sections; other keys of `mapping` are passed over.
+        """Read the four sections; other keys of `mapping` are passed over.
 
         Parameters
         ----------
         mapping : mapping
-            `{"features": {...}, "databases": {...}, "selectors": {...}}`, as contextdb.toml holds them; each may be absent.
+            `{"features": {...}, "databases": {...}, "selectors": {...}, "controllers": {...}}`, as contextdb.toml holds them; each
+            may be absent. `Schema.motion` is one.
         tables : collection of str, optional
             The names of the tables there are. Default: any name is accepted.
         file : str, optional
@@ -70,16 +81,18 @@ class MotionConfig:
             With every fault of all sections.
         """
         faults: list[Fault] = []
-        parts = {section: _named_parts(mapping, section, faults, file) for section in ("features", "databases", "selectors")}
+        parts = {section: _named_parts(mapping, section, faults, file) for section in SECTIONS}
         schemas = dict(_read_schemas(parts["features"], faults, file))
         databases = {
             settings.name: settings
             for settings in read_databases(parts["databases"], parts["features"], schemas, tables, faults, file)
         }
         selectors = dict(_read_selectors(parts, faults, file))
+        known = read_controllers(parts["controllers"], parts["selectors"], faults, file)
+        controllers = {name: (selector, settings) for name, selector, settings in known}
         if faults:
             raise SchemaError(*faults)
-        return cls(schemas, databases, selectors, file)
+        return cls(schemas, databases, selectors, controllers, file)
 
     def database(self, name: str) -> DatabaseSettings:
         """The settings of the database of a name; an unknown name raises SchemaError with the nearest."""
@@ -129,6 +142,19 @@ class MotionConfig:
         """The selector of a name over built databases; one that is not among them counts as not loaded."""
         settings = _known("selectors", name, self.selectors, self.file)
         return Selector([Entry(database, databases.get(database), threshold) for database, threshold in settings.order])
+
+    def controller(self, name: str, databases: Mapping[str, MotionDatabase], **options: Unpack[ControllerOptions]) -> Controller:
+        """The controller of a name over built databases; `recorder`, `rng` and `clock` are those of `Controller`."""
+        selector, settings = _known("controllers", name, self.controllers, self.file)
+        return Controller(self.selector(selector, databases), settings, **options)
+
+
+class ControllerOptions(TypedDict, total=False):
+    """What a controller is given beside its selector and settings."""
+
+    recorder: Recorder | None
+    rng: Rng | None
+    clock: Clock | None
 
 
 def _known(section: str, name: str, parts: Mapping[str, Part], file: str | None) -> Part:

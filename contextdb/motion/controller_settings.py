@@ -4,12 +4,12 @@
     selector = "locomotion"
     search_every_s = 0.1       # between two searches, unless one is forced
     jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are no candidates
-    history_s = 0.3            # frames played within so many seconds are not entered again
+    history_s = 0.5            # frames played within so many seconds are not entered again
     variation_within = 0.05    # frames that cost at most so much more than the best are as good as it; without the key, none are
     variation_memory = 2       # and none of the last so many assets is chosen while another is as good
 
-Source: SearchThrottleTime, PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch; the defaults are those of its
-locomotion, but for the throttle, which is 0 there.
+Source: SearchThrottleTime, PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch. The default history is the shortest
+one with which a steered character without fitting clips still showed new frames half of the time.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from contextdb.motion.variation import Variation
 SECONDS = {
     "search_every_s": ("seconds from 0 to 60, such as 0.1; 0 is every update", 60.0),
     "jump_threshold_s": ("seconds from 0 to 60, such as 0.2", 60.0),
-    "history_s": ("seconds from 0 to 60, such as 0.3; 0 is no memory", 60.0),
+    "history_s": ("seconds from 0 to 60, such as 0.5; 0 is no memory", 60.0),
 }
 VARIATION = ("variation_within", "variation_memory")
 WITHIN = "a cost from 0 to 1e30, such as 0.05"
@@ -60,7 +60,7 @@ class ControllerSettings:
 
     search_every_s: float = 0.1
     jump_threshold_s: float = 0.2
-    history_s: float = 0.3
+    history_s: float = 0.5
     variation: Variation | None = None
     rate: float = 30.0
 

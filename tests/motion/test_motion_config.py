@@ -8,6 +8,7 @@ import pytest
 
 from contextdb.errors import ClipError, MotionError, SchemaError
 from contextdb.motion import DatabaseSettings, MotionConfig, Reason, make_clip, query_from, steady_path, write_bvh
+from contextdb.motion.controller_settings import ControllerSettings
 
 SECTIONS = {
     "features": {
@@ -245,3 +246,21 @@ def test_weights_of_a_schema_with_faults_are_not_held_against_the_database():
     with pytest.raises(SchemaError) as error:
         MotionConfig.from_dict(sections)
     assert len(error.value.faults) == 1
+
+
+def test_a_controller_has_its_selector_and_settings():
+    sections = SECTIONS | {"controllers": {"player": {"selector": "locomotion", "search_every_s": 0.2}}}
+    config = MotionConfig.from_dict(sections)
+    controller = config.controller("player", {})
+    assert [entry.name for entry in controller.selector.entries] == ["jog_tired", "jog"]
+    assert controller.settings == ControllerSettings(search_every_s=0.2)
+    with pytest.raises(SchemaError, match=r'Did you mean "player"'):
+        config.controller("playr", {})
+
+
+def test_a_controller_of_a_selector_that_is_not_there_is_told_beside_other_faults():
+    sections = SECTIONS | {"controllers": {"player": {"selector": "locomotoin", "history_s": -1}}}
+    with pytest.raises(SchemaError) as error:
+        MotionConfig.from_dict(sections)
+    assert len(error.value.faults) == 2
+    assert 'Did you mean selector = "locomotion"?' in str(error.value)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any, TypeAlias, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contextdb.errors import Fault, QueryError
 from contextdb.motion.arguments import HasAssets, Valid
 from contextdb.motion.choice import Choice
 from contextdb.motion.filtering import Penalties, Tags
@@ -45,6 +47,16 @@ class Asked:
     among: Among | None = None
     skip: Mapping[str, Sequence[Skip]] | None = None
     penalties: OfPenalties | None = None
+
+    def __post_init__(self) -> None:
+        for what in ("bias", "skip", "penalties"):
+            if not isinstance(given := getattr(self, what), (Mapping, NoneType)):
+                accepted = f"{'a mapping of assets to costs, or ' if what == 'penalties' else ''}a mapping of databases"
+                raise QueryError(Fault(f"{what} is a {type(given).__name__}.", accepted))
+        if not isinstance(self.tags, (TagFilter, Mapping, NoneType)):
+            raise QueryError(Fault(f"tags is a {type(self.tags).__name__}.", "a TagFilter, or a mapping of databases"))
+        if not isinstance(self.current, (Choice, NoneType)) and not _is_pair(self.current):
+            raise QueryError(Fault(f"what plays now is {self.current!r}.", 'a Choice, or such as ("jog", 120)'))
 
     def of(self, name: str) -> dict[str, Any]:
         """What one database is given, by the names of the parameters of `MotionDatabase.search`."""
@@ -86,6 +98,10 @@ class Asked:
 
     def _penalties_of(self, name: str) -> object:
         return self.penalties if not self.penalties or _are_of_assets(self.penalties) else self.penalties.get(name)
+
+
+def _is_pair(current: object) -> bool:
+    return isinstance(current, tuple) and len(current) == 2
 
 
 def _are_of_assets(penalties: OfPenalties) -> bool:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
-from contextdb.motion import arguments, cost
+from contextdb.motion import arguments
 from contextdb.motion.database import MotionDatabase
 from contextdb.motion.filters import Filter
 from contextdb.motion.quaternions import Floats
@@ -33,6 +34,20 @@ def continuing_cost(database: MotionDatabase, query: Floats, chosen: Filter) -> 
     if len(chosen.frame_biases):
         bias += float(chosen.frame_biases[frame])
     wanted = database.normalisation.apply(arguments.query_of(query, database.feature_names))
-    found = float(cost.costs(database.layout, np.array([frame]), wanted, database.slices, database.weights)[0])
-    total = found + (bias + chosen.continuing)
+    total = _cost(database, frame, wanted) + (bias + chosen.continuing)
     return total if total < math.inf else None
+
+
+def _cost(database: MotionDatabase, frame: int, query: Floats) -> float:
+    """The cost of one frame for a normalised query: the sums of `contextdb.motion.cost`, in their order, without their arrays."""
+    values, wanted = database.layout.take(np.array([frame]))[0].tolist(), query.tolist()
+    squares = [(value - want) * (value - want) for value, want in zip(values, wanted, strict=True)]
+    return _sum(weight * _sum(squares[columns]) for columns, weight in zip(database.slices, database.weights.tolist(), strict=True))
+
+
+def _sum(values: Iterable[float]) -> float:
+    """A sum added one by one, each step rounded: Python's own keeps what is rounded away, from 3.12 on."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total

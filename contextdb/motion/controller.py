@@ -138,8 +138,7 @@ class Controller:
         """
         dt_s = _seconds(dt_s)
         asked = Asked(valid, tags, None, bias, among, None, penalties)
-        ongoing = Ongoing.of(self._state.playing, self.selector, self.settings.rate, dt_s)
-        step = Step(self.selector, self.settings, self._state, dt_s, self._checked(query), asked, ongoing)
+        step = Step.of(self.selector, self.settings, self._state, dt_s, self._checked(query), asked)
         decision = self._decided(step, step.trigger(force, interrupt), context)
         if self.recorder is not None:
             self.recorder.record(decision)

@@ -8,8 +8,8 @@
     variation_within = 0.05    # frames that cost at most so much more than the best are as good as it; without the key, none are
     variation_memory = 2       # and none of the last so many assets is chosen while another is as good
 
-Source: SearchThrottleTime, PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch. The default history is the shortest
-one with which a steered character without fitting clips still showed new frames half of the time.
+Source: SearchThrottleTime, PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch. The default history is the
+shortest one with which a steered character without fitting clips still showed new frames half of the time.
 """
 
 from __future__ import annotations

@@ -32,18 +32,18 @@ class Played:
 def remembered(
     history: tuple[Played, ...], database: str, spans: Iterable[tuple[int, int]], now_s: float, for_s: float
 ) -> tuple[Played, ...]:
-    """A history with some spans that are played now; what is older than `for_s` seconds is forgotten."""
-    recent = tuple(played for played in history if _is_recent(played, now_s, for_s))
+    """A history with some spans that are played now; what was played `for_s` seconds ago, or before, is forgotten."""
+    oldest_s = now_s - for_s + TOLERANCE_S
+    recent = tuple(played for played in history if played.time_s > oldest_s)
     return recent + tuple(Played(database, start, stop, now_s) for start, stop in spans) if for_s > 0.0 else ()
 
 
-def history_skips(history: Iterable[Played], now_s: float, for_s: float) -> dict[str, list[Skip]]:
-    """What was played within the last `for_s` seconds, by database; spans that touch are one."""
-    found: dict[str, list[Skip]] = {}
-    for played in sorted(history, key=lambda played: (played.database, played.start)):
-        if _is_recent(played, now_s, for_s):
-            _add(found.setdefault(played.database, []), Skip(played.start, played.stop, LeftOut.HISTORY))
-    return found
+def history_skips(history: Iterable[Played]) -> dict[str, list[Skip]]:
+    """What was played, by database; spans that touch are one."""
+    spans: dict[str, list[tuple[int, int]]] = {}
+    for played in history:
+        spans.setdefault(played.database, []).append((played.start, played.stop))
+    return {name: [Skip(start, stop, LeftOut.HISTORY) for start, stop in _joined(found)] for name, found in spans.items()}
 
 
 def playing_skips(head: Playhead, frame: int, threshold_s: float) -> Iterator[Skip]:
@@ -67,15 +67,16 @@ def ended_skip(head: Playhead, frame: int, threshold_s: float) -> Skip:
     return Skip(max(frame - _n_frames(threshold_s, head.rate), head.start + 1), head.stop, LeftOut.JUMP)
 
 
-def _add(skips: list[Skip], skip: Skip) -> None:
-    """Add a span, or lengthen the last one that it touches."""
-    if skips and skip.start <= skips[-1].stop:
-        skip = Skip(skips[-1].start, max(skips.pop().stop, skip.stop), skip.why)
-    skips.append(skip)
-
-
-def _is_recent(played: Played, now_s: float, for_s: float) -> bool:
-    return now_s - played.time_s < for_s - TOLERANCE_S
+def _joined(spans: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
+    """Spans in order, those that touch as one."""
+    first, *others = sorted(spans)
+    start, stop = first
+    for next_start, next_stop in others:
+        if next_start > stop:
+            yield start, stop
+            start = next_start
+        stop = max(stop, next_stop)
+    yield start, stop
 
 
 def _n_frames(seconds: float, rate: float) -> int:

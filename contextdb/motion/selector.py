@@ -165,8 +165,11 @@ class Selector:
         """The names of the databases that some names, or the assets of some Matches, stand for: of all for None."""
         if among is None:
             return frozenset(self.names)
-        if not isinstance(among, Collection) or hasattr(among, "assets"):
-            return frozenset(among.assets).intersection(self.names)
+        assets = getattr(among, "assets", None)
+        if assets is not None:
+            return frozenset(assets).intersection(self.names)
+        if not isinstance(among, Collection):
+            raise QueryError(Fault(f"the databases of the moment are {among!r}.", some(self.names)))
         names = [among] if isinstance(among, str) else list(among)
         self._check_names(names)
         return frozenset(names)

@@ -38,7 +38,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """An update under way: where the controller stands, what it is asked, and what plays, moved on."""
+    """An update under way: where the controller stands, what it is asked, and what plays and was played, moved on."""
 
     selector: Selector
     settings: ControllerSettings
@@ -47,19 +47,23 @@ class Step:
     query: Floats
     asked: Asked
     ongoing: Ongoing | None
+    history: tuple[Played, ...]
+
+    @classmethod
+    def of(
+        cls, selector: Selector, settings: ControllerSettings, state: ControllerState, dt_s: float, query: Floats, asked: Asked
+    ) -> Step:
+        """An update that moves what plays on by some time."""
+        now_s, for_s = state.time_s + dt_s, settings.history_s
+        ongoing = Ongoing.of(state.playing, selector, settings.rate, dt_s)
+        name, spans = ("", ()) if ongoing is None else (ongoing.database, ongoing.move.spans)
+        history = remembered(state.history, name, spans, now_s, for_s)
+        return cls(selector, settings, state, dt_s, query, asked, ongoing, history)
 
     @property
     def now_s(self) -> float:
         """Seconds of play, this update's in it."""
         return self.state.time_s + self.dt_s
-
-    @property
-    def history(self) -> tuple[Played, ...]:
-        """What was played, with what was passed in this update."""
-        for_s = self.settings.history_s
-        if self.ongoing is None:
-            return remembered(self.state.history, "", (), self.now_s, for_s)
-        return remembered(self.state.history, self.ongoing.database, self.ongoing.move.spans, self.now_s, for_s)
 
     @property
     def before(self) -> Playing | None:
@@ -96,11 +100,7 @@ class Step:
 
     def wanted(self, cause: Trigger) -> Asked:
         """What the selector is asked: beside what the caller asks, what may play on, and what is left out."""
-        skip = {
-            name: skips
-            for name, skips in history_skips(self.history, self.now_s, self.settings.history_s).items()
-            if name in self.selector.databases
-        }
+        skip = {name: skips for name, skips in history_skips(self.history).items() if name in self.selector.databases}
         if self.ongoing is None:
             return replace(self.asked, skip=skip)
         name, frame = self.ongoing.database, self.ongoing.move.frame

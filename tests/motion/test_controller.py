@@ -1,4 +1,4 @@
-"""One character: each rule as a scenario, and every update against a plain reading of all rules, frame by frame."""
+"""One character: each rule as a scenario."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from lines import DT, RATE, line
 
 from contextdb.errors import MotionError, QueryError
-from contextdb.motion import Entry, Selector, Status
+from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, Status, make_clip
+from contextdb.motion.continuing import continuing_cost
 from contextdb.motion.controller import Controller
-from contextdb.motion.controller_settings import ControllerSettings, read_controllers
+from contextdb.motion.controller_settings import ControllerSettings
 from contextdb.motion.controller_state import ControllerState
 from contextdb.motion.decision import Action
+from contextdb.motion.filters import Biases
 from contextdb.motion.left_out import LeftOut
-from contextdb.motion.marks import Mark, TagFilter
+from contextdb.motion.marks import TagFilter
 from contextdb.motion.variation import Variation
 
 EVERY = {"search_every_s": 0.0, "jump_threshold_s": 0.0, "history_s": 0.0, "rate": RATE}
@@ -94,6 +94,21 @@ def test_the_cost_of_playing_on_is_to_the_last_bit_what_the_search_makes_of_it()
     current = next(row for row in decision.candidates[0][1] if row.frame == 1)
     assert decision.continuing_cost == current.cost
     assert set(current.biases) == {"base", "penalty", "tags", "modifier", "given", "continuing"}
+
+
+def test_the_cost_of_playing_on_is_exact_in_a_database_of_many_channels():
+    channels = [{"type": kind, "bone": bone, "weight": 0.7} for kind in ("position", "velocity") for bone in ("LeftFoot", "Hips")]
+    schema = FeatureSchema.from_dict(
+        "loco", {"rate": 30.0, "channels": [*channels, {"type": "trajectory", "what": "speed", "at": 0.3}]}
+    )
+    clips = [make_clip(name).clip for name in ("walk", "run")]
+    database = MotionDatabase.build(clips, schema, biases=Biases(0.1, -0.005, -0.01))
+    stick = random.Random(6)
+    for _ in range(50):
+        current, query = stick.randrange(database.n_frames), database.raw(stick.randrange(database.n_frames))
+        found = database.candidates(query, database.n_frames, current=current)
+        expected = next(row.cost for row in found if row.frame == current)
+        assert continuing_cost(database, query, database.filter(current=current)) == expected
 
 
 def test_on_a_tie_the_character_plays_on():
@@ -475,167 +490,3 @@ def test_recording_changes_no_decision():
     database = line(walk=range(10), run=range(2, 12))
     plain, recorded = controller(database), controller(database, recorder=Recorder(3))
     assert [told(plain.update(DT, place)) for place in asked] == [told(recorded.update(DT, place)) for place in asked]
-
-
-# ---- every update against a plain reading of the rules
-
-
-@st.composite
-def scenes(draw):
-    """A database of a few short assets with markup, settings, and what is asked at each of some updates of one frame."""
-    names = "pqr"[: draw(st.integers(1, 3))]
-    assets = {name: draw(st.lists(st.integers(0, 6), min_size=1, max_size=9)) for name in names}
-    rows = []
-    for name in names:
-        if draw(st.booleans()):
-            rows.append(f"{name},Looping,,,")
-        if draw(st.booleans()):
-            start, length = draw(st.integers(0, 6)) / RATE, draw(st.integers(0, 3)) / RATE
-            tag = draw(st.sampled_from(["DoNotChoose", "Excluded", "NextNaturalOnly"]))
-            rows.append(f"{name},{tag},{start},{start + length},{0.1 if length and tag == 'NextNaturalOnly' else ''}")
-    made = line("\n".join(rows), continuing=draw(st.sampled_from([0.0, -0.5, -3.0])), **assets)
-    seconds = st.sampled_from([0.0, 0.1, 0.2, 0.3])
-    rules = {key: draw(seconds) for key in ("search_every_s", "jump_threshold_s", "history_s")}
-    masks = st.one_of(st.none(), st.lists(st.booleans(), min_size=len(names), max_size=len(names)))
-    asked = draw(st.lists(st.tuples(st.integers(0, 6), masks), min_size=1, max_size=25))
-    return made, rules, asked
-
-
-@settings(max_examples=300)
-@given(scenes())
-def test_every_update_follows_from_the_rules_read_frame_by_frame(scene):
-    database, rules, asked = scene
-    one = controller(database, **rules)
-    oracle = Oracle(database, rules)
-    for place, mask in asked:
-        decision = one.update(DT, [float(place)], None if mask is None else np.array(mask))
-        expected = oracle.update(float(place), mask)
-        assert (decision.action, decision.searched, decision.playing and decision.playing.frame) == expected
-
-
-class Oracle:
-    """A character at one frame an update; every rule asked of every frame, one by one."""
-
-    def __init__(self, database, rules):
-        self.database = database
-        self.n = {key: round(seconds * RATE) for key, seconds in rules.items()}
-        self.frame, self.tick, self.searched_at, self.played = None, 0, 0, {}
-
-    def update(self, place, mask):
-        self.tick += 1
-        following, passed, is_looped = self._following()
-        searched = self._must_search(following, mask)
-        may_continue = following is not None and self._is_valid(following, mask)
-        before, here = self.frame, (passed or [self.frame])[-1]
-        self.played.update(dict.fromkeys(passed, self.tick))
-        chosen = self._best(place, mask, here, may_continue, following is None) if searched else following
-        if searched:
-            self.searched_at = self.tick
-        self.frame = here if chosen is None else chosen
-        if self.frame is not None and chosen is not None:
-            self.played[chosen] = self.tick
-        onward = Action.LOOP if is_looped else Action.CONTINUE
-        if self.frame is None:
-            return Action.NOTHING, True, None
-        if chosen is None:
-            return Action.HOLD if following is None else onward, True, self.frame
-        if chosen == following and (may_continue or not searched):
-            return onward, searched, chosen
-        return Action.START if before is None else Action.JUMP, True, chosen
-
-    def _following(self):
-        """The frame one on, None for none; the frames that are passed on the way; and whether the end was passed."""
-        if self.frame is None:
-            return None, [], False
-        i = self.database.range_of(self.frame)
-        start, stop = int(self.database.starts[i]), int(self.database.stops[i])
-        is_excluded = [bool(self.database.marks.mark_of(frame) & Mark.EXCLUDED) for frame in range(stop)]
-        if self.frame + 1 < stop:
-            return (None, [], False) if is_excluded[self.frame + 1] else (self.frame + 1, [self.frame + 1], False)
-        if not self.database.marks.looping[i] or stop - start < 2 or is_excluded[start]:
-            return None, [], False
-        if is_excluded[start + 1]:  # the last frame is the first once more
-            return None, [start], True
-        return start + 1, [start, start + 1], True
-
-    def _must_search(self, following, mask):
-        if following is None or not self._is_valid(following, mask):
-            return True
-        return self.tick - self.searched_at >= self.n["search_every_s"]
-
-    def _is_valid(self, frame, mask):
-        return mask is None or mask[self.database.range_of(frame)]
-
-    def _best(self, place, mask, here, may_continue, is_ended):
-        found, least = None, math.inf
-        for frame in range(self.database.n_frames):
-            is_current = may_continue and frame == here
-            if not is_current and not self._may_enter(frame, mask, here, is_ended):
-                continue
-            cost = float(self.database.features[frame, 0] - place) ** 2
-            cost += self.database.biases.continuing if is_current else 0.0
-            if cost < least or (cost == least and is_current):
-                found, least = frame, cost
-        return found
-
-    def _may_enter(self, frame, mask, here, is_ended):
-        mark = self.database.marks.mark_of(frame)
-        if mark & (Mark.EXCLUDED | Mark.DO_NOT_CHOOSE | Mark.PAST_ENTRY) or not self._is_valid(frame, mask):
-            return False
-        if self.tick - self.played.get(frame, -99) < self.n["history_s"]:
-            return False
-        if here is None or self.database.range_of(frame) != self.database.range_of(here):
-            return True
-        i = self.database.range_of(here)
-        start, stop = int(self.database.starts[i]), int(self.database.stops[i])
-        if is_ended:
-            near = max(self.n["jump_threshold_s"], self.n["search_every_s"])
-            return frame == start or frame < here - near
-        if self.database.marks.mark_of(here) & Mark.NEXT_NATURAL:
-            return False
-        apart = abs(frame - here)
-        if self.database.marks.looping[i] and stop - start > 1:
-            apart = min(apart, stop - start - 1 - apart)
-        return apart > self.n["jump_threshold_s"]
-
-
-# ---- settings
-
-
-def read(**part):
-    faults = []
-    found = list(read_controllers({"player": {"selector": "loco", **part}}, ["loco"], faults, "contextdb.toml"))
-    return found, [str(fault) for fault in faults]
-
-
-def test_settings_are_read_from_the_project():
-    keys = {"search_every_s": 0.0, "jump_threshold_s": 0.5, "history_s": 1, "variation_within": 0.05, "variation_memory": 2}
-    found, faults = read(**keys)
-    assert found == [("player", "loco", ControllerSettings(0.0, 0.5, 1.0, Variation(0.05, 2)))]
-    assert faults == []
-    assert read()[0] == [("player", "loco", ControllerSettings())]
-
-
-@pytest.mark.parametrize(
-    ("part", "message"),
-    [
-        ({"selector": "locos"}, 'there is no such selector. Accepted: "loco". Did you mean selector = "loco"?'),
-        ({"search_every": 0.1}, 'has no key "search_every"'),
-        ({"history_s": "0.3"}, 'history_s = "0.3": this is text, not a number'),
-        ({"jump_threshold_s": -1}, "jump_threshold_s = -1: this is out of range"),
-        ({"variation_memory": 2}, 'has "variation_memory", but without "variation_within" nothing varies'),
-        ({"variation_within": 0.1, "variation_memory": 1.5}, "this is no whole number. Accepted: a whole number from 0 to 1000"),
-        ({"variation_within": True}, "variation_within = true: this is true or false, not a number"),
-    ],
-)
-def test_settings_that_cannot_be_meant_are_told_with_the_nearest_mend(part, message):
-    found, faults = read(**part)
-    assert found == []
-    assert len(faults) == 1
-    assert message in faults[0]
-    assert faults[0].startswith("contextdb.toml: [controllers.player]")
-
-
-def test_settings_made_in_python_are_checked_too():
-    with pytest.raises(MotionError, match=r"search_every_s is -1\.0\. Accepted: a number, 0 or more\.\nrate is 0\.0\."):
-        ControllerSettings(search_every_s=-1.0, rate=0.0)

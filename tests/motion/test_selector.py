@@ -273,3 +273,19 @@ def test_the_best_of_each_range_is_had_of_one_database():
     assert selector.best_of_ranges("a", [0.0], 0.5, among=["b"]) == []
     with pytest.raises(QueryError, match='the selector has no database "c"'):
         selector.best_of_ranges("c", [0.0], 0.5)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"among": 3}, r"the databases of the moment are 3\. Accepted: "),
+        ({"tags": [True, False]}, r"tags is a list\. Accepted: a TagFilter, or a mapping of databases"),
+        ({"bias": np.zeros(2)}, r"bias is a ndarray\. Accepted: a mapping of databases"),
+        ({"skip": [Skip(0, 1)]}, "skip is a list"),
+        ({"penalties": [1.0]}, r"penalties is a list\. Accepted: a mapping of assets to costs"),
+        ({"current": 5}, r"what plays now is 5\. Accepted: a Choice, or such as"),
+    ],
+)
+def test_what_a_selector_cannot_be_asked_with_is_refused(given, message):
+    with pytest.raises(QueryError, match=message):
+        SELECTOR.search([9.0], **given)

@@ -1,0 +1,135 @@
+"""Every update of a character against a plain reading of all rules, frame by frame."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lines import DT, RATE, line
+
+from contextdb.motion import Entry, Selector
+from contextdb.motion.controller import Controller
+from contextdb.motion.controller_settings import ControllerSettings
+from contextdb.motion.decision import Action
+from contextdb.motion.marks import Mark
+
+
+@st.composite
+def scenes(draw):
+    """A database of a few short assets with markup, settings, and what is asked at each of some updates of one frame."""
+    names = "pqr"[: draw(st.integers(1, 3))]
+    assets = {name: draw(st.lists(st.integers(0, 6), min_size=1, max_size=9)) for name in names}
+    rows = []
+    for name in names:
+        if draw(st.booleans()):
+            rows.append(f"{name},Looping,,,")
+        if draw(st.booleans()):
+            start, length = draw(st.integers(0, 6)) / RATE, draw(st.integers(0, 3)) / RATE
+            tag = draw(st.sampled_from(["DoNotChoose", "Excluded", "NextNaturalOnly"]))
+            rows.append(f"{name},{tag},{start},{start + length},{0.1 if length and tag == 'NextNaturalOnly' else ''}")
+    made = line("\n".join(rows), continuing=draw(st.sampled_from([0.0, -0.5, -3.0])), **assets)
+    seconds = st.sampled_from([0.0, 0.1, 0.2, 0.3])
+    rules = {key: draw(seconds) for key in ("search_every_s", "jump_threshold_s", "history_s")}
+    masks = st.one_of(st.none(), st.lists(st.booleans(), min_size=len(names), max_size=len(names)))
+    asked = draw(st.lists(st.tuples(st.integers(0, 6), masks), min_size=1, max_size=25))
+    return made, rules, asked
+
+
+@settings(max_examples=300)
+@given(scenes())
+def test_every_update_follows_from_the_rules_read_frame_by_frame(scene):
+    database, rules, asked = scene
+    one = Controller(Selector([Entry("a", database)]), ControllerSettings(**rules, rate=RATE))
+    oracle = Oracle(database, rules)
+    for place, mask in asked:
+        decision = one.update(DT, [float(place)], None if mask is None else np.array(mask))
+        expected = oracle.update(float(place), mask)
+        assert (decision.action, decision.searched, decision.playing and decision.playing.frame) == expected
+
+
+class Oracle:
+    """A character at one frame an update; every rule asked of every frame, one by one."""
+
+    def __init__(self, database, rules):
+        self.database = database
+        self.n = {key: round(seconds * RATE) for key, seconds in rules.items()}
+        self.frame, self.tick, self.searched_at, self.played = None, 0, 0, {}
+
+    def update(self, place, mask):
+        self.tick += 1
+        following, passed, is_looped = self._following()
+        searched = self._must_search(following, mask)
+        may_continue = following is not None and self._is_valid(following, mask)
+        before, here = self.frame, (passed or [self.frame])[-1]
+        self.played.update(dict.fromkeys(passed, self.tick))
+        chosen = self._best(place, mask, here, may_continue, following is None) if searched else following
+        if searched:
+            self.searched_at = self.tick
+        self.frame = here if chosen is None else chosen
+        if self.frame is not None and chosen is not None:
+            self.played[chosen] = self.tick
+        onward = Action.LOOP if is_looped else Action.CONTINUE
+        if self.frame is None:
+            return Action.NOTHING, True, None
+        if chosen is None:
+            return Action.HOLD if following is None else onward, True, self.frame
+        if chosen == following and (may_continue or not searched):
+            return onward, searched, chosen
+        return Action.START if before is None else Action.JUMP, True, chosen
+
+    def _following(self):
+        """The frame one on, None for none; the frames that are passed on the way; and whether the end was passed."""
+        if self.frame is None:
+            return None, [], False
+        i = self.database.range_of(self.frame)
+        start, stop = int(self.database.starts[i]), int(self.database.stops[i])
+        is_excluded = [bool(self.database.marks.mark_of(frame) & Mark.EXCLUDED) for frame in range(stop)]
+        if self.frame + 1 < stop:
+            return (None, [], False) if is_excluded[self.frame + 1] else (self.frame + 1, [self.frame + 1], False)
+        if not self.database.marks.looping[i] or stop - start < 2 or is_excluded[start]:
+            return None, [], False
+        if is_excluded[start + 1]:  # the last frame is the first once more
+            return None, [start], True
+        return start + 1, [start, start + 1], True
+
+    def _must_search(self, following, mask):
+        if following is None or not self._is_valid(following, mask):
+            return True
+        return self.tick - self.searched_at >= self.n["search_every_s"]
+
+    def _is_valid(self, frame, mask):
+        return mask is None or mask[self.database.range_of(frame)]
+
+    def _best(self, place, mask, here, may_continue, is_ended):
+        found, least = None, math.inf
+        for frame in range(self.database.n_frames):
+            is_current = may_continue and frame == here
+            if not is_current and not self._may_enter(frame, mask, here, is_ended):
+                continue
+            cost = float(self.database.features[frame, 0] - place) ** 2
+            cost += self.database.biases.continuing if is_current else 0.0
+            if cost < least or (cost == least and is_current):
+                found, least = frame, cost
+        return found
+
+    def _may_enter(self, frame, mask, here, is_ended):
+        mark = self.database.marks.mark_of(frame)
+        if mark & (Mark.EXCLUDED | Mark.DO_NOT_CHOOSE | Mark.PAST_ENTRY) or not self._is_valid(frame, mask):
+            return False
+        if self.tick - self.played.get(frame, -99) < self.n["history_s"]:
+            return False
+        if here is None or self.database.range_of(frame) != self.database.range_of(here):
+            return True
+        i = self.database.range_of(here)
+        start, stop = int(self.database.starts[i]), int(self.database.stops[i])
+        if is_ended:
+            near = max(self.n["jump_threshold_s"], self.n["search_every_s"])
+            return frame == start or frame < here - near
+        if self.database.marks.mark_of(here) & Mark.NEXT_NATURAL:
+            return False
+        apart = abs(frame - here)
+        if self.database.marks.looping[i] and stop - start > 1:
+            apart = min(apart, stop - start - 1 - apart)
+        return apart > self.n["jump_threshold_s"]

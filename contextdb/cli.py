@@ -1,11 +1,15 @@
-"""The command line: parse, call, print. Each command is a module of `contextdb.commands`, imported when it is asked for."""
+"""The command line: parse, call, print. Each command is a module of `contextdb.commands`, imported when it is asked for.
+
+A module that has `COMMANDS` instead of `run` is a group: the next word says which of its commands is meant.
+"""
 
 from __future__ import annotations
 
 import argparse
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 from typing import IO, Any, NoReturn
@@ -19,6 +23,7 @@ COMMANDS = {
     "evaluate": "every context of a file: how many assets are valid in each",
     "check": "what is wrong with the tables",
     "compile": "write the binary artefact for the game",
+    "motion": "motion databases: build, search, select, run, replay",
     "demo": "the whole way on the sample tables",
 }
 
@@ -65,12 +70,49 @@ class Help(argparse.HelpFormatter):
         return "\n\n".join(p if p.startswith(" ") else textwrap.fill(" ".join(p.split()), width) for p in paragraphs)
 
 
+@dataclass(frozen=True)
+class Group:
+    """Commands that begin with the same words: all of them, or those of `contextdb motion`."""
+
+    words: tuple[str, ...]
+    commands: Mapping[str, str]
+    about: str | None = None
+
+    @property
+    def overview(self) -> str:
+        """The commands, each with what it does."""
+        return _overview(self.commands) if self.about is None else self._help()
+
+    def command(self, name: str) -> ModuleType:
+        """The module of a command; an unknown name is refused with the nearest."""
+        if name in self.commands:
+            return import_module(f"contextdb.commands.{'_'.join((*self.words, name))}_command")
+        near = nearest(name, self.commands)
+        mend = in_quotes(" ".join((*self.words, near))) if near else ""
+        found = f"there is no command {in_quotes(' '.join((*self.words, name)))}."
+        raise ContextDBError(Fault(found, ", ".join(self.commands), mend))
+
+    def parser(self, name: str, command: ModuleType) -> Parser:
+        """What reads the arguments of a command."""
+        parser = _new_parser((*self.words, name), command.__doc__)
+        command.add_arguments(parser)
+        return parser
+
+    def _help(self) -> str:
+        parser = _new_parser(self.words, self.about)
+        parser.usage = f"{parser.prog} COMMAND …"
+        listed = parser.add_argument_group("commands")
+        for name, text in self.commands.items():
+            listed.add_argument(name, help=text)
+        return parser.format_help()
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; gives the exit code. Errors of contextdb go to standard error, each fault on its line."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     _use_utf8()
     try:
-        code = _run(given)
+        code = _run(Group((), COMMANDS), given)
         sys.stdout.flush()
         return code
     except ContextDBError as error:
@@ -93,41 +135,35 @@ def _failed(*faults: Fault) -> ExitCode:
     return ExitCode.BAD_USE
 
 
-def _run(given: Sequence[str]) -> int:
+def _run(group: Group, given: Sequence[str]) -> int:
     if not given or given[0] in ("-h", "--help"):
-        print(_overview(), end="", file=sys.stdout if given else sys.stderr)
+        print(group.overview, end="", file=sys.stdout if given else sys.stderr)
         return ExitCode.OK if given else ExitCode.BAD_USE
-    if given[0] == "--version":
+    if given[0] == "--version" and not group.words:
         from contextdb import __version__
 
         print(f"contextdb {__version__}")
         return ExitCode.OK
     if given[0] == "help":
-        return _run([*given[1:2], "--help"])
-    command = _command(given[0])
+        return _run(group, [*given[1:], "--help"])
+    command = group.command(given[0])
+    if hasattr(command, "COMMANDS"):
+        return _run(Group((*group.words, given[0]), command.COMMANDS, command.__doc__), given[1:])
     try:
-        return int(command.run(_parser(given[0], command).parse(given[1:])))
+        return int(command.run(group.parser(given[0], command).parse(given[1:])))
     except SystemExit as leaving:  # how argparse ends after --help and after an error
         sys.stdout.flush()
         return int(leaving.code or 0)
 
 
-def _command(name: str) -> ModuleType:
-    if name not in COMMANDS:
-        near = nearest(name, COMMANDS)
-        raise ContextDBError(Fault(f"there is no command {in_quotes(name)}.", ", ".join(COMMANDS), in_quotes(near) if near else ""))
-    return import_module(f"contextdb.commands.{name}_command")
+def _new_parser(words: Sequence[str], about: str | None) -> Parser:
+    prog = " ".join(("contextdb", *words))
+    return Parser(prog=prog, description=about, formatter_class=Help, allow_abbrev=False)
 
 
-def _parser(name: str, command: ModuleType) -> Parser:
-    parser = Parser(prog=f"contextdb {name}", description=command.__doc__, formatter_class=Help, allow_abbrev=False)
-    command.add_arguments(parser)
-    return parser
-
-
-def _overview() -> str:
-    width = max(map(len, COMMANDS))
-    lines = [f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()]
+def _overview(commands: Mapping[str, str]) -> str:
+    width = max(map(len, commands))
+    lines = [f"  {name:<{width}}  {text}" for name, text in commands.items()]
     return (
         "usage: contextdb COMMAND …\n\n"
         + "\n".join(lines)

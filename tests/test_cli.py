@@ -83,12 +83,12 @@ def test_a_misspelt_command_is_named_with_the_nearest(word: str, near: str):
     assert run(word, "t.csv") == Result(
         2,
         "",
-        f'contextdb: there is no command "{word}". Accepted: query, evaluate, check, compile, demo. Did you mean "{near}"?\n',
+        f'contextdb: there is no command "{word}". Accepted: query, evaluate, check, compile, motion, demo. Did you mean "{near}"?\n',
     )
 
 
 def test_a_command_that_is_like_none_is_refused_without_a_guess():
-    assert run("xyzzy").err == 'contextdb: there is no command "xyzzy". Accepted: query, evaluate, check, compile, demo.\n'
+    assert run("xyzzy").err == 'contextdb: there is no command "xyzzy". Accepted: query, evaluate, check, compile, motion, demo.\n'
 
 
 @pytest.mark.parametrize(

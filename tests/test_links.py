@@ -119,8 +119,7 @@ def test_every_example_of_a_contextdb_toml_is_accepted():
     assert examples
     for example in examples:
         schema = read_schema(example, "contextdb.toml")
-        parts = {"features": schema.features, "databases": schema.databases, "selectors": schema.selectors}
-        MotionConfig.from_dict(parts, file="contextdb.toml")
+        MotionConfig.from_dict(schema.motion, file="contextdb.toml")
 
 
 def test_the_format_page_names_every_section_and_key_of_contextdb_toml():

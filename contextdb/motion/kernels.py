@@ -27,7 +27,7 @@ from contextdb.motion.skeleton import Ints
 _options: dict[str, Any] = {"cache": True, "nogil": True, "boundscheck": False, "error_model": "numpy"}
 
 LANES = 16
-FEW = 6
+FEW = 14
 """After so many features each, a box, group or cluster may be given up."""
 UNIT = 6e-8
 """The greatest relative rounding error of one float32 operation."""

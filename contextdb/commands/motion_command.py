@@ -1,0 +1,17 @@
+"""Motion matching over the valid assets: databases from clips, a search with its costs, a choice of databases, recorded sessions.
+
+contextdb motion build game/
+contextdb motion search game/ loco --query walk@1.5 --speed 1.3
+contextdb motion run game/ player stick.csv --out session.parquet
+contextdb motion replay session.parquet --at 2.5s
+"""
+
+from __future__ import annotations
+
+COMMANDS = {
+    "build": "save the motion databases that contextdb.toml declares",
+    "search": "the best frames of one database, with what each channel adds to their cost",
+    "select": "which database of a selector wins, with which frame, and why",
+    "run": "steer a character along a recorded stick, and record what it decides",
+    "replay": "what was decided in a recorded session, and why",
+}

@@ -1,0 +1,109 @@
+"""What was decided in a recorded session: what changed, when, and why; with --at, one decision in full.
+
+Without --at a row stands for each change, with what playing on would have cost and how long it then went on. --at takes an update's
+tick, as the first column tells it, or a time such as 2.5s.
+
+  contextdb motion replay session.parquet
+  contextdb motion replay session.parquet --at 2.5s --view pose
+  contextdb motion replay session.parquet --name jog
+"""
+
+from __future__ import annotations
+
+import argparse
+from bisect import bisect_right
+
+from contextdb.commands.motion_stage import add_view
+from contextdb.console import output, terminal_width
+from contextdb.errors import Fault, Place, QueryError, in_quotes
+from contextdb.exit_codes import ExitCode
+from contextdb.motion.cost_views import View
+from contextdb.motion.decision import Playing
+from contextdb.motion.reading import as_number
+from contextdb.motion.trace import Trace
+from contextdb.motion.trace_json import decision_json
+from contextdb.motion.views import decision_lines, session_lines, summary_line
+from contextdb.report.render_json import as_json
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("file", metavar="FILE", help="a recorded session, a .parquet file")
+    parser.add_argument("--at", metavar="N|TIME", help="one decision in full: its tick, or a time such as 2.5s")
+    add_view(parser, "with --at: which costs are shown")
+    parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name holds this")
+    parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Print a session, or one decision of it."""
+    if arguments.view and arguments.at is None:
+        raise QueryError(Fault("--view shows the costs of one decision.", "--at N|TIME beside it, such as --at 2.5s"))
+    trace = Trace.load(arguments.file)
+    place = None if arguments.at is None else place_of(arguments.at, trace, arguments.file)
+    with output():
+        if place is None:
+            _print_session(trace, arguments)
+        else:
+            _print_decision(trace, place, arguments)
+    return ExitCode.OK
+
+
+def place_of(text: str, trace: Trace, file: str) -> int:
+    """Where the decision stands that --at means: of that tick, or the last one at or before that time.
+
+    Raises
+    ------
+    QueryError
+        There is none; with the ticks and times there are.
+    """
+    ticks = [decision.tick for decision in trace.brief()]
+    times_s = [decision.time_s for decision in trace.brief()]
+    place = Place(file)
+    if not ticks:
+        raise QueryError(Fault("the session has no decision.", "one with at least an update", place=place))
+    accepted = f"a tick from {ticks[0]} to {ticks[-1]}, or a time from {times_s[0]:.2f}s to {times_s[-1]:.2f}s"
+    if text.endswith("s"):
+        time_s = _number(text[:-1])
+        if time_s is not None and times_s[0] - 0.005 <= time_s <= times_s[-1] + 0.005:
+            return max(0, bisect_right(times_s, time_s + 0.005) - 1)
+    elif text.isdecimal() and int(text) in ticks:
+        return ticks.index(int(text))
+    mend = in_quotes(f"{text}s") if _number(text) is not None and not text.isdecimal() else ""
+    raise QueryError(Fault(f"there is no decision at {in_quotes(text)}.", accepted, mend, place))
+
+
+def _number(text: str) -> float | None:
+    try:
+        return as_number(float(text))
+    except ValueError:
+        return None
+
+
+def _print_session(trace: Trace, asked: argparse.Namespace) -> None:
+    if asked.json:
+        told = [decision for decision in trace.brief() if _is_named(decision.playing, asked.name)]
+        document = {"format": 1, "file": asked.file, "decisions": [_brief(decision_json(decision)) for decision in told]}
+        print(as_json(document), end="")
+        return
+    print(summary_line(trace.brief()))
+    lines = list(session_lines(trace.brief(), name=asked.name, width=terminal_width()))
+    print("", *(lines or [f"no asset's name holds {in_quotes(asked.name)}" if asked.name else "no decision"]), sep="\n")
+
+
+def _is_named(playing: Playing | None, name: str) -> bool:
+    return not name or (playing is not None and name.casefold() in playing.asset.casefold())
+
+
+def _brief(decision: dict[str, object]) -> dict[str, object]:
+    """A decision without what only --at tells."""
+    return {key: value for key, value in decision.items() if key not in ("query", "candidates")}
+
+
+def _print_decision(trace: Trace, place: int, asked: argparse.Namespace) -> None:
+    decision, events = trace[place], trace.events(place)
+    if asked.json:
+        print(as_json({"format": 1, "file": asked.file, **decision_json(decision, events)}), end="")
+        return
+    view = View(asked.view or View.SUMMARY)
+    print(*decision_lines(decision, view, name=asked.name, events=events, width=terminal_width()), sep="\n")

@@ -1,0 +1,164 @@
+"""Steer a character along a recorded stick, and record every decision: the same files give the same session.
+
+STICK is a CSV or Parquet file with a row for each moment, which lasts until the next: time_s; speed_mps, turn_dps and strafe_deg
+as for `motion search`, or x_mps and z_mps, a velocity over the ground, and facing_deg. All other columns are facts.
+
+Exits with 1 when nothing ever plays.
+
+  contextdb motion run game/ player stick.csv --out session.parquet
+  contextdb motion replay session.parquet
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import random
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from contextdb.commands.motion_stage import Stage, reach_s
+from contextdb.commands.motion_stick import Moments, Stick, conditions_of
+from contextdb.console import output, progress
+from contextdb.disk import path_in_quotes
+from contextdb.errors import Fault, FileError, Place, in_quotes
+from contextdb.exit_codes import ExitCode
+from contextdb.facts import UNKNOWN_MODES
+from contextdb.motion import FeatureSchema, Trajectory, steady_path, with_path
+from contextdb.motion.controller import Controller
+from contextdb.motion.extraction import Features
+from contextdb.motion.steering import Steered, steered_path
+from contextdb.motion.trace import Trace
+from contextdb.motion.views import summary_line
+from contextdb.report.render_json import as_json
+
+SUFFIX = ".parquet"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
+    parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
+    parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what is asked for, moment by moment")
+    parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
+    parser.add_argument("--rate", metavar="HZ", type=_rate, help="updates a second (default: the features' rate)")
+    parser.add_argument("--k", metavar="N", type=_count, default=12, help="candidates of each search to keep (default: 12)")
+    parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="of the variation that the controller has (default: 0)")
+    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="what a missing fact does (default: error)")
+    parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Run a controller along a stick."""
+    out = _out_file(Path(arguments.out), Path(arguments.stick))
+    stage = Stage.of(arguments.path)
+    controller = stage.config.controller(arguments.controller, stage.databases, rng=random.Random(arguments.seed))
+    trace = controller.recorder = Trace(arguments.k, controller.selector.databases)
+    names = list(controller.selector.names)
+    tables = stage.tables(names)
+    path = Path(arguments.stick)
+    stick = Stick.read(path, conditions_of(tables))
+    table_of = {name: table for name in names if (table := stage.config.databases[name].table) is not None}
+    moments = Moments.read(path, table_of, tables, arguments.unknown)
+    steer(controller, stage.schema(names[0]), stick, moments, arguments.rate)
+    trace.save(out, timings=False)
+    with output():
+        if arguments.json:
+            print(as_json({"format": 1, "file": str(out), "updates": len(trace), "bytes": out.stat().st_size}), end="")
+        else:
+            print(summary_line(trace.brief()))
+    return ExitCode.OK if any(decision.playing is not None for decision in trace.brief()) else ExitCode.FOUND
+
+
+def steer(controller: Controller, schema: FeatureSchema, stick: Stick, moments: Moments | None, rate: float | None) -> None:
+    """Update a controller from the stick's first moment to its last, so many times a second; by default at the schema's rate."""
+    per_s = schema.rate if rate is None else rate
+    n_updates = math.floor(stick.duration_s * per_s + 1e-6) + 1
+    paths = _paths(stick, schema, per_s)
+    for i in progress(range(n_updates), "steering"):
+        moment, dt_s = stick.at(i / per_s), 1.0 / per_s if i else 0.0
+        query = with_path(schema, _pose(controller, schema, dt_s), next(paths))
+        valid, context = (None, None) if moments is None else (moments.valid[moment], moments.contexts[moment])
+        controller.update(dt_s, query, valid, context=context)
+
+
+def _pose(controller: Controller, schema: FeatureSchema, dt_s: float) -> Features:
+    """The pose that would play on; the mean pose of all clips where nothing plays."""
+    upcoming, databases = controller.upcoming(dt_s), controller.selector.databases
+    if upcoming is None:
+        mean = next(iter(databases.values())).normalisation.undo(np.zeros(schema.n_features))
+        return mean.astype(np.float32)
+    return databases[upcoming.database].raw(upcoming.frame).astype(np.float32)
+
+
+def _paths(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[Trajectory]:
+    """The wished path at each update."""
+    return _along_ground(stick, schema, per_s) if stick.is_velocity else _from_body(stick, schema, per_s)
+
+
+def _from_body(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[Trajectory]:
+    for i in _counting():
+        moment = stick.at(i / per_s)
+        speed, turn, strafe = (stick.value(name, moment) for name in ("speed_mps", "turn_dps", "strafe_deg"))
+        yield steady_path(speed, turn, strafe_deg=strafe, reach_s=reach_s(schema, speed), rate=schema.rate)
+
+
+def _along_ground(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[Trajectory]:
+    """A body that follows the stick smoothly, as `contextdb.motion.steering` has it."""
+    body = Steered()
+    past = [body]
+    for i in _counting():
+        moment = stick.at(i / per_s)
+        wanted = (stick.value("x_mps", moment), stick.value("z_mps", moment))
+        degrees = stick.value("facing_deg", moment, math.nan)
+        facing = None if math.isnan(degrees) else math.radians(degrees)
+        if i:
+            past.append(past[-1].moved(1.0 / per_s, wanted, facing))
+        reach = reach_s(schema, math.hypot(*wanted))
+        past = past[-math.ceil(reach * per_s) - 1 :]
+        yield steered_path(past, wanted, facing, reach_s=reach, rate=per_s)
+
+
+def _counting() -> Iterator[int]:
+    i = 0
+    while True:
+        yield i
+        i += 1
+
+
+def _out_file(out: Path, stick: Path) -> Path:
+    """The file to write to, refused before the work where it could only be refused after."""
+    place = Place(str(out))
+    if out.suffix != SUFFIX:
+        raise FileError(Fault("a session cannot be written to such a file.", f"a name that ends in {SUFFIX}", place=place))
+    if not os.path.isdir(out.parent):
+        found = f"there is no folder {path_in_quotes(out.parent)}."
+        raise FileError(Fault(found, "a folder that is there", place=place, rule="no-such-path"))
+    if out.resolve() == stick.resolve():
+        raise FileError(Fault("the session would be written over the stick.", "another file", place=place))
+    return out
+
+
+def _rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = math.nan
+    if not 1.0 <= rate <= 1000.0:
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no rate. Accepted: 1 to 1000 updates a second, such as 30.")
+    return rate
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) > 1000:
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no number of candidates. Accepted: 0 to 1000, such as 12.")
+    return int(text)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or len(text) > 18:
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no seed. Accepted: a whole number, such as 7.")
+    return int(text)

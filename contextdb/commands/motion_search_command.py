@@ -1,0 +1,98 @@
+"""The best frames of one database for a pose and a wished path, with what each channel and bias adds to their cost.
+
+With facts, only the assets that the database's table says are valid may play. Exits with 1 when nothing may.
+
+  contextdb motion search game/ loco --query walk@1.5 --speed 1.3 --turn 30
+  contextdb motion search game/ loco gait=Walk speed=1.3 direction=0 style=tired --query walk@1.5 --view pose
+  contextdb motion search game/ loco --query walk@1.5 --speed 3 --name jog
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from contextdb.commands.motion_stage import Stage, add_asked, add_view, context_text
+from contextdb.console import output, printable, terminal_width
+from contextdb.errors import in_quotes, plural
+from contextdb.exit_codes import ExitCode
+from contextdb.facts import Fact
+from contextdb.matches import Matches
+from contextdb.motion import Candidates, MotionDatabase
+from contextdb.motion.cost_views import Ranked, View, candidate_lines
+from contextdb.motion.extraction import Features
+from contextdb.motion.trace_json import candidates_json
+from contextdb.motion.views import left_out_text
+from contextdb.report.render_json import as_json
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
+    parser.add_argument("database", metavar="DATABASE", help="the name of a [databases.NAME]")
+    add_asked(parser)
+    add_view(parser, "which costs are shown", View.SUMMARY)
+    parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name holds this, chosen or not")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Search one database."""
+    stage = Stage.of(arguments.path)
+    name = stage.config.database(arguments.database).name
+    valid, facts = stage.valid([name], arguments.facts, arguments.unknown)
+    query = stage.query(arguments.query, [name], arguments)
+    found = _candidates(stage.databases[name], query, valid.get(name), arguments)
+    n_free = stage.databases[name].n_frames - sum(found.counts.values())
+    with output():
+        if arguments.json:
+            document = {"format": 1, "context": context_text(facts), "frames": n_free, **_document(stage, name, found)}
+            print(as_json(document), end="")
+        else:
+            print(*_lines(stage, name, found, facts, valid.get(name), n_free, arguments), sep="\n")
+    return ExitCode.OK if n_free else ExitCode.FOUND
+
+
+def _candidates(database: MotionDatabase, query: Features, valid: Matches | None, asked: argparse.Namespace) -> Candidates:
+    """The best frames; of assets whose name holds --name, those that may not be chosen too."""
+    if not asked.name:
+        return database.candidates(query, asked.k, valid, left_out=asked.left_out, tags=asked.tags)
+    counts = database.candidates(query, 0, valid, tags=asked.tags).counts
+    is_named = np.array([asked.name.casefold() in asset.casefold() for asset in database.assets], np.bool_)
+    others = np.where(is_named, 0.0, np.inf)  # no other frame comes before those that are asked for
+    found = database.candidates(query, asked.k, valid, left_out=True, tags=asked.tags, penalties=others)
+    return replace(found, rows=tuple(row for row in found if is_named[row.range]), counts=counts)
+
+
+def _events(stage: Stage, name: str, found: Candidates) -> dict[tuple[str, int], tuple[str, ...]]:
+    return {(name, row.frame): stage.databases[name].marks.events(row.frame) for row in found}
+
+
+def _document(stage: Stage, name: str, found: Candidates) -> dict[str, object]:
+    return candidates_json(name, found, _events(stage, name, found))
+
+
+def _lines(
+    stage: Stage,
+    name: str,
+    found: Candidates,
+    facts: dict[str, Fact],
+    valid: Matches | None,
+    n_free: int,
+    asked: argparse.Namespace,
+) -> Iterator[str]:
+    if valid is not None:
+        yield f"{len(valid):,} of {plural(valid.n_rows, 'row')} valid in {printable(str(stage.config.databases[name].table))}"
+    yield f"{n_free:,} of {plural(stage.databases[name].n_frames, 'frame')} of {printable(name)} may play"
+    if found.counts:
+        yield f"left out: {left_out_text(found)}"
+    rows = [Ranked(rank, name, row) for rank, row in enumerate(found, 1)]
+    yield ""
+    if rows:
+        yield from candidate_lines(rows, View(asked.view), _events(stage, name, found), terminal_width())
+    elif asked.name:
+        yield f"no asset's name holds {in_quotes(asked.name)}"
+    else:
+        yield "nothing may play"

@@ -1,0 +1,65 @@
+"""Which database of a selector wins for a pose and a wished path, with which frame, and why.
+
+With facts, only the assets that the databases' tables say are valid may play. Exits with 1 when nothing may.
+
+  contextdb motion select game/ locomotion --query walk@2 --speed 1.3
+  contextdb motion select game/ locomotion gait=Walk speed=1.3 direction=0 style=tired --query walk@2 --speed 1.3 --view all
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+from contextdb.commands.motion_stage import Stage, add_asked, add_view, context_text
+from contextdb.console import output, terminal_width
+from contextdb.exit_codes import ExitCode
+from contextdb.motion import LeftOut
+from contextdb.motion.controller import Controller
+from contextdb.motion.cost_views import View
+from contextdb.motion.decision import Decision
+from contextdb.motion.trace import Trace
+from contextdb.motion.trace_json import decision_json
+from contextdb.motion.views import decision_lines
+from contextdb.report.render_json import as_json
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
+    parser.add_argument("selector", metavar="SELECTOR", help="the name of a [selectors.NAME]")
+    add_asked(parser)
+    add_view(parser, "which costs are shown", View.SUMMARY)
+    parser.add_argument("--name", metavar="TEXT", default="", help="only candidates whose name holds this")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Choose as a character does that plays nothing yet."""
+    stage = Stage.of(arguments.path)
+    selector = stage.config.selector(arguments.selector, stage.databases)
+    names = list(selector.names)
+    valid, facts = stage.valid(names, arguments.facts, arguments.unknown)
+    trace = Trace(arguments.k, selector.databases)
+    query = stage.query(arguments.query, names, arguments)
+    controller = Controller(selector, recorder=trace)
+    decision = controller.update(0.0, query, valid or None, arguments.tags, context_text(facts))
+    if not arguments.left_out:
+        decision = _without_left_out(decision)
+    with output():
+        if arguments.json:
+            print(as_json({"format": 1, **decision_json(decision, trace.events(0))}), end="")
+        else:
+            shown = decision_lines(
+                decision, View(arguments.view), name=arguments.name, events=trace.events(0), width=terminal_width()
+            )
+            print(*shown, sep="\n")
+    return ExitCode.OK if decision.playing is not None else ExitCode.FOUND
+
+
+def _without_left_out(decision: Decision) -> Decision:
+    """The same without the candidates that may not be chosen."""
+    candidates = [
+        (name, replace(found, rows=tuple(row for row in found if row.left_out is LeftOut.NO)))
+        for name, found in decision.candidates
+    ]
+    return replace(decision, candidates=tuple(candidates))

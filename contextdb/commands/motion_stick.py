@@ -1,0 +1,205 @@
+"""A recorded stick: what a player asked for, moment by moment, read from a CSV or Parquet file.
+
+Columns: `time_s`, ascending; then either `speed_mps` and, if wanted, `turn_dps` and `strafe_deg`, seen from the body as in
+`contextdb motion search`; or `x_mps` and `z_mps`, a velocity over the ground, and, if wanted, `facing_deg`. All other columns are
+facts. A moment lasts until the next one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from contextdb.columns import TextColumn
+from contextdb.commands import missing_facts_by_option
+from contextdb.compiled import CompiledTable
+from contextdb.contexts import read_contexts
+from contextdb.disk import path_in_quotes
+from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, some
+from contextdb.facts import Unknown
+from contextdb.files import AnySource, read_texts
+from contextdb.matches import Matches
+from contextdb.motion.quaternions import Floats
+from contextdb.motion.reading import as_number
+
+BY_SPEED = ("speed_mps", "turn_dps", "strafe_deg")
+BY_VELOCITY = ("x_mps", "z_mps", "facing_deg")
+STICK = ("time_s", *BY_SPEED, *BY_VELOCITY)
+LIMITS = {
+    "time_s": (-1e9, 1e9),
+    "speed_mps": (0.0, 100.0),
+    "turn_dps": (-3600.0, 3600.0),
+    "strafe_deg": (-3600.0, 3600.0),
+    "x_mps": (-100.0, 100.0),
+    "z_mps": (-100.0, 100.0),
+    "facing_deg": (-3600.0, 3600.0),
+}
+LONGEST_S = 24 * 3600.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stick:
+    """What was asked for at some moments.
+
+    Attributes
+    ----------
+    path : Path
+    times_s : float64 array
+        Ascending, from 0.
+    asked : mapping of str to float64 array
+        By the column's name; NaN where it says nothing.
+    """
+
+    path: Path
+    times_s: Floats
+    asked: Mapping[str, Floats]
+
+    @property
+    def is_velocity(self) -> bool:
+        """Whether it asks for velocities over the ground, not for speeds."""
+        return "x_mps" in self.asked
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first moment to the last."""
+        return float(self.times_s[-1])
+
+    def at(self, time_s: float) -> int:
+        """The moment that holds at a time."""
+        return max(0, int(np.searchsorted(self.times_s, time_s + 1e-9, side="right")) - 1)
+
+    def value(self, name: str, moment: int, otherwise: float = 0.0) -> float:
+        """What a column says at a moment, or something else where it says nothing."""
+        found = float(self.asked[name][moment]) if name in self.asked else float("nan")
+        return otherwise if np.isnan(found) else found
+
+    @classmethod
+    def read(cls, path: Path, conditions: Sequence[str]) -> Stick:
+        """Read a file; `conditions` are the columns that are facts.
+
+        Raises
+        ------
+        TableError, FileError
+            The file cannot be read; with every column that is neither the stick's nor a fact, and every value that is no number.
+        """
+        source, columns = read_texts(path)
+        faults = [_unknown(path, column.name, conditions) for column in columns if column.name not in (*STICK, *conditions)]
+        by_name = {column.name: column for column in columns if column.name in STICK}
+        faults += _missing(path, by_name)
+        asked = {name: _numbers(path, source, column, faults) for name, column in by_name.items()}
+        if not faults:
+            _check_times(path, source, asked["time_s"], faults)
+        if faults:
+            raise TableError(*faults)
+        times_s = asked.pop("time_s")
+        return cls(path, times_s - times_s[0], asked)
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """The facts of each moment of a stick, and the rows that are valid then."""
+
+    contexts: Sequence[Mapping[str, object]]
+    valid: Sequence[Mapping[str, Matches]]
+
+    @classmethod
+    def read(cls, path: Path, table_of: Mapping[str, str], tables: Mapping[str, CompiledTable], unknown: Unknown) -> Moments | None:
+        """Read the facts for databases, each with the name of its table. None when the file has no facts: nothing is filtered.
+
+        Raises
+        ------
+        ContextDBError
+            Facts that a table cannot be asked with; with file, line and fact.
+        """
+        read = {name: read_contexts(path, table) for name, table in tables.items()}
+        known = {name: [c for c in each.facts.columns if c in tables[name].places] for name, each in read.items()}
+        if not any(known.values()):
+            return None
+        for name, each in read.items():
+            with missing_facts_by_option():
+                each.ask(tables[name], unknown)  # tells all that is wrong, with its line
+        facts = {name: each.facts.select(known[name]).to_dicts() for name, each in read.items()}
+        n_moments = max(map(len, facts.values()))
+        merged = [_given([each[i] for each in facts.values()]) for i in range(n_moments)]
+        answers = {name: [tables[name].query(_given([row]), unknown) for row in facts[name]] for name in facts}
+        valid = [{database: answers[table][i] for database, table in table_of.items()} for i in range(n_moments)]
+        return cls(merged, valid)
+
+
+def _given(rows: Sequence[Mapping[str, object]]) -> dict[str, object]:
+    """The facts of some rows that are not missing."""
+    return {key: value for row in rows for key, value in row.items() if value is not None}
+
+
+def conditions_of(tables: Mapping[str, CompiledTable]) -> list[str]:
+    """The facts that some tables ask for; a column of the stick's is none."""
+    names = [name for table in tables.values() for name in table.places]
+    taken = [name for name in names if name in STICK]
+    if taken:
+        found = f"the condition {in_quotes(taken[0])} has the name of a column of the stick's."
+        raise ContextDBError(Fault(found, f"other names for conditions than {some(STICK, len(STICK))}"))
+    return list(dict.fromkeys(names))
+
+
+# ---- what is wrong with a file
+
+
+def _unknown(path: Path, name: str, conditions: Sequence[str]) -> Fault:
+    known = [*STICK, *conditions]
+    near = nearest(name, known)
+    found = f"the column {in_quotes(name)} is neither the stick's nor a fact of the tables."
+    return Fault(found, some(known, len(known)), in_quotes(near) if near else "", Place(str(path)))
+
+
+def _missing(path: Path, columns: Mapping[str, TextColumn]) -> list[Fault]:
+    place, faults = Place(str(path)), []
+    if "time_s" not in columns:
+        faults.append(Fault(f"the file has no column {in_quotes('time_s')}.", "seconds, ascending", place=place))
+    by_speed = [name for name in BY_SPEED if name in columns]
+    by_velocity = [name for name in BY_VELOCITY if name in columns]
+    if by_speed and by_velocity:
+        faults.append(
+            Fault(f"the file has {some([*by_speed, *by_velocity])}.", f"{some(BY_SPEED)}; or {some(BY_VELOCITY)}", place=place)
+        )
+    elif "speed_mps" not in columns and not {"x_mps", "z_mps"} <= columns.keys():
+        found = f"the file says nowhere where to go: it has no {in_quotes('speed_mps')}."
+        faults.append(Fault(found, "speed_mps, metres a second; or both x_mps and z_mps, a velocity over the ground", place=place))
+    if columns and not next(iter(columns.values())).n_rows:
+        faults.append(Fault("the file has no rows.", "a row for each moment", place=place))
+    return faults
+
+
+def _numbers(path: Path, source: AnySource, column: TextColumn, faults: list[Fault]) -> Floats:
+    """The numbers of a column, NaN where it is empty; what is none leaves a fault."""
+    least, most = LIMITS[column.name]
+    values = np.full(len(column.texts), np.nan)
+    for code, text in enumerate(column.texts):
+        number = _number(text)
+        if number is not None and least <= number <= most:
+            values[code] = number
+        elif text.strip() or column.name == "time_s":
+            row = int((column.codes == code).argmax())
+            place = Place(str(path), source.line(row), column.name, row)
+            faults.append(Fault(f"{in_quotes(text)} is no number that can be meant.", f"{least:g} to {most:g}", place=place))
+    return np.asarray(values[column.codes])
+
+
+def _number(text: str) -> float | None:
+    try:
+        return as_number(float(text))
+    except ValueError:
+        return None
+
+
+def _check_times(path: Path, source: AnySource, times_s: Floats, faults: list[Fault]) -> None:
+    late = np.flatnonzero(np.diff(times_s) <= 0.0)
+    if len(late):
+        row = int(late[0]) + 1
+        place = Place(str(path), source.line(row), "time_s", row)
+        faults.append(Fault(f"{times_s[row]:g} s comes after {times_s[row - 1]:g} s.", "times that ascend", place=place))
+    elif times_s[-1] - times_s[0] > LONGEST_S:
+        found = f"the file {path_in_quotes(path)} lasts {times_s[-1] - times_s[0]:g} s."
+        faults.append(Fault(found, f"at most {LONGEST_S:g} s", place=Place(str(path))))

@@ -1,0 +1,540 @@
+"""`contextdb motion search | select | run | replay` on a project of made clips; every argument wrongly too."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from running import Result, run
+
+from contextdb.commands.motion_stage import read_tags
+from contextdb.motion import MotionConfig, TagFilter, load_bvh, make_clip, open_or_build, query_from, steady_path, write_bvh
+from contextdb.motion.trace import Trace
+from contextdb.project import Project
+
+TOML = """
+[tables.moves]
+policy = "collect"
+[conditions.gait]
+type = "enum"
+values = ["Idle", "Walk", "Run"]
+[conditions.speed]
+type = "number"
+[conditions.style]
+type = "enum"
+values = ["normal", "tired"]
+[features.loco]
+rate = 30.0
+channels = [
+  { type = "position", bone = "LeftFoot" },
+  { type = "velocity", bone = "Hips" },
+  { type = "trajectory", what = "position", at = [0.33, 1.0] },
+  { type = "trajectory", what = "speed", along = [1.0] },
+]
+[databases.all]
+table = "moves"
+clips = "clips/*.bvh"
+features = "loco"
+markup = "clips/marks.csv"
+[databases.tired]
+table = "moves"
+clips = "clips/*_tired.bvh"
+features = "loco"
+[databases.free]
+clips = "clips/jog.bvh"
+features = "loco"
+[selectors.moves]
+order = [{ database = "tired", threshold = 0.5 }, { database = "all" }]
+[selectors.free]
+order = [{ database = "free" }]
+[controllers.player]
+selector = "moves"
+variation_within = 0.01
+"""
+TABLE = """Asset,gait,speed,style
+idle,Idle,0..0.3,Any
+walk,Walk,0.3..2,Any
+walk_tired,Walk,0.3..2,tired
+jog,Run,1..5,normal ~0.75
+swim,Idle,9,Any
+"""
+MARKS = "asset,tag,from,to,value\nwalk*,Move.Walk,,,\njog,Move.Run,,,\nidle,Looping,,,\nwalk,DoNotChoose,0,0.5,\n"
+STICK = """time_s,speed_mps,turn_dps,gait,speed,style
+10,0,0,Idle,0,normal
+11,1.3,0,Walk,1.2,normal
+12.5,2.5,20,Run,2,normal
+14,1.2,,Walk,1.2,tired
+15,0,,Idle,0,tired
+"""
+WALK = ("gait=Walk", "speed=1.2", "style=tired")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project in game/, its features computed, and a recorded session."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "game" / "clips").mkdir(parents=True)
+    (folder / "game" / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    (folder / "game" / "moves.csv").write_text(TABLE, encoding="utf-8")
+    (folder / "game" / "clips" / "marks.csv").write_text(MARKS, encoding="utf-8")
+    for name in ("idle", "walk", "walk_tired", "jog"):
+        write_bvh(make_clip(name).clip, folder / "game" / "clips" / f"{name}.bvh", digits=3)
+    (folder / "stick.csv").write_text(STICK, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert run("motion", "run", "game", "player", "stick.csv", "--out", "session.parquet").code == 0
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with a copy of it all."""
+    folder = tmp_path / "here"
+    shutil.copytree(made, folder)
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("COLUMNS", "100")
+    return folder
+
+
+def motion(*arguments: str, code: int = 0) -> Result:
+    result = run("motion", *arguments)
+    assert result.code == code, result.err
+    return result
+
+
+def refused(*arguments: str) -> str:
+    """The message of a command that is refused."""
+    result = motion(*arguments, code=2)
+    assert result.out == ""
+    assert "Traceback" not in result.err
+    return result.err
+
+
+def rows_of(result: Result) -> list[list[str]]:
+    """The rows of candidates that a command printed."""
+    lines = result.lines
+    header = next(i for i, line in enumerate(lines) if line.startswith("rank"))
+    stop = next((i for i, line in enumerate(lines) if i > header and not line), len(lines))
+    return [line.split() for line in lines[header + 1 : stop]]
+
+
+# ---- the group
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["help"]])
+def test_the_group_lists_its_commands(arguments: list[str]):
+    result = motion(*arguments)
+    assert [line.split()[0] for line in result.lines[result.lines.index("commands:") + 1 :] if line[2:3].strip()] == [
+        "build",
+        "search",
+        "select",
+        "run",
+        "replay",
+    ]
+    assert run("motion") == Result(2, "", result.out)
+    assert run("help", "motion") == result
+
+
+@pytest.mark.parametrize("command", ["build", "search", "select", "run", "replay"])
+@pytest.mark.parametrize("width", [60, 100])
+def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    result = motion(command, "--help")
+    assert result == run("help", "motion", command) == run("motion", "help", command)
+    assert result.out.startswith(f"usage: contextdb motion {command} ")
+    examples = [line for line in result.lines if line.startswith("  contextdb ")]
+    assert len(examples) >= 2
+    assert [line for line in result.lines if len(line) > width and line not in examples] == []
+
+
+@pytest.mark.parametrize(("word", "near"), [("serch", "search"), ("Replay", "replay"), ("selekt", "select"), ("bild", "build")])
+def test_a_misspelt_command_of_the_group_is_named_with_the_nearest(word: str, near: str):
+    assert refused(word, "game") == (
+        f'contextdb: there is no command "motion {word}". Accepted: build, search, select, run, replay. '
+        f'Did you mean "motion {near}"?\n'
+    )
+
+
+# ---- search
+
+
+def test_a_search_prints_the_frames_that_the_database_finds():
+    result = motion("search", "game", "all", *WALK, "--query", "walk_tired@1.0", "--speed", "1.2", "--turn", "15", "--k", "4")
+    project = Project.load("game")
+    config = MotionConfig.from_dict(project.schema.motion, tables=project.tables)
+    database = open_or_build(config, "game", {"moves": project["moves"].assets})["all"]
+    pose = load_bvh("game/clips/walk_tired.bvh")
+    query = query_from(config.features["loco"], pose, 30, steady_path(1.2, 15.0))
+    valid = project["moves"].compile().query({"gait": "Walk", "speed": 1.2, "style": "tired"})
+    expected = database.candidates(query, 4, valid)
+    assert [(row[1], int(row[3].replace(",", ""))) for row in rows_of(result)] == [(row.asset, row.frame) for row in expected]
+    assert [float(row[4]) for row in rows_of(result)] == pytest.approx([row.cost for row in expected], abs=1e-3)
+    assert result.lines[0] == "2 of 5 rows valid in moves"
+    n_frames = database.n_frames - sum(expected.counts.values())
+    assert result.lines[1] == f"{n_frames} of {database.n_frames:,} frames of all may play"
+    assert result.err == ""
+
+
+def test_a_saved_database_gives_the_same_answer_as_one_that_is_built():
+    arguments = ("search", "game", "all", "--query", "walk@1", "--speed", "2")
+    built = motion(*arguments)
+    motion("build", "game")
+    assert motion(*arguments) == built
+
+
+def test_the_pose_of_a_clip_is_its_own_best_match():
+    assert rows_of(motion("search", "game", "all", "--query", "jog@0.5"))[0][:3] == ["1", "jog", "0.50"]
+    by_file = motion("search", "game", "all", "--query", "game/clips/jog.bvh@0.5s")
+    assert rows_of(by_file)[0][:3] == ["1", "jog", "0.50"]
+
+
+def test_the_pose_may_come_from_another_database_of_the_same_features():
+    assert {row[1] for row in rows_of(motion("search", "game", "tired", "--query", "idle@1"))} == {"walk_tired"}
+
+
+def test_a_search_as_json_has_every_cost_and_reason():
+    arguments = (*WALK, "--query", "walk@0.2", "--speed", "1.2", "--k", "300")
+    document = motion("search", "game", "all", *arguments, "--left-out", "--json").json
+    assert document["format"] == 1
+    assert document["database"] == "all"
+    assert document["context"] == {"gait": "Walk", "speed": 1.2, "style": "tired"}
+    for row in document["rows"]:
+        assert row["cost"] == pytest.approx(sum(row["channels"].values()) + sum(row["biases"].values()))
+    rank, barred = next(each for each in enumerate(document["rows"], 1) if each[1]["left_out"])
+    assert (barred["rank"], barred["asset"], barred["left_out"]) == (rank, "walk", "DoNotChoose")
+    assert barred["events"] == ["Move.Walk", "DoNotChoose"]
+    assert document["left_out"]["DoNotChoose"] == 16
+    assert document["left_out"]["asset not valid"] > 0
+
+
+def test_soft_cells_are_in_the_cost():
+    arguments = ("gait=Run", "speed=2", "--query", "jog@1", "--json", "--k", "1")
+    soft, plain = (motion("search", "game", "all", *arguments, f"style={style}").json["rows"][0] for style in ("tired", "normal"))
+    assert soft["biases"]["penalty"] == 0.75
+    assert "penalty" not in plain["biases"]
+    assert soft["cost"] == pytest.approx(plain["cost"] + 0.75)
+
+
+def test_a_name_shows_the_best_frames_of_those_assets_though_they_may_not_play():
+    result = motion("search", "game", "all", *WALK, "--query", "walk@1", "--speed", "1.2", "--name", "JO", "--k", "3")
+    assert [row[1] for row in rows_of(result)] == ["jog"] * 3
+    assert all("asset not valid" in line for line in result.lines if " jog " in line)
+    assert "2 of 5 rows valid in moves" in result.lines
+    assert motion("search", "game", "all", "--query", "walk@1", "--name", "fly").lines[-1] == 'no asset\'s name holds "fly"'
+
+
+@pytest.mark.parametrize(
+    ("tags", "assets"), [("Move", {"walk", "walk_tired", "jog"}), ("Move -Move.Walk", {"jog"}), ("+Move.Run", {"jog"})]
+)
+def test_tags_filter_frames(tags: str, assets: set[str]):
+    rows = rows_of(motion("search", "game", "all", "--query", "walk@1", "--tags", tags, "--k", "2000"))
+    assert {row[1] for row in rows} == assets
+
+
+def test_tags_are_read_in_every_form():
+    assert read_tags("A +B -C D~2.5 -E~1") == TagFilter("A", "B", "C", prefer={"D": 2.5}, avoid={"E": 1.0})
+
+
+def test_a_search_in_which_nothing_may_play_exits_with_1():
+    result = motion("search", "game", "all", "gait=Idle", "speed=5", "style=normal", "--query", "walk@1", code=1)
+    assert result.lines[0] == "0 of 5 rows valid in moves"
+    assert result.lines[-1] == "nothing may play"
+    document = motion("search", "game", "all", "gait=Idle", "speed=5", "style=normal", "--query", "walk@1", "--json", code=1).json
+    assert (document["frames"], document["rows"]) == (0, [])
+
+
+@pytest.mark.parametrize("view", ["all", "summary", "pose", "trajectory", "bias", "events"])
+def test_every_view_fits_the_terminal(view: str):
+    result = motion("search", "game", "all", "--query", "walk@1", "--view", view)
+    assert max(map(len, result.lines)) <= 100
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["gmae", "all", "--query", "walk@1"],
+            "gmae: there is no such folder. Accepted: a folder of tables, or its contextdb.toml. Did",
+        ),
+        (["game", "al", "--query", "walk@1"], 'there is no [databases.al]. Accepted: "all", "tired", "free". Did you mean "all"?'),
+        (["game", "all"], "the following arguments are required: --query"),
+        (["game", "--query", "walk@1"], "the following arguments are required: DATABASE"),
+        (
+            ["game", "all", "--query", "wakl@1"],
+            'there is no clip "wakl". Accepted: "idle", "jog", "walk", "walk_tired", or a .bvh file.',
+        ),
+        (["game", "all", "--query", "wakl@1"], 'Did you mean "walk@1"?'),
+        (["game", "all", "--query", "walk"], '"walk" is no moment of a clip. Accepted: CLIP@SECONDS, such as walk@1.5.'),
+        (["game", "all", "--query", "@1"], '"@1" is no moment of a clip.'),
+        (["game", "all", "--query", "walk@nan"], '"walk@nan" is no moment of a clip.'),
+        (["game", "all", "--query", "walk@-1"], '"walk@-1" is no moment of a clip.'),
+        (["game", "all", "--query", "walk@99"], 'there is no moment 99 s of "walk". Accepted: seconds from 0 to '),
+        (["game", "all", "--query", "none.bvh@1"], "none.bvh: "),
+        (["game", "all", "--query", "game/clips/jog.bvh@99"], "there is no moment 99 s of "),
+        (["game", "all", "--query", "walk@1", "--speed", "fast"], '"fast" is no speed. Accepted: 0 to 100 m/s, such as 1.3.'),
+        (["game", "all", "--query", "walk@1", "--speed", "-1"], '"-1" is no speed.'),
+        (["game", "all", "--query", "walk@1", "--turn", "9"], "--turn without --speed wishes for nothing."),
+        (["game", "all", "--query", "walk@1", "--strafe", "9"], "--strafe without --speed wishes for nothing."),
+        (["game", "all", "--query", "walk@1", "--speed", "1", "--turn", "inf"], '"inf" is no angle.'),
+        (["game", "all", "--query", "walk@1", "--k", "0"], '"0" is no number of candidates. Accepted: 1 to 10000, such as 10.'),
+        (["game", "all", "--query", "walk@1", "--k", "ten"], '"ten" is no number of candidates.'),
+        (["game", "all", "--query", "walk@1", "--view", "sumary"], 'there is no "sumary".'),
+        (["game", "all", "--query", "walk@1", "--view", "sumary"], 'Did you mean "summary"?'),
+        (["game", "all", "--query", "walk@1", "--tags", "Mvoe"], 'there is no tag "Mvoe".'),
+        (["game", "all", "--query", "walk@1", "--tags", "Move~x"], '"Move~x" is no tag to filter by.'),
+        (["game", "all", "--query", "walk@1", "--tags", "+Move~2"], '"+Move~2" is no tag to filter by.'),
+        (["game", "all", "--query", "walk@1", "--tags", "+"], '"+" is no tag to filter by.'),
+        (["game", "all", "--query", "walk@1", "--qery", "x"], 'there is no option "--qery". Did you mean "--query"?'),
+        (["game", "all", "gait=Wlak", *WALK[1:], "--query", "walk@1"], 'Did you mean "Walk"?'),
+        (["game", "all", "gati=Walk", *WALK[1:], "--query", "walk@1"], 'there is no condition "gati".'),
+        (["game", "all", "Walk", "--query", "walk@1"], '"Walk" is no fact. Accepted: FACT=VALUE'),
+        (["game", "all", "gait=Walk", "--query", "walk@1"], 'the fact "speed" is missing (2 facts missing: "speed", "style").'),
+        (["game", "all", "gait=Walk", "--query", "walk@1"], "--unknown any, or --unknown never"),
+        (["game", "all", "gait=Walk", "--query", "walk@1", "--unknown", "nver"], 'there is no "nver".'),
+        (["game", "free", "gait=Walk", "--query", "jog@1"], 'no table says which assets of "free" are valid'),
+    ],
+)
+def test_a_wrong_argument_of_a_search_is_told_with_what_is_accepted(arguments: list[str], message: str):
+    assert message in refused("search", *arguments)
+
+
+def test_missing_facts_can_be_ignored():
+    assert (
+        motion("search", "game", "all", "gait=Walk", "--query", "walk@1", "--unknown", "any").lines[0]
+        == "2 of 5 rows valid in moves"
+    )
+
+
+def test_a_database_without_any_of_its_table_s_clips_plays_nothing(here: Path):
+    (here / "game" / "moves.csv").write_text("Asset,gait,speed,style\nswim,Idle,9,Any\n", encoding="utf-8")
+    result = motion("search", "game", "all", "--query", "jog@1", code=1)
+    assert result.lines == ["0 of 0 frames of all may play", "", "nothing may play"]
+    assert "there is no clip" in refused("search", "game", "all", "--query", "walk@1")
+
+
+def test_clips_that_are_not_there_are_told(here: Path):
+    shutil.rmtree(here / "game" / "clips")
+    assert "contextdb.toml: [databases.free] no file fits clips" in refused("search", "game", "free", "--query", "walk@1")
+
+
+# ---- select
+
+
+def test_a_priority_database_under_its_threshold_wins_and_the_next_is_not_searched():
+    result = motion("select", "game", "moves", *WALK, "--query", "walk_tired@1")
+    assert result.lines[0] == "tick 0 at 0.00 s: starts"
+    assert any(line.endswith("0.5  winner, under its threshold") for line in result.lines)
+    assert any(line.split() == ["2", "all", "not", "searched"] for line in result.lines)
+    assert "context     gait = Walk, speed = 1.2, style = tired" in result.lines
+
+
+def test_else_the_lowest_cost_wins_and_both_are_told():
+    document = motion("select", "game", "moves", "--query", "jog@1", "--json", "--k", "2").json
+    assert document["format"] == 1
+    assert (document["choice"]["database"], document["choice"]["reason"]) == ("all", "lowest cost")
+    assert [search["status"] for search in document["choice"]["searches"]] == ["beaten", "winner"]
+    assert [(found["database"], len(found["rows"])) for found in document["candidates"]] == [("tired", 2), ("all", 2)]
+    assert document["playing"]["asset"] == "jog"
+    assert document["cost"] == document["candidates"][1]["rows"][0]["cost"]
+
+
+def test_frames_that_may_not_be_chosen_are_shown_when_asked_for():
+    arguments = ("select", "game", "moves", "gait=Walk", "speed=1", "style=normal", "--query", "walk@0.2")
+    assert "DoNotChoose" not in "".join(motion(*arguments).lines[:-1])
+    assert any("DoNotChoose" in line for line in motion(*arguments, "--left-out").lines if line.strip()[:1].isdigit())
+
+
+def test_a_selection_in_which_nothing_may_play_exits_with_1():
+    result = motion("select", "game", "moves", "gait=Idle", "speed=5", "style=normal", "--query", "walk@1", code=1)
+    assert result.lines[0] == "tick 0 at 0.00 s: plays nothing"
+    assert sum("nothing valid" in line for line in result.lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["game", "movse", "--query", "walk@1"], 'there is no [selectors.movse]. Accepted: "moves", "free". Did you mean "moves"?'),
+        (["game", "free", "gait=Walk", "--query", "jog@1"], 'no table says which assets of "free" are valid'),
+        (["game", "moves", "--query", "wlk@1"], 'there is no clip "wlk".'),
+        (["game", "moves", "--query", "walk@1", "--tags=-Mve"], 'there is no tag "Mve".'),
+        (["game", "moves", "--query", "walk@1", "gati=Walk"], 'there is no condition "gati".'),
+    ],
+)
+def test_a_wrong_argument_of_a_selection_is_told(arguments: list[str], message: str):
+    assert message in refused("select", *arguments)
+
+
+# ---- run
+
+
+def test_a_run_follows_the_stick_and_only_valid_assets_play():
+    trace = Trace.load("session.parquet")
+    assert len(trace) == 151
+    assert (trace[0].time_s, trace[-1].time_s) == (0.0, pytest.approx(5.0))
+    at = {round(decision.time_s, 2): decision for decision in trace.brief()}
+    assert at[0.5].playing.asset == "idle"
+    assert at[2.0].playing.asset in ("walk", "walk_tired")
+    assert at[3.5].playing.asset == "jog"
+    assert at[4.9].playing.asset == "walk_tired"
+    assert at[3.5].context == {"gait": "Run", "speed": 2.0, "style": "normal"}
+    assert trace.about["all"]["rate"] == 30.0
+
+
+def test_the_same_files_give_the_same_session():
+    result = motion("run", "game", "player", "stick.csv", "--out", "again.parquet")
+    assert Path("again.parquet").read_bytes() == Path("session.parquet").read_bytes()
+    assert result.lines == [motion("replay", "again.parquet").lines[0]]
+    document = motion("run", "game", "player", "stick.csv", "--out", "again.parquet", "--json").json
+    assert document == {"format": 1, "file": "again.parquet", "updates": 151, "bytes": Path("again.parquet").stat().st_size}
+
+
+def test_fewer_updates_and_no_candidates_are_recorded_when_asked_for():
+    motion("run", "game", "player", "stick.csv", "--out", "few.parquet", "--rate", "10", "--k", "0")
+    trace = Trace.load("few.parquet")
+    assert len(trace) == 51
+    assert not any(decision.candidates for decision in trace)
+
+
+def test_a_stick_over_the_ground_steers_a_body_that_follows_it():
+    Path("ground.csv").write_text("time_s,x_mps,z_mps,facing_deg\n0,0,1.3,\n2,1.3,0,\n4,0,0,90\n", encoding="utf-8")
+    motion("run", "game", "player", "ground.csv", "--out", "ground.parquet")
+    trace = Trace.load("ground.parquet")
+    assert {decision.context for decision in trace.brief()} == {None}
+    assert all(decision.playing is not None for decision in trace.brief())
+    path = trace[75].query[6:10]  # where the body will be, to its left and ahead, at 0.33 and 1 s
+    assert path[2] > 0.1  # it was asked to turn to the left
+
+
+def test_contexts_may_come_from_parquet(here: Path):
+    import polars as pl
+
+    pl.read_csv(here / "stick.csv").write_parquet(here / "stick.parquet")
+    motion("run", "game", "player", "stick.parquet", "--out", "again.parquet")
+    assert Path("again.parquet").read_bytes() == Path("session.parquet").read_bytes()
+
+
+def test_a_run_in_which_nothing_ever_plays_exits_with_1(here: Path):
+    (here / "none.csv").write_text("time_s,speed_mps,gait,speed,style\n0,0,Idle,5,normal\n1,0,Idle,5,normal\n", encoding="utf-8")
+    assert motion("run", "game", "player", "none.csv", "--out", "none.parquet", code=1).lines == [
+        "1.00 s: 31 updates, 31 searches, 0 jumps, 0 loops"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time_s\n0\n", 'stick.csv: the file says nowhere where to go: it has no "speed_mps".'),
+        ("speed_mps\n0\n", 'stick.csv: the file has no column "time_s". Accepted: seconds, ascending.'),
+        ("time_s,x_mps\n0,1\n", "both x_mps and z_mps"),
+        ("time_s,speed_mps,x_mps\n0,1,1\n", 'the file has "speed_mps", "x_mps".'),
+        ("time_s,speed_mps,gati\n0,1,Walk\n", 'the column "gati" is neither the stick\'s nor a fact of the tables.'),
+        ("time_s,speed_mps,gati\n0,1,Walk\n", 'Did you mean "gait"?'),
+        ("time_s,speed_mps\n", "the file has no rows."),
+        ("time_s,speed_mps\n0,1\n0,1\n", 'stick.csv, line 3, column "time_s": 0 s comes after 0 s. Accepted: times that ascend.'),
+        ("time_s,speed_mps\n0,1\n1e8,1\n", "lasts 1e+08 s. Accepted: at most 86400 s."),
+        (
+            "time_s,speed_mps\n0,fast\n",
+            'stick.csv, line 2, column "speed_mps": "fast" is no number that can be meant. Accepted: 0 to 100.',
+        ),
+        ("time_s,speed_mps\nnan,1\n", 'line 2, column "time_s": "nan" is no number'),
+        ("time_s,speed_mps\n,1\n", 'line 2, column "time_s"'),
+        ("time_s,speed_mps,gait,speed,style\n0,1,Wlak,1,tired\n", 'stick.csv, line 2, column "gait": '),
+        ("time_s,speed_mps,gait,speed\n0,1,Walk,1\n", '"style" is missing'),
+        ("", "stick.csv"),
+    ],
+)
+def test_a_stick_that_cannot_be_followed_is_refused_with_its_place(here: Path, text: str, message: str):
+    (here / "stick.csv").write_text(text, encoding="utf-8")
+    assert message in refused("run", "game", "player", "stick.csv", "--out", "new.parquet")
+    assert not (here / "new.parquet").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["game", "plyer", "stick.csv", "--out", "new.parquet"],
+            'there is no [controllers.plyer]. Accepted: "player". Did you mean',
+        ),
+        (["game", "player", "stik.csv", "--out", "new.parquet"], 'stik.csv: there is no such file. Did you mean "stick.csv"?'),
+        (["game", "player", "stick.csv"], "the following arguments are required: --out"),
+        (["game", "player", "stick.csv", "--out", "new.csv"], "new.csv: a session cannot be written to such a file."),
+        (["game", "player", "stick.csv", "--out", "none/new.parquet"], 'there is no folder "none".'),
+        (["game", "player", "x.parquet", "--out", "x.parquet"], "the session would be written over the stick."),
+        (
+            ["game", "player", "stick.csv", "--out", "new.parquet", "--rate", "0"],
+            '"0" is no rate. Accepted: 1 to 1000 updates a second',
+        ),
+        (["game", "player", "stick.csv", "--out", "new.parquet", "--k", "-1"], '"-1" is no number of candidates.'),
+        (["game", "player", "stick.csv", "--out", "new.parquet", "--seed", "x"], '"x" is no seed.'),
+    ],
+)
+def test_a_wrong_argument_of_a_run_is_told(arguments: list[str], message: str):
+    assert message in refused("run", *arguments)
+
+
+# ---- replay
+
+
+def test_a_replay_tells_each_change_and_one_decision_in_full():
+    result = motion("replay", "session.parquet")
+    assert result.lines[0].startswith("5.00 s: 151 updates, ")
+    assert any(line.split()[2:4] == ["not", "valid"] for line in result.lines)
+    tick = next(line.split()[0] for line in result.lines if " jog " in line)
+    one = motion("replay", "session.parquet", "--at", tick)
+    assert one.lines[0].startswith(f"tick {tick} at ")
+    assert "not valid any more" in one.lines[1]
+    assert {"searches", "top candidates (summary)"} <= set(one.lines)
+
+
+@pytest.mark.parametrize(
+    ("at", "tick"), [("0", 0), ("75", 75), ("2.5s", 75), ("2.52s", 75), ("0s", 0), ("5.0 s", 150), ("150", 150)]
+)
+def test_a_decision_is_found_by_its_tick_or_its_time(at: str, tick: int):
+    assert motion("replay", "session.parquet", "--at", at, "--json").json["tick"] == tick
+
+
+def test_a_replay_as_json_has_every_decision():
+    document = motion("replay", "session.parquet", "--json").json
+    assert (document["format"], len(document["decisions"])) == (1, 151)
+    assert {"tick", "time_s", "action", "why", "playing", "cost", "continuing_cost"} <= document["decisions"][0].keys()
+    named = motion("replay", "session.parquet", "--json", "--name", "JOG").json["decisions"]
+    assert {decision["playing"]["asset"] for decision in named} == {"jog"}
+    one = motion("replay", "session.parquet", "--json", "--at", "0").json
+    assert one["candidates"][0]["rows"][0]["rank"] == 1
+    assert len(one["query"]) == 11
+
+
+def test_a_name_leaves_what_it_fits():
+    assert len(motion("replay", "session.parquet", "--name", "jog").lines) < len(motion("replay", "session.parquet").lines)
+    assert motion("replay", "session.parquet", "--name", "swim").lines[-1] == 'no asset\'s name holds "swim"'
+    one = motion("replay", "session.parquet", "--at", "0", "--name", "tired")
+    assert {row[1] for row in rows_of(one)} <= {"walk_tired"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["sesion.parquet"], 'sesion.parquet: there is no such file. Did you mean "session.parquet"?'),
+        (
+            ["stick.csv"],
+            "stick.csv: this is no Parquet file. Accepted: a session recorded by contextdb.motion.Trace. Try to record",
+        ),
+        (
+            ["session.parquet", "--at", "151"],
+            'there is no decision at "151". Accepted: a tick from 0 to 150, or a time from 0.00s to 5.00s.',
+        ),
+        (["session.parquet", "--at", "9s"], 'there is no decision at "9s".'),
+        (["session.parquet", "--at", "soon"], 'there is no decision at "soon".'),
+        (["session.parquet", "--at", "2.5"], 'there is no decision at "2.5".'),
+        (["session.parquet", "--at", "2.5"], 'Did you mean "2.5s"?'),
+        (["session.parquet", "--at", "nans"], 'there is no decision at "nans".'),
+        (["session.parquet", "--view", "pose"], "--view shows the costs of one decision."),
+        (["session.parquet", "--at", "0", "--view", "poes"], 'Did you mean "pose"?'),
+        (["session.parquet", "more"], '"more" is one argument too many.'),
+        ([], "the following arguments are required: FILE"),
+    ],
+)
+def test_a_wrong_argument_of_a_replay_is_told(arguments: list[str], message: str):
+    assert message in refused("replay", *arguments)

@@ -83,7 +83,8 @@ def test_a_misspelt_command_is_named_with_the_nearest(word: str, near: str):
     assert run(word, "t.csv") == Result(
         2,
         "",
-        f'contextdb: there is no command "{word}". Accepted: query, evaluate, check, compile, motion, demo. Did you mean "{near}"?\n',
+        f'contextdb: there is no command "{word}". '
+        f'Accepted: query, evaluate, check, compile, motion, demo. Did you mean "{near}"?\n',
     )
 
 

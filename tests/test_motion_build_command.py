@@ -14,8 +14,9 @@ from running import Result, run
 
 from contextdb.cli import main
 from contextdb.commands.motion_build_command import MotionProject
-from contextdb.motion import building, make_clip, write_bvh
-from contextdb.motion.stored import open_database
+from contextdb.motion import make_clip, write_bvh
+from contextdb.motion.storage import building
+from contextdb.motion.storage.stored import open_database
 
 TOML = """
 [tables.locomotion]

@@ -9,10 +9,10 @@ import pytest
 
 from contextdb.cells import Cell, parse_cell
 from contextdb.commands.demo_command import make_sample
-from contextdb.motion import made
-from contextdb.motion.config import MotionConfig
-from contextdb.motion.database import MotionDatabase
-from contextdb.motion.selector import Selector
+from contextdb.motion.made import recipes as made
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.selection.selector import Selector
+from contextdb.motion.storage.config import MotionConfig
 from contextdb.schema import Schema, read_schema
 
 FOLDER = Path(__file__).parent.parent / "tables"

@@ -31,7 +31,7 @@ from contextdb.motion import (
     steady_path,
     write_made_clips,
 )
-from contextdb.motion.extraction import Features
+from contextdb.motion.features.extraction import Features
 from contextdb.project import SCHEMA_FILE, Project
 
 TACKLE = {

@@ -21,11 +21,11 @@ from contextdb.console import aligned, output, printable
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
 from contextdb.exit_codes import ExitCode
-from contextdb.motion import building
-from contextdb.motion.building import Built, Progress, saved_path
-from contextdb.motion.clip_files import unmatched
-from contextdb.motion.config import MotionConfig
-from contextdb.motion.stored import save_database
+from contextdb.motion.storage import building
+from contextdb.motion.storage.building import Built, Progress, saved_path
+from contextdb.motion.storage.clip_files import unmatched
+from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.stored import save_database
 from contextdb.project import SCHEMA_FILE, Project
 
 HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed", "cached", "file")

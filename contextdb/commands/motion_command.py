@@ -1,9 +1,9 @@
 """Motion matching over the valid assets: databases from clips, a search with its costs, a choice of databases, recorded sessions.
 
-contextdb motion build game/
-contextdb motion search game/ loco --query walk@1.5 --speed 1.3
-contextdb motion run game/ player stick.csv --out session.parquet
-contextdb motion replay session.parquet --at 2.5s
+  contextdb motion build game/
+  contextdb motion search game/ loco --query walk@1.5 --speed 1.3
+  contextdb motion run game/ player stick.csv --out session.parquet
+  contextdb motion replay session.parquet --at 2.5s
 """
 
 from __future__ import annotations

@@ -17,12 +17,12 @@ from contextdb.commands.motion_stage import add_view
 from contextdb.console import output, terminal_width
 from contextdb.errors import Fault, Place, QueryError, in_quotes
 from contextdb.exit_codes import ExitCode
-from contextdb.motion.cost_views import View
-from contextdb.motion.decision import Playing
 from contextdb.motion.reading import as_number
-from contextdb.motion.trace import Trace
-from contextdb.motion.trace_json import decision_json
-from contextdb.motion.views import decision_lines, session_lines, summary_line
+from contextdb.motion.selection.decision import Playing
+from contextdb.motion.trace.cost_views import View
+from contextdb.motion.trace.json_form import decision_json
+from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.views import decision_lines, session_lines, summary_line
 from contextdb.report.render_json import as_json
 
 

@@ -28,11 +28,11 @@ from contextdb.errors import Fault, FileError, Place, in_quotes
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import UNKNOWN_MODES
 from contextdb.motion import FeatureSchema, Trajectory, steady_path, with_path
-from contextdb.motion.controller import Controller
-from contextdb.motion.extraction import Features
-from contextdb.motion.steering import Steered, steered_path
-from contextdb.motion.trace import Trace
-from contextdb.motion.views import summary_line
+from contextdb.motion.clips.steering import Steered, steered_path
+from contextdb.motion.features.extraction import Features
+from contextdb.motion.selection.controller import Controller
+from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.views import summary_line
 from contextdb.report.render_json import as_json
 
 SUFFIX = ".parquet"
@@ -107,7 +107,7 @@ def _from_body(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[Tr
 
 
 def _along_ground(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[Trajectory]:
-    """A body that follows the stick smoothly, as `contextdb.motion.steering` has it."""
+    """A body that follows the stick smoothly, as `contextdb.motion.clips.steering` has it."""
     body = Steered()
     past = [body]
     for i in _counting():

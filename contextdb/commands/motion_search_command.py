@@ -22,10 +22,10 @@ from contextdb.exit_codes import ExitCode
 from contextdb.facts import Fact
 from contextdb.matches import Matches
 from contextdb.motion import Candidates, MotionDatabase
-from contextdb.motion.cost_views import Ranked, View, candidate_lines
-from contextdb.motion.extraction import Features
-from contextdb.motion.trace_json import candidates_json
-from contextdb.motion.views import left_out_text
+from contextdb.motion.features.extraction import Features
+from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines
+from contextdb.motion.trace.json_form import candidates_json
+from contextdb.motion.trace.views import left_out_text
 from contextdb.report.render_json import as_json
 
 

@@ -15,12 +15,12 @@ from contextdb.commands.motion_stage import Stage, add_asked, add_view, context_
 from contextdb.console import output, terminal_width
 from contextdb.exit_codes import ExitCode
 from contextdb.motion import LeftOut
-from contextdb.motion.controller import Controller
-from contextdb.motion.cost_views import View
-from contextdb.motion.decision import Decision
-from contextdb.motion.trace import Trace
-from contextdb.motion.trace_json import decision_json
-from contextdb.motion.views import decision_lines
+from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.decision import Decision
+from contextdb.motion.trace.cost_views import View
+from contextdb.motion.trace.json_form import decision_json
+from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.views import decision_lines
 from contextdb.report.render_json import as_json
 
 

@@ -27,10 +27,10 @@ from contextdb.motion import (
     steady_path,
     with_path,
 )
-from contextdb.motion.cost_views import View
-from contextdb.motion.extraction import Features
+from contextdb.motion.features.extraction import Features
+from contextdb.motion.markup.reserved import MOST_COST
 from contextdb.motion.reading import as_number
-from contextdb.motion.reserved import MOST_COST
+from contextdb.motion.trace.cost_views import View
 from contextdb.project import SCHEMA_FILE, Project
 
 MOST_SPEED_MPS, MOST_SECONDS = 100.0, 1e6

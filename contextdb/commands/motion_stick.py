@@ -22,7 +22,7 @@ from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes
 from contextdb.facts import Unknown
 from contextdb.files import AnySource, read_texts
 from contextdb.matches import Matches
-from contextdb.motion.quaternions import Floats
+from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.reading import as_number
 
 BY_SPEED = ("speed_mps", "turn_dps", "strafe_deg")

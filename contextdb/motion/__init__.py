@@ -9,43 +9,43 @@ A table's query says which assets are valid; this finds the best frame among the
 Metres, seconds, y up; angles are positive to the left. numba makes the search fast and is loaded by the first one.
 """
 
-from contextdb.motion.building import Built, build, build_all, open_or_build, saved_path
-from contextdb.motion.candidates import Candidate, Candidates
-from contextdb.motion.channels import Channel
-from contextdb.motion.choice import Choice, Reason, Search, Status
-from contextdb.motion.clips import Clip, load_bvh, load_clips, parse_bvh, write_bvh
-from contextdb.motion.config import MotionConfig, SelectorSettings
-from contextdb.motion.controller import Controller
-from contextdb.motion.controller_settings import ControllerSettings
-from contextdb.motion.controller_state import ControllerState
-from contextdb.motion.database import Hit, MotionDatabase, build_databases
-from contextdb.motion.database_settings import DatabaseSettings
-from contextdb.motion.decision import Action, Decision, Playing, Recorder
-from contextdb.motion.extraction import ClipFeatures, clip_features, features_of, query_from, with_path
-from contextdb.motion.features import CustomFunction, FeatureSchema
-from contextdb.motion.feet import Footfalls, footfalls
-from contextdb.motion.filters import Biases
-from contextdb.motion.left_out import LeftOut, Skip
-from contextdb.motion.made import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
-from contextdb.motion.marks import ANY_TAGS, Mark, Marks, TagFilter
-from contextdb.motion.markup import Markup
-from contextdb.motion.match_gate import GateLook, MatchGate
-from contextdb.motion.match_node import MatchCosts, MatchNode, MatchPlay
-from contextdb.motion.mirror import mirrored, mirrored_path, partners_of
-from contextdb.motion.normalisation import Normalisation
-from contextdb.motion.pose_match import best_start, pose_schema
-from contextdb.motion.poses import LocalPoses, Poses, forward_kinematics, local_poses, poses_of, resampled
-from contextdb.motion.reserved import ReservedTag
-from contextdb.motion.root_motion import RootMotion
-from contextdb.motion.selector import Entry, Selector
-from contextdb.motion.skeleton import Skeleton
-from contextdb.motion.spans import Span
-from contextdb.motion.steering import Steered, steered_path
-from contextdb.motion.stored import inputs_of, open_database, save_database
-from contextdb.motion.trace import Trace
-from contextdb.motion.trajectory import Trajectory, root_trajectory, steady_path
-from contextdb.motion.variation import Variation
-from contextdb.motion.warping import Target, WarpShare
+from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
+from contextdb.motion.clips.feet import Footfalls, footfalls
+from contextdb.motion.clips.mirror import mirrored, mirrored_path, partners_of
+from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, local_poses, poses_of, resampled
+from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.clips.steering import Steered, steered_path
+from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, steady_path
+from contextdb.motion.features.channels import Channel
+from contextdb.motion.features.extraction import ClipFeatures, clip_features, features_of, query_from, with_path
+from contextdb.motion.features.normalisation import Normalisation
+from contextdb.motion.features.schema import CustomFunction, FeatureSchema
+from contextdb.motion.made.recipes import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
+from contextdb.motion.markup.left_out import LeftOut, Skip
+from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.markup.reserved import ReservedTag
+from contextdb.motion.markup.spans import Span
+from contextdb.motion.nodes.match_gate import GateLook, MatchGate
+from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
+from contextdb.motion.nodes.pose_match import best_start, pose_schema
+from contextdb.motion.nodes.warping import Target, WarpShare
+from contextdb.motion.search.candidates import Candidate, Candidates
+from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
+from contextdb.motion.search.filters import Biases
+from contextdb.motion.selection.choice import Choice, Reason, Search, Status
+from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.selection.controller_state import ControllerState
+from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
+from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.selection.selector import Entry, Selector
+from contextdb.motion.selection.variation import Variation
+from contextdb.motion.storage.building import Built, build, build_all, open_or_build, saved_path
+from contextdb.motion.storage.config import MotionConfig, SelectorSettings
+from contextdb.motion.storage.database_settings import DatabaseSettings
+from contextdb.motion.storage.stored import inputs_of, open_database, save_database
+from contextdb.motion.trace.session import Trace
 
 __all__ = [
     "ANY_TAGS",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, plural, some
-from contextdb.motion.quaternions import Floats
+from contextdb.motion.clips.quaternions import Floats
 
 Flags = NDArray[np.bool_]
 NO_BIASES: Floats = np.empty(0)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.errors import Fault, MotionError, in_quotes, plural
-from contextdb.motion.skeleton import Ints
+from contextdb.motion.clips.skeleton import Ints
 
 
 def frames_between(starts: Ints, stops: Ints) -> Ints:

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from contextdb.motion import MotionDatabase
-from contextdb.motion.filters import Biases
-from contextdb.motion.marks import Marks
-from contextdb.motion.markup import Markup
+from contextdb.motion.markup.marks import Marks
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.search.filters import Biases
 
 RATE = 10.0
 DT = 1.0 / RATE

@@ -11,14 +11,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contextdb.errors import ClipError, FileError, MotionError, SchemaError
-from contextdb.motion import MotionConfig, MotionDatabase, building, load_bvh, make_clip, write_bvh
-from contextdb.motion.building import build, build_all, open_or_build, saved_path
-from contextdb.motion.clip_files import unmatched
-from contextdb.motion.database import build_databases
-from contextdb.motion.extraction import clip_features
-from contextdb.motion.feature_cache import EXTRACTION, FeatureCache, file_name, key_of
-from contextdb.motion.filters import Biases
-from contextdb.motion.stored import save_database
+from contextdb.motion import (
+    MotionConfig,
+    MotionDatabase,
+    load_bvh,
+    make_clip,
+    write_bvh,
+)
+from contextdb.motion.features.extraction import clip_features
+from contextdb.motion.search.database import build_databases
+from contextdb.motion.search.filters import Biases
+from contextdb.motion.storage import building
+from contextdb.motion.storage.building import build, build_all, open_or_build, saved_path
+from contextdb.motion.storage.clip_files import unmatched
+from contextdb.motion.storage.feature_cache import EXTRACTION, FeatureCache, file_name, key_of
+from contextdb.motion.storage.stored import save_database
 
 NAMES = ("idle", "jog", "jog_tired", "walk")
 SECTIONS = {

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from contextdb.errors import ClipError, FileError
 from contextdb.motion import Clip, Skeleton, load_bvh, load_clips, parse_bvh, write_bvh
-from contextdb.motion.skeleton import CHANNELS
+from contextdb.motion.clips.skeleton import CHANNELS
 
 SMALL = """HIERARCHY
 ROOT Hips

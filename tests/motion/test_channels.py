@@ -14,10 +14,10 @@ from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError, SchemaError
 from contextdb.motion import Clip, FeatureSchema, Skeleton, features_of, make_clip, query_from, steady_path
-from contextdb.motion.channels import AXES, WHATS
-from contextdb.motion.extraction import clip_features
-from contextdb.motion.features import Channel
-from contextdb.motion.feet import feet_of
+from contextdb.motion.clips.feet import feet_of
+from contextdb.motion.features.channels import AXES, WHATS
+from contextdb.motion.features.extraction import clip_features
+from contextdb.motion.features.schema import Channel
 
 BONES = ("Hips", "Head", "LeftFoot", "RightHand", "LeftUpLeg")
 WALK = make_clip("walk").clip

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from lines import DT, RATE, line
 
 from contextdb.motion import Entry, Selector
-from contextdb.motion.controller import Controller
-from contextdb.motion.controller_settings import ControllerSettings
-from contextdb.motion.decision import Action
-from contextdb.motion.marks import Mark
+from contextdb.motion.markup.marks import Mark
+from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.selection.decision import Action
 
 
 @st.composite

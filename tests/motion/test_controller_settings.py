@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from contextdb.errors import MotionError
-from contextdb.motion.controller_settings import ControllerSettings, read_controllers
-from contextdb.motion.variation import Variation
+from contextdb.motion.selection.controller_settings import ControllerSettings, read_controllers
+from contextdb.motion.selection.variation import Variation
 
 
 def read(**part):

@@ -9,7 +9,7 @@ import pytest
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, Footfalls, Skeleton, footfalls, make_clip
-from contextdb.motion.feet import phases
+from contextdb.motion.clips.feet import phases
 
 FALLS = Footfalls(4.0, {"LeftFoot": np.array([[0.0, 1.0], [2.0, 3.0]]), "RightFoot": np.zeros((0, 2))})
 

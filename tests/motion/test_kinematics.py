@@ -10,8 +10,17 @@ from motion_oracles import place_joint, rotation_about
 from test_bvh import SMALL, clips
 
 from contextdb.errors import MotionError
-from contextdb.motion import Clip, Skeleton, local_poses, make_clip, parse_bvh, poses_of, quaternions, resampled
-from contextdb.motion.skeleton import sided_pairs
+from contextdb.motion import (
+    Clip,
+    Skeleton,
+    local_poses,
+    make_clip,
+    parse_bvh,
+    poses_of,
+    resampled,
+)
+from contextdb.motion.clips import quaternions
+from contextdb.motion.clips.skeleton import sided_pairs
 
 ANGLES = st.floats(-360.0, 360.0)
 

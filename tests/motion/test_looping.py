@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contextdb.motion import FeatureSchema, Markup, MotionDatabase, clip_features, make_clip, poses_of, root_trajectory
-from contextdb.motion.looping import three_rounds
+from contextdb.motion.clips.looping import three_rounds
 
 SCHEMA = FeatureSchema.from_dict(
     "loco",

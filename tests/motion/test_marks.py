@@ -11,11 +11,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from contextdb.errors import MotionError, QueryError
-from contextdb.motion.left_out import LeftOut
-from contextdb.motion.marks import ANY_TAGS, Mark, Marks, TagFilter, covers, tags_of
-from contextdb.motion.markup import Markup
-from contextdb.motion.reserved import ReservedTag
-from contextdb.motion.spans import TOLERANCE_S, Span, fits
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter, covers, tags_of
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.markup.reserved import ReservedTag
+from contextdb.motion.markup.spans import TOLERANCE_S, Span, fits
 
 # ---- the oracle: one frame and one span at a time
 

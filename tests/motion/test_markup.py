@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import FileError, MotionError
-from contextdb.motion.markup import MOST_FAULTS, Markup
-from contextdb.motion.reserved import ReservedTag
-from contextdb.motion.spans import Span, fits
+from contextdb.motion.markup.markup import MOST_FAULTS, Markup
+from contextdb.motion.markup.reserved import ReservedTag
+from contextdb.motion.markup.spans import Span, fits
 
 HEADER = "asset,tag,from,to,value\n"
 

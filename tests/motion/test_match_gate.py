@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import MotionDatabase, make_clip, query_from
-from contextdb.motion.match_gate import MatchGate
-from contextdb.motion.match_node import MatchNode
-from contextdb.motion.pose_match import pose_schema
-from contextdb.motion.warping import Target
+from contextdb.motion.nodes.match_gate import MatchGate
+from contextdb.motion.nodes.match_node import MatchNode
+from contextdb.motion.nodes.pose_match import pose_schema
+from contextdb.motion.nodes.warping import Target
 
 SCHEMA = pose_schema(make_clip("walk").clip.skeleton)
 POINTS = MotionDatabase.from_features([[0.0], [10.0]], [0, 1], [1, 2], ["near", "far"])

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import Clip, MotionDatabase, make_clip, query_from
-from contextdb.motion.left_out import LeftOut
-from contextdb.motion.marks import Mark, Marks, TagFilter
-from contextdb.motion.markup import Markup
-from contextdb.motion.match_node import MatchNode
-from contextdb.motion.pose_match import pose_schema
-from contextdb.motion.root_motion import RootMotion
-from contextdb.motion.warping import Target
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.markup.marks import Mark, Marks, TagFilter
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.nodes.match_node import MatchNode
+from contextdb.motion.nodes.pose_match import pose_schema
+from contextdb.motion.nodes.warping import Target
+from contextdb.motion.selection.root_motion import RootMotion
 
 RATE = 30.0
 SKELETON = make_clip("walk").clip.skeleton

@@ -10,13 +10,13 @@ from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, FeatureSchema, LocalPoses, Skeleton, forward_kinematics, local_poses, make_clip, poses_of
-from contextdb.motion.extraction import clip_features
-from contextdb.motion.features import Channel
-from contextdb.motion.feet import feet_of
-from contextdb.motion.mirror import has_even_axes, mirrored, mirrored_path, partners_of
-from contextdb.motion.quaternions import matrices
-from contextdb.motion.skeleton import sided_pairs
-from contextdb.motion.trajectory import root_trajectory
+from contextdb.motion.clips.feet import feet_of
+from contextdb.motion.clips.mirror import has_even_axes, mirrored, mirrored_path, partners_of
+from contextdb.motion.clips.quaternions import matrices
+from contextdb.motion.clips.skeleton import sided_pairs
+from contextdb.motion.clips.trajectory import root_trajectory
+from contextdb.motion.features.extraction import clip_features
+from contextdb.motion.features.schema import Channel
 
 MADE = make_clip("walk").clip.skeleton
 SIDES = (("Left*", "Right*"),)

@@ -8,7 +8,7 @@ import pytest
 
 from contextdb.errors import ClipError, MotionError, SchemaError
 from contextdb.motion import DatabaseSettings, MotionConfig, Reason, make_clip, query_from, steady_path, write_bvh
-from contextdb.motion.controller_settings import ControllerSettings
+from contextdb.motion.selection.controller_settings import ControllerSettings
 
 SECTIONS = {
     "features": {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contextdb.motion import FeatureSchema, Normalisation, features_of, make_clip
-from contextdb.motion.features import Channel
+from contextdb.motion.features.schema import Channel
 
 CHANNELS = (
     Channel("velocity", bone="LeftFoot"),

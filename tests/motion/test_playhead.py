@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from lines import RATE, line
 
 from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, make_clip
-from contextdb.motion.controller import Controller
-from contextdb.motion.controller_settings import ControllerSettings
-from contextdb.motion.markup import Markup
-from contextdb.motion.playhead import Playhead
-from contextdb.motion.root_motion import NO_MOTION, RootMotion
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.selection.playhead import Playhead
+from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
 
 SCHEMA = FeatureSchema.from_dict("loco", {"rate": 30.0, "channels": [{"type": "velocity", "bone": "Hips"}]})
 

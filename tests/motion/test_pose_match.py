@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from contextdb.errors import ContextDBError, MotionError, QueryError, SchemaError
 from contextdb.motion import Markup, MotionDatabase, Skeleton, make_clip, query_from
-from contextdb.motion.pose_match import best_start, hands_of, pose_schema
+from contextdb.motion.nodes.pose_match import best_start, hands_of, pose_schema
 
 SKELETON = make_clip("walk").clip.skeleton
 SCHEMA = pose_schema(SKELETON)

@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contextdb.errors import QueryError
-from contextdb.motion.database import Biases, Hit, MotionDatabase
-from contextdb.motion.left_out import LeftOut, Skip
-from contextdb.motion.marks import Mark, Marks, TagFilter
-from contextdb.motion.normalisation import Normalisation
+from contextdb.motion.features.normalisation import Normalisation
+from contextdb.motion.markup.left_out import LeftOut, Skip
+from contextdb.motion.markup.marks import Mark, Marks, TagFilter
+from contextdb.motion.search.database import Biases, Hit, MotionDatabase
 
 TAGS = ("Move", "Move.Run", "Stop")
 EIGHTHS = st.integers(-16, 16).map(lambda i: i / 8)  # sums of these and of their squares are exact: a tie is a tie

@@ -14,8 +14,8 @@ from lines import line
 from contextdb import Table
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import Entry, MotionDatabase, Reason, Selector, Status
-from contextdb.motion.left_out import LeftOut, Skip
-from contextdb.motion.marks import TagFilter
+from contextdb.motion.markup.left_out import LeftOut, Skip
+from contextdb.motion.markup.marks import TagFilter
 
 
 def database(*places, asset="clip"):

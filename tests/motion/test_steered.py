@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from contextdb.motion import Entry, FeatureSchema, MotionConfig, MotionDatabase, Selector, load_bvh, made_clips, with_path
-from contextdb.motion.controller import Controller
-from contextdb.motion.controller_settings import ControllerSettings
-from contextdb.motion.decision import Action
-from contextdb.motion.filters import Biases
-from contextdb.motion.marks import Mark
-from contextdb.motion.markup import Markup
-from contextdb.motion.steering import Steered, steered_path
+from contextdb.motion.clips.steering import Steered, steered_path
+from contextdb.motion.markup.marks import Mark
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.search.filters import Biases
+from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.selection.decision import Action
 
 TABLES = Path(__file__).parents[2] / "tables"
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import MotionError
-from contextdb.motion.steering import Steered, steered_path
+from contextdb.motion.clips.steering import Steered, steered_path
 
 SPEEDS = st.floats(-5.0, 5.0)
 

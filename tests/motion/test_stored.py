@@ -17,12 +17,12 @@ from safetensors.numpy import save as as_safetensors
 
 from contextdb.errors import ArtefactError, FileError, MotionError
 from contextdb.motion import Channel, FeatureSchema, MotionDatabase, make_clip
-from contextdb.motion.filters import Biases
-from contextdb.motion.marks import TagFilter
-from contextdb.motion.markup import Markup
-from contextdb.motion.schema_dict import schema_to_dict
-from contextdb.motion.spans import Span
-from contextdb.motion.stored import inputs_of, open_database, save_database
+from contextdb.motion.features.schema_dict import schema_to_dict
+from contextdb.motion.markup.marks import TagFilter
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.markup.spans import Span
+from contextdb.motion.search.filters import Biases
+from contextdb.motion.storage.stored import inputs_of, open_database, save_database
 from contextdb.table import Table
 
 CHANNELS = [

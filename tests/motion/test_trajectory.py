@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.motion import Clip, Skeleton, Trajectory, make_clip, poses_of, root_trajectory, steady_path
-from contextdb.motion.trajectory import after_seconds, along_path, heading_vectors, smoothed, to_own_frame
+from contextdb.motion.clips.trajectory import after_seconds, along_path, heading_vectors, smoothed, to_own_frame
 
 EVERY = np.arange(61.0)
 

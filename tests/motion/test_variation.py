@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from contextdb.errors import MotionError
 from contextdb.motion import Hit
-from contextdb.motion.variation import Variation, restore, state_of
+from contextdb.motion.selection.variation import Variation, restore, state_of
 
 
 def ties(*assets):

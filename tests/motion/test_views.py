@@ -13,16 +13,16 @@ from hypothesis import strategies as st
 from test_trace import DECISIONS, recorded
 
 from contextdb.console import width_of
-from contextdb.motion.candidates import Candidate, Candidates
-from contextdb.motion.choice import Choice, Reason, Search, Status
-from contextdb.motion.cost_views import Ranked, View, candidate_lines, cost_text
-from contextdb.motion.database import Hit
-from contextdb.motion.decision import Action, Decision, Playing
-from contextdb.motion.left_out import LeftOut
-from contextdb.motion.root_motion import RootMotion
-from contextdb.motion.trigger import Trigger
-from contextdb.motion.view_table import Column, shortened, table_lines
-from contextdb.motion.views import decision_lines, session_lines, summary_line
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.search.candidates import Candidate, Candidates
+from contextdb.motion.search.database import Hit
+from contextdb.motion.selection.choice import Choice, Reason, Search, Status
+from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.selection.trigger import Trigger
+from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines, cost_text
+from contextdb.motion.trace.text_table import Column, shortened, table_lines
+from contextdb.motion.trace.views import decision_lines, session_lines, summary_line
 
 CHANNELS = ("LeftFoot position", "Hips velocity", "trajectory position at 0.33 0.67 1 s")
 

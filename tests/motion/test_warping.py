@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import QueryError
-from contextdb.motion.root_motion import RootMotion
-from contextdb.motion.warping import Target, Window, warped
+from contextdb.motion.nodes.warping import Target, Window, warped
+from contextdb.motion.selection.root_motion import RootMotion
 
 RATE = 30.0
 NEVER = Window(0.0, -1.0)

@@ -1,0 +1,1 @@
+"""Clips: BVH files, skeletons, poses, paths, footfalls."""

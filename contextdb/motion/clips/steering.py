@@ -1,0 +1,117 @@
+"""Where a character wishes to go: a body that follows a stick, smoothly, and the path that it expects of it.
+
+The velocity nears the one that the stick asks for like a critically damped spring, and so does the facing. The past of the path is
+where the body was, its future where it will be if the stick stays as it is. It becomes a query's trajectory by `with_path`.
+
+Ground positions are (x, z) in metres and headings radians, as in `contextdb.motion.clips.trajectory`. Positions are computed
+exactly, not step by step: a step of 0.2 s leads to where twenty of 0.01 s lead.
+
+Source: D. Holden, "Spring-It-On", 2021; orangeduck/Motion-Matching, `controller.cpp`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contextdb.errors import Fault, MotionError
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.reading import as_number
+
+STANDING_MPS = 0.1
+"""Asked to go slower than this, a body keeps its facing."""
+
+Ground = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Steered:
+    """A body that follows a stick. `moved` gives the body some time later.
+
+    Attributes
+    ----------
+    position, velocity, acceleration : (x, z)
+        m, m/s, m/s².
+    heading, turn_rate : float
+        Radians, positive to the left, and radians a second.
+    velocity_halflife_s, heading_halflife_s : float
+        How long it takes until about half of a difference to what is asked for is gone.
+    """
+
+    position: Ground = (0.0, 0.0)
+    velocity: Ground = (0.0, 0.0)
+    acceleration: Ground = (0.0, 0.0)
+    heading: float = 0.0
+    turn_rate: float = 0.0
+    velocity_halflife_s: float = 0.27
+    heading_halflife_s: float = 0.27
+
+    def __post_init__(self) -> None:
+        for name in ("velocity_halflife_s", "heading_halflife_s"):
+            number = as_number(getattr(self, name))
+            if number is None or number <= 0.0:
+                raise MotionError(Fault(f"{name} is {getattr(self, name)!r}.", "seconds above 0, such as 0.27"))
+
+    def moved(self, dt_s: float, wanted: Ground, facing: float | None = None) -> Steered:
+        """The body some seconds later, when the stick asks for a velocity and a heading; by default, to face where it goes."""
+        x, z = (self._along(axis, dt_s, wanted[axis]) for axis in (0, 1))
+        heading, turn_rate = self._turned(dt_s, self._facing(wanted) if facing is None else facing)
+        return replace(
+            self,
+            position=(x[0], z[0]),
+            velocity=(x[1], z[1]),
+            acceleration=(x[2], z[2]),
+            heading=heading,
+            turn_rate=turn_rate,
+        )
+
+    def _along(self, axis: int, dt_s: float, wanted: float) -> tuple[float, float, float]:
+        """Position, velocity and acceleration on one axis."""
+        damping = 2.0 * math.log(2.0) / self.velocity_halflife_s
+        apart = self.velocity[axis] - wanted
+        drift = self.acceleration[axis] + apart * damping
+        left = math.exp(-damping * dt_s)
+        position = left * (-drift / damping**2 - (apart + drift * dt_s) / damping)
+        position += drift / damping**2 + apart / damping + wanted * dt_s + self.position[axis]
+        return position, left * (apart + drift * dt_s) + wanted, left * (self.acceleration[axis] - drift * damping * dt_s)
+
+    def _turned(self, dt_s: float, wanted: float) -> tuple[float, float]:
+        """Heading and turn rate, on the shorter way to a heading."""
+        damping = 2.0 * math.log(2.0) / self.heading_halflife_s
+        apart = -math.remainder(wanted - self.heading, 2.0 * math.pi)
+        drift = self.turn_rate + apart * damping
+        left = math.exp(-damping * dt_s)
+        goal = self.heading - apart
+        return goal + left * (apart + drift * dt_s), left * (self.turn_rate - drift * damping * dt_s)
+
+    def _facing(self, wanted: Ground) -> float:
+        return math.atan2(*wanted) if math.hypot(*wanted) >= STANDING_MPS else self.heading
+
+
+def steered_path(
+    past: list[Steered], wanted: Ground, facing: float | None = None, *, reach_s: float = 1.0, rate: float = 30.0
+) -> Trajectory:
+    """The path of a body: where it was, and where it will be if the stick stays as it is.
+
+    Parameters
+    ----------
+    past : list of Steered
+        The body at each of the last moments, 1 / rate seconds apart, the last of them now; at least one.
+    wanted : (x, z)
+        The velocity that the stick asks for, m/s.
+    facing : float, optional
+        The heading that it asks for. Default: where the body goes.
+    reach_s : float
+        Seconds ahead.
+    rate : float
+        Frames a second.
+    """
+    if not past:
+        raise MotionError(Fault("there is no body to steer.", "its last moments, at least the present one"))
+    future = [past[-1].moved(i / rate, wanted, facing) for i in range(1, math.ceil(reach_s * rate) + 1)]
+    bodies = [*past, *future]
+    headings: Floats = np.unwrap([body.heading for body in bodies])
+    return Trajectory(rate, np.array([body.position for body in bodies]), headings, len(past) - 1)

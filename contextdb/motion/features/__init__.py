@@ -1,0 +1,1 @@
+"""What a search compares: schemas, channels, features of clips, normalisation."""

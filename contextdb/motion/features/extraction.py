@@ -1,0 +1,345 @@
+"""Compute features: from clips for a database, and from a pose and a wished path for a query. One code path for both.
+
+F frames at the schema's rate, N features, in the schema's units (m, m/s, rad/s, unit vectors) and not yet normalised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, nearest, plural, some
+from contextdb.motion.clips import mirror, quaternions
+from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.feet import feet_of, footfalls_of, phases
+from contextdb.motion.clips.looping import three_rounds
+from contextdb.motion.clips.poses import Poses, poses_of
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints, Skeleton
+from contextdb.motion.clips.trajectory import (
+    PathPoints,
+    Trajectory,
+    after_seconds,
+    along_path,
+    heading_vectors,
+    rates_of_change,
+    root_trajectory,
+    to_own_frame,
+)
+from contextdb.motion.features.channels import DEFAULT_AXIS, Channel
+from contextdb.motion.features.schema import CustomFunction, FeatureSchema
+
+Features = NDArray[np.float32]
+
+FARTHEST_M = 1e6
+LARGEST_CUSTOM = 1e12
+SLOW_MPS = 0.3
+"""A body that is slower moves in no clear direction: its direction to velocity shrinks evenly to 0, 0 at rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClipFeatures:
+    """What a clip, as it is or mirrored, gives to a database.
+
+    Attributes
+    ----------
+    asset : str
+        The clip's name, mirrored or not.
+    mirrored : bool
+    features : float32 array, shape (F, N)
+        In the schema's units.
+    root : float32 array, shape (F, 3)
+        Where the body is on the ground and which way it faces: x and z in metres, heading in radians, unwrapped.
+    """
+
+    asset: str
+    mirrored: bool
+    features: Features
+    root: Features
+
+
+def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, looping: bool = False) -> ClipFeatures:
+    """The features of every frame of a clip, resampled to the schema's rate, and the body's path.
+
+    Parameters
+    ----------
+    clip : Clip
+    schema : FeatureSchema
+    mirrored : bool
+        Take the clip in a mirror, left and right bones exchanged by the schema's `mirror`.
+    looping : bool
+        The clip goes on at its start when it ends: its path goes on too, and does not run out straight.
+
+    Raises
+    ------
+    MotionError
+        The skeleton lacks a bone of the schema (the nearest is named) or cannot be mirrored by its pairs, the clip's numbers are
+        too large to be a body, or a custom channel has no function or one that does not give what it should.
+    """
+    faults = list(_faults(clip.skeleton, schema, mirrored))
+    if faults:
+        raise MotionError(*(fault.at(Place(clip.name)) for fault in faults))
+    if clip.n_frames == 0:
+        return ClipFeatures(clip.name, mirrored, np.zeros((0, schema.n_features), np.float32), np.zeros((0, 3), np.float32))
+    with np.errstate(all="ignore"):  # numbers too large become infinite or NaN, and are refused below
+        poses = poses_of(clip, schema.rate)
+    _check_size(poses, clip)
+    if mirrored:
+        poses = mirror.mirrored(poses, schema.mirror)
+    path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
+    root = np.column_stack((path.positions, path.headings)).astype(np.float32)
+    own = slice(None)
+    if looping:
+        poses, own = three_rounds(poses, path)
+        path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
+    blocks = [_channel_features(channel, poses, path, schema, clip)[own] for channel in schema.channels]
+    features = np.concatenate(blocks, axis=1).astype(np.float32)
+    return ClipFeatures(clip.name, mirrored, features, root)
+
+
+def features_of(clip: Clip, schema: FeatureSchema) -> Features:
+    """The features of every frame of a clip alone: float32 [F, N]; see `clip_features`."""
+    return clip_features(clip, schema).features
+
+
+def query_from(
+    schema: FeatureSchema, clip: Clip, frame: int = 0, wanted: Trajectory | None = None, *, mirrored: bool = False
+) -> Features:
+    """A query: the pose of a clip's frame, with the trajectory of the clip or a wished one.
+
+    Parameters
+    ----------
+    schema : FeatureSchema
+    clip : Clip
+        Whose pose the body is in. Phases and custom channels count as pose.
+    frame : int
+        The frame of that pose, at the schema's rate.
+    wanted : Trajectory, optional
+        Where the body shall go, such as `steady_path(1.4)`; its frame `now` is this moment.
+    mirrored : bool
+        Take the clip in a mirror; a wished path stays as it is wished.
+
+    Returns
+    -------
+    float32 array, shape (N,)
+        In the schema's units, for `MotionDatabase.search`.
+    """
+    features = clip_features(clip, schema, mirrored=mirrored).features
+    if not 0 <= frame < len(features):
+        found = f"there is no frame {frame} in {clip.name}."
+        raise QueryError(
+            Fault(found, f"0 to {len(features) - 1}: it has {plural(len(features), 'frame')} at {schema.rate:g} a second")
+        )
+    return features[frame].copy() if wanted is None else with_path(schema, features[frame], wanted)
+
+
+def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajectory) -> Features:
+    """A query [N] whose trajectory is a wished one instead; the pose stays."""
+    if np.shape(query) != (schema.n_features,) or not 0 <= wanted.now < len(wanted.headings):
+        n_frames = len(wanted.headings)
+        found = f"the query has shape {np.shape(query)}, and the path {plural(n_frames, 'frame')} and its present at {wanted.now}."
+        raise QueryError(Fault(found, f"a query of {schema.n_features} features, and a path that holds its present"))
+    changed = np.array(query, np.float32)
+    frames = np.array([wanted.now])
+    for channel in schema.channels:
+        if channel.type == "trajectory":
+            changed[schema.slices[channel.name]] = _trajectory_features(channel, wanted, frames)[0]
+    return changed
+
+
+def _channel_features(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: Clip) -> Floats:
+    match channel.type:
+        case "trajectory":
+            return _trajectory_features(channel, path, np.arange(poses.n_frames))
+        case "phase":
+            found = phases(footfalls_of(poses, channel.feet), np.arange(poses.n_frames) / poses.rate)
+        case "custom":
+            found = _custom_features(channel, poses, path, schema.functions, clip.name)
+        case _:
+            found = _bone_features(channel, poses, path)
+    return found if not channel.at else np.concatenate([_moved(found, seconds * poses.rate) for seconds in channel.at], axis=1)
+
+
+def _moved(values: Floats, frames: float) -> Floats:
+    """Values [F, ...] as they are some frames later, at the nearest frame within the clip."""
+    every = np.arange(len(values))
+    return values[np.clip(every + int(np.rint(frames)), 0, len(values) - 1)]
+
+
+# ---- a bone
+
+
+def _bone_features(channel: Channel, poses: Poses, path: Trajectory) -> Floats:
+    assert channel.bone is not None, "a channel of a bone names it"
+    bone = poses.skeleton.index(channel.bone)
+    other = None if channel.relative_to is None else poses.skeleton.index(channel.relative_to)
+    match channel.type:
+        case "position":
+            vectors = poses.positions[:, bone] - (_origins(path) if other is None else poses.positions[:, other])
+        case "velocity":
+            places = poses.positions[:, bone] - (0.0 if other is None else poses.positions[:, other])
+            vectors = rates_of_change(places, poses.rate)
+        case "angular_velocity":
+            vectors = angular_velocities(poses.rotations[:, bone], poses.rate)
+            if other is not None:
+                vectors = vectors - angular_velocities(poses.rotations[:, other], poses.rate)
+        case "direction":
+            return quaternions.rotate(_seen_rotations(poses, path, bone, other), _axis(channel.axis or DEFAULT_AXIS))
+        case _:
+            turned = _seen_rotations(poses, path, bone, other)
+            return np.concatenate([quaternions.rotate(turned, _axis(axis)) for axis in "xy"], axis=-1)
+    return _in_body(vectors, path.headings)
+
+
+def _origins(path: Trajectory) -> Floats:
+    """The body's places on the ground, in the world: [F, 3]."""
+    return np.insert(path.positions, 1, 0.0, axis=1)
+
+
+def _axis(name: str) -> Floats:
+    """The vector of an axis such as "z" or "-z"."""
+    return np.asarray((-1.0 if name[0] == "-" else 1.0) * np.eye(3)[quaternions.AXES.index(name[-1])])
+
+
+def _seen_rotations(poses: Poses, path: Trajectory, bone: int, other: int | None) -> Floats:
+    """A bone's rotations as the body sees them, or another bone: [F, 4]."""
+    seen_from = quaternions.about_axis("y", path.headings) if other is None else poses.rotations[:, other]
+    return quaternions.multiply(quaternions.inverse(seen_from), poses.rotations[:, bone])
+
+
+def angular_velocities(rotations: Floats, rate: float) -> Floats:
+    """Radians a second about the world's axes of rotations [F, 4]: [F, 3]; each frame has the mean of the turns to it and from it.
+
+    Exact for a steady turn of less than half a turn a frame; the ends have their one turn, a single frame 0.
+    """
+    if len(rotations) < 2:
+        return np.zeros((len(rotations), 3))
+    turns = quaternions.rotation_vectors(quaternions.multiply(rotations[1:], quaternions.inverse(rotations[:-1]))) * rate
+    return np.concatenate((turns[:1], (turns[1:] + turns[:-1]) / 2.0, turns[-1:]))
+
+
+def _in_body(vectors: Floats, headings: Floats) -> Floats:
+    """World vectors [F, 3] as (left, up, ahead) of a body with these headings [F]."""
+    ground = to_own_frame(vectors[:, [0, 2]], headings)
+    return np.stack((ground[:, 0], vectors[:, 1], ground[:, 1]), axis=-1)
+
+
+# ---- the path
+
+
+def _trajectory_features(channel: Channel, path: Trajectory, frames: Ints) -> Floats:
+    """A trajectory channel's features at some frames of a path: [frames, features of the channel]."""
+    at = frames.astype(np.float64)
+    points = [after_seconds(path, at, seconds) for seconds in channel.at] + [
+        along_path(path, at, metres) for metres in channel.along
+    ]
+    return np.concatenate([_point_features(channel, path, frames, point) for point in points], axis=1)
+
+
+def _point_features(channel: Channel, path: Trajectory, frames: Ints, points: PathPoints) -> Floats:
+    headings = path.headings[frames]
+    match channel.what:
+        case "position":
+            return to_own_frame(points.positions - path.positions[frames], headings)
+        case "direction":
+            return heading_vectors(points.headings - headings)
+        case "velocity":
+            return to_own_frame(points.velocities, headings)
+        case "direction_to_velocity":
+            return _direction_to_velocity(points)
+        case _:
+            return np.asarray(np.linalg.norm(points.velocities, axis=-1, keepdims=True))
+
+
+def _direction_to_velocity(points: PathPoints) -> Floats:
+    """The facing as seen by one who looks where the body moves: [N, 2], of length 1 from `SLOW_MPS` on and shorter below."""
+    speeds = np.linalg.norm(points.velocities, axis=-1, keepdims=True)
+    moving = to_own_frame(points.velocities / np.maximum(speeds, SLOW_MPS), points.headings)
+    return np.asarray(moving * np.array([-1.0, 1.0]))
+
+
+# ---- functions of others
+
+
+def _custom_features(
+    channel: Channel, poses: Poses, path: Trajectory, functions: Mapping[str, CustomFunction], clip: str
+) -> Floats:
+    """What a custom channel's function gives, checked: [F, size]."""
+    assert channel.function is not None, "a custom channel names its function"
+    place = Place(clip)
+    for array in (poses.positions, poses.rotations, path.positions, path.headings):
+        array.flags.writeable = False
+    try:
+        found = np.asarray(functions[channel.function](poses, path), np.float64)
+    except Exception as error:
+        said = f"channel {in_quotes(channel.name)}: its function failed: {type(error).__name__}: {error}."
+        raise MotionError(Fault(said, f"a float array of {poses.n_frames} x {channel.size}", place=place)) from error
+    if found.shape != (poses.n_frames, channel.size):
+        said = f"channel {in_quotes(channel.name)}: its function gives shape {found.shape}."
+        raise MotionError(Fault(said, f"{poses.n_frames} frames x {plural(channel.size, 'feature')}", place=place))
+    wrong = np.argwhere(~(np.abs(found) <= LARGEST_CUSTOM))
+    if len(wrong):
+        frame, feature = wrong[0].tolist()
+        said = f"channel {in_quotes(channel.name)}: its function gives {found[frame, feature]} in frame {frame}."
+        raise MotionError(Fault(said, f"finite numbers, at most {LARGEST_CUSTOM:g}", place=place))
+    return found
+
+
+# ---- checks
+
+
+def _faults(skeleton: Skeleton, schema: FeatureSchema, mirrored: bool) -> Iterator[Fault]:
+    """Why a skeleton's features cannot be computed."""
+    yield from schema.bone_faults(skeleton)
+    for channel in schema.channels:
+        if channel.type == "phase" and channel.feet is None:
+            yield from _feet_faults(skeleton)
+        if channel.type == "custom" and channel.function not in schema.functions:
+            yield _no_function(channel, schema)
+    if mirrored:
+        yield from _mirror_faults(skeleton, schema)
+
+
+def _feet_faults(skeleton: Skeleton) -> Iterator[Fault]:
+    try:
+        feet_of(skeleton)
+    except MotionError as error:
+        yield from error.faults
+
+
+def _no_function(channel: Channel, schema: FeatureSchema) -> Fault:
+    name = str(channel.function)
+    near = nearest(name, schema.functions)
+    accepted = f"schema.with_functions({{{in_quotes(name)}: function}}); there are {some(schema.functions) or 'none'}"
+    return Fault(f"channel {in_quotes(channel.name)} has no function.", accepted, in_quotes(near) if near else "")
+
+
+def _mirror_faults(skeleton: Skeleton, schema: FeatureSchema) -> Iterator[Fault]:
+    if not schema.mirror:
+        yield mirror.undeclared(skeleton, schema.name)
+        return
+    try:
+        partners = mirror.partners_of(skeleton, schema.mirror)
+    except MotionError as error:
+        yield from error.faults
+        return
+    fault = mirror.facing_fault(skeleton, partners, schema.facing) if not schema.bone_faults(skeleton) else None
+    if fault is not None:
+        yield fault
+    turned = [channel.name for channel in schema.channels if channel.type in ("direction", "orientation")]
+    if turned and not mirror.has_even_axes(skeleton, partners):
+        found = f"the bones' own axes are not mirror images of each other, so channel {in_quotes(turned[0])} cannot be mirrored."
+        yield Fault(found, "position, velocity, angular velocity, trajectory and phase, or no mirroring of this clip")
+
+
+def _check_size(poses: Poses, clip: Clip) -> None:
+    """Refuse positions that no body has: they would turn into infinite features."""
+    far = np.argwhere(~(np.abs(poses.positions).max(axis=-1) <= FARTHEST_M))
+    if len(far):
+        frame, joint = far[0].tolist()
+        found = f"bone {in_quotes(poses.skeleton.names[joint])} is more than {FARTHEST_M / 1000.0:,.0f} km away in frame {frame}."
+        accepted = f"positions of a body; one unit of the clip is taken to be {clip.metres_per_unit:g} m"
+        raise MotionError(Fault(found, accepted, place=Place(clip.name)))

@@ -1,0 +1,191 @@
+"""The feature schema: which numbers of a frame a search compares, how often they are sampled, and how much each channel weighs.
+
+A schema is data, read from `[features.NAME]` of contextdb.toml; `contextdb.motion.features.channels` says what each type of
+channel holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from contextdb.errors import Fault, SchemaError, in_quotes, nearest, some
+from contextdb.motion.clips.mirror import Pairs, pattern_fault
+from contextdb.motion.clips.poses import Poses
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.features.channels import Channel, check_together, is_pair, read_channel, read_pair
+from contextdb.motion.reading import Mapped, Section, as_toml, what_is
+
+__all__ = ["Channel", "CustomFunction", "FeatureSchema"]
+
+CustomFunction = Callable[[Poses, Trajectory], Floats]
+"""Makes the features of a custom channel, [F, size], of a body's poses and its path, both F frames at the schema's rate."""
+
+SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror")
+MOST_RATE = 1000.0
+MOST_SMOOTH_S = 2.0
+A_FACING = 'the left and the right bone, such as ["LeftUpLeg", "RightUpLeg"]'
+A_MIRROR = 'pairs of a left and a right bone, such as [["Left*", "Right*"]]'
+
+
+@dataclass(frozen=True)
+class FeatureSchema:
+    """What a search compares.
+
+    Attributes
+    ----------
+    name : str
+    rate : float
+        Frames a second: clips are resampled to it.
+    channels : tuple of Channel
+    root : str, optional
+        The bone whose place on the ground is the body's. Default: the one above both thighs.
+    facing : (left bone, right bone), optional
+        The body faces across the line between them. Default: the sided pair of bones nearest the root, as a rule the thighs.
+    facing_smooth_s : float
+        Evens out the facing's sway with each step: the standard deviation in seconds of a Gaussian about each frame, which shifts
+        nothing in time. Default: 0, the facing as it is.
+    mirror : tuple of (left, right)
+        Pairs of bones that change places when a clip is mirrored; a `*` on both sides stands for the same rest of the name.
+    functions : mapping of name to function
+        What custom channels are computed by. Not compared, and not part of contextdb.toml: see `with_functions`.
+    """
+
+    name: str
+    rate: float
+    channels: tuple[Channel, ...]
+    root: str | None = None
+    facing: tuple[str, str] | None = None
+    facing_smooth_s: float = 0.0
+    mirror: Pairs = ()
+    functions: Mapping[str, CustomFunction] = field(default_factory=dict, compare=False, repr=False)
+
+    @cached_property
+    def feature_names(self) -> tuple[str, ...]:
+        """The name of each feature, in order."""
+        return tuple(name for channel in self.channels for name in channel.feature_names)
+
+    @property
+    def n_features(self) -> int:
+        """How many features a frame has."""
+        return len(self.feature_names)
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where each channel's features stand."""
+        stops = np.cumsum([channel.n_features for channel in self.channels]).tolist()
+        return {channel.name: slice(stop - channel.n_features, stop) for channel, stop in zip(self.channels, stops, strict=True)}
+
+    @property
+    def weights(self) -> Floats:
+        """Each channel's weight: float64 [channels]."""
+        return np.array([channel.weight for channel in self.channels], np.float64)
+
+    @property
+    def bones(self) -> tuple[str, ...]:
+        """Every bone that the channels, `root` and `facing` name, once."""
+        named = [bone for channel in self.channels for bone in channel.bones] + [self.root, *(self.facing or ())]
+        return tuple(dict.fromkeys(bone for bone in named if bone is not None))
+
+    def bone_faults(self, skeleton: Skeleton) -> list[Fault]:
+        """What is wrong with using the schema on a skeleton: a fault for each bone that it lacks, with the nearest one."""
+        return [skeleton.missing_bone(bone) for bone in self.bones if bone not in skeleton]
+
+    def with_functions(self, functions: Mapping[str, CustomFunction]) -> FeatureSchema:
+        """The same schema with functions for its custom channels, by the names that the channels give.
+
+        A function takes `(poses, path)`: the `Poses` of all frames and the `Trajectory` of the body, at the schema's rate. It gives
+        a float array [F, size], for each frame what the frame itself and its neighbours tell; it must not change what it is given.
+        It is called on the mirrored poses and path for a mirrored clip, and for a query on those of the query's clip.
+
+        Raises
+        ------
+        SchemaError
+            No channel asks for a name; the nearest that one does ask for is told.
+        """
+        asked = [channel.function for channel in self.channels if channel.function is not None]
+        faults = [_unasked(name, asked, self.name) for name in functions if name not in asked]
+        if faults:
+            raise SchemaError(*faults)
+        return replace(self, functions={**self.functions, **functions})
+
+    @classmethod
+    def from_dict(cls, name: str, mapping: Mapped, *, file: str | None = None) -> FeatureSchema:
+        """Read what `[features.NAME]` of contextdb.toml holds; `file` is its name in messages.
+
+        Raises
+        ------
+        SchemaError
+            With every fault: an unknown key, type or word with the nearest known one, a value of the wrong kind, a channel named
+            twice, or weights that are all zero.
+        """
+        faults: list[Fault] = []
+        schema = _read_schema(cls, name, mapping, faults, file)
+        if faults:
+            raise SchemaError(*faults)
+        assert schema is not None, "a schema that cannot be read leaves a fault"
+        return schema
+
+
+def _unasked(name: str, asked: list[str], schema: str) -> Fault:
+    near = nearest(name, asked)
+    accepted = some(asked) or 'the name in a channel { type = "custom", function = "…" }'
+    return Fault(f"no channel of [features.{schema}] has function = {in_quotes(name)}.", accepted, in_quotes(near) if near else "")
+
+
+def _read_schema(
+    cls: type[FeatureSchema], name: str, mapping: Mapped, faults: list[Fault], file: str | None
+) -> FeatureSchema | None:
+    section = Section(f"[features.{name}]", mapping, SCHEMA_KEYS, faults, file)
+    rate = _read_rate(section)
+    channels = _read_channels(section)
+    root = section.text("root", 'a bone, such as "Hips"') if "root" in mapping else None
+    facing = read_pair(section, "facing", A_FACING) if "facing" in mapping else None
+    smooth_s = _read_smooth(section) if "facing_smooth_s" in mapping else 0.0
+    mirror = _read_mirror(section) if "mirror" in mapping else ()
+    if faults or rate is None or smooth_s is None:
+        return None
+    return cls(name, rate, tuple(channels), root, facing, smooth_s, mirror)
+
+
+def _read_rate(section: Section) -> float | None:
+    accepted = f"frames a second, from 1 to {MOST_RATE:g}, such as 30.0"
+    return section.number("rate", accepted, 1.0, MOST_RATE) if section.has("rate", accepted) else None
+
+
+def _read_smooth(section: Section) -> float | None:
+    return section.number("facing_smooth_s", f"seconds, from 0 to {MOST_SMOOTH_S:g}, such as 0.2", 0.0, MOST_SMOOTH_S)
+
+
+def _read_mirror(section: Section) -> Pairs:
+    """The pairs of names or patterns; whether a skeleton has the bones is asked when a clip is mirrored."""
+    value = section.part["mirror"]
+    if not isinstance(value, (list, tuple)) or not value:
+        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what_is(value)}, not a list"
+        section.wrong("mirror", why, A_MIRROR)
+        return ()
+    for i, item in enumerate(value):
+        why = pattern_fault(item[0], item[1]) if is_pair(item) else "this is no pair of different names"
+        if why:
+            section.add(f"{section.where} mirror pair {i + 1} is {as_toml(item)}: {why}.", A_MIRROR)
+    return tuple((item[0], item[1]) for item in value if is_pair(item))
+
+
+def _read_channels(section: Section) -> list[Channel]:
+    accepted = 'a list of channels, such as [{ type = "position", bone = "LeftFoot", weight = 1.0 }]'
+    if not section.has("channels", accepted):
+        return []
+    value = section.part["channels"]
+    if not isinstance(value, (list, tuple)) or not value:
+        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what_is(value)}, not a list"
+        section.wrong("channels", why, accepted)
+        return []
+    read = [read_channel(section, i, item) for i, item in enumerate(value)]
+    channels = [channel for channel in read if channel is not None]
+    check_together(section, channels, is_whole=len(channels) == len(value))
+    return channels

@@ -1,0 +1,1 @@
+"""Made clips: walking, running, turning, starting, stopping and idling by formulas."""

@@ -1,0 +1,1 @@
+"""What a side table says of frames: spans, marks, tag filters."""

@@ -1,0 +1,304 @@
+"""What the markup says of each frame, in the form that a search uses.
+
+N frames, R ranges, T tags, K kinds. Frames about which the markup says the same are of one kind, and there are few kinds: what a
+tag filter lets pass is decided kind by kind, so that a new filter costs nothing that grows with the frames; what the last filters
+let pass is kept.
+
+A frame's flags say what stands in the way of *choosing* it; the frame that plays now may always play on, unless it is excluded.
+
+Source: the tags DoNotChoose and NextNaturalOnly and the include and exclude masks of EA's talk; soft categories, match range and
+warp range of Remedy's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from enum import IntFlag
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from contextdb.errors import Fault, QueryError, in_quotes, nearest, some
+from contextdb.motion.arguments import Flags, frame_of
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.markup.reserved import ReservedTag
+from contextdb.motion.markup.tag_filter import ANY_TAGS, TagFilter, covers, tags_of
+
+if TYPE_CHECKING:
+    from contextdb.motion.markup.markup import Markup
+
+__all__ = ["ANY_TAGS", "Mark", "Marks", "TagFilter", "covers", "tags_of"]
+
+Array = TypeVar("Array", bound=NDArray[Any])
+
+KEPT_FILTERS = 64
+"""The answers to so many filters are kept; a game asks with a few, again and again."""
+
+
+class Mark(IntFlag):
+    """What the markup says of a frame, beside its tags."""
+
+    EXCLUDED = 1
+    """Never chosen, and never played on to."""
+    DO_NOT_CHOOSE = 2
+    """Cannot be entered; may play on."""
+    PAST_ENTRY = 4
+    """In a NextNaturalOnly span, behind its entry zone: reached only by playing on."""
+    NEXT_NATURAL = 8
+    """In a NextNaturalOnly span, its entry zone too: while it plays, no other frame of its own range may be chosen."""
+    CLIP_END = 16
+    """So near the end of its range that entering it is pointless; may play on."""
+    MATCH_RANGE = 32
+    """A match node may start here. Every frame of a range without a declared match range has it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """The markup of a database's frames. Make it with `of`; its arrays are read-only.
+
+    Attributes
+    ----------
+    tags : tuple of str, length T
+        All tags that the markup knows, also those that no frame of this database has.
+    kinds : uint16 or int32 array, shape (N,)
+        The kind of each frame.
+    kind_tags : bool array, shape (K, T)
+    kind_marks : uint8 array, shape (K,)
+        `Mark` flags.
+    kind_biases : float64 array, shape (K,)
+        Cost modifiers: added to the cost.
+    kind_root_weights : float64 array, shape (K,)
+        How much of the movement comes from the animation: 1 all of it, 0 none (then the game's own model moves the body).
+    looping : bool array, shape (R,)
+        Whether the range goes on at its start when it ends.
+    warps : float64 array, shape (R, 2, 2)
+        For position and rotation, from and to in seconds since the range's start: where a match node may warp. NaN: anywhere.
+    """
+
+    tags: tuple[str, ...]
+    kinds: NDArray[np.integer]
+    kind_tags: Flags
+    kind_marks: NDArray[np.uint8]
+    kind_biases: Floats
+    kind_root_weights: Floats
+    looping: Flags
+    warps: Floats
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, field.name, _read_only(value.view()))
+
+    @classmethod
+    def of(
+        cls,
+        markup: Markup | None,
+        assets: Sequence[str],
+        starts: ArrayLike,
+        stops: ArrayLike,
+        rate: float,
+        end_s: float = 0.0,
+        *,
+        n_frames: int | None = None,
+    ) -> Marks:
+        """The markup of some ranges. Frame i of a range is at i / rate seconds, in a mirrored one too.
+
+        Parameters
+        ----------
+        markup : Markup or None
+            None: nothing is said, but for the ends of ranges.
+        assets : sequence of str, length R
+            The asset of each range.
+        starts, stops : integer arrays, shape (R,)
+            Range i is the frames from starts[i] up to, not including, stops[i]. They do not overlap.
+        rate : float
+            Frames a second.
+        end_s : float
+            Frames less than so many seconds before the last one of a range cannot be entered, unless the range loops. Its first
+            frame always can: a shorter clip could never play otherwise.
+        n_frames : int, optional
+            Frames of the database. Default: up to the last range's end. Frames between ranges are of kind 0.
+
+        Returns
+        -------
+        Marks
+            Kind 0 is that of which nothing is said; the others follow in the order in which they are met in the ranges.
+
+        Raises
+        ------
+        MotionError
+            Ranges that do not fit, a wrong rate or end, or patterns that fit one asset and contradict each other.
+
+        Notes
+        -----
+        A span holds the frames from `from` to `to`, both within, to a millionth of a second. Cost modifiers add up. Of root motion
+        weights, and of warps, one that names the asset is stronger than one with a pattern. A warp ends with its range; one that
+        starts behind the end is as good as none.
+        """
+        from contextdb.motion.markup.marking import marks_of
+
+        return marks_of(markup, assets, starts, stops, rate, end_s, n_frames)
+
+    @classmethod
+    def none(cls, n_frames: int, n_ranges: int) -> Marks:
+        """No markup: every frame may be chosen."""
+        return cls(
+            (),
+            np.zeros(n_frames, np.uint16),
+            np.zeros((1, 0), np.bool_),
+            np.array([Mark.MATCH_RANGE], np.uint8),
+            np.zeros(1),
+            np.ones(1),
+            np.zeros(n_ranges, np.bool_),
+            np.full((n_ranges, 2, 2), np.nan),
+        )
+
+    @property
+    def n_kinds(self) -> int:
+        """How many kinds of frames there are."""
+        return len(self.kind_marks)
+
+    # ---- what a search asks, kind by kind
+
+    def left_out(self, tags: TagFilter | Sequence[str] = ANY_TAGS, *, in_match_range: bool = False) -> NDArray[np.uint8]:
+        """Why frames of each kind may not be chosen, as `LeftOut`: uint8 [K], read-only.
+
+        Raises
+        ------
+        QueryError
+            The filter names a tag that the markup does not know; with the nearest that it does. So in `tag_biases`.
+        """
+        return self._left_out(tags_of(tags), in_match_range)
+
+    def playable(self) -> Flags:
+        """Whether a frame of each kind may play on: bool [K], read-only."""
+        return self._playable
+
+    def tag_biases(self, tags: TagFilter | Sequence[str] = ANY_TAGS) -> Floats:
+        """What the soft categories of a filter add to the cost of frames of each kind: float64 [K], read-only."""
+        return self._tag_biases(tags_of(tags))
+
+    @cached_property
+    def _left_out(self) -> Callable[[TagFilter, bool], NDArray[np.uint8]]:
+        known, marks = _Tags(self.tags, self.kind_tags), self.kind_marks
+        return lru_cache(KEPT_FILTERS)(lambda tags, in_match_range: _read_only(_left_out(known, marks, tags, in_match_range)))
+
+    @cached_property
+    def _tag_biases(self) -> Callable[[TagFilter], Floats]:
+        known = _Tags(self.tags, self.kind_tags)
+        return lru_cache(KEPT_FILTERS)(lambda tags: _read_only(_tag_biases(known, tags)))
+
+    @cached_property
+    def _playable(self) -> Flags:
+        return _read_only(np.asarray((self.kind_marks & Mark.EXCLUDED) == 0))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # without the answers that are kept
+
+    # ---- what is said of one frame
+
+    def mark_of(self, frame: int) -> Mark:
+        """The flags of a frame."""
+        return Mark(int(self.kind_marks[self._kind_of(frame)]))
+
+    def tags_of(self, frame: int) -> tuple[str, ...]:
+        """The plain tags of a frame, sorted."""
+        return tuple(self.tags[i] for i in np.flatnonzero(self.kind_tags[self._kind_of(frame)]).tolist())
+
+    def bias(self, frame: int) -> float:
+        """The cost modifiers of a frame, added up."""
+        return float(self.kind_biases[self._kind_of(frame)])
+
+    def root_weight(self, frame: int) -> float:
+        """How much of the movement comes from the animation in a frame, from 0 to 1."""
+        return float(self.kind_root_weights[self._kind_of(frame)])
+
+    def events(self, frame: int) -> tuple[str, ...]:
+        """All that is said of a frame, in the words of a markup file: plain tags, then reserved ones, as "CostModifier 0.5".
+
+        Beside them stand "ClipEnd" for a frame too near the end, and "NextNaturalOnly entry" for one in an entry zone.
+        """
+        kind = self._kind_of(frame)
+        mark, bias, weight = int(self.kind_marks[kind]), self.kind_biases[kind], self.kind_root_weights[kind]
+        said = [text for bit, text in _MARK_TEXTS if mark & bit]
+        if mark & Mark.NEXT_NATURAL:
+            said.append(str(ReservedTag.NEXT_NATURAL_ONLY) if mark & Mark.PAST_ENTRY else f"{ReservedTag.NEXT_NATURAL_ONLY} entry")
+        if bias:
+            said.append(f"{ReservedTag.COST_MODIFIER} {bias:g}")
+        if weight != 1.0:
+            said.append(f"{ReservedTag.ROOT_MOTION_WEIGHT} {weight:g}")
+        return (*self.tags_of(frame), *said)
+
+    def _kind_of(self, frame: int) -> int:
+        return int(self.kinds[frame_of(frame, len(self.kinds), "frame")])
+
+
+_MARK_TEXTS = (
+    (Mark.EXCLUDED, str(ReservedTag.EXCLUDED)),
+    (Mark.DO_NOT_CHOOSE, str(ReservedTag.DO_NOT_CHOOSE)),
+    (Mark.CLIP_END, "ClipEnd"),
+)
+_REASONS = (
+    (Mark.CLIP_END, LeftOut.CLIP_END),
+    (Mark.PAST_ENTRY, LeftOut.NEXT_NATURAL),
+    (Mark.DO_NOT_CHOOSE, LeftOut.DO_NOT_CHOOSE),
+    (Mark.EXCLUDED, LeftOut.EXCLUDED),
+)
+"""From the weakest to the strongest: the strongest is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Tags:
+    """The tags of each kind: their names, and bool [K, T]."""
+
+    names: tuple[str, ...]
+    flags: Flags
+
+    def has(self, tag: str) -> Flags:
+        """Which kinds have a tag or one below it: bool [K]."""
+        at = [i for i, known in enumerate(self.names) if covers(tag, known)]
+        if not at:
+            near = nearest(tag, self.names)
+            accepted = some(self.names) or "none: the markup knows no tags"
+            raise QueryError(Fault(f"there is no tag {in_quotes(tag)}.", accepted, in_quotes(near) if near else ""))
+        return np.asarray(self.flags[:, at].any(axis=1))
+
+    def passes(self, tags: TagFilter) -> Flags:
+        """Which kinds a filter lets pass: bool [K]."""
+        passes = np.ones(len(self.flags), np.bool_)
+        if tags.include:
+            passes &= np.any([self.has(tag) for tag in tags.include], axis=0)
+        for tag in tags.every:
+            passes &= self.has(tag)
+        for tag in tags.exclude:
+            passes &= ~self.has(tag)
+        return passes
+
+
+def _left_out(known: _Tags, marks: NDArray[np.uint8], tags: TagFilter, in_match_range: bool) -> NDArray[np.uint8]:
+    found = np.zeros(len(marks), np.uint8)
+    if in_match_range:
+        found[(marks & Mark.MATCH_RANGE) == 0] = LeftOut.MATCH_RANGE
+    found[~known.passes(tags)] = LeftOut.TAGS
+    for mark, why in _REASONS:
+        found[(marks & mark) != 0] = why
+    return found
+
+
+def _tag_biases(known: _Tags, tags: TagFilter) -> Floats:
+    added = np.zeros(len(known.flags))
+    for tag, cost in tags.prefer:
+        added[~known.has(tag)] += cost
+    for tag, cost in tags.avoid:
+        added[known.has(tag)] += cost
+    return added
+
+
+def _read_only(array: Array) -> Array:
+    array.flags.writeable = False
+    return array

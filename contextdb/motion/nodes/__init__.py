@@ -1,0 +1,1 @@
+"""One-offs: match nodes, match gates, pose matching."""

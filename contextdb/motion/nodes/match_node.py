@@ -1,0 +1,343 @@
+"""A match node: a one-off animation, chosen once when it is entered and played to completion, that brings the body to a target.
+
+    cost of a frame = motion cost + position_weight x distance² + rotation_weight x angle²
+
+The distance is that from the target to where the animation, played from this frame, would bring the body by itself: to the end of
+its warp range (or of the clip, where it has none, or the frame lies behind it), unwarped. The angle is that between the headings.
+So an animation is chosen that comes near by itself, and the warp has little left to do. The search is the database's own, with
+these two costs as biases: exact, among the frames of match ranges alone.
+
+The chosen animation plays from its frame up to the end of its range, a looping one too, or to the frame before an excluded one.
+
+N frames. Source: "Match Node", "Candidate End Points" and "Distance To Target Cost" in EA's talk; the match node of Remedy's, whose
+match range says where an animation can be started and whose warp range says in which frames it is warped.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypedDict, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes
+from contextdb.motion.arguments import Valid
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.clips.trajectory import to_own_frame
+from contextdb.motion.features.channels import MOST_WEIGHT
+from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped, wrapped
+from contextdb.motion.reading import as_number
+from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.search.database import Hit, MotionDatabase
+from contextdb.motion.search.filtering import Penalties, Tags
+from contextdb.motion.selection.playhead import Playhead
+from contextdb.motion.selection.root_motion import RootMotion
+
+
+class MatchOptions(TypedDict, total=False):
+    """What a match node's search may be given beside query, target and valid assets; see `MotionDatabase.search`."""
+
+    tags: Tags | None
+    penalties: Penalties | None
+
+
+@dataclass(frozen=True)
+class MatchCosts:
+    """What the chosen frame costs, part by part.
+
+    Attributes
+    ----------
+    motion : dict of str to float
+        By channel.
+    distance, rotation : float
+        Of the target from where the animation ends by itself, and of its heading.
+    biases : float
+        What markup, tags, penalties and the database's own biases add.
+    """
+
+    motion: dict[str, float]
+    distance: float
+    rotation: float
+    biases: float
+
+    @property
+    def total(self) -> float:
+        """Their sum: the hit's cost, but for rounding."""
+        return math.fsum((*self.motion.values(), self.distance, self.rotation, self.biases))
+
+
+@dataclass(eq=False)
+class MatchPlay:
+    """An animation that a match node has entered, on its way to the target.
+
+    Attributes
+    ----------
+    hit : Hit
+        The frame at which it was entered, and its cost.
+    target : Target
+    costs : MatchCosts
+    path : WarpedPath
+        Where the body is at every moment; `path.position_s` and `path.rotation_s` say when the target is reached.
+    playhead : Playhead
+        The range that plays.
+    time_s : float
+        Seconds since the entry.
+    """
+
+    hit: Hit
+    target: Target
+    costs: MatchCosts
+    path: WarpedPath
+    playhead: Playhead
+    time_s: float = 0.0
+
+    @property
+    def entry_s(self) -> float:
+        """Seconds from the asset's start to the frame at which it was entered."""
+        return (self.hit.frame - self.playhead.start) / self.playhead.rate
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the entry to the end."""
+        return float(self.path.times_s[-1])
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it has played to completion."""
+        return self.time_s >= self.duration_s
+
+    @property
+    def frame(self) -> int:
+        """The frame that shows now, counted over the whole database."""
+        return self.playhead.frame_at(self.entry_s + self.time_s)
+
+    def advance(self, dt_s: float) -> RootMotion:
+        """Play on for some seconds, and say where the body is then; at the end it stays."""
+        self.time_s += _seconds(dt_s, "the time step")
+        if self.time_s > self.duration_s - TOLERANCE_S:
+            self.time_s = self.duration_s
+        return self.at(self.time_s)
+
+    def at(self, time_s: float) -> RootMotion:
+        """Where the body is some seconds after the entry, seen from where it was then; behind the end, as there."""
+        return self.path.at(_seconds(time_s, "the time since the entry"))
+
+    def warp_share(self, time_s: float) -> WarpShare:
+        """How much of the warp has been blended in some seconds after the entry: 0 to 1, of position and rotation."""
+        return self.path.share_at(_seconds(time_s, "the time since the entry"))
+
+
+class MatchNode:
+    """Chooses among the animations of a database the one that fits the pose and brings the body to a target.
+
+    Parameters
+    ----------
+    database : MotionDatabase
+        With root motion: built from clips, or with `root` given.
+    position_weight : float
+        Cost of a square metre between the target and where the animation ends.
+    rotation_weight : float
+        Cost of a square radian between the headings.
+    rate : float, optional
+        Frames a second, for a database made from features. Default: the schema's.
+
+    Raises
+    ------
+    MotionError
+        A database without root motion or rate, root motion that is not finite, or a weight that is no number from 0 to a million.
+    """
+
+    def __init__(
+        self, database: MotionDatabase, *, position_weight: float = 1.0, rotation_weight: float = 1.0, rate: float | None = None
+    ) -> None:
+        self.database = database
+        self.rate = _rate_of(database, rate)
+        self.position_weight = _weight(position_weight, "position_weight")
+        self.rotation_weight = _weight(rotation_weight, "rotation_weight")
+        self._root = _checked_root(database)
+
+    def enter(
+        self, query: ArrayLike, target: Target, valid: Valid | None = None, **options: Unpack[MatchOptions]
+    ) -> MatchPlay | None:
+        """Choose an animation and the frame to start it at; None when nothing may play.
+
+        Parameters
+        ----------
+        query : float array, shape (F,)
+            The pose at entry.
+        target : Target
+            Where the body shall be when the warp range of the animation ends, or the animation itself where it has none.
+        valid, tags, penalties
+            As for `MotionDatabase.search`.
+
+        Raises
+        ------
+        QueryError
+            As from `MotionDatabase.search`, or a target that is none.
+        """
+        hit = self.search(query, target, valid, **options)
+        return self.play(hit, query, target, valid, **options) if hit else None
+
+    def search(self, query: ArrayLike, target: Target, valid: Valid | None = None, **options: Unpack[MatchOptions]) -> Hit:
+        """The frame that `enter` would start at."""
+        bias = self._target_bias(target)
+        return self.database.search(query, valid, bias=bias, in_match_range=True, **options)
+
+    def candidates(
+        self, query: ArrayLike, target: Target, k: int = 10, valid: Valid | None = None, **options: Unpack[MatchOptions]
+    ) -> Candidates:
+        """The k best frames of that search, and why others were left out; what the target adds is their bias "given".
+
+        Where they would bring the body by themselves is `ends[candidate.frame]`.
+        """
+        bias = self._target_bias(target)
+        return self.database.candidates(query, k, valid, bias=bias, in_match_range=True, **options)
+
+    def play(
+        self, hit: Hit, query: ArrayLike, target: Target, valid: Valid | None = None, **options: Unpack[MatchOptions]
+    ) -> MatchPlay:
+        """Start at a frame that `search` has found with the same arguments."""
+        costs = self._costs(hit, query, target, valid, **options)
+        frames = np.arange(hit.frame, self._last[hit.frame] + 1)
+        position, rotation = (Window(*each) for each in self._windows(frames[:1])[0].tolist())
+        path = warped((frames - hit.frame) / self.rate, _path(self._root, frames), position, rotation, target)
+        return MatchPlay(hit, target, costs, path, Playhead(self.database, hit.range, self.rate))
+
+    def target_costs(self, target: Target) -> tuple[Floats, Floats]:
+        """What distance and rotation add to the cost of each frame: two float64 arrays [N], 0 between ranges."""
+        if not isinstance(target, Target):
+            raise QueryError(Fault(f"the target is {target!r}.", "a Target"))
+        return self._distance_costs(self.ends, target), self._rotation_costs(self.ends, target)
+
+    @cached_property
+    def ends(self) -> Floats:
+        """Where each frame's animation brings the body by itself, seen from the frame: metres left and ahead, radians; [N, 3].
+
+        The place is that at the end of the positional warp range, the turn that at the end of the rotational one; of a frame that
+        has no time left there, that at the end of its animation.
+        """
+        frames = self.database.layout.frames
+        path, places = _path(self._root, frames), np.zeros(self.database.n_frames, np.int64)
+        places[frames] = np.arange(len(frames))
+        windows = self._windows(frames)
+        lasts = (self._last[frames] - frames) / self.rate
+        is_open = windows[:, :, 1] - windows[:, :, 0] > TOLERANCE_S
+        arrivals = np.where(is_open, windows[:, :, 1], lasts[:, None])
+        rows, last_rows = np.arange(len(frames)), places[self._last[frames]]
+        there, turned = (_path_at(path, rows + arrivals[:, i] * self.rate, last_rows) for i in (0, 1))
+        ends = np.zeros((self.database.n_frames, 3))
+        ends[frames, :2] = to_own_frame(there[:, :2] - path[:, :2], path[:, 2])
+        ends[frames, 2] = turned[:, 2] - path[:, 2]
+        ends.flags.writeable = False
+        return ends
+
+    def _windows(self, frames: Ints) -> Floats:
+        """The warp windows of position and rotation left to each frame, from and to in seconds since the frame: [n, 2, 2].
+
+        One that ends before it begins has no time left. A warp range of NaN is as long as the animation.
+        """
+        ranges = self.database.layout.frame_ranges[frames]
+        own_s = (frames - self.database.starts[ranges]) / self.rate
+        lasts_s = (self._last[frames] - frames) / self.rate
+        since = self.database.marks.warps[ranges] - own_s[:, None, None]
+        return np.stack((np.fmax(since[:, :, 0], 0.0), np.fmin(since[:, :, 1], lasts_s[:, None])), axis=-1)
+
+    @cached_property
+    def _last(self) -> Ints:
+        """The last frame that playing on from each leads to: int64 [N]."""
+        ranges, n_frames = self.database.layout.frame_ranges, self.database.n_frames
+        playable = self.database.marks.playable()[self.database.marks.kinds] & (ranges >= 0)
+        goes_on = np.zeros(n_frames, np.bool_)
+        goes_on[:-1] = playable[1:] & (ranges[1:] == ranges[:-1])
+        stops = np.where(goes_on, n_frames, np.arange(n_frames))
+        return np.asarray(np.minimum.accumulate(stops[::-1])[::-1])
+
+    def _distance_costs(self, ends: Floats, target: Target) -> Floats:
+        away = ends[..., :2] - np.array((target.left_m, target.ahead_m))
+        return np.asarray(self.position_weight * (away[..., 0] ** 2 + away[..., 1] ** 2))
+
+    def _rotation_costs(self, ends: Floats, target: Target) -> Floats:
+        if target.turn_rad is None:
+            return np.zeros(ends.shape[:-1])
+        return np.asarray(self.rotation_weight * wrapped(ends[..., 2] - target.turn_rad) ** 2)
+
+    def _target_bias(self, target: Target) -> Floats:
+        distance, rotation = self.target_costs(target)
+        return distance + rotation
+
+    def _costs(
+        self, hit: Hit, query: ArrayLike, target: Target, valid: Valid | None, **options: Unpack[MatchOptions]
+    ) -> MatchCosts:
+        motion = self.database.channel_costs(hit, query)
+        chosen = self.database.filter(valid, in_match_range=True, **options)
+        end = self.ends[hit.frame]
+        return MatchCosts(
+            motion,
+            float(self._distance_costs(end, target)),
+            float(self._rotation_costs(end, target)),
+            float(chosen.range_biases[hit.range] + chosen.kinds.biases[self.database.marks.kinds[hit.frame]]),
+        )
+
+
+# ---- paths
+
+
+def _path(root: Floats, frames: Ints) -> Floats:
+    """The path of some frames, their headings unwrapped: float64 [n, 3]."""
+    path = root[frames].astype(np.float64)
+    path[:, 2] = np.unwrap(path[:, 2])
+    return path
+
+
+def _path_at(path: Floats, rows: Floats, last_rows: Ints) -> Floats:
+    """A path [n, 3] at fractional rows, each at most its last row: [n, 3]."""
+    low = np.minimum(rows.astype(np.int64), last_rows)
+    high = np.minimum(low + 1, last_rows)
+    shares = np.clip(rows - low, 0.0, 1.0)[:, None]
+    return np.asarray(path[low] * (1.0 - shares) + path[high] * shares)
+
+
+# ---- checks
+
+
+def _checked_root(database: MotionDatabase) -> Floats:
+    root = database.root
+    accepted = f"x and z in metres and the heading in radians of each of {database.n_frames} frames"
+    if root is None or np.shape(root) != (database.n_frames, 3):
+        found = "has no root motion" if root is None else f"has root motion of shape {np.shape(root)}"
+        raise MotionError(Fault(f"a match node's database {found}.", accepted))
+    frames = database.layout.frames
+    wrong = frames[~np.isfinite(root[frames]).all(axis=1)]
+    if len(wrong):
+        asset = database.assets[database.range_of(int(wrong[0]))]
+        found = f"the root motion of frame {wrong[0]} is {root[wrong[0]].tolist()} (asset {in_quotes(asset)})."
+        raise MotionError(Fault(found, "finite numbers"))
+    return np.asarray(root)
+
+
+def _rate_of(database: MotionDatabase, rate: float | None) -> float:
+    known = None if database.schema is None else database.schema.rate
+    number = known if rate is None else as_number(rate)
+    if number is None or number <= 0.0 or (known is not None and number != known):
+        found = "a match node's database has no schema to tell its rate." if rate is None else f"the rate is {rate!r}."
+        raise MotionError(Fault(found, "frames a second, more than 0" if known is None else f"{known:g}, the schema's"))
+    return number
+
+
+def _weight(weight: object, what: str) -> float:
+    number = as_number(weight)
+    if number is None or not 0.0 <= number <= MOST_WEIGHT:
+        raise MotionError(Fault(f"{what} is {weight!r}.", f"a number from 0 to {MOST_WEIGHT:,.0f}"))
+    return number
+
+
+def _seconds(value: object, what: str) -> float:
+    number = as_number(value)
+    if number is None or number < 0.0:
+        raise QueryError(Fault(f"{what} is {value!r}.", "seconds, 0 or more"))
+    return number

@@ -1,0 +1,1 @@
+"""Motion databases and the exact search of their frames."""

@@ -1,0 +1,150 @@
+"""The best frames of a search with what each channel and bias adds, and why the other frames were left out.
+
+The costs come from `contextdb.motion.search.cost` and the reasons from the search's own `Filter`: the first candidate is the frame
+that the search chooses, at the same cost to the last bit.
+
+Source: the window "Top Candidates" of EA's diagnostics; the debugger of Remedy's talk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.errors import Fault, QueryError
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.search import cost, scan
+from contextdb.motion.search.filters import Filter
+
+if TYPE_CHECKING:
+    from contextdb.motion.search.database import MotionDatabase
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One frame of a search.
+
+    Attributes
+    ----------
+    asset : str
+    range, frame : int
+    time_s : float or None
+        Seconds since the start of the asset; None for a database made from features.
+    mirrored : bool
+    cost : float
+        The total, its biases in it.
+    channels : dict of str to float
+        What each channel adds.
+    biases : dict of str to float
+        What else is added, as far as it is not 0: "base", "looping", "penalty" (soft cells), "tags", "modifier" (markup), "given"
+        and "continuing".
+    left_out : LeftOut
+        Why it may not be chosen; LeftOut.NO if it may.
+    """
+
+    asset: str
+    range: int
+    frame: int
+    time_s: float | None
+    mirrored: bool
+    cost: float
+    channels: dict[str, float]
+    biases: dict[str, float]
+    left_out: LeftOut
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """The best frames of a search, and what became of all others.
+
+    Attributes
+    ----------
+    rows : tuple of Candidate
+        Cheapest first.
+    counts : dict of LeftOut to int
+        How many frames of ranges were left out for each reason.
+    why : uint8 array, shape (N,)
+        `LeftOut` of every frame; frames between ranges count as of an asset that is not valid.
+    """
+
+    rows: tuple[Candidate, ...]
+    counts: dict[LeftOut, int]
+    why: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Candidate]:
+        return iter(self.rows)
+
+
+def of(database: MotionDatabase, query: Floats, chosen: Filter, k: int, with_left_out: bool) -> Candidates:
+    """The k best frames for a normalised query."""
+    if k < 0:
+        raise QueryError(Fault(f"{k} candidates were asked for.", "0 or more"))
+    lay, kinds = database.layout, database.marks.kinds
+    why = chosen.why(lay.frame_ranges, kinds)
+    in_ranges = lay.frames
+    frames = in_ranges if with_left_out else in_ranges[why[in_ranges] == LeftOut.NO]
+    totals = scan.totals(lay, query, database.slices, database.weights, chosen, kinds, frames)
+    is_other = frames != chosen.playing(lay.frame_ranges, kinds)
+    best = _least_first(totals, is_other, k)
+    counted = np.bincount(why[in_ranges], minlength=len(LeftOut))
+    counts: dict[LeftOut, int] = {reason: int(counted[reason]) for reason in LeftOut if reason != LeftOut.NO and counted[reason]}
+    return Candidates(tuple(_candidates(database, query, chosen, frames[best], totals[best], why)), counts, why)
+
+
+def _least_first(totals: Floats, is_other: NDArray[np.bool_], k: int) -> Ints:
+    """Where the k least totals are, in order; on a tie the current frame is first, then the lowest."""
+    n = len(totals)
+    near = np.arange(n)
+    if k < n:
+        near = np.flatnonzero(totals <= np.partition(totals, k)[k]) if k else near[:0]
+    order = np.lexsort((near, is_other[near], totals[near]))
+    return np.asarray(near[order][:k])
+
+
+def _candidates(
+    database: MotionDatabase, query: Floats, chosen: Filter, frames: Ints, totals: Floats, why: NDArray[np.uint8]
+) -> Iterator[Candidate]:
+    by_channel = (
+        cost.channel_costs(database.layout, frames, query, database.slices, database.weights) if len(frames) else np.empty((0, 0))
+    )
+    for i, (frame, total) in enumerate(zip(frames.tolist(), totals.tolist(), strict=True)):
+        at = int(database.layout.frame_ranges[frame])
+        rate = None if database.schema is None else database.schema.rate
+        yield Candidate(
+            asset=database.assets[at],
+            range=at,
+            frame=frame,
+            time_s=None if rate is None else (frame - int(database.starts[at])) / rate,
+            mirrored=bool(database.mirrored[at]),
+            cost=total,
+            channels=dict(zip(database.channel_names, by_channel[:, i].tolist(), strict=True)),
+            biases=_biases(database, chosen, frame, at),
+            left_out=LeftOut(int(why[frame])),
+        )
+
+
+def _biases(database: MotionDatabase, chosen: Filter, frame: int, at: int) -> dict[str, float]:
+    """The parts of a frame's bias that are not 0; `at` is its range."""
+    marks, kind = database.marks, int(database.marks.kinds[frame])
+    looping = database.biases.looping if marks.looping[at] else 0.0
+    modifier = float(marks.kind_biases[kind])
+    is_playing = chosen.playing(database.layout.frame_ranges, database.marks.kinds) == frame
+    parts = {
+        "base": database.biases.base,
+        "looping": looping,
+        "penalty": float(chosen.range_biases[at]) - (database.biases.base + looping),
+        "tags": float(chosen.kinds.biases[kind]) - modifier,
+        "modifier": modifier,
+        "given": float(chosen.frame_biases[frame]) if len(chosen.frame_biases) else 0.0,
+        "continuing": chosen.continuing if is_playing else 0.0,
+    }
+    return {name: part for name, part in parts.items() if part}

@@ -1,0 +1,497 @@
+"""A motion database: the features of all frames of some assets, and the exact search for the best frame that may play now.
+
+    cost of a frame = Σ over channels of channel_weight × squared difference of normalised features + its biases
+
+N frames, F features, R ranges. A range is the frames [start, stop) of one asset; frames between ranges belong to none and are never
+chosen. Which assets may play now comes as a mask beside the cost, so that it can change with every search and rebuilds nothing.
+Nothing here reads a file or knows a table.
+
+Source: Büttner and Clavet, "Motion Matching", 2015; orangeduck/Motion-Matching; the filter is the context database's (EA, GDC); the
+biases are those of Unreal's PoseSearch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
+from contextdb.motion import arguments
+from contextdb.motion.arguments import Flags, Valid
+from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.features.extraction import ClipFeatures, clip_features
+from contextdb.motion.features.normalisation import Normalisation
+from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.markup.left_out import Skip
+from contextdb.motion.markup.marks import Marks
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.ranges import check_ranges
+from contextdb.motion.search import candidates, cost
+from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.search.cost import weights_of_features
+from contextdb.motion.search.filtering import FilterMaker, Penalties, SearchOptions, Tags
+from contextdb.motion.search.filters import NO_BIAS, Biases, Filter
+from contextdb.motion.search.layout import Features, Layout
+from contextdb.motion.search.searcher import Searcher
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """The frame that a search chose. False when nothing may play; its cost is then infinite, its asset None, range and frame -1.
+
+    Attributes
+    ----------
+    asset : str or None
+    range : int
+        The range that holds the frame, 0…R-1.
+    frame : int
+        Counted over the whole database, 0…N-1.
+    cost : float
+        Without a unit; the biases are in it.
+    """
+
+    asset: str | None
+    range: int
+    frame: int
+    cost: float
+
+    def __bool__(self) -> bool:
+        return self.frame >= 0
+
+
+NOTHING = Hit(None, -1, -1, math.inf)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionDatabase:
+    """Frames to search. Make one with `build` from clips, or with `from_features` from arrays.
+
+    Attributes
+    ----------
+    layout : Layout
+        The features, normalised and not weighted, in the boxes that a search reads.
+    starts, stops : int64 arrays, shape (R,)
+        Range i is the frames from starts[i] up to, not including, stops[i].
+    assets : tuple of str, length R
+        The asset of each range.
+    mirrored : bool array, shape (R,)
+        Whether the range plays its asset mirrored.
+    channel_names : tuple of str, length C
+    slices : tuple of slice, length C
+        Each channel's features.
+    weights : float64 array, shape (C,)
+    normalisation : Normalisation
+        How a query in the schema's units becomes comparable with `features`.
+    marks : Marks
+        What the markup says of each frame.
+    biases : Biases
+    root : float32 array, shape (N, 3), or None
+        Where the body is on the ground in its clip, x and z in metres, and its heading in radians.
+    schema : FeatureSchema or None
+        None for a database made from features.
+    """
+
+    layout: Layout
+    starts: Ints
+    stops: Ints
+    assets: tuple[str, ...]
+    mirrored: Flags
+    channel_names: tuple[str, ...]
+    slices: tuple[slice, ...]
+    weights: Floats
+    normalisation: Normalisation
+    marks: Marks
+    biases: Biases = NO_BIAS
+    root: Features | None = None
+    schema: FeatureSchema | None = None
+
+    @classmethod
+    def build(
+        cls,
+        clips: Iterable[Clip],
+        schema: FeatureSchema,
+        *,
+        normalisation: Normalisation | None = None,
+        markup: Markup | None = None,
+        mirror: bool | Collection[str] = False,
+        biases: Biases = NO_BIAS,
+        end_s: float = 0.0,
+    ) -> MotionDatabase:
+        """Compute the features of some clips; each clip is one range, named like it.
+
+        Parameters
+        ----------
+        clips : iterable of Clip
+            With different names. They may have different skeletons, as long as each has the schema's bones.
+        schema : FeatureSchema
+        normalisation : Normalisation, optional
+            Another database's, so that the costs of both can be compared. Default: the one that fits these clips.
+        markup : Markup, optional
+            Tags and other marks on frames.
+        mirror : bool or collection of str
+            Whether every clip, or those of these names, are there mirrored too, as a second range of the same asset.
+        biases : Biases
+        end_s : float
+            Frames in the last so many seconds of a range that does not loop cannot be entered.
+
+        Raises
+        ------
+        MotionError
+            A bone that a skeleton lacks, two clips of one name, or numbers too large to be a body; all faults together.
+        """
+        parts = parts_of(clips, schema, mirror, markup)
+        return cls.from_parts(parts, schema, normalisation=normalisation, markup=markup, biases=biases, end_s=end_s)
+
+    @classmethod
+    def from_parts(
+        cls,
+        parts: Sequence[ClipFeatures],
+        schema: FeatureSchema,
+        *,
+        normalisation: Normalisation | None = None,
+        markup: Markup | None = None,
+        biases: Biases = NO_BIAS,
+        end_s: float = 0.0,
+    ) -> MotionDatabase:
+        """The database of some clips whose features are known, one range each."""
+        shared = Normalisation.of([part.features for part in parts], schema) if normalisation is None else normalisation
+        lengths = np.array([len(part.features) for part in parts], np.int64)
+        stops = np.cumsum(lengths)
+        starts, assets = stops - lengths, tuple(part.asset for part in parts)
+        features = np.zeros((int(lengths.sum()), schema.n_features), np.float32)
+        for part, start, stop in zip(parts, starts, stops, strict=True):
+            features[start:stop] = shared.apply(part.features)
+        marks = Marks.of(Markup() if markup is None else markup, assets, starts, stops, schema.rate, end_s)
+        slices = tuple(schema.slices.values())
+        return cls(
+            Layout.of(features, starts, stops, weights_of_features(slices, schema.weights)),
+            starts,
+            stops,
+            assets,
+            np.array([part.mirrored for part in parts], np.bool_),
+            tuple(schema.slices),
+            slices,
+            schema.weights,
+            shared,
+            marks,
+            biases,
+            np.concatenate([np.zeros((0, 3), np.float32), *(part.root for part in parts)]),
+            schema,
+        )
+
+    @classmethod
+    def from_features(cls, features: ArrayLike, starts: ArrayLike, stops: ArrayLike, assets: Sequence[str]) -> MotionDatabase:
+        """Take features as they are: already normalised and weighted, as the query then is.
+
+        Parameters
+        ----------
+        features : float32 array, shape (N, F)
+            Finite within the ranges. Other number types are converted to float32.
+        starts, stops : integer arrays, shape (R,)
+            Range i is the frames from starts[i] up to, not including, stops[i]. Ranges do not overlap; their order is free.
+        assets : sequence of str, length R
+            The asset of each range; an asset may have several.
+
+        Raises
+        ------
+        MotionError
+            Shapes or ranges that do not fit, or a feature that is not finite.
+        """
+        array = _as_features(features)
+        first, last, names = check_ranges(starts, stops, assets, len(array))
+        _check_finite(array, first, last, names)
+        n_features = array.shape[1]
+        return cls(
+            Layout.of(array, first, last, np.ones(n_features)),
+            first,
+            last,
+            names,
+            np.zeros(len(names), np.bool_),
+            ("features",),
+            (slice(0, n_features),),
+            np.ones(1),
+            Normalisation.none(n_features),
+            Marks.none(len(array), len(names)),
+        )
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames there are, those between ranges included."""
+        return self.layout.n_frames
+
+    @property
+    def n_features(self) -> int:
+        """How many features a frame has."""
+        return self.layout.n_features
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """The name of each feature."""
+        return tuple(f"feature {i}" for i in range(self.n_features)) if self.schema is None else self.schema.feature_names
+
+    @property
+    def features(self) -> Features:
+        """The features as rows: float32 [N, F], gathered anew; frames between ranges hold zeros."""
+        found = np.zeros((self.n_frames, self.n_features), np.float32)
+        found[self.layout.frames] = self.layout.take(self.layout.frames)
+        return found
+
+    def search(
+        self,
+        query: ArrayLike,
+        valid: Valid | None = None,
+        tags: Tags | None = None,
+        current: int | None = None,
+        bias: ArrayLike | None = None,
+        *,
+        skip: Sequence[Skip] = (),
+        in_match_range: bool = False,
+        penalties: Penalties | None = None,
+    ) -> Hit:
+        """Find the frame of lowest cost among those that may play now.
+
+        Exact: equal to scanning every frame. On a tie the current frame wins, then the lowest.
+
+        Parameters
+        ----------
+        query : float array, shape (F,)
+            One pose and trajectory: in the schema's units (m, m/s, unit vectors) for a database built from clips; as the features
+            are for one made from features.
+        valid : Matches or bool array, shape (R,), optional
+            Matches: the assets of those rows; names that the database lacks are passed over. An array: which ranges may play.
+            Default: all may.
+        tags : TagFilter or bool array, shape (N,), optional
+            A filter: which tags frames must, must not or should have. An array: exactly these frames. Marks such as DoNotChoose
+            always count.
+        current : int, optional
+            The frame that would play next anyway; -1 for none. It is scored first and wins ties. Tags, marks and skips do not keep
+            it from playing on; a mask does, and the mark Excluded.
+        bias : float array, shape (N,), optional
+            Added to each frame's cost; negative favours a frame, positive infinity forbids it.
+        skip : sequence of Skip
+            Frames that this search leaves out.
+        in_match_range : bool
+            Whether only frames of a match range may be chosen.
+        penalties : mapping of asset to float, or float array, shape (R,), optional
+            Added to the cost of all frames of an asset, or of each range. Matches of a table with soft cells bring their own.
+
+        Returns
+        -------
+        Hit
+            False, with an infinite cost, when nothing may play.
+
+        Raises
+        ------
+        QueryError
+            A query, mask, tag, frame or bias that does not fit the database, or is not a number; the message names the feature.
+
+        Notes
+        -----
+        A box is skipped when its lower bound plus its least bias is above the best total so far; see
+        `contextdb.motion.search.kernels`.
+        """
+        chosen = self._filters.make(valid, tags, current, bias, skip, in_match_range, penalties)
+        found, totals, frames = self._searcher.least(query, chosen, math.inf, 1)
+        return self._hit(found, int(frames[0]), float(totals[0]))
+
+    def best_of_ranges(
+        self, query: ArrayLike, within: float, valid: Valid | None = None, **options: Unpack[SearchOptions]
+    ) -> list[Hit]:
+        """The best frame of each range that costs at most `within` more than the best of all, cheapest first.
+
+        The other parameters are those of `search`.
+        """
+        if not within >= 0.0:
+            raise QueryError(Fault(f"the costs may differ by {within!r}.", "a number, 0 or more"))
+        chosen = self.filter(valid, **options)
+        best = float(self._searcher.least(query, chosen, math.inf, 1)[1][0])
+        if best == math.inf:
+            return []
+        _, totals, frames = self._searcher.least(query, chosen, best + within, len(self.assets))
+        ranges = np.flatnonzero(frames >= 0)
+        is_other = frames[ranges] != chosen.current
+        order = ranges[np.lexsort((frames[ranges], is_other, totals[ranges]))]
+        return [self._hit(i, int(frames[i]), float(totals[i])) for i in order.tolist()]
+
+    def search_many(
+        self,
+        queries: ArrayLike,
+        valid: Valid | Sequence[Valid | None] | None = None,
+        current: Sequence[int | None] | NDArray[np.integer] | None = None,
+        tags: Tags | None = None,
+    ) -> list[Hit]:
+        """Search for many characters at once: one `Hit` for each query, in order.
+
+        Parameters
+        ----------
+        queries : float array, shape (Q, F)
+        valid : optional
+            As for `search`, one for all; or one for each query: a list of Q Matches, arrays or None, or a bool array (Q, R).
+        current : sequence of Q frames, optional
+            None or -1 for a character that plays none.
+        tags : TagFilter or bool array, shape (N,), optional
+            As for `search`, one for all.
+        """
+        wanted = arguments.numbers_of(queries, "the queries")
+        if wanted.ndim != 2:
+            raise QueryError(Fault(f"the queries have shape {wanted.shape}.", f"queries x {self.n_features} features"))
+        masks = arguments.for_each(valid, len(wanted))
+        playing: Sequence[int | None] = [None] * len(wanted) if current is None else list(current)
+        if len(playing) != len(wanted):
+            raise QueryError(Fault(f"{plural(len(playing), 'current frame')} for {len(wanted)} queries.", "one for each query"))
+        answers = zip(*self._searcher.least_of_each(wanted, self._filters.make_each(masks, playing, tags)), strict=True)
+        return [self._hit(*answer) for answer in answers]
+
+    def candidates(
+        self, query: ArrayLike, k: int = 10, valid: Valid | None = None, *, left_out: bool = False, **options: Unpack[SearchOptions]
+    ) -> Candidates:
+        """The k frames of lowest cost, with what each channel and bias adds, and why the other frames were left out.
+
+        The first is the one that `search` chooses, at the same cost.
+
+        Parameters
+        ----------
+        k : int
+        left_out : bool
+            Whether frames that may not be chosen stand among the k too, each with its reason.
+        query, valid, **options
+            As for `search`.
+        """
+        chosen = self.filter(valid, **options)
+        return candidates.of(self, self._searcher.normalised(query), chosen, k, left_out)
+
+    def channel_costs(self, frame: Hit | int, query: ArrayLike) -> dict[str, float]:
+        """What each channel adds to the cost of one frame. Their sum, in order, is the frame's cost without its biases."""
+        frames = np.array([self._number(frame)])
+        found = cost.channel_costs(self.layout, frames, self._searcher.normalised(query), self.slices, self.weights)
+        return dict(zip(self.channel_names, found[:, 0].tolist(), strict=True))
+
+    def raw(self, frame: Hit | int) -> Floats:
+        """The features of one frame in the schema's units, as a query has them: float64 [F]."""
+        return self.normalisation.undo(self.layout.take(np.array([self._number(frame)]))[0])
+
+    def time_s(self, hit: Hit) -> float:
+        """Seconds from the start of the hit's range to its frame."""
+        if self.schema is None or not hit:
+            raise QueryError(Fault("there is no time to tell.", "a hit of this database, built from clips"))
+        return (hit.frame - int(self.starts[hit.range])) / self.schema.rate
+
+    def frame_at(self, range_number: int, time_s: float) -> int:
+        """The frame of a range that is nearest to a time since the range's start, inside the range."""
+        if self.schema is None or not 0 <= range_number < len(self.assets) or not math.isfinite(time_s):
+            found = f"there is no frame at {time_s!r} s of range {range_number}."
+            raise QueryError(Fault(found, "a range of this database, built from clips, and seconds"))
+        start, stop = int(self.starts[range_number]), int(self.stops[range_number])
+        return min(max(start, start + round(time_s * self.schema.rate)), stop - 1)
+
+    def range_of(self, frame: int) -> int:
+        """The range that holds a frame, or -1 for a frame between ranges."""
+        return self.layout.range_of(frame)
+
+    def with_weights(self, weights: Mapping[str, float]) -> MotionDatabase:
+        """The same database with some channels weighed otherwise; nothing is rebuilt, the features are shared."""
+        changed = self.weights.copy()
+        for name, weight in weights.items():
+            if name not in self.channel_names:
+                near = nearest(name, self.channel_names)
+                found = f"there is no channel {in_quotes(name)}."
+                raise MotionError(Fault(found, some(self.channel_names), in_quotes(near) if near else ""))
+            if not math.isfinite(weight) or weight < 0.0:
+                raise MotionError(Fault(f"the weight of channel {in_quotes(name)} is {weight!r}.", "a finite number, 0 or more"))
+            changed[self.channel_names.index(name)] = weight
+        return replace(self, weights=changed)
+
+    def __getstate__(self) -> dict[str, object]:
+        """The fields alone: what a search has prepared is prepared anew where the database is unpickled."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    def __repr__(self) -> str:
+        sizes = plural(len(self.assets), "range"), plural(self.n_frames, "frame"), plural(self.n_features, "feature")
+        return f"<MotionDatabase: {', '.join(sizes)}>"
+
+    def filter(self, valid: Valid | None = None, **options: Unpack[SearchOptions]) -> Filter:
+        """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`."""
+        return self._filters.make(valid, **options)
+
+    @cached_property
+    def _filters(self) -> FilterMaker:
+        return FilterMaker(self.n_frames, self.assets, self.marks, self.biases)
+
+    @cached_property
+    def _searcher(self) -> Searcher:
+        return Searcher(self.layout, self.marks.kinds, self.normalisation, self.slices, self.weights, self.feature_names)
+
+    def _hit(self, found: int, frame: int, total: float) -> Hit:
+        """The answer for a range, or for -1, none."""
+        return Hit(self.assets[found], found, frame, total) if found >= 0 else NOTHING
+
+    def _number(self, frame: Hit | int) -> int:
+        number = arguments.frame_of(frame.frame if isinstance(frame, Hit) else frame, self.n_frames, "frame")
+        if self.range_of(number) < 0:
+            raise QueryError(Fault(f"frame {number} is in no range: nothing is known of it.", "a frame of a range"))
+        return number
+
+
+def build_databases(sets: Mapping[str, Iterable[Clip]], schema: FeatureSchema) -> dict[str, MotionDatabase]:
+    """Several databases that share one normalisation, fitted to the frames of all, so that a selector can compare their costs."""
+    parts = {name: parts_of(clips, schema) for name, clips in sets.items()}
+    shared = Normalisation.of([part.features for each in parts.values() for part in each], schema)
+    return {name: MotionDatabase.from_parts(each, schema, normalisation=shared) for name, each in parts.items()}
+
+
+def parts_of(
+    clips: Iterable[Clip], schema: FeatureSchema, mirror: bool | Collection[str] = False, markup: Markup | None = None
+) -> list[ClipFeatures]:
+    """The features of each clip, and of those to be mirrored once more mirrored; the faults of all clips together.
+
+    Clips that loop by the markup go on at their ends.
+    """
+    parts = []
+    faults: list[Fault] = []
+    seen: set[str] = set()
+    for clip in clips:
+        if clip.name in seen:
+            faults.append(
+                Fault(f"two clips are named {in_quotes(clip.name)}.", "a different name for each asset", rule="duplicate")
+            )
+        seen.add(clip.name)
+        is_mirrored = mirror if isinstance(mirror, bool) else clip.name in mirror
+        try:
+            looping = markup is not None and markup.is_looping(clip.name)
+            ways = (False, True) if is_mirrored else (False,)
+            parts += [clip_features(clip, schema, mirrored=way, looping=looping) for way in ways]
+        except MotionError as error:
+            faults.extend(error.faults)
+    if faults:
+        raise MotionError(*faults)
+    return parts
+
+
+# ---- checks
+
+
+def _as_features(features: ArrayLike) -> Features:
+    array = arguments.array_of(features, "the features", MotionError)
+    if array.ndim != 2:
+        raise MotionError(Fault(f"the features have shape {array.shape}.", "frames x features"))
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(array, np.float32)
+
+
+def _check_finite(features: Features, starts: Ints, stops: Ints, assets: Sequence[str]) -> None:
+    """Refuse features that are not finite inside a range; what lies between ranges is never looked at."""
+    is_wrong: Flags = np.logical_not(np.isfinite(features).all(axis=1))
+    for i, (start, stop) in enumerate(zip(starts.tolist(), stops.tolist(), strict=True)):
+        if is_wrong[start:stop].any():
+            frame = start + int(np.argmax(is_wrong[start:stop]))
+            feature = int(np.argmin(np.isfinite(features[frame])))
+            found = f"feature {feature} of frame {frame} is {features[frame, feature]} (range {i}, asset {in_quotes(assets[i])})."
+            raise MotionError(Fault(found, "finite numbers within every range"))

@@ -1,0 +1,169 @@
+"""Turn what a caller of a search gives (matches or flags, tags, biases) into a `Filter`, and keep what calls have in common.
+
+N frames, R ranges, K kinds. A game asks thousands of times with the same tables and the same few tag filters: which rows of a table
+belong to which range, and what a filter says of each kind of frame, is worked out once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from contextdb.errors import Fault, QueryError, plural
+from contextdb.motion import arguments
+from contextdb.motion.arguments import Flags, Valid
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.markup.left_out import LeftOut, Skip
+from contextdb.motion.markup.marks import ANY_TAGS, Marks, TagFilter
+from contextdb.motion.search.filters import NO_FLAGS, Biases, Filter, Kinds
+
+Tags = TagFilter | ArrayLike
+Penalties = Mapping[str, float] | NDArray[np.floating]
+
+MOST_FILTERS, MOST_TABLES = 64, 16
+"""What is kept of tag filters and tables; past that all are forgotten and it begins again."""
+
+
+class SearchOptions(TypedDict, total=False):
+    """The parameters of a search beside the query and the valid assets; see `MotionDatabase.search`."""
+
+    tags: Tags | None
+    current: int | None
+    bias: ArrayLike | None
+    skip: Sequence[Skip]
+    in_match_range: bool
+    penalties: Penalties | None
+
+
+class FilterMaker:
+    """Makes the filters of one database."""
+
+    def __init__(self, n_frames: int, assets: Sequence[str], marks: Marks, biases: Biases) -> None:
+        self.n_frames, self.assets, self.marks, self.biases = n_frames, assets, marks, biases
+        self._all_ranges: Flags = np.ones(len(assets), np.bool_)
+        self._range_biases: Floats = np.where(marks.looping, biases.base + biases.looping, biases.base)
+        self._least_bias = float(self._range_biases.min(initial=np.inf))
+        self._kinds: dict[tuple[TagFilter, bool], Kinds] = {}
+        self._rows: dict[int, tuple[Sequence[str], Ints, Ints]] = {}
+
+    def make(
+        self,
+        valid: Valid | None = None,
+        tags: Tags | None = None,
+        current: int | None = None,
+        bias: ArrayLike | None = None,
+        skip: Sequence[Skip] = (),
+        in_match_range: bool = False,
+        penalties: Penalties | None = None,
+    ) -> Filter:
+        """The filter for one search; see `MotionDatabase.search` for what is given."""
+        ranges, range_biases = self._ranges(valid)
+        if penalties is not None:
+            range_biases = range_biases + self._range_penalties(penalties)
+        is_filter = tags is None or isinstance(tags, TagFilter)
+        return Filter(
+            ranges,
+            ranges is self._all_ranges,
+            range_biases,
+            self._least_of(range_biases),
+            self._kinds_of(tags or ANY_TAGS if is_filter else ANY_TAGS, in_match_range),  # type: ignore[arg-type]
+            NO_FLAGS if is_filter else arguments.flags_of(tags, self.n_frames, "tags", "frame"),
+            arguments.bias_of(bias, self.n_frames),
+            tuple(skip),
+            arguments.current_of(current, self.n_frames),
+            self.biases.continuing,
+        )
+
+    def make_each(self, valid: Sequence[Valid | None], current: Sequence[int | None], tags: Tags | None) -> list[Filter]:
+        """The filters for many characters; those that are given the same mask share what it says."""
+        shared = self.make(None, tags)
+        ranges = {id(mask): self._ranges(mask) for mask in valid}
+        return [
+            shared._replace(
+                ranges=ranges[id(mask)][0],
+                is_whole=ranges[id(mask)][0] is self._all_ranges,
+                range_biases=ranges[id(mask)][1],
+                least_of_ranges=self._least_of(ranges[id(mask)][1]),
+                current=arguments.current_of(frame, self.n_frames),
+            )
+            for mask, frame in zip(valid, current, strict=True)
+        ]
+
+    def _least_of(self, range_biases: Floats) -> float:
+        return self._least_bias if range_biases is self._range_biases else float(range_biases.min(initial=np.inf))
+
+    def _ranges(self, valid: Valid | None) -> tuple[Flags, Floats]:
+        """Which ranges may play, bool [R], and the biases of ranges, float64 [R]."""
+        if valid is None:
+            return self._all_ranges, self._range_biases
+        if type(valid) is np.ndarray and valid.dtype == np.bool_ and valid.shape == self._all_ranges.shape:
+            return np.ascontiguousarray(valid), self._range_biases
+        if hasattr(valid, "table_assets"):
+            return self._of_matches(valid)
+        names = getattr(valid, "assets", None)
+        if names is None:
+            return arguments.flags_of(valid, len(self.assets), "valid", "range"), self._range_biases
+        flags = np.zeros(len(self.assets), np.bool_)
+        for name in set(names):
+            flags[self._ranges_of_asset.get(name, [])] = True
+        return flags, self._range_biases
+
+    def _of_matches(self, matches: Any) -> tuple[Flags, Floats]:
+        """The same for a table's answer; of several valid rows of one asset, the cheapest counts."""
+        rows, ranges = self._rows_of_table(matches.table_assets)
+        valid = matches.flags[rows]
+        flags = np.zeros(len(self.assets), np.bool_)
+        flags[ranges[valid]] = True
+        if not getattr(matches, "has_penalties", False):
+            return flags, self._range_biases
+        least = np.full(len(self.assets), np.inf)
+        np.minimum.at(least, ranges[valid], matches.penalties[rows[valid]])
+        return flags, self._range_biases + np.where(flags, least, 0.0)
+
+    def _rows_of_table(self, table_assets: Sequence[str]) -> tuple[Ints, Ints]:
+        """The pairs of a table's rows and the ranges of their assets: two int64 arrays."""
+        known = self._rows.get(id(table_assets))
+        if known is None or known[0] is not table_assets:
+            pairs = [(row, i) for row, asset in enumerate(table_assets) for i in self._ranges_of_asset.get(asset, ())]
+            rows, ranges = np.array(pairs, np.int64).reshape(-1, 2).T.copy()
+            if len(self._rows) >= MOST_TABLES:
+                self._rows.clear()
+            known = self._rows[id(table_assets)] = (table_assets, rows, ranges)
+        return known[1], known[2]
+
+    def _range_penalties(self, penalties: Penalties) -> Floats:
+        if isinstance(penalties, Mapping):
+            found = np.zeros(len(self.assets))
+            for asset, penalty in penalties.items():
+                found[self._ranges_of_asset.get(asset, [])] = penalty
+        else:
+            found = arguments.numbers_of(penalties, "the penalties")
+        if found.shape != self._all_ranges.shape or np.isnan(found).any() or np.isneginf(found).any():
+            ranges = plural(len(self.assets), "range")
+            accepted = f"a number for each of {ranges}, or for some assets; positive infinity forbids one"
+            raise QueryError(Fault(f"the penalties have shape {found.shape}, or one is no number.", accepted))
+        return found
+
+    def _kinds_of(self, tags: TagFilter, in_match_range: bool) -> Kinds:
+        """What a tag filter says of each kind."""
+        known = self._kinds.get((tags, in_match_range))
+        if known is None:
+            left_out = self.marks.left_out(tags, in_match_range=in_match_range)
+            biases = self.marks.kind_biases + self.marks.tag_biases(tags)
+            if len(self._kinds) >= MOST_FILTERS:
+                self._kinds.clear()
+            known = Kinds(left_out == LeftOut.NO, biases, self.marks.playable(), left_out)
+            self._kinds[tags, in_match_range] = known
+        return known
+
+    @cached_property
+    def _ranges_of_asset(self) -> dict[str, list[int]]:
+        found: dict[str, list[int]] = {}
+        for i, asset in enumerate(self.assets):
+            found.setdefault(asset, []).append(i)
+        return found

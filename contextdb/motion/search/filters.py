@@ -1,0 +1,143 @@
+"""What one search may choose from, and what is added to the cost of each frame: everything but the query.
+
+N frames, R ranges, K kinds of frames (see `contextdb.motion.markup.marks`). The fast search, the full scan, the candidates and the
+reasons are all read off one `Filter`, so that they cannot disagree.
+
+    bias of a frame = its range's + its kind's + its own, and the continuing bias for the frame that would play on
+
+A range's bias is the database's base and looping bias and what the table's soft cells cost; a kind's is what the markup says and
+what the tag filter prefers; a frame's own is what the caller gives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.motion.arguments import Flags
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.markup.left_out import LeftOut, Skip
+
+NO_FLAGS: Flags = np.empty(0, np.bool_)
+NO_SKIPS: Ints = np.empty((0, 2), np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Biases:
+    """What is added to the cost of frames, whatever the query; negative favours them.
+
+    Attributes
+    ----------
+    base : float
+        For every frame of the database.
+    looping : float
+        For frames of looping ranges.
+    continuing : float
+        For the frame that would play on, so that a character does not jump for a trifle.
+    """
+
+    base: float = 0.0
+    looping: float = 0.0
+    continuing: float = 0.0
+
+
+NO_BIAS = Biases()
+
+
+class Kinds(NamedTuple):
+    """What a tag filter says of frames of each kind.
+
+    Attributes
+    ----------
+    allowed : bool array, shape (K,)
+        Whether they may be chosen.
+    biases : float64 array, shape (K,)
+    playable : bool array, shape (K,)
+        Whether they may play on.
+    left_out : uint8 array, shape (K,)
+        Why they may not be chosen, as `LeftOut`.
+    """
+
+    allowed: Flags
+    biases: Floats
+    playable: Flags
+    left_out: NDArray[np.uint8]
+
+
+class Filter(NamedTuple):
+    """One search's masks and biases.
+
+    Attributes
+    ----------
+    ranges : bool array, shape (R,)
+        The ranges whose asset is valid.
+    is_whole : bool
+        Whether that is all of them.
+    range_biases : float64 array, shape (R,)
+    least_of_ranges : float
+        The least of them; 0 where there is no range.
+    kinds : Kinds
+    frames : bool array, shape (N,) or (0,)
+        The frames that the caller lets pass; empty: all.
+    frame_biases : float64 array, shape (N,) or (0,)
+    skips : tuple of Skip
+    current : int
+        The frame that would play on; -1 for none. It may be chosen whatever tags and skips say, if its asset is valid, it is not
+        excluded, and it is among `frames`.
+    continuing : float
+        What is added to its cost alone.
+    """
+
+    ranges: Flags
+    is_whole: bool
+    range_biases: Floats
+    least_of_ranges: float
+    kinds: Kinds
+    frames: Flags
+    frame_biases: Floats
+    skips: tuple[Skip, ...]
+    current: int
+    continuing: float
+
+    @property
+    def skip_spans(self) -> Ints:
+        """The skips as spans: int64 [S, 2]."""
+        return np.array([(skip.start, skip.stop) for skip in self.skips], np.int64) if self.skips else NO_SKIPS
+
+    def playing(self, ranges: Ints, kinds: NDArray[np.integer]) -> int:
+        """The frame that plays on if it may, else -1; from the range (-1: none) and the kind of every frame."""
+        at = self.current
+        if at < 0 or ranges[at] < 0 or not self.ranges[ranges[at]] or not self.kinds.playable[kinds[at]]:
+            return -1
+        return at if not len(self.frames) or self.frames[at] else -1
+
+    def why(self, ranges: Ints, kinds: NDArray[np.integer]) -> NDArray[np.uint8]:
+        """Why each frame may not be chosen, as `LeftOut`: uint8 [N], from the range (-1: none) and the kind of every frame."""
+        why = np.zeros(len(ranges), np.uint8)
+        for skip in reversed(self.skips):
+            why[max(0, skip.start) : max(0, skip.stop)] = skip.why
+        if len(self.frames):
+            why[~self.frames] = LeftOut.TAGS
+        by_kind = self.kinds.left_out[kinds]
+        why = np.where(by_kind != LeftOut.NO, by_kind, why)
+        playing = self.playing(ranges, kinds)
+        if playing >= 0:
+            why[playing] = LeftOut.NO
+        is_free = why == LeftOut.NO
+        why[is_free & np.isposinf(self.biases(ranges, kinds))] = LeftOut.FORBIDDEN
+        why[(ranges < 0) | ~self.ranges[ranges]] = LeftOut.NOT_VALID
+        return np.asarray(why, np.uint8)
+
+    def biases(self, ranges: Ints, kinds: NDArray[np.integer]) -> Floats:
+        """What is added to the cost of each frame: float64 [N]; frames in no range are given some range's."""
+        added = self.range_biases[ranges] + self.kinds.biases[kinds]
+        if len(self.frame_biases):
+            added = added + self.frame_biases
+        playing = self.playing(ranges, kinds)
+        if playing >= 0:
+            added[playing] += self.continuing
+        return np.asarray(added)

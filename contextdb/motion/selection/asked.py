@@ -1,0 +1,109 @@
+"""What several databases are asked with beside the query: some of it is for all alike, some for each by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import NoneType
+from typing import Any, TypeAlias, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contextdb.errors import Fault, QueryError
+from contextdb.motion.arguments import HasAssets, Valid
+from contextdb.motion.markup.left_out import Skip
+from contextdb.motion.markup.tag_filter import TagFilter
+from contextdb.motion.search.filtering import Penalties, Tags
+from contextdb.motion.selection.choice import Choice
+
+Among: TypeAlias = Collection[str] | HasAssets
+OfValid: TypeAlias = Valid | Mapping[str, Valid]
+OfTags: TypeAlias = TagFilter | Mapping[str, Tags]
+OfPenalties: TypeAlias = Mapping[str, float] | Mapping[str, Penalties]
+Current: TypeAlias = Choice | tuple[str, int]
+
+
+class Options(TypedDict, total=False):
+    """The parameters of `Selector.search` beside the query, by name."""
+
+    valid: OfValid | None
+    tags: OfTags | None
+    current: Current | None
+    bias: Mapping[str, ArrayLike] | None
+    among: Among | None
+    skip: Mapping[str, Sequence[Skip]] | None
+    penalties: OfPenalties | None
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The same as one thing; see `Selector.search`."""
+
+    valid: OfValid | None = None
+    tags: OfTags | None = None
+    current: Current | None = None
+    bias: Mapping[str, ArrayLike] | None = None
+    among: Among | None = None
+    skip: Mapping[str, Sequence[Skip]] | None = None
+    penalties: OfPenalties | None = None
+
+    def __post_init__(self) -> None:
+        for what in ("bias", "skip", "penalties"):
+            if not isinstance(given := getattr(self, what), (Mapping, NoneType)):
+                accepted = f"{'a mapping of assets to costs, or ' if what == 'penalties' else ''}a mapping of databases"
+                raise QueryError(Fault(f"{what} is a {type(given).__name__}.", accepted))
+        if not isinstance(self.tags, (TagFilter, Mapping, NoneType)):
+            raise QueryError(Fault(f"tags is a {type(self.tags).__name__}.", "a TagFilter, or a mapping of databases"))
+        if not isinstance(self.current, (Choice, NoneType)) and not _is_pair(self.current):
+            raise QueryError(Fault(f"what plays now is {self.current!r}.", 'a Choice, or such as ("jog", 120)'))
+
+    def of(self, name: str) -> dict[str, Any]:
+        """What one database is given, by the names of the parameters of `MotionDatabase.search`."""
+        return {
+            "valid": self.valid.get(name) if isinstance(self.valid, Mapping) else self.valid,
+            "tags": self.tags.get(name) if isinstance(self.tags, Mapping) else self.tags,
+            "current": self._current_in(name),
+            "bias": self.bias.get(name) if self.bias else None,
+            "skip": self.skip.get(name, ()) if self.skip else (),
+            "penalties": self._penalties_of(name),
+        }
+
+    def options(self) -> Options:
+        """The same as keyword arguments."""
+        return {
+            "valid": self.valid,
+            "tags": self.tags,
+            "current": self.current,
+            "bias": self.bias,
+            "among": self.among,
+            "skip": self.skip,
+            "penalties": self.penalties,
+        }
+
+    def databases(self) -> Iterator[str]:
+        """Every name of a database in it, but for those in `among` and `current`."""
+        for given in (self.valid, self.tags, self.bias, self.skip):
+            if isinstance(given, Mapping):
+                yield from given
+        if self.penalties and not _are_of_assets(self.penalties):
+            yield from self.penalties
+
+    def _current_in(self, name: str) -> int | None:
+        if self.current is None:
+            return None
+        if isinstance(self.current, Choice):
+            return self.current.hit.frame if self.current.database == name else None
+        return self.current[1] if self.current[0] == name else None
+
+    def _penalties_of(self, name: str) -> object:
+        return self.penalties if not self.penalties or _are_of_assets(self.penalties) else self.penalties.get(name)
+
+
+def _is_pair(current: object) -> bool:
+    return isinstance(current, tuple) and len(current) == 2
+
+
+def _are_of_assets(penalties: OfPenalties) -> bool:
+    """Costs are of assets, mappings and arrays of databases."""
+    return not any(isinstance(each, (Mapping, Sequence, np.ndarray)) for each in penalties.values())

@@ -1,0 +1,220 @@
+"""One character: what it plays now, when it searches, and whether it jumps or plays on.
+
+At each update the playing animation moves on. A search follows when one is due or forced, when the clip has ended, and when what
+plays is no longer valid, loaded or among the databases of the moment. What would play on takes part in the search as the continuing
+pose, with its bias; some frames are no candidates because of what plays and what was played (see
+`contextdb.motion.selection.history`). When nothing is found, the character plays on, or holds the last frame of a clip that has
+ended.
+
+A controller reads no clock and draws no random number of its own: the same calls give the same decisions.
+
+Source: the settings of Unreal's motion matching node (throttle, jump threshold, reselect history, continuing pose, interrupt);
+DoNotChoose, NextNaturalOnly and root motion weight of EA's talk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from numpy.typing import ArrayLike
+
+from contextdb.errors import Fault, MotionError, QueryError
+from contextdb.motion import arguments
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.reading import as_number
+from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.selection import variation
+from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValid
+from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.selection.controller_state import ControllerState
+from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
+from contextdb.motion.selection.history import remembered
+from contextdb.motion.selection.ongoing import Ongoing
+from contextdb.motion.selection.root_motion import NO_MOTION
+from contextdb.motion.selection.selector import Selector
+from contextdb.motion.selection.step import Step
+from contextdb.motion.selection.trigger import Trigger
+from contextdb.motion.selection.variation import Rng
+
+Clock = Callable[[], float]
+DEFAULT_SETTINGS = ControllerSettings()
+
+
+class Controller:
+    """Chooses what one character plays.
+
+    Parameters
+    ----------
+    selector : Selector
+        May be exchanged between updates, such as by `selector.with_database`: a database that is no longer there is left at once.
+    settings : ControllerSettings
+        May be exchanged too.
+    recorder : Recorder, optional
+        Is handed every decision.
+    rng : random.Random or numpy Generator, optional
+        For the variation that the settings ask for.
+    clock : function, optional
+        Gives seconds, such as `time.perf_counter`: only for `Decision.search_us`.
+
+    Raises
+    ------
+    MotionError
+        The settings ask for variation, and there is no generator.
+    """
+
+    def __init__(
+        self,
+        selector: Selector,
+        settings: ControllerSettings = DEFAULT_SETTINGS,
+        recorder: Recorder | None = None,
+        rng: Rng | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        if settings.variation is not None and rng is None:
+            raise MotionError(Fault("the settings ask for variation, and there is no generator.", "rng=random.Random(seed)"))
+        self.selector, self.settings, self.recorder = selector, settings, recorder
+        self._rng, self._clock = rng, clock
+        self._state = ControllerState()
+
+    @property
+    def playing(self) -> Playing | None:
+        """What plays now."""
+        return self._state.playing
+
+    def upcoming(self, dt_s: float) -> Playing | None:
+        """What plays in some seconds if it plays on: the pose that the query of the next update is to be made of.
+
+        A query with the pose of the last update lags behind, and the frame that it fits best is always one that steps back.
+        """
+        ongoing = Ongoing.of(self._state.playing, self.selector, self.settings.rate, _seconds(dt_s))
+        return None if ongoing is None else ongoing.playing
+
+    @property
+    def state(self) -> ControllerState:
+        """Where the controller stands, to come back to with `restore`."""
+        return replace(self._state, rng=variation.state_of(self._rng))
+
+    def restore(self, state: ControllerState) -> None:
+        """Go on from a state of this controller, or of another one with the same selector and settings."""
+        variation.restore(self._rng, state.rng)
+        self._state = replace(state, rng=None)
+
+    def update(
+        self,
+        dt_s: float,
+        query: ArrayLike,
+        valid: OfValid | None = None,
+        tags: OfTags | None = None,
+        context: Mapping[str, object] | None = None,
+        *,
+        bias: Mapping[str, ArrayLike] | None = None,
+        penalties: OfPenalties | None = None,
+        among: Among | None = None,
+        force: bool = False,
+        interrupt: bool = False,
+    ) -> Decision:
+        """Move what plays on by some time, search if it is time to, and say what plays now.
+
+        Parameters
+        ----------
+        dt_s : float
+            Seconds since the last update, 0 or more.
+        query : float array, shape (F,)
+            The pose at the end of this update, see `upcoming`, and the wished trajectory; in the schema's units.
+        valid, tags, bias, penalties, among
+            What may play, as for `Selector.search`. That an asset is no longer valid, or its database not among those of the
+            moment, forces a search; that its tags do not fit lets it play on.
+        context : mapping of str to object, optional
+            The facts of the moment, for the recorder alone.
+        force : bool
+            Search now, though no search is due. What plays may win.
+        interrupt : bool
+            Search now, and leave what plays if anything else may.
+
+        Raises
+        ------
+        QueryError
+            A time, query, mask, tag or name that does not fit. The controller then stands where it stood.
+        """
+        dt_s = _seconds(dt_s)
+        asked = Asked(valid, tags, None, bias, among, None, penalties)
+        step = Step.of(self.selector, self.settings, self._state, dt_s, self._checked(query), asked)
+        decision = self._decided(step, step.trigger(force, interrupt), context)
+        if self.recorder is not None:
+            self.recorder.record(decision)
+        self._state = self._state_after(step, decision)
+        return decision
+
+    def _decided(self, step: Step, cause: Trigger | None, context: Mapping[str, object] | None) -> Decision:
+        search_us: float | None = None
+        candidates: tuple[tuple[str, Candidates], ...] = ()
+        if cause is None:
+            assert step.ongoing is not None, "without anything playing there is a cause to search"
+            outcome = step.unsearched(step.ongoing)
+        else:
+            wanted = step.wanted(cause)
+            began_s = self._clock() if self._clock else 0.0
+            outcome = step.searched(cause, wanted, self._rng)
+            search_us = (self._clock() - began_s) * 1e6 if self._clock else None
+            candidates = self._candidates(step.query, wanted)
+        return Decision(
+            tick=self._state.tick,
+            time_s=step.now_s,
+            action=outcome.action,
+            why=outcome.why,
+            searched=cause is not None,
+            playing=outcome.playing,
+            before=step.before,
+            cost=outcome.cost,
+            continuing_cost=outcome.continuing_cost,
+            choice=outcome.choice,
+            context=context,
+            query=step.query,
+            candidates=candidates,
+            search_us=search_us,
+            root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
+            root_weight=self._root_weight(outcome.playing),
+        )
+
+    def _state_after(self, step: Step, decision: Decision) -> ControllerState:
+        state, playing, for_s = self._state, decision.playing, self.settings.history_s
+        history, recent = step.history, state.recent
+        if playing is not None and decision.action in (Action.START, Action.JUMP):
+            history = remembered(history, playing.database, ((playing.frame, playing.frame + 1),), step.now_s, for_s)
+            if self.settings.variation is not None:
+                recent = self.settings.variation.remember(recent, playing.asset)
+        since_s = 0.0 if decision.searched else state.since_search_s + step.dt_s
+        return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent)
+
+    def _candidates(self, query: Floats, wanted: Asked) -> tuple[tuple[str, Candidates], ...]:
+        """For the recorder, of each database that was searched: the best frames, and those left out that cost as little."""
+        k = 0 if self.recorder is None else self.recorder.n_candidates
+        if k <= 0:
+            return ()
+        best = self.selector.candidates(query, k, **wanted.options())
+        all_of = dict(self.selector.candidates(query, k, left_out=True, **wanted.options()))
+        return tuple((name, _merged(found, all_of[name])) for name, found in best)
+
+    def _root_weight(self, playing: Playing | None) -> float:
+        return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)
+
+    def _checked(self, query: ArrayLike) -> Floats:
+        """The query as float64 [F], checked as long as any database is there to say how long it must be."""
+        for database in self.selector.databases.values():
+            return arguments.query_of(query, database.feature_names)
+        return arguments.numbers_of(query, "the query")
+
+
+def _merged(best: Candidates, every: Candidates) -> Candidates:
+    """The candidates that may be chosen, and those left out, cheapest first."""
+    left_out = [row for row in every if row.left_out is not LeftOut.NO]
+    return replace(best, rows=tuple(sorted((*best, *left_out), key=lambda row: row.cost)))
+
+
+def _seconds(dt_s: float) -> float:
+    found = as_number(dt_s)
+    if found is None or found < 0.0:
+        raise QueryError(Fault(f"an update of {dt_s!r} seconds.", "a finite number, 0 or more"))
+    return found

@@ -1,0 +1,116 @@
+"""What `[controllers.NAME]` of contextdb.toml says: when a character searches, and where it may not jump.
+
+    [controllers.player]
+    selector = "locomotion"
+    search_every_s = 0.1       # between two searches, unless one is forced
+    jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are no candidates
+    history_s = 0.5            # frames played within so many seconds are not entered again
+    variation_within = 0.05    # frames that cost at most so much more than the best are as good as it; without the key, none are
+    variation_memory = 2       # and none of the last so many assets is chosen while another is as good
+
+Source: SearchThrottleTime, PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch. The default history is the
+shortest one with which a steered character without fitting clips still showed new frames half of the time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from contextdb.errors import Fault, MotionError, in_quotes, some
+from contextdb.motion.reading import Mapped, Section, as_number
+from contextdb.motion.selection.variation import Variation
+
+SECONDS = {
+    "search_every_s": ("seconds from 0 to 60, such as 0.1; 0 is every update", 60.0),
+    "jump_threshold_s": ("seconds from 0 to 60, such as 0.2", 60.0),
+    "history_s": ("seconds from 0 to 60, such as 0.5; 0 is no memory", 60.0),
+}
+VARIATION = ("variation_within", "variation_memory")
+WITHIN = "a cost from 0 to 1e30, such as 0.05"
+MEMORY = "a whole number from 0 to 1000, such as 2"
+MOST_COST, MOST_ASSETS = 1e30, 1000
+KEYS = ("selector", *SECONDS, *VARIATION)
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerSettings:
+    """How a controller goes about it.
+
+    Attributes
+    ----------
+    search_every_s : float
+        Seconds between two searches; a search that is forced, or needed because the clip has ended, does not wait.
+    jump_threshold_s : float
+        Frames of the playing range that are within so many seconds of the playing frame are no candidates.
+    history_s : float
+        Frames that were played within the last so many seconds are not entered again.
+    variation : Variation, optional
+        Random choice among near ties. Default: always the best.
+    rate : float
+        Frames a second of databases made from features; those built from clips know theirs.
+
+    Raises
+    ------
+    MotionError
+        Seconds that are no finite numbers of 0 or more, or a rate that is not above 0.
+    """
+
+    search_every_s: float = 0.1
+    jump_threshold_s: float = 0.2
+    history_s: float = 0.5
+    variation: Variation | None = None
+    rate: float = 30.0
+
+    def __post_init__(self) -> None:
+        faults = [
+            Fault(f"{field.name} is {value!r}.", f"a number, {'above 0' if field.name == 'rate' else '0 or more'}")
+            for field in fields(self)
+            if field.name != "variation" and not _is_accepted(field.name, value := getattr(self, field.name))
+        ]
+        if faults:
+            raise MotionError(*faults)
+
+
+def _is_accepted(name: str, value: object) -> bool:
+    number = as_number(value)
+    return number is not None and (number > 0.0 or (number == 0.0 and name != "rate"))
+
+
+def read_controllers(
+    parts: Mapping[str, Mapped], selectors: Collection[str], faults: list[Fault], file: str | None
+) -> Iterator[tuple[str, str, ControllerSettings]]:
+    """Name, selector and settings of each part without a fault; the faults of the others are kept."""
+    for name, part in parts.items():
+        n_faults = len(faults)
+        section = Section(f"[controllers.{name}]", part, KEYS, faults, file)
+        selector = _read_selector(section, list(selectors))
+        values: dict[str, Any] = {
+            key: section.number(key, accepted, 0.0, most) for key, (accepted, most) in SECONDS.items() if key in part
+        }
+        variation = _read_variation(section)
+        if len(faults) == n_faults and selector is not None:
+            yield name, selector, ControllerSettings(**values, variation=variation)
+
+
+def _read_selector(section: Section, selectors: list[str]) -> str | None:
+    accepted = some(selectors) or "the name of a [selectors.NAME]"
+    return section.one_of("selector", selectors, "selector") if section.has("selector", accepted) else None
+
+
+def _read_variation(section: Section) -> Variation | None:
+    """Variation, if the part asks for any."""
+    within = section.number("variation_within", WITHIN, 0.0, MOST_COST) if "variation_within" in section.part else None
+    memory: float | None = 1.0
+    if "variation_memory" in section.part:
+        memory = section.number("variation_memory", MEMORY, 0.0, MOST_ASSETS)
+        if memory is not None and not memory.is_integer():
+            section.wrong("variation_memory", "this is no whole number", MEMORY, f"variation_memory = {math.floor(memory)}")
+        if "variation_within" not in section.part:
+            found = (
+                f"{section.where} has {in_quotes('variation_memory')}, but without {in_quotes('variation_within')} nothing varies."
+            )
+            section.add(found, f"variation_within, {WITHIN}")
+    return None if within is None or memory is None else Variation(within, int(memory))

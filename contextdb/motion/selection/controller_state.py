@@ -1,0 +1,39 @@
+"""Where a controller stands: all that its next decision depends on beside what it is then asked. Small, frozen, to be kept and put
+back, as rollback over a network does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from contextdb.motion.selection.decision import Playing
+from contextdb.motion.selection.history import Played
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerState:
+    """A controller's state. The one that nothing is given to is that of a new controller.
+
+    Attributes
+    ----------
+    tick : int
+        How many updates there were.
+    time_s : float
+        Seconds of play.
+    playing : Playing or None
+    since_search_s : float
+        Seconds since the last search.
+    history : tuple of Played
+        What was played within the last seconds.
+    recent : tuple of str
+        The assets of the last changes, as far as variation remembers them.
+    rng : object
+        Where the random generator stands; None without one.
+    """
+
+    tick: int = 0
+    time_s: float = 0.0
+    playing: Playing | None = None
+    since_search_s: float = 0.0
+    history: tuple[Played, ...] = ()
+    recent: tuple[str, ...] = ()
+    rng: object = None

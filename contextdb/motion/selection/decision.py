@@ -1,0 +1,117 @@
+"""What a controller decided at one update, and why: the words that a recorded session is written in.
+
+A `Decision` is data. A recorder is handed each one; a controller without a recorder spends nothing on it but the object itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.selection.choice import Choice
+from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
+
+
+@dataclass(frozen=True, slots=True)
+class Playing:
+    """What a character plays.
+
+    Attributes
+    ----------
+    database, asset : str
+    range, frame : int
+        The frame nearest to `time_s`, counted over the whole database, and its range.
+    time_s : float
+        Seconds since the start of the range.
+    mirrored : bool
+    """
+
+    database: str
+    asset: str
+    range: int
+    frame: int
+    time_s: float
+    mirrored: bool
+
+
+class Action(StrEnum):
+    """What an update did to the playing animation."""
+
+    START = "starts"
+    """Something plays where nothing did."""
+    CONTINUE = "plays on"
+    JUMP = "jumps"
+    """To another frame, of the same asset or another: here a game blends."""
+    LOOP = "loops"
+    """Plays on, and passed the end of a looping range on the way."""
+    HOLD = "holds"
+    """The last frame is held: the clip has ended and nothing else may play."""
+    NOTHING = "plays nothing"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One update of a controller.
+
+    Attributes
+    ----------
+    tick : int
+        Counts the updates from 0.
+    time_s : float
+        Seconds of play, this update's in it.
+    action : Action
+    why : str
+        One sentence for people.
+    searched : bool
+    playing, before : Playing or None
+        What plays after the update; and what would play without a search: what played before, moved on.
+    cost : float or None
+        Of the chosen frame, its biases in it; None without a search, or when nothing was found.
+    continuing_cost : float or None
+        Of the frame that would play on, the continuing bias in it; None without a search, or when nothing may play on.
+    choice : Choice or None
+        The selector's answer; None without a search.
+    context : mapping of str to object, or None
+        The facts of the moment, as they were given.
+    query : float64 array, shape (F,), or None
+        What was asked for.
+    candidates : tuple of (database name, Candidates)
+        Of the databases that were searched; empty unless the recorder asks for them.
+    search_us : float or None
+        Microseconds that searching took; None without a search, or without a clock.
+    root_motion : RootMotion
+        How the playing animation moved the body since the last update.
+    root_weight : float
+        How much of its movement is to come from the animation, from 0 to 1; the rest is the game's.
+    """
+
+    tick: int
+    time_s: float
+    action: Action
+    why: str
+    searched: bool
+    playing: Playing | None
+    before: Playing | None
+    cost: float | None = None
+    continuing_cost: float | None = None
+    choice: Choice | None = None
+    context: Mapping[str, object] | None = None
+    query: Floats | None = None
+    candidates: tuple[tuple[str, Candidates], ...] = ()
+    search_us: float | None = None
+    root_motion: RootMotion = NO_MOTION
+    root_weight: float = 1.0
+
+
+class Recorder(Protocol):
+    """Something that keeps decisions."""
+
+    n_candidates: int
+    """How many candidates of each searched database it wants; 0 for none."""
+
+    def record(self, decision: Decision) -> None:
+        """Take one decision."""

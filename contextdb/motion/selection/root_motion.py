@@ -1,0 +1,64 @@
+"""How an animation moves the body over the ground: the part of a clip's path that was played.
+
+A clip's path is where its root is, frame by frame. Between two moments of a range it gives a movement in the body's own frame as it
+was at the first: metres to its left and ahead, and a turn. A jump to another frame moves nobody.
+
+Source: "Root Motion Weight" in EA's talk; animation-driven movement in Remedy's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from contextdb.motion.search.layout import Features
+
+
+@dataclass(frozen=True, slots=True)
+class RootMotion:
+    """A movement over the ground in the body's own frame at its beginning: metres and radians, positive to the left."""
+
+    left_m: float = 0.0
+    ahead_m: float = 0.0
+    turn_rad: float = 0.0
+
+    def then(self, other: RootMotion) -> RootMotion:
+        """This movement and after it another one, which begins where this one ends."""
+        sin, cos = math.sin(self.turn_rad), math.cos(self.turn_rad)
+        return RootMotion(
+            self.left_m + cos * other.left_m + sin * other.ahead_m,
+            self.ahead_m - sin * other.left_m + cos * other.ahead_m,
+            self.turn_rad + other.turn_rad,
+        )
+
+    def repeated(self, times: int) -> RootMotion:
+        """This movement some times, one after the other."""
+        if times <= 0:
+            return NO_MOTION
+        half = self.repeated(times // 2)
+        twice = half.then(half)
+        return twice.then(self) if times % 2 else twice
+
+    def scaled(self, share: float) -> RootMotion:
+        """A share of the movement, such as what a root weight leaves of it."""
+        return RootMotion(share * self.left_m, share * self.ahead_m, share * self.turn_rad)
+
+
+NO_MOTION = RootMotion()
+
+
+def motion_between(path: Features, from_frame: float, to_frame: float) -> RootMotion:
+    """The movement of a path [n, 3], x and z in metres and heading in radians, from one frame to another; both may be fractions."""
+    x, z, heading = _at(path, from_frame)
+    to_x, to_z, to_heading = _at(path, to_frame)
+    sin, cos = math.sin(heading), math.cos(heading)
+    return RootMotion(cos * (to_x - x) - sin * (to_z - z), sin * (to_x - x) + cos * (to_z - z), to_heading - heading)
+
+
+def _at(path: Features, frame: float) -> tuple[float, float, float]:
+    """The path at a frame; between two frames on the straight line."""
+    low = min(max(int(frame), 0), len(path) - 1)
+    high = min(low + 1, len(path) - 1)
+    share = min(max(frame - low, 0.0), 1.0)
+    (x, z, heading), (to_x, to_z, to_heading) = path[low].tolist(), path[high].tolist()
+    return x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)

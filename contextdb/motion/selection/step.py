@@ -1,0 +1,184 @@
+"""One update of a controller: whether it searches, what it leaves out, and what comes of it. Changes nothing but the generator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.markup.left_out import Skip
+from contextdb.motion.search.database import Hit
+from contextdb.motion.selection import trigger
+from contextdb.motion.selection.asked import Asked
+from contextdb.motion.selection.choice import Choice, Reason
+from contextdb.motion.selection.continuing import continuing_cost
+from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.selection.controller_state import ControllerState
+from contextdb.motion.selection.decision import Action, Playing
+from contextdb.motion.selection.history import Played, ended_skip, history_skips, playing_skips, remembered
+from contextdb.motion.selection.ongoing import Ongoing, playing_at
+from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
+from contextdb.motion.selection.selector import Selector
+from contextdb.motion.selection.trigger import Trigger
+from contextdb.motion.selection.variation import Rng
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What an update comes to; the attributes are those of `Decision`."""
+
+    action: Action
+    why: str
+    playing: Playing | None
+    cost: float | None = None
+    continuing_cost: float | None = None
+    choice: Choice | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """An update under way: where the controller stands, what it is asked, and what plays and was played, moved on."""
+
+    selector: Selector
+    settings: ControllerSettings
+    state: ControllerState
+    dt_s: float
+    query: Floats
+    asked: Asked
+    ongoing: Ongoing | None
+    history: tuple[Played, ...]
+
+    @classmethod
+    def of(
+        cls, selector: Selector, settings: ControllerSettings, state: ControllerState, dt_s: float, query: Floats, asked: Asked
+    ) -> Step:
+        """An update that moves what plays on by some time."""
+        now_s, for_s = state.time_s + dt_s, settings.history_s
+        ongoing = Ongoing.of(state.playing, selector, settings.rate, dt_s)
+        name, spans = ("", ()) if ongoing is None else (ongoing.database, ongoing.move.spans)
+        history = remembered(state.history, name, spans, now_s, for_s)
+        return cls(selector, settings, state, dt_s, query, asked, ongoing, history)
+
+    @property
+    def now_s(self) -> float:
+        """Seconds of play, this update's in it."""
+        return self.state.time_s + self.dt_s
+
+    @property
+    def before(self) -> Playing | None:
+        """What would play without a search; or, where it cannot, what played."""
+        return self.state.playing if self.ongoing is None else self.ongoing.playing
+
+    @property
+    def due_s(self) -> float:
+        """Seconds until the next search is due."""
+        return self.settings.search_every_s - self.state.since_search_s - self.dt_s
+
+    # ---- whether to search
+
+    def trigger(self, force: bool, interrupt: bool) -> Trigger | None:
+        """Why to search now; None not to."""
+        if self.ongoing is None:
+            return Trigger.NOTHING_PLAYS if self.state.playing is None else Trigger.LOST
+        is_valid = self._is_valid(self.ongoing)
+        if self.ongoing.move.is_ended:
+            return Trigger.ENDED
+        if self.ongoing.database not in self.selector.among(self.asked.among):
+            return Trigger.NOT_AMONG
+        if not is_valid:
+            return Trigger.NOT_VALID
+        if interrupt or force:
+            return Trigger.INTERRUPTED if interrupt else Trigger.FORCED
+        return Trigger.DUE if self.due_s <= TOLERANCE_S else None
+
+    def _is_valid(self, ongoing: Ongoing) -> bool:
+        """Whether the playing asset is still valid."""
+        return bool(ongoing.head.database.filter(**self.asked.of(ongoing.database)).ranges[ongoing.head.range])
+
+    # ---- what to leave out
+
+    def wanted(self, cause: Trigger) -> Asked:
+        """What the selector is asked: beside what the caller asks, what may play on, and what is left out."""
+        skip = {name: skips for name, skips in history_skips(self.history).items() if name in self.selector.databases}
+        if self.ongoing is None:
+            return replace(self.asked, skip=skip)
+        name, frame = self.ongoing.database, self.ongoing.move.frame
+        current = (name, frame) if cause.may_continue else None
+        return replace(self.asked, current=current, skip={**skip, name: [*self._skips(self.ongoing), *skip.get(name, ())]})
+
+    def _skips(self, ongoing: Ongoing) -> Sequence[Skip]:
+        head, frame = ongoing.head, ongoing.move.frame
+        if ongoing.move.is_ended:
+            return [ended_skip(head, frame, max(self.settings.jump_threshold_s, self.settings.search_every_s))]
+        return list(playing_skips(head, frame, self.settings.jump_threshold_s))
+
+    # ---- what comes of it
+
+    def unsearched(self, ongoing: Ongoing) -> Outcome:
+        """What plays, plays on."""
+        return Outcome(_onward(ongoing), trigger.not_due(self.due_s), ongoing.playing)
+
+    def searched(self, cause: Trigger, asked: Asked, rng: Rng | None) -> Outcome:
+        """Search, and choose: to play on, to jump, or, when nothing is found, to make do with what there is."""
+        choice = self.selector.search(self.query, **asked.options())
+        if not choice:
+            return self._nothing_else(cause, choice)
+        continuing = self._continuing_cost(asked, choice)
+        hit = self._varied(asked, choice, continuing, rng)
+        if hit is None or _is_current(hit, choice, asked):
+            assert self.ongoing is not None, "only what plays can play on"
+            assert continuing is not None, "a frame that wins has a cost"
+            why = trigger.continued(cause, self.ongoing.playing, continuing, choice.hit.cost)
+            return Outcome(_onward(self.ongoing), why, self.ongoing.playing, continuing, continuing, choice)
+        playing = self._playing(choice, hit)
+        why = trigger.jumped(cause, self.before, playing, hit.cost, choice, continuing)
+        action = Action.START if self.state.playing is None else Action.JUMP
+        return Outcome(action, why, playing, hit.cost, continuing, choice)
+
+    def _nothing_else(self, cause: Trigger, choice: Choice) -> Outcome:
+        why = trigger.nothing_else(cause, self.before, cause is Trigger.ENDED)
+        if self.ongoing is None:
+            return Outcome(Action.NOTHING, why, None, choice=choice)
+        action = Action.HOLD if cause is Trigger.ENDED else _onward(self.ongoing)
+        return Outcome(action, why, self.ongoing.playing, choice=choice)
+
+    def _continuing_cost(self, asked: Asked, choice: Choice) -> float | None:
+        if asked.current is None or self.ongoing is None:
+            return None
+        if _is_current(choice.hit, choice, asked):
+            return choice.hit.cost
+        database = self.ongoing.head.database
+        return continuing_cost(database, self.query, database.filter(**asked.of(self.ongoing.database)))
+
+    def _varied(self, asked: Asked, choice: Choice, continuing: float | None, rng: Rng | None) -> Hit | None:
+        """The hit to play: the choice's, or one about as good. None to play on, which comes before all that is about as good."""
+        variation = self.settings.variation
+        if variation is None or rng is None:
+            return choice.hit
+        name, limit = str(choice.database), choice.hit.cost + variation.within
+        below = _below(choice)
+        is_comparable = below == math.inf or (self.ongoing is not None and self.ongoing.database == name)
+        if continuing is not None and is_comparable and continuing <= limit:
+            return None
+        ties = self.selector.best_of_ranges(name, self.query, variation.within, **asked.options())
+        return variation.choose([hit for hit in ties if hit.cost < below], self.state.recent, rng)
+
+    def _playing(self, choice: Choice, hit: Hit) -> Playing:
+        name = str(choice.database)
+        head = Playhead.of(self.selector.databases[name], hit.range, self.settings.rate)
+        return playing_at(name, head, hit.frame, (hit.frame - head.start) / head.rate)
+
+
+def _onward(ongoing: Ongoing) -> Action:
+    return Action.LOOP if ongoing.move.n_loops else Action.CONTINUE
+
+
+def _is_current(hit: Hit, choice: Choice, asked: Asked) -> bool:
+    return asked.current == (choice.database, hit.frame)
+
+
+def _below(choice: Choice) -> float:
+    """The threshold that the winner is under, if that is why it won; else infinite."""
+    found = next((search.threshold for search in choice.searches if search.database == choice.database), None)
+    return found if found is not None and choice.reason is Reason.UNDER_THRESHOLD else math.inf

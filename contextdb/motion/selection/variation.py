@@ -1,0 +1,76 @@
+"""Random variation among frames that are about equally good, with a memory of what was played.
+
+Only near ties vary: frames that cost at most `within` more than the best. What plays already plays on while it is among them, so
+that variation never makes a character flicker.
+
+Source: "RandomVariation" in the settings of EA's diagnostics; reproducible, because the game gives the generator.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from contextdb.errors import Fault, MotionError
+from contextdb.motion.search.database import Hit
+
+Rng: TypeAlias = random.Random | np.random.Generator
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """How a frame is chosen among near ties.
+
+    Attributes
+    ----------
+    within : float
+        So much more than the best a frame may cost.
+    memory : int
+        None of the assets chosen at the last so many changes is chosen again while another one is near enough.
+
+    Raises
+    ------
+    MotionError
+        `within` is no finite number of 0 or more, or `memory` no whole one.
+    """
+
+    within: float
+    memory: int = 1
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.within) and self.within >= 0.0):
+            raise MotionError(Fault(f"variation within {self.within!r} of the best cost.", "a cost, 0 or more, such as 0.05"))
+        if not isinstance(self.memory, int) or self.memory < 0:
+            raise MotionError(Fault(f"variation with a memory of {self.memory!r}.", "a whole number of assets, 0 or more"))
+
+    def choose(self, ties: Sequence[Hit], recent: Collection[str], rng: Rng) -> Hit:
+        """One of some near ties, each equally likely; of the assets played recently only when there is no other."""
+        fresh = [hit for hit in ties if hit.asset not in recent]
+        among = fresh or list(ties)
+        return among[int(rng.random() * len(among))]
+
+    def remember(self, recent: tuple[str, ...], asset: str) -> tuple[str, ...]:
+        """The last `memory` assets, the latest of them last."""
+        return (*recent, asset)[-self.memory :] if self.memory else ()
+
+
+def state_of(rng: Rng | None) -> object:
+    """Where a generator stands, to come back to with `restore`; None for none."""
+    if rng is None:
+        return None
+    return rng.getstate() if isinstance(rng, random.Random) else rng.bit_generator.state
+
+
+def restore(rng: Rng | None, state: object) -> None:
+    """Set a generator to where it, or one of its kind, stood."""
+    if rng is None or state is None:
+        return
+    if isinstance(rng, random.Random):
+        rng.setstate(state)  # type: ignore[arg-type]
+    else:
+        rng.bit_generator.state = state  # type: ignore[assignment]

@@ -1,0 +1,1 @@
+"""What contextdb.toml says of motion, and databases on the disk."""

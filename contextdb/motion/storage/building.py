@@ -1,0 +1,219 @@
+"""Build the databases of a project from its clips: only what changed is computed, the rest comes from the cache.
+
+    clip files ─► features of each, or the cache ─► one normalisation for all databases of a feature schema ─► MotionDatabase
+
+With the cache a build gives bit for bit what it gives without. A saved database that holds the digest of its inputs is up to date.
+An edge: this touches the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contextdb.errors import ArtefactError, Fault, FileError
+from contextdb.motion.features.normalisation import Normalisation
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import Biases
+from contextdb.motion.storage import stored
+from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs
+from contextdb.motion.storage.clip_files import ClipFile, Extracted, extract
+from contextdb.motion.storage.database_settings import DatabaseSettings
+from contextdb.motion.storage.feature_cache import FeatureCache, file_name
+
+if TYPE_CHECKING:
+    from contextdb.motion.storage.config import MotionConfig
+
+CACHE_FOLDER = ".contextdb-cache"
+SAVED_SUFFIX = ".motion.safetensors"
+
+Progress = Callable[[int, int, str], None]
+"""Called with how many clips are done, how many there are, and the name of the one done last."""
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A database and how it came about.
+
+    Attributes
+    ----------
+    database : MotionDatabase
+    digest : str
+        Of all that it was made of; empty for a schema with functions, of which that cannot be told.
+    computed, cached : tuple of str
+        The clips whose features were computed, and those whose features came from the cache.
+    markup_faults : tuple of Fault
+        What of its markup does nothing; see `Markup.faults_for`.
+    """
+
+    database: MotionDatabase
+    digest: str
+    computed: tuple[str, ...]
+    cached: tuple[str, ...]
+    markup_faults: tuple[Fault, ...] = ()
+
+
+def build(
+    config: MotionConfig,
+    folder: str | PathLike[str],
+    assets: Assets | None = None,
+    progress: Progress | None = None,
+    *,
+    names: Collection[str] | None = None,
+    cache: str | PathLike[str] | None = CACHE_FOLDER,
+) -> dict[str, MotionDatabase]:
+    """Build the databases of a project; those of one feature schema share a normalisation.
+
+    Parameters
+    ----------
+    config : MotionConfig
+    folder : path
+        That of contextdb.toml, where the paths of the settings begin.
+    assets : mapping of str to collection of str, optional
+        For a table's name the assets in it: a database of that table holds the clips of these alone. Default: all clips.
+    progress : function of (done, total, clip name), optional
+    names : collection of str, optional
+        Which databases to give. Default: all.
+    cache : path, optional
+        The folder of the cache; a relative one lies in `folder`. None: nothing is kept.
+
+    Raises
+    ------
+    MotionError, FileError
+        With every fault of all clips and of all markup.
+    """
+    built = build_all(config, folder, assets, progress, names=names, cache=cache)
+    return {name: each.database for name, each in built.items()}
+
+
+def build_all(
+    config: MotionConfig,
+    folder: str | PathLike[str],
+    assets: Assets | None = None,
+    progress: Progress | None = None,
+    *,
+    names: Collection[str] | None = None,
+    cache: str | PathLike[str] | None = CACHE_FOLDER,
+) -> dict[str, Built]:
+    """Build as `build` does, and tell of each database what it was made of."""
+    root = Path(folder)
+    kept = None if cache is None else FeatureCache(root / cache)
+    inputs = Inputs.of(config, root, assets or {}, names)
+    extracted = _extract_all(inputs.files, kept, progress)
+    digests = inputs.digests({name: [each.keys for each in found] for name, found in extracted.items()})
+    shared = {schema: _shared_normalisation(config, schema, extracted) for schema in inputs.schemas}
+    faults, built = Faults(), {}
+    for name in inputs.wanted:
+        with faults:
+            built[name] = _built(inputs, name, extracted[name], shared, digests[name])
+    faults.tell()
+    if kept is not None:
+        _prune(kept, config, extracted)
+    return built
+
+
+def open_or_build(
+    config: MotionConfig,
+    folder: str | PathLike[str],
+    assets: Assets | None = None,
+    progress: Progress | None = None,
+    *,
+    saved: str | PathLike[str] | None = None,
+    cache: str | PathLike[str] | None = CACHE_FOLDER,
+) -> dict[str, MotionDatabase]:
+    """Open the saved databases that are up to date, and build the others in memory.
+
+    Parameters
+    ----------
+    saved : path, optional
+        Where `contextdb motion build` has put them; a relative one lies in `folder`. Default: `folder`.
+    config, folder, assets, progress, cache
+        As for `build`. All clips are read, as their contents say whether a saved database is up to date.
+    """
+    root = Path(folder)
+    inputs = Inputs.of(config, root, assets or {})
+    digests = inputs.digests(inputs.keys())
+    opened = {name: _open(saved_path(root / (saved or ""), name), digest) for name, digest in digests.items()}
+    missing = [name for name, database in opened.items() if database is None]
+    built = build(config, root, assets, progress, names=missing, cache=cache) if missing else {}
+    return {name: built[name] if database is None else database for name, database in opened.items()}
+
+
+def saved_path(folder: Path, name: str) -> Path:
+    """Where a database of a name is saved."""
+    return folder / file_name(name, SAVED_SUFFIX)
+
+
+def _open(path: Path, digest: str) -> MotionDatabase | None:
+    """The saved database of a digest, or None."""
+    try:
+        return stored.open_database(path) if digest and stored.inputs_of(path) == digest else None
+    except (ArtefactError, FileError):
+        return None
+
+
+# ---- steps of a build
+
+
+def _extract_all(
+    files: Mapping[str, list[ClipFile]], cache: FeatureCache | None, progress: Progress | None
+) -> dict[str, list[Extracted]]:
+    """The features of all clips; the faults of all broken ones together."""
+    total, done = sum(map(len, files.values())), 0
+    found: dict[str, list[Extracted]] = {name: [] for name in files}
+    faults = Faults()
+    for name, listed in files.items():
+        for file in listed:
+            with faults:
+                found[name].append(extract(file, cache))
+            done += 1
+            if progress is not None:
+                progress(done, total, file.asset)
+    faults.tell()
+    return found
+
+
+def _shared_normalisation(config: MotionConfig, schema: str, extracted: Mapping[str, list[Extracted]]) -> Normalisation:
+    members = [name for name in extracted if config.databases[name].features == schema]
+    blocks = [part.features for name in members for each in extracted[name] for part in each.parts]
+    return Normalisation.of(blocks, config.features[schema])
+
+
+def _built(inputs: Inputs, name: str, found: list[Extracted], shared: Mapping[str, Normalisation], digest: str) -> Built:
+    settings, markup = inputs.config.databases[name], inputs.markups.get(name)
+    database = MotionDatabase.from_parts(
+        [part for each in found for part in each.parts],
+        inputs.config.features[settings.features],
+        normalisation=shared[settings.features],
+        markup=markup,
+        biases=Biases(settings.base_bias, settings.looping_bias, settings.continuing_bias),
+        end_s=settings.end_s,
+    )
+    return Built(
+        database.with_weights(settings.weights) if settings.weights else database,
+        digest,
+        tuple(each.file.asset for each in found if each.is_computed),
+        tuple(each.file.asset for each in found if not each.is_computed),
+        () if markup is None else tuple(_markup_faults(inputs, markup, settings, database)),
+    )
+
+
+def _markup_faults(inputs: Inputs, markup: Markup, settings: DatabaseSettings, database: MotionDatabase) -> list[Fault]:
+    """What of a markup does nothing: for no clip of the databases that share it, or for no frame of this one's."""
+    sharing = [each for each in inputs.config.databases.values() if each.markup == settings.markup]
+    known = {path.stem for each in sharing for path in inputs.root.glob(each.clips)}
+    rate = inputs.config.features[settings.features].rate
+    lengths = (database.stops - database.starts).tolist()
+    durations_s = {asset: max(0, length - 1) / rate for asset, length in zip(database.assets, lengths, strict=True)}
+    return markup.faults_for(known, durations_s, rate=rate)
+
+
+def _prune(cache: FeatureCache, config: MotionConfig, extracted: Mapping[str, list[Extracted]]) -> None:
+    """Forget clips that changed or are gone."""
+    for name, found in extracted.items():
+        cache.prune(name, {key for each in found for key in each.keys})
+    cache.prune_databases(config.databases)

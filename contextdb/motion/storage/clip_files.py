@@ -1,0 +1,149 @@
+"""The files of a database's clips, and their features: computed, or from the cache.
+
+A file is read once, and what is computed from it is kept under the digest of just these bytes, so that a file that changes
+meanwhile does no harm. An edge: this touches the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from contextdb.disk import path_in_quotes, read_bytes
+from contextdb.errors import Fault, MotionError, Place, in_quotes
+from contextdb.motion.clips import clip as clips
+from contextdb.motion.features.extraction import ClipFeatures, clip_features
+from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.reading import as_toml
+from contextdb.motion.storage.database_settings import DatabaseSettings
+from contextdb.motion.storage.feature_cache import FeatureCache, key_of
+
+
+@dataclass(frozen=True)
+class ClipFile:
+    """A clip of a database: its file, and what its features depend on beside the file's bytes."""
+
+    path: Path
+    settings: DatabaseSettings
+    schema: FeatureSchema
+    is_looping: bool = False
+
+    @property
+    def asset(self) -> str:
+        """The clip's name."""
+        return self.path.stem
+
+    @property
+    def sides(self) -> tuple[bool, ...]:
+        """For each range of the clip whether it is mirrored."""
+        return (False, True) if self.settings.mirror else (False,)
+
+    def keys(self, content: bytes) -> list[str]:
+        """For each range the key of its features."""
+        unit, up = self.settings.metres_per_unit, self.settings.up
+        loops = self.is_looping
+        return [key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side, looping=loops) for side in self.sides]
+
+
+@dataclass(frozen=True, eq=False)
+class Extracted:
+    """The features of a clip's ranges, with their keys, and whether any had to be computed."""
+
+    file: ClipFile
+    parts: list[ClipFeatures]
+    keys: list[str]
+    is_computed: bool
+
+
+def clip_files(
+    settings: DatabaseSettings,
+    schema: FeatureSchema,
+    folder: Path,
+    assets: Collection[str] | None = None,
+    file: str | None = None,
+    markup: Markup | None = None,
+) -> list[ClipFile]:
+    """The clips of a database in the order of their paths; with `assets` those of these names alone. The markup says which loop.
+
+    Raises
+    ------
+    MotionError
+        No file fits the pattern, or two of the files have one name; `file` is that of the settings in messages.
+    """
+    paths = sorted(folder.glob(settings.clips))
+    if not paths:
+        found = f"[databases.{settings.name}] no file fits clips = {as_toml(settings.clips)}."
+        raise MotionError(Fault(found, place=Place(file), rule="file"))
+    wanted = [path for path in paths if assets is None or path.stem in assets]
+    faults = list(_twice_named(settings.name, wanted, file))
+    if faults:
+        raise MotionError(*faults)
+    loops = {path.stem for path in wanted if markup is not None and markup.is_looping(path.stem)}
+    return [ClipFile(path, settings, schema, path.stem in loops) for path in wanted]
+
+
+def unmatched(
+    databases: Iterable[DatabaseSettings], folder: Path, assets: Mapping[str, Collection[str]]
+) -> tuple[dict[str, list[str]], list[str]]:
+    """What has no counterpart: for each table the assets of which no database has a clip, and the clips that no database holds.
+
+    `assets` gives for a table's name the assets in it. A table that no database names is passed over.
+    """
+    clips: dict[str, set[str]] = {}
+    found: set[str] = set()
+    held: set[str] = set()
+    for settings in databases:
+        names = {path.stem for path in folder.glob(settings.clips)}
+        found |= names
+        if settings.table is not None:
+            clips.setdefault(settings.table, set()).update(names)
+        held |= names if settings.table is None else names.intersection(assets[settings.table])
+    missing = {table: [asset for asset in dict.fromkeys(assets[table]) if asset not in names] for table, names in clips.items()}
+    return {table: names for table, names in missing.items() if names}, sorted(found - held)
+
+
+def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
+    """The features of a clip's ranges: from the cache, or computed and then kept in it.
+
+    Nothing is kept of a schema with functions: whether they still are what they were cannot be told.
+
+    Raises
+    ------
+    MotionError, FileError
+        The clip cannot be read, or lacks a bone of the schema.
+    """
+    content = read_bytes(file.path)
+    keys = file.keys(content)
+    cache = None if file.schema.functions else cache
+    kept = [_kept(file, key, side, cache) for key, side in zip(keys, file.sides, strict=True)]
+    parts = [part for part in kept if part is not None]
+    if len(parts) == len(kept):
+        return Extracted(file, parts, keys, is_computed=False)
+    clip = _parsed(file, content)
+    computed = [clip_features(clip, file.schema, mirrored=side, looping=file.is_looping) for side in file.sides]
+    if cache is not None:
+        for key, part in zip(keys, computed, strict=True):
+            cache.write(file.settings.name, key, part)
+    return Extracted(file, computed, keys, is_computed=True)
+
+
+def _kept(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | None) -> ClipFeatures | None:
+    return None if cache is None else cache.read(file.settings.name, key, file.asset, mirrored=is_mirrored)
+
+
+def _parsed(file: ClipFile, content: bytes) -> clips.Clip:
+    place = str(file.path)
+    text = clips.text_of(content, place)
+    return clips.parse_bvh(text, file.asset, file=place, metres_per_unit=file.settings.metres_per_unit, up=file.settings.up)
+
+
+def _twice_named(database: str, paths: Sequence[Path], file: str | None) -> Iterator[Fault]:
+    first: dict[str, Path] = {}
+    for path in paths:
+        other = first.setdefault(path.stem, path)
+        if other is not path:
+            both = f"{path_in_quotes(other)} and {path_in_quotes(path)}"
+            found = f"[databases.{database}] two clips are named {in_quotes(path.stem)}: {both}."
+            yield Fault(found, "a different name for each asset", place=Place(file), rule="duplicate")

@@ -1,0 +1,242 @@
+"""What contextdb.toml says of motion: feature schemas, databases, selectors and controllers, and how they are built from a folder.
+
+    [features.NAME]     what a search compares
+    [databases.NAME]    which clips, by which features; `table` names the table whose assets it holds
+    [selectors.NAME]    databases in order: all but the last with the threshold under which they win outright
+    [controllers.NAME]  a selector, and how often and how a character may jump with it
+
+Reading touches no file; only `load_clips` and what builds do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TypedDict, TypeVar, Unpack
+
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, some
+from contextdb.motion.clips import clip as clips
+from contextdb.motion.clips.clip import Clip
+from contextdb.motion.features.schema import CustomFunction, FeatureSchema
+from contextdb.motion.reading import Mapped, Section, as_toml, what_is
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.selection.controller import Clock, Controller
+from contextdb.motion.selection.controller_settings import ControllerSettings, read_controllers
+from contextdb.motion.selection.decision import Recorder
+from contextdb.motion.selection.selector import Entry, Selector
+from contextdb.motion.selection.variation import Rng
+from contextdb.motion.storage import building
+from contextdb.motion.storage.build_inputs import Assets
+from contextdb.motion.storage.building import Progress
+from contextdb.motion.storage.clip_files import clip_files
+from contextdb.motion.storage.database_settings import DatabaseSettings, read_databases
+
+__all__ = ["DatabaseSettings", "MotionConfig", "SelectorSettings"]
+
+SECTIONS = ("features", "databases", "selectors", "controllers")
+STEP_KEYS = ("database", "threshold")
+MOST_COST = 1e30
+
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class SelectorSettings:
+    """What `[selectors.NAME]` says: the databases in order, each with its threshold; the last has none."""
+
+    name: str
+    order: tuple[tuple[str, float | None], ...]
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """The sections `features`, `databases`, `selectors` and `controllers` of a contextdb.toml.
+
+    A controller is the name of its selector and its settings.
+    """
+
+    features: Mapping[str, FeatureSchema] = field(default_factory=dict)
+    databases: Mapping[str, DatabaseSettings] = field(default_factory=dict)
+    selectors: Mapping[str, SelectorSettings] = field(default_factory=dict)
+    controllers: Mapping[str, tuple[str, ControllerSettings]] = field(default_factory=dict)
+    file: str | None = None
+
+    @classmethod
+    def from_dict(cls, mapping: Mapped, *, tables: Collection[str] | None = None, file: str | None = None) -> MotionConfig:
+        """Read the four sections; other keys of `mapping` are passed over.
+
+        Parameters
+        ----------
+        mapping : mapping
+            `{"features": {...}, "databases": {...}, "selectors": {...}, "controllers": {...}}`, as contextdb.toml holds them; each
+            may be absent. `Schema.motion` is one.
+        tables : collection of str, optional
+            The names of the tables there are. Default: any name is accepted.
+        file : str, optional
+            The name of the file in messages.
+
+        Raises
+        ------
+        SchemaError
+            With every fault of all sections.
+        """
+        faults: list[Fault] = []
+        parts = {section: _named_parts(mapping, section, faults, file) for section in SECTIONS}
+        schemas = dict(_read_schemas(parts["features"], faults, file))
+        databases = {
+            settings.name: settings
+            for settings in read_databases(parts["databases"], parts["features"], schemas, tables, faults, file)
+        }
+        selectors = dict(_read_selectors(parts, faults, file))
+        known = read_controllers(parts["controllers"], parts["selectors"], faults, file)
+        controllers = {name: (selector, settings) for name, selector, settings in known}
+        if faults:
+            raise SchemaError(*faults)
+        return cls(schemas, databases, selectors, controllers, file)
+
+    def database(self, name: str) -> DatabaseSettings:
+        """The settings of the database of a name; an unknown name raises SchemaError with the nearest."""
+        return _known("databases", name, self.databases, self.file)
+
+    def load_clips(self, name: str, folder: str | Path, assets: Collection[str] | None = None) -> list[Clip]:
+        """Read the clips of a database, in the order of their names.
+
+        `folder` is that of contextdb.toml. With `assets`, clips of these names alone are read; an asset without a clip is not
+        missed.
+        """
+        settings = self.database(name)
+        files = clip_files(settings, self.features[settings.features], Path(folder), assets, self.file)
+        return clips.load_clips([each.path for each in files], metres_per_unit=settings.metres_per_unit, up=settings.up)
+
+    def with_functions(self, functions: Mapping[str, CustomFunction]) -> MotionConfig:
+        """The same with functions for custom channels, by the names that the channels of any schema give.
+
+        Raises
+        ------
+        SchemaError
+            No channel asks for a name.
+        """
+        asked = {name: {channel.function for channel in schema.channels} for name, schema in self.features.items()}
+        every = {function for names in asked.values() for function in names if function is not None}
+        for unknown in (function for function in functions if function not in every):
+            near = nearest(unknown, every)
+            found = f"no channel has function = {in_quotes(unknown)}."
+            raise SchemaError(Fault(found, some(sorted(every)), in_quotes(near) if near else "", Place(self.file)))
+        given = {
+            name: schema.with_functions({each: functions[each] for each in functions if each in asked[name]})
+            for name, schema in self.features.items()
+        }
+        return replace(self, features=given)
+
+    def build(
+        self, folder: str | Path, assets: Assets | None = None, progress: Progress | None = None
+    ) -> dict[str, MotionDatabase]:
+        """Build all databases from the clips in a folder, in memory; those of one feature schema share a normalisation.
+
+        `assets` gives for a table's name the assets in it: a database of that table holds the clips of these alone.
+        `contextdb.motion.storage.building.build` keeps on the disk what it computes.
+        """
+        return building.build(self, folder, assets, progress, cache=None)
+
+    def selector(self, name: str, databases: Mapping[str, MotionDatabase]) -> Selector:
+        """The selector of a name over built databases; one that is not among them counts as not loaded."""
+        settings = _known("selectors", name, self.selectors, self.file)
+        return Selector([Entry(database, databases.get(database), threshold) for database, threshold in settings.order])
+
+    def controller(self, name: str, databases: Mapping[str, MotionDatabase], **options: Unpack[ControllerOptions]) -> Controller:
+        """The controller of a name over built databases; `recorder`, `rng` and `clock` are those of `Controller`."""
+        selector, settings = _known("controllers", name, self.controllers, self.file)
+        return Controller(self.selector(selector, databases), settings, **options)
+
+
+class ControllerOptions(TypedDict, total=False):
+    """What a controller is given beside its selector and settings."""
+
+    recorder: Recorder | None
+    rng: Rng | None
+    clock: Clock | None
+
+
+def _known(section: str, name: str, parts: Mapping[str, Part], file: str | None) -> Part:
+    """The part of a name, or a SchemaError with the nearest name."""
+    if name not in parts:
+        near = nearest(name, parts)
+        found = f"there is no [{section}.{name}]."
+        raise SchemaError(Fault(found, some(parts), in_quotes(near) if near else "", Place(file)))
+    return parts[name]
+
+
+def _named_parts(mapping: Mapped, section: str, faults: list[Fault], file: str | None) -> dict[str, Mapped]:
+    """The tables [section.NAME] of a section; what is no table leaves a fault."""
+    whole = mapping.get(section, {})
+    parts = whole if isinstance(whole, Mapping) else {}
+    if not isinstance(whole, Mapping):
+        faults.append(Fault(f"{section} is {what_is(whole)}, not a table.", f"[{section}.NAME] and its keys", place=Place(file)))
+    for name, part in parts.items():
+        if not isinstance(part, Mapping):
+            found = f"{section}.{name} = {as_toml(part)}: this is {what_is(part)}, not a table."
+            faults.append(Fault(found, f"[{section}.{name}] and its keys", place=Place(file)))
+    return {name: part for name, part in parts.items() if isinstance(part, Mapping)}
+
+
+def _read_schemas(parts: Mapping[str, Mapped], faults: list[Fault], file: str | None) -> Iterator[tuple[str, FeatureSchema]]:
+    for name, part in parts.items():
+        try:
+            yield name, FeatureSchema.from_dict(name, part, file=file)
+        except SchemaError as error:
+            faults.extend(error.faults)
+
+
+def _read_selectors(
+    parts: Mapping[str, Mapping[str, Mapped]], faults: list[Fault], file: str | None
+) -> Iterator[tuple[str, SelectorSettings]]:
+    accepted = 'databases in order, such as [{ database = "jog_tired", threshold = 2.75 }, { database = "jog" }]'
+    for name, part in parts["selectors"].items():
+        section = Section(f"[selectors.{name}]", part, ("order",), faults, file)
+        steps = part.get("order") if section.has("order", accepted) else ()
+        if not isinstance(steps, (list, tuple)) or (not steps and "order" in part):
+            section.wrong("order", "this is no list, or empty", accepted)
+            continue
+        n_faults = len(faults)
+        order = [_read_step(section, i, step, len(steps), list(parts["databases"])) for i, step in enumerate(steps)]
+        _check_once(section, [database for database, _ in order])
+        _check_one_schema(section, [database for database, _ in order], parts["databases"])
+        if len(faults) == n_faults:
+            yield (
+                name,
+                SelectorSettings(name, tuple((database, threshold) for database, threshold in order if database is not None)),
+            )
+
+
+def _read_step(section: Section, i: int, step: object, n_steps: int, known: list[str]) -> tuple[str | None, float | None]:
+    where = f"{section.where} order {i + 1}"
+    if not isinstance(step, Mapping):
+        section.add(f"{where} is {as_toml(step)}: this is {what_is(step)}, not a table.", '{ database = "jog" }')
+        return None, None
+    part = Section(where, step, STEP_KEYS, section.faults, section.file)
+    database = part.one_of("database", known, "database") if part.has("database", some(known) or "the name of a database") else None
+    accepted = "a cost, such as 2.75"
+    if "threshold" in step:
+        if i == n_steps - 1:
+            part.wrong("threshold", "nothing follows that it could spare a search", "no threshold on the last database")
+        return database, part.number("threshold", accepted, -MOST_COST, MOST_COST)
+    if i < n_steps - 1:
+        part.has("threshold", f"{accepted}: under it this database wins outright, before those behind it")
+    return database, None
+
+
+def _check_once(section: Section, databases: list[str | None]) -> None:
+    for database in dict.fromkeys(databases):
+        if database is not None and databases.count(database) > 1:
+            section.add(f"{section.where} names the database {in_quotes(database)} {databases.count(database)} times.", "each once")
+
+
+def _check_one_schema(section: Section, databases: list[str | None], parts: Mapping[str, Mapped]) -> None:
+    """Costs can be compared when they come from one feature schema."""
+    schemas = {name: parts[name].get("features") for name in databases if name is not None}
+    if len(set(map(as_toml, schemas.values()))) > 1:
+        told = ", ".join(f"{in_quotes(name)} {as_toml(schema)}" for name, schema in schemas.items())
+        section.add(
+            f"{section.where} has databases of different features: {told}.", "one feature schema, so that costs can be compared"
+        )

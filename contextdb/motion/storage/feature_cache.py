@@ -1,0 +1,131 @@
+"""Features of clips kept on the disk, so that building again computes only the clips that changed.
+
+    FOLDER/DATABASE.features/KEY.safetensors      one clip, as recorded or mirrored: features and root, in raw units
+
+The key is a digest of all that the features depend on: the bytes of the BVH file, what the settings say of its unit and axis, the
+channels without their weights, and `EXTRACTION`. An entry is written in one step and checked when it is read; one that is missing,
+broken or of another version is as if it were not there; so is one that another version of numpy made, which may round otherwise.
+So builds may be interrupted, and run beside each other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import secrets
+from collections.abc import Collection
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from contextdb.errors import ArtefactError, FileError
+from contextdb.motion.clips.clip import Up
+from contextdb.motion.features.extraction import ClipFeatures
+from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.features.schema_dict import unweighted
+from contextdb.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, to_bytes
+
+EXTRACTION = 1
+"""The version of what features are made of a clip: one more whenever the same clip would give other features."""
+
+CLIP_FEATURES = FileKind(
+    "contextdb.features", 1, "features of a clip", "features of a clip that this version computed", "to build again"
+)
+FOLDER_SUFFIX = ".features"
+
+_ENTRY = re.compile(r"[0-9a-f]{32}\.safetensors|[0-9a-f]{16}\.tmp")
+
+
+def key_of(content: bytes, schema: FeatureSchema, *, metres_per_unit: float, up: Up, mirrored: bool, looping: bool) -> str:
+    """The key of a clip's features, from the bytes of its file and all else that they depend on."""
+    about = {
+        "extraction": EXTRACTION,
+        "features": unweighted(schema),
+        "unit": float(metres_per_unit).hex(),
+        "up": up,
+        "mirrored": mirrored,
+        "looping": looping,
+    }
+    digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
+    digest.update(content)
+    return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class FeatureCache:
+    """A folder of features. One that cannot be written is no error: nothing is kept then."""
+
+    folder: Path
+
+    def read(self, database: str, key: str, asset: str, *, mirrored: bool) -> ClipFeatures | None:
+        """The features of a key; None when they are not there, or not whole."""
+        entry = self._entry(database, key)
+        if not os.path.isfile(entry):  # the error of a missing file would look for the nearest name
+            return None
+        try:
+            tensors, metadata = read_tensors(entry, CLIP_FEATURES)
+        except (ArtefactError, FileError, OSError):
+            return None
+        is_whole = metadata.get("digest") == _digest(tensors, key)
+        return ClipFeatures(asset, mirrored, tensors["features"], tensors["root"]) if is_whole else None
+
+    def write(self, database: str, key: str, part: ClipFeatures) -> None:
+        """Keep the features of a key.
+
+        The system is not asked to put them on the disk at once, which would take longer than to compute them: an entry that a loss
+        of power spoils is seen when it is read.
+        """
+        tensors = {"features": part.features, "root": part.root}
+        entry = self._entry(database, key)
+        temporary = entry.with_name(f"{secrets.token_hex(8)}.tmp")
+        with suppress(OSError, ValueError):  # ValueError: no system can have a file of this name
+            self._make(entry.parent)
+            try:
+                temporary.write_bytes(to_bytes(tensors, CLIP_FEATURES.metadata({"digest": _digest(tensors, key)})))
+                os.replace(temporary, entry)
+            except BaseException:  # also when the user interrupts
+                temporary.unlink(missing_ok=True)
+                raise
+
+    def prune(self, database: str, keys: Collection[str]) -> None:
+        """Remove all that is kept of a database but some keys."""
+        _remove(self.folder / file_name(database, FOLDER_SUFFIX), {key + SUFFIX for key in keys})
+
+    def prune_databases(self, databases: Collection[str]) -> None:
+        """Remove what is kept of all databases but some."""
+        kept = {file_name(database, FOLDER_SUFFIX).casefold() for database in databases}
+        with suppress(OSError):
+            for folder in sorted(self.folder.iterdir()):
+                if folder.name.casefold() not in kept and folder.name.endswith(FOLDER_SUFFIX):
+                    _remove(folder)
+                    folder.rmdir()
+
+    def _entry(self, database: str, key: str) -> Path:
+        return self.folder / file_name(database, FOLDER_SUFFIX) / (key + SUFFIX)
+
+    def _make(self, folder: Path) -> None:
+        if not self.folder.exists():
+            self.folder.mkdir(parents=True, exist_ok=True)
+            (self.folder / ".gitignore").write_text("*\n", encoding="utf-8")
+        folder.mkdir(exist_ok=True)
+
+
+def _remove(folder: Path, kept: Collection[str] = ()) -> None:
+    """Remove the entries of a folder but some; what is no entry stays."""
+    with suppress(OSError):
+        for entry in sorted(folder.iterdir()):
+            if entry.name not in kept and _ENTRY.fullmatch(entry.name):
+                entry.unlink(missing_ok=True)
+
+
+def _digest(tensors: Tensors, key: str) -> str:
+    return digest_of(tensors, key, np.__version__)
+
+
+def file_name(name: str, suffix: str) -> str:
+    """A file's name for a database's: what some system's file names cannot hold stands as %XX."""
+    return "".join(f"%{ord(c):02X}" if c in '%<>:"/\\|?*' or not c.isprintable() else c for c in name) + suffix

@@ -1,0 +1,210 @@
+"""Motion databases on disk: .safetensors, opened by memory map, never pickle. An edge: this touches the disk.
+
+Tensors, R ranges, F features, C channels; every number little-endian:
+
+    starts, stops          int64 [R]
+    mirrored               bool [R]
+    assets                 uint8                 JSON list of R texts
+    weights                float64 [C]
+    offset, scale          float64 [F]           of the normalisation
+    root                   float32 [N, 3]        not there for a database made from features
+    layout.FIELD           as in `Layout`
+    marks.FIELD            as in `Marks`
+
+The metadata hold `contextdb.motion` (the version of this layout), `about` (JSON: schema, channels, biases and what of layout and
+marks is no array), `inputs` (the digest of what the database was built of), `digest` of all but the large arrays, and
+`large_digest` of these. Opening checks `digest`, so that no index leads astray; the large arrays, which hold no index, are read
+when a search needs them, and checked when that is asked for.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from itertools import pairwise
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from contextdb.errors import Fault, MotionError, SchemaError, in_quotes
+from contextdb.motion.features.normalisation import Normalisation
+from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.features.schema_dict import schema_to_dict
+from contextdb.motion.markup.marks import Marks
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import Biases
+from contextdb.motion.search.layout import Layout
+from contextdb.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+
+STORED = FileKind(
+    "contextdb.motion",
+    1,
+    "a motion database of contextdb",
+    "a motion database that this version of contextdb built",
+    "to build it again with `contextdb motion build`",
+)
+LARGE = ("layout.blocks", "layout.lows", "layout.highs", "root")
+"""What grows with frames times features, and holds no index."""
+
+Part = TypeVar("Part", Layout, Marks)
+
+
+def save_database(database: MotionDatabase, path: str | PathLike[str], *, inputs: str = "") -> None:
+    """Write a database; the old file is whole until the new one is. The same database gives the same bytes.
+
+    Parameters
+    ----------
+    database : MotionDatabase
+    path : path
+        Whose name ends in .safetensors, as a rule in .motion.safetensors.
+    inputs : str
+        The digest of what the database was built of; see `inputs_of`.
+
+    Raises
+    ------
+    MotionError
+        The schema was made in Python and could not be read back.
+    FileError
+        The disk refuses.
+    """
+    tensors: Tensors = {
+        "starts": database.starts,
+        "stops": database.stops,
+        "mirrored": database.mirrored,
+        "assets": texts_to_array(list(database.assets)),
+        "weights": database.weights,
+        "offset": database.normalisation.offset,
+        "scale": database.normalisation.scale,
+        **_arrays("layout", database.layout),
+        **_arrays("marks", database.marks),
+    }
+    if database.root is not None:
+        tensors["root"] = database.root
+    about = json.dumps(
+        {
+            "schema": None if database.schema is None else _schema_to_json(database.schema),
+            "channels": [[name, columns.stop] for name, columns in zip(database.channel_names, database.slices, strict=True)],
+            "biases": asdict(database.biases),
+            "layout": _others(database.layout),
+            "marks": _others(database.marks),
+        }
+    )
+    small, large = _divided(tensors)
+    shapes = _shapes(large)
+    metadata = {
+        "about": about,
+        "inputs": inputs,
+        "digest": digest_of(small, about, inputs, shapes),
+        "large_digest": digest_of(large),
+    }
+    write_tensors(Path(path), STORED, tensors, metadata)
+
+
+def open_database(path: str | PathLike[str], *, verify: bool = False) -> MotionDatabase:
+    """Open a saved database by memory map: its features are read from the disk when a search first needs them.
+
+    Parameters
+    ----------
+    path : path
+    verify : bool
+        Read all and compare with the digest of the features too. Default: all but the features is checked.
+
+    Raises
+    ------
+    ArtefactError
+        The file is truncated, altered, of another layout, or no motion database; with the reason and the mend.
+    FileError
+        The file cannot be read.
+
+    Notes
+    -----
+    The arrays are private views of the file: a file that is replaced changes nothing, as long as it is replaced by a new one, as
+    `save_database` does, and not written into.
+    """
+    file = Path(path)
+    tensors, metadata = read_tensors(file, STORED, writeable=True)  # as built ones are: the compiled search tells the two apart
+    with STORED.reading(file):
+        small, large = _divided(tensors)
+        expected = digest_of(small, metadata["about"], metadata["inputs"], _shapes(large))
+        if expected != metadata["digest"] or (verify and digest_of(large) != metadata["large_digest"]):
+            raise STORED.refused(file, "the file was altered: its contents do not give its digest.")
+        try:
+            return _database(json.loads(metadata["about"]), tensors)
+        except SchemaError as error:
+            raise STORED.refused(file, f"this version cannot read its schema: {error.faults[0].found}") from error
+
+
+def inputs_of(path: str | PathLike[str]) -> str:
+    """The digest of what a saved database was built of, without opening it.
+
+    Raises
+    ------
+    ArtefactError, FileError
+        As `open_database` does for a file that is no motion database of this layout.
+    """
+    file = Path(path)
+    metadata = read_tensors(file, STORED)[1]
+    with STORED.reading(file):
+        return metadata["inputs"]
+
+
+def _database(about: dict[str, Any], tensors: Tensors) -> MotionDatabase:
+    stops = [0, *(stop for _, stop in about["channels"])]
+    schema = about["schema"]
+    return MotionDatabase(
+        _put_together(Layout, "layout", tensors, about["layout"]),
+        tensors["starts"],
+        tensors["stops"],
+        tuple(texts_from_array(tensors["assets"])),
+        tensors["mirrored"],
+        tuple(name for name, _ in about["channels"]),
+        tuple(slice(start, stop) for start, stop in pairwise(stops)),
+        tensors["weights"],
+        Normalisation(tensors["offset"], tensors["scale"]),
+        _put_together(Marks, "marks", tensors, about["marks"]),
+        Biases(**about["biases"]),
+        tensors.get("root"),
+        None if schema is None else FeatureSchema.from_dict(schema["name"], schema["keys"]),
+    )
+
+
+def _schema_to_json(schema: FeatureSchema) -> dict[str, object]:
+    """The schema as JSON, after a look whether it can be read back."""
+    keys = schema_to_dict(schema)
+    try:
+        FeatureSchema.from_dict(schema.name, keys)
+    except SchemaError as error:
+        found = f"the schema {in_quotes(schema.name)} cannot be saved: {error.faults[0].found}"
+        raise MotionError(Fault(found, "a schema that contextdb.toml could hold")) from error
+    return {"name": schema.name, "keys": keys}
+
+
+def _divided(tensors: Tensors) -> tuple[Tensors, Tensors]:
+    """All but the large arrays, and the large ones."""
+    large = {name: tensors[name] for name in LARGE if name in tensors}
+    return {name: array for name, array in tensors.items() if name not in large}, large
+
+
+def _shapes(tensors: Tensors) -> str:
+    return json.dumps({name: [array.dtype.newbyteorder("<").str, array.shape] for name, array in sorted(tensors.items())})
+
+
+def _arrays(prefix: str, part: Layout | Marks) -> Tensors:
+    """The arrays of a part of a database."""
+    values = {each.name: getattr(part, each.name) for each in fields(part) if each.init}
+    return {f"{prefix}.{name}": value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+
+def _others(part: Layout | Marks) -> dict[str, object]:
+    """What of a part is no array."""
+    values = {each.name: getattr(part, each.name) for each in fields(part) if each.init}
+    return {name: value for name, value in values.items() if not isinstance(value, np.ndarray)}
+
+
+def _put_together(kind: type[Part], prefix: str, tensors: Tensors, others: Mapping[str, Any]) -> Part:
+    values: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in others.items()}
+    values |= {name.removeprefix(f"{prefix}."): array for name, array in tensors.items() if name.startswith(f"{prefix}.")}
+    return kind(**values)

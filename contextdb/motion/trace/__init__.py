@@ -1,0 +1,1 @@
+"""Recorded sessions and the views of them."""

@@ -1,0 +1,56 @@
+"""Decisions and candidates as JSON has them: dicts, lists, texts and finite numbers. What is infinite or missing is null."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.search.candidates import Candidate, Candidates
+from contextdb.motion.selection.decision import Decision
+
+Json = dict[str, object]
+Events = Mapping[tuple[str, int], Sequence[str]]
+
+
+def decision_json(decision: Decision, events: Events | None = None) -> Json:
+    """A decision; its candidates are a list of databases, each with its `rows` and how many frames were `left_out`."""
+    told = {field.name: as_plain(getattr(decision, field.name)) for field in fields(decision) if field.name != "candidates"}
+    told["candidates"] = [candidates_json(name, found, events) for name, found in decision.candidates]
+    return told
+
+
+def candidates_json(database: str, found: Candidates, events: Events | None = None) -> Json:
+    """The candidates of one database."""
+    rows = [_candidate_json(rank, row, (events or {}).get((database, row.frame), ())) for rank, row in enumerate(found, 1)]
+    return {"database": database, "left_out": {reason.text: count for reason, count in found.counts.items()}, "rows": rows}
+
+
+def _candidate_json(rank: int, row: Candidate, events: Sequence[str]) -> Json:
+    told = {field.name: as_plain(getattr(row, field.name)) for field in fields(row)}
+    return {"rank": rank, **told, "events": list(events)}
+
+
+def as_plain(value: object) -> object:
+    """A value as JSON has it; a dataclass by its fields, a reason by its words."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        value = value.tolist()
+    if isinstance(value, LeftOut):
+        return value.text
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (bool, int)):
+        return int(value) if isinstance(value, IntEnum) else value
+    if isinstance(value, Mapping):
+        return {str(key): as_plain(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [as_plain(each) for each in value]
+    if isinstance(value, (set, frozenset)):
+        return sorted(map(str, value))
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: as_plain(getattr(value, field.name)) for field in fields(value)}
+    return str(value)

@@ -1,0 +1,285 @@
+"""Decisions as rows of a table with nested columns, and back.
+
+One row a decision. What a decision may lack is null. Times of searching stand in a column of their own, `search_us`, which a file
+may leave out: all other columns are the same whenever the same session is recorded.
+
+A context becomes JSON: tags a sorted list, a fact that is no number null, and what JSON has no word for its text. Of the frames of
+a search only the candidates stay: `Candidates.why` comes back empty, its sums stand in `counts`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.search.candidates import Candidate, Candidates
+from contextdb.motion.search.database import NOTHING, Hit
+from contextdb.motion.selection.choice import Choice, Reason, Search, Status
+from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.root_motion import RootMotion
+
+if TYPE_CHECKING:
+    from polars import DataType as PolarsType
+
+Row = dict[str, Any]
+EventsOf = Callable[[str, int], tuple[str, ...]]
+"""What the markup says of a frame of a database."""
+Events = dict[tuple[str, int], tuple[str, ...]]
+
+TIMINGS = "search_us"
+
+
+def columns() -> dict[str, PolarsType]:
+    """Every column with its type."""
+    import polars as pl
+
+    text, whole, number, flag = pl.String(), pl.Int64(), pl.Float64(), pl.Boolean()
+    where: dict[str, PolarsType] = {
+        "database": text,
+        "asset": text,
+        "range": whole,
+        "frame": whole,
+        "time_s": number,
+        "mirrored": flag,
+    }
+    playing = pl.Struct({**where, "events": pl.List(text)})
+    hit = pl.Struct({"asset": text, "range": whole, "frame": whole, "cost": number})
+    search = pl.Struct({"database": text, "threshold": number, "hit": hit, "status": text})
+    costs = pl.List(pl.Struct({"name": text, "cost": number}))
+    candidate: dict[str, PolarsType] = {
+        "asset": text,
+        "range": whole,
+        "frame": whole,
+        "time_s": number,
+        "mirrored": flag,
+        "cost": number,
+        "channels": pl.List(number),
+        "biases": costs,
+        "left_out": text,
+        "events": pl.List(text),
+    }
+    counts = pl.List(pl.Struct({"left_out": text, "frames": whole}))
+    found = {"database": text, "channels": pl.List(text), "counts": counts, "rows": pl.List(pl.Struct(candidate))}
+    return {
+        "tick": whole,
+        "time_s": number,
+        "action": text,
+        "why": text,
+        "searched": flag,
+        "playing": playing,
+        "before": playing,
+        "cost": number,
+        "continuing_cost": number,
+        "choice": pl.Struct({"hit": hit, "database": text, "reason": text, "searches": pl.List(search)}),
+        "context": text,
+        "query": pl.List(number),
+        "candidates": pl.List(pl.Struct(found)),
+        "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
+        "root_weight": number,
+        TIMINGS: number,
+    }
+
+
+# ---- a decision as a row
+
+
+def row_of(decision: Decision, events_of: EventsOf) -> Row:
+    """A decision as a row of `columns`."""
+    move = decision.root_motion
+    return {
+        "tick": int(decision.tick),
+        "time_s": float(decision.time_s),
+        "action": str(decision.action),
+        "why": _text(decision.why),
+        "searched": bool(decision.searched),
+        "playing": _playing_row(decision.playing, events_of),
+        "before": _playing_row(decision.before, events_of),
+        "cost": _number(decision.cost),
+        "continuing_cost": _number(decision.continuing_cost),
+        "choice": None if decision.choice is None else _choice_row(decision.choice),
+        "context": None if decision.context is None else context_json(decision.context),
+        "query": None if decision.query is None else np.asarray(decision.query, np.float64).tolist(),
+        "candidates": [_candidates_row(name, found, events_of) for name, found in decision.candidates],
+        "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
+        "root_weight": float(decision.root_weight),
+        TIMINGS: _number(decision.search_us),
+    }
+
+
+def context_json(context: Mapping[str, object]) -> str:
+    """A context as JSON; the same facts give the same text, whatever their order."""
+    return json.dumps({str(name): _plain(value) for name, value in context.items()}, sort_keys=True)
+
+
+def _plain(value: object) -> object:
+    """A fact as JSON has it."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None if math.isnan(value) else str(value)
+    if isinstance(value, (set, frozenset)):
+        return sorted(map(str, value))
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(each) for each in value]
+    return {str(k): _plain(v) for k, v in value.items()} if isinstance(value, Mapping) else str(value)
+
+
+def _text(text: str) -> str:
+    """Text that UTF-8 can hold: half a surrogate pair, as a file's name may have it, becomes its escape."""
+    return str(text) if text.isascii() else text.encode("utf-8", "backslashreplace").decode()
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None else float(value)
+
+
+def _playing_row(playing: Playing | None, events_of: EventsOf) -> Row | None:
+    if playing is None:
+        return None
+    return {
+        "database": _text(playing.database),
+        "asset": _text(playing.asset),
+        "range": int(playing.range),
+        "frame": int(playing.frame),
+        "time_s": float(playing.time_s),
+        "mirrored": bool(playing.mirrored),
+        "events": list(events_of(playing.database, playing.frame)),
+    }
+
+
+def _choice_row(choice: Choice) -> Row:
+    searches = [
+        {
+            "database": _text(search.database),
+            "threshold": _number(search.threshold),
+            "hit": None if search.hit is None else _hit_row(search.hit),
+            "status": str(search.status),
+        }
+        for search in choice.searches
+    ]
+    database = None if choice.database is None else _text(choice.database)
+    return {"hit": _hit_row(choice.hit), "database": database, "reason": str(choice.reason), "searches": searches}
+
+
+def _hit_row(hit: Hit) -> Row:
+    asset = None if hit.asset is None else _text(hit.asset)
+    return {"asset": asset, "range": int(hit.range), "frame": int(hit.frame), "cost": float(hit.cost)}
+
+
+def _candidates_row(name: str, found: Candidates, events_of: EventsOf) -> Row:
+    channels = list(found.rows[0].channels) if found.rows else []
+    return {
+        "database": _text(name),
+        "channels": list(map(_text, channels)),
+        "counts": [{"left_out": reason.name, "frames": int(count)} for reason, count in found.counts.items()],
+        "rows": [_candidate_row(row, list(events_of(name, row.frame))) for row in found.rows],
+    }
+
+
+def _candidate_row(row: Candidate, events: list[str]) -> Row:
+    return {
+        "asset": _text(row.asset),
+        "range": int(row.range),
+        "frame": int(row.frame),
+        "time_s": _number(row.time_s),
+        "mirrored": bool(row.mirrored),
+        "cost": float(row.cost),
+        "channels": list(map(float, row.channels.values())),
+        "biases": [{"name": _text(bias), "cost": float(added)} for bias, added in row.biases.items()],
+        "left_out": row.left_out.name,
+        "events": events,
+    }
+
+
+# ---- a row as a decision
+
+
+def decision_of(row: Row) -> Decision:
+    """The decision that a row was made of.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError
+        The row was made of none.
+    """
+    return Decision(
+        tick=int(row["tick"]),
+        time_s=float(row["time_s"]),
+        action=Action(row["action"]),
+        why=_known(row["why"]),
+        searched=_known(row["searched"]),
+        playing=_playing(row["playing"]),
+        before=_playing(row["before"]),
+        cost=row["cost"],
+        continuing_cost=row["continuing_cost"],
+        choice=None if row["choice"] is None else _choice(row["choice"]),
+        context=None if row["context"] is None else dict(json.loads(row["context"])),
+        query=None if row["query"] is None else np.array(row["query"], np.float64),
+        candidates=tuple((_known(each["database"]), _candidates(each)) for each in row["candidates"]),
+        search_us=row.get(TIMINGS),
+        root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
+        root_weight=float(row["root_weight"]),
+    )
+
+
+def events_in(row: Row) -> Events:
+    """What the markup says of each frame that a row tells of, as far as it says anything."""
+    return {(database, frame): tuple(events) for database, frame, events in _told(row) if events}
+
+
+def _told(row: Row) -> Iterator[tuple[str, int, list[str]]]:
+    for each in (row["playing"], row["before"]):
+        if each is not None:
+            yield each["database"], each["frame"], each["events"]
+    for found in row["candidates"]:
+        yield from ((found["database"], each["frame"], each["events"]) for each in found["rows"])
+
+
+def _known(value: Any) -> Any:
+    if value is None:
+        raise ValueError("a null where a value is needed")
+    return value
+
+
+def _playing(row: Row | None) -> Playing | None:
+    return None if row is None else Playing(*(_known(row[key]) for key in Playing.__slots__))
+
+
+def _choice(row: Row) -> Choice:
+    return Choice(_hit(row["hit"]), row["database"], Reason(row["reason"]), tuple(map(_search, row["searches"])))
+
+
+def _search(row: Row) -> Search:
+    hit = None if row["hit"] is None else _hit(row["hit"])
+    return Search(_known(row["database"]), row["threshold"], hit, Status(row["status"]))
+
+
+def _hit(row: Row) -> Hit:
+    hit = Hit(row["asset"], int(row["range"]), int(row["frame"]), float(row["cost"]))
+    return hit if hit else NOTHING
+
+
+def _candidates(row: Row) -> Candidates:
+    counts = {LeftOut[each["left_out"]]: int(each["frames"]) for each in row["counts"]}
+    return Candidates(tuple(_candidate(each, row["channels"]) for each in row["rows"]), counts, np.empty(0, np.uint8))
+
+
+def _candidate(row: Row, channels: list[str]) -> Candidate:
+    return Candidate(
+        asset=_known(row["asset"]),
+        range=int(row["range"]),
+        frame=int(row["frame"]),
+        time_s=row["time_s"],
+        mirrored=_known(row["mirrored"]),
+        cost=float(row["cost"]),
+        channels=dict(zip(channels, row["channels"], strict=True)),
+        biases={_known(each["name"]): float(each["cost"]) for each in row["biases"]},
+        left_out=LeftOut[row["left_out"]],
+    )

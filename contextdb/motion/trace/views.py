@@ -1,0 +1,283 @@
+"""A recorded session for people: what changed and when, and one decision in full. Pure functions that give lines of text.
+
+Source: "PTM Status", "PTM Searches" and "Top Candidates" of the diagnostics in EA's talk; the debugger of Remedy's: why was my
+animation interrupted, and why is mine not picked?
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from contextdb.console import printable
+from contextdb.errors import in_quotes
+from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.selection.choice import Choice, Search, Status
+from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.root_motion import NO_MOTION
+from contextdb.motion.selection.trigger import Trigger
+from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines, cost_text, named, seconds, summary_of
+from contextdb.motion.trace.text_table import WIDTH, Column, shortened, table_lines
+
+EventTexts = Mapping[tuple[str, int], Sequence[str]]
+STEADY = (Action.HOLD, Action.NOTHING)
+"""What is told once while it lasts, as playing on is told with what is played."""
+CAUSES = {
+    Trigger.NOTHING_PLAYS: "nothing played",
+    Trigger.LOST: "not loaded",
+    Trigger.ENDED: "ended",
+    Trigger.NOT_AMONG: "not among",
+    Trigger.NOT_VALID: "not valid",
+    Trigger.INTERRUPTED: "interrupted",
+    Trigger.FORCED: "forced",
+    Trigger.DUE: "due",
+}
+LEAST_ASSET, MOST_DATABASE = 16, 16
+LABEL = 12
+
+
+# ---- a session
+
+
+def summary_line(decisions: Iterable[Decision]) -> str:
+    """A session in one line: how long it is, and how often what happened."""
+    n, n_searches, last_s, actions = 0, 0, 0.0, dict.fromkeys(Action, 0)
+    for decision in decisions:
+        n, n_searches, last_s = n + 1, n_searches + decision.searched, decision.time_s
+        actions[decision.action] += 1
+    counts = [(n, "update"), (n_searches, "search"), (actions[Action.JUMP], "jump"), (actions[Action.LOOP], "loop")]
+    told = [f"{count:,} {noun}{'' if count == 1 else 'es' if noun == 'search' else 's'}" for count, noun in counts]
+    return f"{last_s:.2f} s: {', '.join(told)}"
+
+
+def session_lines(decisions: Iterable[Decision], *, name: str = "", width: int = WIDTH) -> Iterator[str]:
+    """One row for each decision that changed something, with how long it then went on.
+
+    Parameters
+    ----------
+    decisions : iterable of Decision
+    name : str
+        Only where an asset whose name holds this text plays or is left.
+    width : int
+        Cells of a line; the names of assets are shortened to fit.
+    """
+    spells = [spell for spell in _spells(decisions) if _plays(spell[0], name)]
+    assets = Column("asset", [_asset(first.playing) for first, _ in spells])
+    columns = list(_session_columns(spells, assets))
+    others = sum(column.width + 2 for column in columns if column is not assets and not column.is_empty)
+    columns[columns.index(assets)] = assets.narrowed(max(LEAST_ASSET, width - others))
+    yield from table_lines(columns, width)
+
+
+def _spells(decisions: Iterable[Decision]) -> list[tuple[Decision, float]]:
+    """Each decision that changed something, and the seconds until the next such one, or the last of all."""
+    changed: list[Decision] = []
+    last: Decision | None = None
+    for decision in decisions:
+        if last is None or _changes(decision, last):
+            changed.append(decision)
+        last = decision
+    ends_s = [decision.time_s for decision in changed[1:]] + ([last.time_s] if last else [])
+    return [(decision, end_s - decision.time_s) for decision, end_s in zip(changed, ends_s, strict=True)]
+
+
+def _changes(decision: Decision, last: Decision) -> bool:
+    if decision.action is Action.CONTINUE:
+        return last.action in STEADY
+    return decision.action not in STEADY or decision.action is not last.action
+
+
+def _plays(decision: Decision, name: str) -> bool:
+    playing = (each for each in (decision.playing, decision.before) if each is not None)
+    return not name or any(name.casefold() in each.asset.casefold() for each in playing)
+
+
+def _session_columns(spells: Sequence[tuple[Decision, float]], assets: Column) -> Iterator[Column]:
+    firsts = [first for first, _ in spells]
+    playing = [first.playing for first in firsts]
+    databases = [each.database if each else "" for each in playing]
+    yield Column("tick", [f"{first.tick:,}" for first in firsts], is_number=True, is_key=True)
+    yield Column("time s", [seconds(first.time_s) for first in firsts], is_number=True)
+    yield Column("search", [_cause(first) for first in firsts])
+    yield Column("", [str(first.action) for first in firsts])
+    if len(set(filter(None, databases))) > 1:
+        yield Column("database", [shortened(database, MOST_DATABASE) for database in databases])
+    yield assets
+    yield Column("at s", [seconds(each.time_s) if each else "" for each in playing], is_number=True)
+    yield Column("cost", [cost_text(first.cost) for first in firsts], is_number=True)
+    yield Column("playing on", [cost_text(first.continuing_cost) for first in firsts], is_number=True)
+    yield Column("for s", [seconds(for_s) for _, for_s in spells], is_number=True)
+
+
+def _asset(playing: Playing | None) -> str:
+    return "" if playing is None else playing.asset + (" (mirrored)" if playing.mirrored else "")
+
+
+def _cause(decision: Decision) -> str:
+    """Why there was a search, in a word or two: what the decision's sentence begins with."""
+    causes = (words for cause, words in CAUSES.items() if decision.why.startswith(cause.told(decision.before)))
+    return next(causes, "") if decision.searched else ""
+
+
+# ---- one decision
+
+
+def decision_lines(
+    decision: Decision,
+    view: View = View.SUMMARY,
+    *,
+    name: str = "",
+    events: EventTexts | None = None,
+    width: int = WIDTH,
+) -> Iterator[str]:
+    """One decision in full: what came of it, what was searched, and what the best candidates cost.
+
+    Parameters
+    ----------
+    decision : Decision
+    view : View
+        Which costs of the candidates are shown.
+    name : str
+        Only candidates whose asset's name holds this text.
+    events : mapping of (database, frame) to sequence of str, optional
+        What the markup says of frames.
+    width : int
+        Cells of a line.
+    """
+    told = {} if events is None else events
+    yield f"tick {decision.tick:,} at {decision.time_s:.2f} s: {decision.action}"
+    yield from _wrapped(decision.why, width)
+    yield ""
+    yield from _status_lines(decision, told, width)
+    if decision.choice is not None:
+        yield from ("", "searches", "", *search_lines(decision, width))
+    if decision.candidates:
+        yield from ("", f"top candidates ({view})", "", *_top_lines(decision, view, name, told, width))
+
+
+def _status_lines(decision: Decision, events: EventTexts, width: int) -> Iterator[str]:
+    for label, text in _status(decision, events):
+        lines = _wrapped(text, width - LABEL) or [""]
+        yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
+
+
+def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]:
+    playing, before, move = decision.playing, decision.before, decision.root_motion
+    yield "plays", _playing_text(playing)
+    if before is not None and before != playing:
+        yield "before", f"{_playing_text(before)}, if it played on"
+    for what, cost, of in (("cost", decision.cost, playing), ("playing on", decision.continuing_cost, before)):
+        if cost is not None:
+            yield what, cost_text(cost) + _parts_text(decision, of)
+    if playing is not None and events.get((playing.database, playing.frame)):
+        yield "events", ", ".join(events[playing.database, playing.frame])
+    if move != NO_MOTION or decision.root_weight != 1.0:
+        turn = math.degrees(move.turn_rad)
+        yield "moved", f"{move.ahead_m:.3f} m ahead, {move.left_m:.3f} m left, turned {turn:.1f}°; weight {decision.root_weight:g}"
+    if decision.search_us is not None:
+        yield "search", f"{decision.search_us:,.0f} µs"
+    if decision.context:
+        yield "context", ", ".join(f"{key} = {_fact_text(value)}" for key, value in decision.context.items())
+
+
+def _playing_text(playing: Playing | None) -> str:
+    if playing is None:
+        return "nothing"
+    return f"{_asset(playing)} at {playing.time_s:.2f} s, frame {playing.frame:,} of {playing.database}"
+
+
+def _parts_text(decision: Decision, playing: Playing | None) -> str:
+    """What a cost is made of, where its frame is among the candidates."""
+    for each in _ranked(decision):
+        if playing is not None and (each.database, each.row.frame) == (playing.database, playing.frame):
+            parts = [f"{part} {cost_text(cost)}" for part, cost in summary_of(each.row).items() if cost]
+            return f": {', '.join(parts)}" if parts else ""
+    return ""
+
+
+def _fact_text(value: object) -> str:
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return " ".join(f"+{tag}" for tag in sorted(map(str, value))) or "no tags"
+    return "missing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def search_lines(decision: Decision, width: int = WIDTH) -> Iterator[str]:
+    """The databases of a decision's choice in order; before them, as 0, what would play on."""
+    choice = decision.choice
+    if choice is None or not choice.searches:
+        return
+    rows = [(str(i), *_search_texts(decision, choice, search)) for i, search in enumerate(choice.searches, 1)]
+    if decision.before is not None and decision.continuing_cost is not None:
+        on = decision.before
+        rows.insert(
+            0,
+            (
+                "0",
+                on.database,
+                _asset(on),
+                seconds(on.time_s),
+                f"{on.frame:,}",
+                cost_text(decision.continuing_cost),
+                "",
+                "plays on",
+            ),
+        )
+    headers = ("order", "database", "asset", "time s", "frame", "cost", "threshold", "result")
+    texts = list(zip(*rows, strict=True))
+    numbers, keys = ("order", "time s", "frame", "cost", "threshold"), ("order", "database")
+    yield from table_lines(
+        [Column(header, text, header in numbers, header in keys) for header, text in zip(headers, texts, strict=True)], width
+    )
+
+
+def _search_texts(decision: Decision, choice: Choice, search: Search) -> tuple[str, ...]:
+    hit, threshold = search.hit, "" if search.threshold is None else f"{search.threshold:g}"
+    result = f"{search.status}, {choice.reason}" if search.status is Status.WINNER else str(search.status)
+    if hit is None or not hit:
+        return search.database, "", "", "", "", threshold, result
+    found = (each.row for each in _ranked(decision) if each.database == search.database and each.row.frame == hit.frame)
+    row = next(found, None)
+    asset = str(hit.asset) + (" (mirrored)" if row is not None and row.mirrored else "")
+    return search.database, asset, seconds(row.time_s if row else None), f"{hit.frame:,}", cost_text(hit.cost), threshold, result
+
+
+def _top_lines(decision: Decision, view: View, name: str, events: EventTexts, width: int) -> Iterator[str]:
+    rows = named(_ranked(decision), name)
+    if rows:
+        yield from candidate_lines(rows, view, events, width)
+    else:
+        yield f"none whose name holds {in_quotes(name)}" if name else "none"
+    several = len(decision.candidates) > 1
+    yield ""
+    for database, found in decision.candidates:
+        if found.counts:
+            yield from _wrapped(f"left out{f' of {database}' if several else ''}: {left_out_text(found)}", width)
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    """A text in lines; no name is broken, however long."""
+    return textwrap.wrap(printable(text), width, break_long_words=False, break_on_hyphens=False)
+
+
+def left_out_text(found: Candidates) -> str:
+    """How many frames were left out for each reason, the most first."""
+    counts = sorted(found.counts.items(), key=lambda item: (-item[1], item[0]))
+    return ", ".join(f"{count:,} {LeftOut(reason).text}" for reason, count in counts)
+
+
+def _ranked(decision: Decision) -> list[Ranked]:
+    """The candidates of all databases, cheapest first."""
+    every = [(row.cost, database, row) for database, found in decision.candidates for row in found]
+    every.sort(key=lambda each: each[0])
+    return [Ranked(i, database, row, _role(decision, database, row.frame)) for i, (_, database, row) in enumerate(every, 1)]
+
+
+def _role(decision: Decision, database: str, frame: int) -> str:
+    """What a candidate is to a decision."""
+    here = (database, frame)
+    playing, before = ((each.database, each.frame) if each else None for each in (decision.playing, decision.before))
+    if here == playing and decision.action in (Action.START, Action.JUMP):
+        return "chosen"
+    return "plays on" if here == before and decision.continuing_cost is not None else ""

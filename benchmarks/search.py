@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if __package__ in (None, ""):
-    sys.path.insert(0, str(Path(__file__).parent.parent))
+    sys.path[0] = str(Path(__file__).parent.parent)  # not this folder: its coverage.py is no package of that name
 
 from benchmarks import captured, timing
 from benchmarks.captured import Frames

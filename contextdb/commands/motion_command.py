@@ -4,6 +4,8 @@
   contextdb motion search game/ loco --query walk@1.5 --speed 1.3
   contextdb motion run game/ player stick.csv --out session.parquet
   contextdb motion replay session.parquet --at 2.5s
+
+`contextdb demo --keep game` makes a project to try them on.
 """
 
 from __future__ import annotations

@@ -88,9 +88,9 @@ class Searcher:
 
 @cache
 def load_kernels() -> ModuleType | None:
-    """The compiled search; None where numba is not there."""
+    """The compiled search; None where numba is not there, or has no place to keep what it compiles."""
     try:
         from contextdb.motion.search import kernels
-    except ImportError:
+    except (ImportError, RuntimeError):
         return None
     return kernels

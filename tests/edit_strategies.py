@@ -1,0 +1,67 @@
+"""Examples for property tests of edits: any edit that a person could make to a table."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from contextdb import edits
+from contextdb.edits import Edit
+from contextdb.table import Table
+
+TEXTS = [
+    "Any",
+    "",
+    "True",
+    "20, 9.99",
+    "5..3",
+    "0..5 | 10..15",
+    "CB FS",
+    'say ""no""',
+    "a,b",
+    'a"b',
+    "zwei\nZeilen",
+    " x ",
+    "~~",
+    "+A -B",
+]
+KINDS = ["cells", "insert", "delete", "duplicate", "move", "reorder", "enable", "column", "drop", "shift", "rename"]
+
+
+@st.composite
+def edits_of(draw: st.DrawFn, table: Table) -> Edit:
+    """An edit that fits a table."""
+    n_rows, names = table.n_rows, [c.name for c in table.columns]
+    others = [n for n in names if n != table.asset_column]
+    fitting = [k for k in KINDS if (n_rows or k in ("insert", "column")) and (others or k not in ("drop", "shift"))]
+    kind = draw(st.sampled_from(fitting))
+    a_row = st.integers(0, max(n_rows - 1, 0))
+    some_rows = st.lists(a_row, min_size=1, max_size=4)
+    texts = st.sampled_from(TEXTS)
+    if kind == "cells":
+        return edits.set_cells(table, draw(st.lists(st.tuples(a_row, st.sampled_from(names), texts), max_size=20)))
+    if kind == "insert":
+        rows = draw(st.lists(st.dictionaries(st.sampled_from(names), texts), max_size=3))
+        return edits.insert_rows(table, draw(st.integers(0, n_rows)), rows)
+    if kind == "delete":
+        return edits.delete_rows(table, draw(some_rows))
+    if kind == "duplicate":
+        return edits.duplicate_rows(table, draw(some_rows))
+    if kind == "move":
+        return edits.move_rows(table, draw(some_rows), draw(st.integers(0, n_rows)))
+    if kind == "reorder":
+        return edits.reorder_rows(table, draw(st.permutations(range(n_rows))))
+    if kind == "enable":
+        return edits.enable_rows(table, draw(some_rows), draw(st.booleans()))
+    free = [n for n in ("new", "Neu ä", "x,y", "speed 2", "q") if n not in names]
+    place = st.integers(1, len(names))
+    if kind == "column" and free:
+        declared = draw(st.none() | st.just({"type": "number", "min": 0.0}))
+        job = draw(st.sampled_from(["condition", "output"] if declared is None else ["condition"]))
+        return edits.insert_column(table, draw(place), draw(st.sampled_from(free)), job, declared, draw(st.sampled_from(["", "5"])))
+    if kind == "drop":
+        return edits.delete_columns(table, [draw(st.sampled_from(others))])
+    if kind == "shift":
+        return edits.move_column(table, draw(st.sampled_from(others)), draw(place))
+    if kind == "rename" and free:
+        return edits.rename_column(table, draw(st.sampled_from(names)), draw(st.sampled_from(free)))
+    return edits.set_cells(table, [])

@@ -1,0 +1,292 @@
+"""The sheet: a table as it is shown, and the verbs that keys call.
+
+Every edit is one step of the history and, where there is a recorder, told to it before the verb returns. Cells that are pasted or
+replaced are taken as they are, and how many of them cannot be read is noted; a text that is typed must be readable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from contextdb import edits
+from contextdb.bitmask import Rows
+from contextdb.changes import Cells, Change
+from contextdb.edits import Edit, Job
+from contextdb.errors import Fault, TableError, in_quotes, plural, shown
+from contextdb.history import History, Step
+from contextdb.table import Table
+from tui.model.clipboard import format_tsv, parse_tsv, place_paste
+from tui.model.find import Search, find, next_hit, replace_all
+from tui.model.selection import Block
+from tui.model.shown import ShownTable
+from tui.model.views import Sort, sorted_rows
+
+
+class Recorder(Protocol):
+    """Who is told of every step, before the verb returns: the journal."""
+
+    def did(self, edit: Edit) -> None:
+        """An edit was made."""
+
+    def went(self, before: Table, history: History, step: Step) -> None:
+        """The history went from `before` to where it is now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What a verb did: the name of the step, empty when nothing changed, and what a person should know of it."""
+
+    name: str = ""
+    notes: tuple[str, ...] = ()
+
+
+class Sheet(ShownTable):
+    """A table being edited."""
+
+    def __init__(self, table: Table, recorder: Recorder | None = None, history: History | None = None) -> None:
+        super().__init__(table, history)
+        self.recorder = recorder
+
+    # ---- edits of cells
+
+    def check(self, text: str) -> Fault | None:
+        """What would be wrong with a text in the cell of the cursor."""
+        return edits.check_cell(self.table, self.table.columns[self.selection.column].name, text)
+
+    def type_text(self, text: str) -> Fault | None:
+        """Put a text into the cell of the cursor, unless it cannot be read: then what is wrong is given and nothing changes."""
+        if not len(self.view):
+            return Fault("the sheet shows no row.", "a row to type in", "to insert one")
+        if fault := self.check(text):
+            return fault
+        row, column = self.cursor
+        self._set([(row, column, text)])
+        return None
+
+    def fill(self, text: str) -> Done:
+        """Put a text into every selected cell."""
+        return self._set(((r, c, text) for r, c in self._cells(self.block)), f"Fill {self._size(self.block)}")
+
+    def clear(self) -> Done:
+        """Empty every selected cell; an empty condition is Any."""
+        return self._set(((r, c, "") for r, c in self._cells(self.block)), f"Clear {self._size(self.block)}")
+
+    def fill_down(self) -> Done:
+        """Copy the first selected row into the others; one row alone is filled from the one above it."""
+        block = self.block
+        source = block.top if block.shape[0] > 1 else block.top - 1
+        if source < 0:
+            return Done(notes=("There is no row above to fill from.",))
+        cells = ((r, c, self.text(source, c)) for r, c in self._cells(block) if r != source)
+        return self._set(cells, f"Fill down {self._size(block)}")
+
+    def fill_right(self) -> Done:
+        """Copy the first selected column into the others; one column alone is filled from the one before it."""
+        block = self.block
+        source = block.left if block.shape[1] > 1 else block.left - 1
+        if source < 0:
+            return Done(notes=("There is no column before to fill from.",))
+        cells = ((r, c, self.text(r, source)) for r, c in self._cells(block) if c != source)
+        return self._set(cells, f"Fill right {self._size(block)}")
+
+    def copy(self) -> str:
+        """The selected cells as tab-separated text."""
+        block = self.block
+        rows, columns = self.view.rows[block.top : block.bottom], self.table.columns[block.left : block.right]
+        texts = [[c.texts[code] for code in c.codes[rows].tolist()] for c in columns]
+        return format_tsv(list(zip(*texts, strict=True)))
+
+    def cut(self) -> tuple[str, Done]:
+        """The selected cells as text; they are empty then."""
+        text, block = self.copy(), self.block
+        return text, self._set(((r, c, "") for r, c in self._cells(block)), f"Cut {self._size(block)}")
+
+    def paste(self, text: str) -> Done:
+        """Put tab-separated text over the selection; see `tui.model.clipboard.place_paste`. Rows past the last are added."""
+        texts = parse_tsv(text)
+        if not texts:
+            return Done(notes=("The clipboard is empty.",))
+        placed = place_paste(texts, self.block, self.shape[1])
+        n_new = max(placed.block.bottom - len(self.view), 0)
+        table, n_before = self.table, self.table.n_rows
+        rows = [*self.view.rows.tolist(), *range(n_before, n_before + n_new)]
+        names = [c.name for c in table.columns]
+        edit = edits.set_cells(table, ((rows[r], names[c], t) for r, c, t in placed.cells()), placed.name, n_new)
+        done = self._do(edit)
+        block = placed.block
+        self._select(self.selection.at(block.top, block.left, self.shape))
+        self._select(self.selection.at(block.bottom - 1, block.right - 1, self.shape, extend=True))
+        notes = [f"{plural(n_new, 'row')} added."] if n_new else []
+        if placed.n_columns_cut:
+            notes.append(f"{plural(placed.n_columns_cut, 'column')} left out: the sheet ends here. Add columns and paste again.")
+        return replace(done, notes=(*notes, *self._unreadable(edit.changes)))
+
+    # ---- edits of rows
+
+    def insert_rows(self, n_rows: int = 1, below: bool = False, texts: Sequence[Mapping[str, str]] = ()) -> Done:
+        """Insert rows above the selection, or below it, empty ones or with texts; they are then selected."""
+        chosen = self.selected_rows
+        at = (max(chosen) + 1 if below else min(chosen)) if chosen else self.table.n_rows
+        rows = list(texts) or [{}] * n_rows
+        done = self._do(edits.insert_rows(self.table, at, rows))
+        self._select_file_rows(at, len(rows))
+        return done
+
+    def delete_rows(self) -> Done:
+        """Delete the selected rows."""
+        row = self.block.top
+        done = self._do(edits.delete_rows(self.table, self.selected_rows))
+        self._select(self.selection.at(row, self.selection.column, self.shape))
+        return done
+
+    def duplicate_rows(self) -> Done:
+        """Copy the selected rows to below them; the copies are then selected."""
+        rows = self.selected_rows
+        done = self._do(edits.duplicate_rows(self.table, rows))
+        self._select_file_rows(max(rows) + 1, len(rows))
+        return done
+
+    def move_rows(self, down: int) -> Done:
+        """Move the selected rows past the next shown row: down 1 or up -1. Not in a sorted view, whose order is not the file's."""
+        if self.view.is_sorted:
+            raise TableError(Fault("the rows are shown sorted.", "the order of the file", "to show them as they stand in the file"))
+        block, rows = self.block, self.selected_rows
+        beside = block.top - 1 if down < 0 else block.bottom
+        if not 0 <= beside < len(self.view):
+            return Done()
+        return self._do(edits.move_rows(self.table, rows, int(self.view.rows[beside]) + (down > 0)))
+
+    def enable_rows(self, is_enabled: bool | None = None) -> Done:
+        """Enable or disable the selected rows; None: the other of what the first is."""
+        rows = self.selected_rows
+        if is_enabled is None:
+            is_enabled = bool(rows) and not self.table.enabled[rows[0]]
+        return self._do(edits.enable_rows(self.table, rows, is_enabled))
+
+    def sort_file(self, sort: Sort) -> Done:
+        """Put the rows of the file itself in order."""
+        way = ", descending" if sort.is_descending else ""
+        name = f"Sort the file by {shown(sort.column)}{way}"
+        return self._do(edits.reorder_rows(self.table, sorted_rows(self.table, sort), name))
+
+    # ---- edits of columns
+
+    def insert_column(
+        self, name: str, job: Job = "condition", declared: Mapping[str, object] | None = None, at: int | None = None
+    ) -> Done:
+        """Insert a column before column `at`; default: behind the cursor's."""
+        place = self.selection.column + 1 if at is None else at
+        done = self._do(edits.insert_column(self.table, min(place, self.shape[1]), name, job, declared))
+        self._select(self.selection.at(self.selection.row, place, self.shape))
+        return done
+
+    def delete_columns(self) -> Done:
+        """Delete the selected columns."""
+        return self._do(edits.delete_columns(self.table, self.selected_columns))
+
+    def move_column(self, right: int) -> Done:
+        """Move the cursor's column one place: right 1 or left -1."""
+        at = self.selection.column
+        if not 0 <= at + right < self.shape[1]:
+            return Done()
+        return self._do(edits.move_column(self.table, self.table.columns[at].name, at + right + (right > 0)))
+
+    def rename_column(self, name: str) -> Done:
+        """Give the cursor's column another name."""
+        return self._do(edits.rename_column(self.table, self.table.columns[self.selection.column].name, name))
+
+    # ---- find and replace
+
+    def find(self, search: Search, is_backwards: bool = False) -> int:
+        """Go to the next cell that is found; gives how many there are."""
+        hits = find(self.table, search, self.view.rows, [c.name for c in self.table.columns])
+        if (place := next_hit(hits, self.cursor, is_backwards)) is not None:
+            self.go(*place)
+        return int(hits.sum())
+
+    def replace_here(self, search: Search, replacement: str) -> Done:
+        """Replace in the cursor's cell, and go to the next one found."""
+        rows = self.view.rows[self.selection.row : self.selection.row + 1]
+        done = self._replace(search, replacement, rows, [self.table.columns[self.selection.column].name])
+        self.find(search)
+        return done
+
+    def replace_all(self, search: Search, replacement: str, in_selection: bool = False) -> Done:
+        """Replace in every shown cell, or every selected one, as one step."""
+        block = self.block if in_selection else Block(0, 0, *self.shape)
+        names = [c.name for c in self.table.columns[block.left : block.right]]
+        return self._replace(search, replacement, self.view.rows[block.top : block.bottom], names)
+
+    def _replace(self, search: Search, replacement: str, rows: Rows, columns: Sequence[str]) -> Done:
+        edit = replace_all(self.table, search, replacement, rows, columns)
+        if not edit.changes:
+            return Done(notes=(f"{in_quotes(search.text)} is not found.",))
+        done = self._do(edit)
+        return replace(done, notes=self._unreadable(edit.changes))
+
+    # ---- history
+
+    def undo(self) -> Done:
+        """Take back the last step."""
+        return self._went(self.history.undo, "Undo")
+
+    def redo(self) -> Done:
+        """Make the step again that was taken back last."""
+        return self._went(self.history.redo, "Redo")
+
+    def apply(self, edit: Edit) -> Done:
+        """Make any other edit: a gap filled, a merge."""
+        return self._do(edit)
+
+    # ---- parts
+
+    def _went(self, step_of: Callable[[], Step | None], verb: str) -> Done:
+        before = self.table
+        step = step_of()
+        if step is None:
+            return Done(notes=(f"There is nothing to {verb.lower()}.",))
+        if self.recorder is not None:
+            self.recorder.went(before, self.history, step)
+        self._follow(before, step)
+        return Done(f"{verb}: {step.name}")
+
+    def _do(self, edit: Edit) -> Done:
+        before, position = self.table, self.history.position
+        step = self.history.do(edit)
+        if self.history.position == position:
+            return Done()
+        if self.recorder is not None:
+            self.recorder.did(edit)
+        self._follow(before, step)
+        return Done(edit.name)
+
+    def _set(self, cells: Iterable[tuple[int, int, str]], name: str = "") -> Done:
+        rows, names = self.view.rows.tolist(), [c.name for c in self.table.columns]
+        return self._do(edits.set_cells(self.table, ((rows[r], names[c], text) for r, c, text in cells), name))
+
+    def _cells(self, block: Block) -> Iterable[tuple[int, int]]:
+        return ((r, c) for r in range(block.top, block.bottom) for c in range(block.left, block.right))
+
+    def _size(self, block: Block) -> str:
+        return f"{block.shape[0]} × {block.shape[1]}"
+
+    def _unreadable(self, changes: Iterable[Change]) -> tuple[str, ...]:
+        """How many of the cells just set cannot be read."""
+        columns = {c.condition.name: c for c in self.table.conditions}
+        n_wrong = 0
+        for change in changes:
+            for name, texts in change.texts.items() if isinstance(change, Cells) else ():
+                if name in columns and columns[name].faults:
+                    codes = columns[name].texts.codes[list(texts)]
+                    n_wrong += int(np.isin(codes, list(columns[name].faults)).sum())
+        return (f"{plural(n_wrong, 'cell')} cannot be read.",) if n_wrong else ()
+
+    def _select_file_rows(self, at: int, n_rows: int) -> None:
+        top, bottom = self.view.place(at), self.view.place(at + n_rows - 1)
+        column = self.selection.column
+        self._select(self.selection.at(top or 0, column, self.shape))
+        self._select(self.selection.at(bottom or 0, column, self.shape, extend=True))

@@ -1,0 +1,246 @@
+"""What an editor shows of a table: its history, the view of it, what is selected, and the test row.
+
+Places are (row, column) of the view, as in `tui.model.selection`; rows of the file are named so. A view is not sorted or filtered
+anew by an edit, so that a row does not jump away under the fingers: `refresh` does that. `tui.model.sheet` adds the edits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import edits
+from contextdb.errors import Fault
+from contextdb.findings import Finding
+from contextdb.history import History, Step, where_now
+from contextdb.table import ConditionColumn, Table
+from tui.model.query_row import QueryRow
+from tui.model.selection import Block, Selection, Shape
+from tui.model.views import Filter, Sort, View, shown_rows
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What the three lines over a column say."""
+
+    name: str
+    kind: str
+    """The type of a condition; "asset", "output", "enabled", "priority" or "weight" for the others."""
+    unit: str = ""
+    leaves: int | None = None
+    """How many rows the fact of the test row alone leaves."""
+    fault: Fault | None = None
+    """What is wrong with that fact."""
+
+
+class ShownTable:
+    """A table as it is shown. `version` grows with whatever may change what is painted."""
+
+    def __init__(self, table: Table, history: History | None = None) -> None:
+        self.history = history or History(table)
+        self.selection = Selection()
+        self.query = QueryRow(self.table)
+        self.sort: Sort | None = None
+        self.filter = Filter()
+        self.view = View.of(self.table)
+        self.version = 0
+        self._findings: NDArray[np.bool_] | None = None
+
+    # ---- what is seen
+
+    @property
+    def table(self) -> Table:
+        """The table as it is now."""
+        return self.history.table
+
+    @property
+    def shape(self) -> Shape:
+        """Rows shown, and columns."""
+        return len(self.view), len(self.table.columns)
+
+    @property
+    def block(self) -> Block:
+        """The cells selected."""
+        return self.selection.block(self.shape)
+
+    @property
+    def cursor(self) -> tuple[int, int]:
+        """The cell where typing goes."""
+        return self.selection.row, self.selection.column
+
+    @property
+    def selected_rows(self) -> list[int]:
+        """The rows of the file that are selected, in the order shown."""
+        return [int(r) for r in self.view.rows[self.block.top : self.block.bottom]]
+
+    @property
+    def selected_columns(self) -> list[str]:
+        """The names of the columns that are selected."""
+        return [c.name for c in self.table.columns[self.block.left : self.block.right]]
+
+    def text(self, row: int, column: int) -> str:
+        """The text of a cell."""
+        return self.table.columns[column][int(self.view.rows[row])]
+
+    def row_number(self, row: int) -> int:
+        """The number beside a row: its place in the file, from 1."""
+        return int(self.view.rows[row]) + 1
+
+    def fault(self, row: int, column: int) -> Fault | None:
+        """Why a cell cannot be read."""
+        texts = self.table.columns[column]
+        condition = self.condition(column)
+        if condition is not None:
+            return condition.faults.get(int(texts.codes[int(self.view.rows[row])]))
+        return edits.check_cell(self.table, texts.name, self.text(row, column))
+
+    def condition(self, column: int) -> ConditionColumn | None:
+        """The condition that a column is; None for one of another kind."""
+        texts = self.table.columns[column]
+        return next((c for c in self.table.conditions if c.texts is texts), None)
+
+    def header(self, column: int) -> Header:
+        """What stands over a column."""
+        name, found = self.table.columns[column].name, self.condition(column)
+        if found is not None:
+            condition = found.condition
+            leaves = self.query.leaves(name)
+            return Header(name, condition.domain.kind, condition.unit, leaves, self.query.faults.get(name))
+        settings = self.table.settings
+        jobs = {settings.enabled: "enabled", settings.priority: "priority", settings.weight: "weight"}
+        return Header(name, "asset" if name == self.table.asset_column else jobs.get(name, "output"))
+
+    def failing(self, top: int, bottom: int) -> NDArray[np.bool_]:
+        """Which cells of the rows shown from `top` up to `bottom` do not accept their fact: bool [rows, columns]."""
+        rows = self.view.rows[top:bottom]
+        fails = np.zeros((len(rows), self.shape[1]), np.bool_)
+        places = {c.name: at for at, c in enumerate(self.table.columns)}
+        fails[:, [places[c.condition.name] for c in self.table.conditions]] = self.query.failing(rows)
+        return fails
+
+    def is_filled(self, row: int, column: int) -> bool:
+        """Whether a cell holds a text."""
+        return bool(self.text(row, column).strip())
+
+    # ---- where one is
+
+    def go(self, row: int, column: int, extend: bool = False) -> None:
+        """Put the cursor on a cell."""
+        self._select(self.selection.at(row, column, self.shape, extend))
+
+    def go_to(self, file_row: int, column: str | None = None) -> None:
+        """Put the cursor on a row of the file; a filter that hides it is taken off."""
+        if self.view.place(file_row) is None:
+            self.set_filter(Filter())
+        names = [c.name for c in self.table.columns]
+        self.go(self.view.place(file_row) or 0, names.index(column) if column in names else self.selection.column)
+
+    def move(self, down: int, right: int, extend: bool = False) -> None:
+        """Arrows and pages."""
+        self._select(self.selection.moved(down, right, self.shape, extend))
+
+    def move_to_edge(self, down: int, right: int, extend: bool = False) -> None:
+        """Ctrl and arrows."""
+        self._select(self.selection.to_edge(down, right, self.shape, self.is_filled, extend))
+
+    def select(self, change: Callable[[Selection, Shape], Selection]) -> None:
+        """Any other move of the selection: `sheet.select(Selection.end)`."""
+        self._select(change(self.selection, self.shape))
+
+    def _select(self, selection: Selection) -> None:
+        self.selection = selection
+        self.version += 1
+
+    # ---- the view
+
+    def set_sort(self, sort: Sort | None) -> None:
+        """Show the rows sorted by a column, or in the order of the file."""
+        self.sort = sort
+        self.refresh()
+
+    def set_filter(self, wanted: Filter) -> None:
+        """Show only the rows that pass."""
+        self.filter = wanted
+        self.refresh()
+
+    def set_findings(self, findings: Iterable[Finding]) -> None:
+        """What `check` found, for the filter on it."""
+        flags = np.zeros(self.table.n_rows, np.bool_)
+        flags[[f.row for f in findings if f.row is not None and f.row < self.table.n_rows]] = True
+        self._findings = flags
+
+    def refresh(self) -> None:
+        """Sort and filter anew; the selection stays on its rows where they are still shown."""
+        rows = [self._file_row(place[0]) for place in self._corners()]
+        valid = self.query.valid if self.filter.is_valid else None
+        sort = self.sort if self.sort and any(c.name == self.sort.column for c in self.table.columns) else None
+        self.view = View.of(self.table, sort, shown_rows(self.table, self.filter, valid, self._findings))
+        self._place_selection(rows)
+
+    def set_fact(self, condition: str, text: str) -> Fault | None:
+        """Write one fact of the test row; gives what is wrong with it."""
+        self.version += 1
+        return self.query.set(condition, text)
+
+    # ---- after a step
+
+    def saved(self, table: Table) -> None:
+        """The table stands on the disk; `table` is what `Table.save` gave back."""
+        self.history.saved(table)
+        self.query.show(self.table)
+        self.version += 1
+
+    @property
+    def is_modified(self) -> bool:
+        """Whether there is something to save."""
+        return self.history.is_modified
+
+    @property
+    def path(self) -> Path | None:
+        """The file of the table."""
+        return self.table.path
+
+    def _follow(self, before: Table, step: Step) -> None:
+        """Bring view, selection and test row to the table as it is after a step."""
+        self.version += 1
+        self.query.show(self.table)
+        self._follow_columns(before)
+        if step.came_from is None:
+            self.selection = self.selection.within(self.shape)
+            return
+        now = where_now(step.came_from, before.n_rows)
+        rows = [None if row is None else int(now[row]) for row in map(self._file_row, (p[0] for p in self._corners()))]
+        self.view = self.view.after(step.came_from)
+        if self._findings is not None:
+            self._findings = np.append(self._findings, False)[step.came_from]
+        self._place_selection(rows)
+
+    def _follow_columns(self, before: Table) -> None:
+        if [c.name for c in before.columns] == [c.name for c in self.table.columns]:
+            return
+        places = {c.name: at for at, c in enumerate(self.table.columns)}
+        names = [c.name for c in before.columns]
+        (row, column), anchor, far = (
+            (place[0], places.get(names[place[1]], place[1]) if place[1] < len(names) else 0) for place in self._corners()
+        )
+        self.selection = replace(self.selection, row=row, column=column, anchor=anchor, far=far)
+
+    def _corners(self) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
+        return self.cursor, self.selection.anchor, self.selection.far
+
+    def _file_row(self, row: int) -> int | None:
+        return int(self.view.rows[row]) if row < len(self.view) else None
+
+    def _place_selection(self, rows: Sequence[int | None]) -> None:
+        """Put the selection's corners on rows of the file; one that is not shown stays where it is on the screen."""
+        places = [
+            old[0] if row is None or self.view.place(row) is None else self.view.place(row)
+            for row, old in zip(rows, self._corners(), strict=True)
+        ]
+        (row, anchor, far), now = (p or 0 for p in places), self.selection
+        moved = replace(now, row=row, anchor=(anchor, now.anchor[1]), far=(far, now.far[1]))
+        self._select(moved.within(self.shape))

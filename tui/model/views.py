@@ -1,0 +1,209 @@
+"""Which rows are shown and in what order: sort and filter as views, that never touch the file.
+
+A view is the numbers of the file's rows, in the order shown. Columns are sorted in the natural order of their type: numbers by
+where they begin, then by where they end; enums as declared; texts without regard to case, numbers in them by value. Any comes
+last, then what cannot be read, both ways round. The sort is stable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from contextdb.bitmask import Flags, Rows
+from contextdb.cells import NumberSet, TagSet, ValueSet
+from contextdb.changes import CameFrom
+from contextdb.columns import TextColumn
+from contextdb.table import ConditionColumn, Table
+
+_DIGITS = 20
+"""Numbers inside texts are compared by value up to so many digits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sort:
+    """By which column the rows shown stand."""
+
+    column: str
+    is_descending: bool = False
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Which rows are shown: all that is said must hold."""
+
+    text: str = ""
+    """Stands in some cell of the row, without regard to case."""
+    columns: tuple[tuple[str, str], ...] = ()
+    """For some columns a text that stands in the cell, without regard to case."""
+    cells: tuple[tuple[str, frozenset[str]], ...] = ()
+    """For some columns the texts that the cell may be, exactly."""
+    is_valid: bool = False
+    """Only rows valid for the test context."""
+    has_findings: bool = False
+    """Only rows that `check` has something to say about."""
+
+    @property
+    def is_off(self) -> bool:
+        """Whether every row is shown."""
+        return not (self.text or self.columns or self.cells or self.is_valid or self.has_findings)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The rows shown: view row i is row `rows[i]` of the table, which has `n_rows`."""
+
+    rows: Rows
+    n_rows: int
+    is_sorted: bool = False
+
+    @classmethod
+    def of(cls, table: Table, sort: Sort | None = None, shown: Flags | None = None) -> View:
+        """A view of a table: sorted, and with the rows whose flag is set; all without flags."""
+        order = np.arange(table.n_rows) if sort is None else sorted_rows(table, sort)
+        return cls(order if shown is None else order[shown[order]], table.n_rows, sort is not None)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def place(self, row: int) -> int | None:
+        """Where a row of the table is shown; None when it is not."""
+        at = int(self._places[row]) if 0 <= row < self.n_rows else -1
+        return at if at >= 0 else None
+
+    def nearest_place(self, row: int) -> int:
+        """Where a row is shown, or else the next row of the file that is; the last place where there is none."""
+        shown = np.flatnonzero(self._places[max(row, 0) :] >= 0)
+        return int(self._places[max(row, 0) + shown[0]]) if len(shown) else max(len(self) - 1, 0)
+
+    def after(self, came_from: CameFrom) -> View:
+        """The view of a table whose rows changed. What was shown stays shown, in the order of the file or, in a sorted view, where
+        it was; new rows stand behind the shown row that is before them in the file."""
+        places = np.append(self._places, -1)[came_from]
+        is_shown = (places >= 0) | (came_from < 0)
+        if self.is_sorted:
+            order = np.argsort(_filled_forward(places), kind="stable")
+            return View(order[is_shown[order]], len(came_from), True)
+        return View(np.flatnonzero(is_shown), len(came_from))
+
+    @cached_property
+    def _places(self) -> NDArray[np.int64]:
+        places = np.full(self.n_rows, -1, np.int64)
+        places[self.rows] = np.arange(len(self.rows))
+        return places
+
+
+def _filled_forward(places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Each -1 as the last value before it that is none; -1 where there is none."""
+    at = np.maximum.accumulate(np.where(places < 0, 0, np.arange(1, len(places) + 1)))
+    return np.append(-1, places)[at]
+
+
+def shown_rows(table: Table, wanted: Filter, valid: Flags | None = None, findings: Flags | None = None) -> Flags | None:
+    """Whether each row passes a filter: bool [n_rows]; None when all do. `valid` and `findings` are flags of rows."""
+    if wanted.is_off:
+        return None
+    shown = np.ones(table.n_rows, np.bool_)
+    if wanted.text:
+        shown &= np.logical_or.reduce([_contains(c, wanted.text) for c in table.columns])
+    for name, text in wanted.columns:
+        shown &= _contains(table.text_column(name), text)
+    for name, texts in wanted.cells:
+        column = table.text_column(name)
+        shown &= _of_codes(column, np.array([t in texts for t in column.texts], np.bool_))
+    if wanted.is_valid and valid is not None:
+        shown &= valid
+    if wanted.has_findings and findings is not None:
+        shown &= findings
+    return shown
+
+
+def _contains(column: TextColumn, text: str) -> Flags:
+    word = text.casefold()
+    return _of_codes(column, np.array([word in folded for folded in map(str.casefold, column.texts)], np.bool_))
+
+
+def _of_codes(column: TextColumn, said: Flags) -> Flags:
+    return said[column.codes] if len(said) else np.zeros(column.n_rows, np.bool_)
+
+
+# ---- the natural order
+
+
+def sorted_rows(table: Table, sort: Sort) -> Rows:
+    """Every row in the natural order of a column: int64 [n_rows]."""
+    if not table.n_rows:
+        return np.arange(0)
+    ranks = _ranks(table, sort.column)
+    order = -ranks.of_texts if sort.is_descending else ranks.of_texts
+    order = order + ranks.is_last.astype(np.int64) * (2 * len(order) + 2)
+    codes = table.text_column(sort.column).codes
+    return np.asarray(np.argsort(order[codes], kind="stable"), np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Ranks:
+    of_texts: NDArray[np.int64]
+    """For each distinct text of the column its place in order."""
+    is_last: NDArray[np.int8]
+    """1 for Any and the empty text, 2 for what cannot be read."""
+
+
+def _ranks(table: Table, name: str) -> _Ranks:
+    column = table.text_column(name)
+    for one in table.conditions:
+        if one.texts is column:
+            return _condition_ranks(one)
+    is_last = np.array([not t.strip() for t in column.texts], np.int8)
+    return _Ranks(_places_in_order([text_keys(column.texts)]), is_last)
+
+
+def _condition_ranks(column: ConditionColumn) -> _Ranks:
+    is_last = np.array([2 if i in column.faults else int(c.is_any) for i, c in enumerate(column.cells)], np.int8)
+    kind = column.condition.domain.kind
+    if kind in ("int", "number", "angle"):
+        ends = [c.accepts.spans for c in column.cells if isinstance(c.accepts, NumberSet)]
+        keys = np.zeros((2, len(column.cells)))
+        at = [i for i, c in enumerate(column.cells) if isinstance(c.accepts, NumberSet)]
+        keys[0, at] = [spans[0][0] if spans else np.inf for spans in ends]
+        keys[1, at] = [spans[-1][1] if spans else np.inf for spans in ends]
+        return _Ranks(_places_in_order([keys[0], keys[1]]), is_last)
+    if kind in ("bool", "enum"):
+        values: tuple[bool | str, ...] = (False, True) if kind == "bool" else column.condition.domain.values or ()
+        declared: dict[bool | str, int] = {v: i for i, v in enumerate(values)}
+        tuples = [_declared_places(c.accepts, declared) for c in column.cells]
+        order = {t: i for i, t in enumerate(sorted(set(tuples)))}
+        return _Ranks(np.array([order[t] for t in tuples], np.int64), is_last)
+    return _Ranks(_places_in_order([text_keys(column.texts.texts)]), is_last)
+
+
+def _declared_places(accepts: NumberSet | ValueSet | TagSet | None, declared: dict[bool | str, int]) -> tuple[int, ...]:
+    if not isinstance(accepts, ValueSet):
+        return ()
+    return tuple(sorted(i for v, i in declared.items() if accepts.holds(v)))
+
+
+def _places_in_order(keys: list[NDArray[np.float64]] | list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """The dense rank of each text by its keys, the first key first; equal keys have one rank."""
+    n_texts = len(keys[0])
+    order = np.lexsort(keys[::-1])
+    differs = np.zeros(n_texts, np.bool_)
+    for key in keys:
+        differs[1:] |= key[order][1:] != key[order][:-1]
+    places = np.empty(n_texts, np.int64)
+    places[order] = np.cumsum(differs)
+    return places
+
+
+@lru_cache(maxsize=4)
+def text_keys(texts: tuple[str, ...]) -> NDArray[np.int64]:
+    """A number for each text, in their natural order: "walk_2" before "walk_10", whatever the case."""
+    if not texts:
+        return np.empty(0, np.int64)
+    found = pl.Series(texts, dtype=pl.String).str.strip_chars().str.to_lowercase()
+    padded = found.str.replace_all(r"([0-9]+)", "0" * _DIGITS + "$1").str.replace_all(rf"[0-9]*([0-9]{{{_DIGITS}}})", "$1")
+    return padded.rank("dense").cast(pl.Int64).to_numpy()

@@ -1,0 +1,193 @@
+"""Context coverage: which share of the contexts has a valid row, which have none, and what is wrong with rows.
+
+One call asks four engines: a counter for the share (`count`), samples where it does not finish and for overlap (`sample`), a search
+for gaps (`gaps`) and one for findings (`judge`). Budgets count steps, never time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from contextdb.compiled import CompiledTable
+from contextdb.covering.count import Bounds, uncovered_share
+from contextdb.covering.gaps import SHARE_WORK, described, find_gaps
+from contextdb.covering.judge import Judge
+from contextdb.covering.report import CoverageReport, Method, Overlap
+from contextdb.covering.sample import LITTLE, Counts, Sampler
+from contextdb.covering.shares import wilson
+from contextdb.covering.space import CellBox, Space, WeightsOf
+from contextdb.errors import ContextError, Fault
+from contextdb.table import Table
+
+WORK = 40_000_000
+SAMPLES = 200_000
+MOST_GAPS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Covered:
+    """The covered share and how it is known, as in `CoverageReport`."""
+
+    value: float
+    lower: float
+    upper: float
+    method: Method
+
+
+def coverage(
+    table: Table | CompiledTable,
+    *,
+    seed: int = 0,
+    work: int = WORK,
+    samples: int = SAMPLES,
+    max_gaps: int = MOST_GAPS,
+    impossible: Sequence[CellBox] = (),
+    weights: WeightsOf | None = None,
+) -> CoverageReport:
+    """Work out which contexts have a valid row.
+
+    Parameters
+    ----------
+    table : Table or CompiledTable
+        Findings of a Table carry lines, and tell rows that are written alike.
+    seed : int
+        Where samples start; the same input and seed give the same report.
+    work : int
+        Row visits for the exact count, and in proportion steps for gaps and for findings. 0: bounds only.
+    samples : int
+        Random contexts, for the estimate where the count is not finished and for overlap. 0: none.
+    max_gaps : int
+        The report names at most so many gaps, the largest.
+    impossible : sequence of mapping of str to Cell or cell text
+        Contexts that cannot happen, as boxes: they belong to no share.
+    weights : mapping of str to mapping of value or cell text to float, optional
+        For some conditions how often their values come up, in any unit; a cell's weight is spread over it. Default: all values
+        alike, numbers by length.
+
+    Raises
+    ------
+    TableError
+        The table has cells that cannot be read, or a condition whose domain is empty.
+    ContextError, CellError
+        `impossible` or `weights` name what is not there.
+    """
+    for name, number in (("work", work), ("samples", samples), ("max_gaps", max_gaps), ("seed", seed)):
+        if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
+            raise ContextError(Fault(f"{name} is {number!r}.", "a whole number from 0 up"))
+    compiled = table.compile() if isinstance(table, Table) else table
+    space = Space.of(compiled, impossible, weights)
+    return _report(space, compiled, table if isinstance(table, Table) else None, seed, work, samples, max_gaps)
+
+
+def _report(
+    space: Space, compiled: CompiledTable, table: Table | None, seed: int, work: int, samples: int, max_gaps: int
+) -> CoverageReport:
+    possible = uncovered_share(space, space.impossible, work)
+    left = uncovered_share(space, space.boxes + space.impossible, work)
+    sampler = Sampler(space)
+    rng = np.random.default_rng(seed)
+    whole = sampler.all_contexts()
+    counts = whole or sampler.sampled(samples, rng)
+    certain = _certain(space, possible, left)
+    covered = _covered(certain, counts, whole is None, sampler, possible, rng, samples)
+    steps = search_steps(work, len(space.boxes))
+    found = find_gaps(space, () if whole else counts.uncovered, 4 * max_gaps + 1, steps)
+    judge = Judge(space, compiled, table, finding_steps(work, len(space.boxes)))
+    findings = judge.findings()
+    middle = (possible.lower + possible.upper) / 2.0
+    if middle == 0.0:
+        covered = _of_nothing(found.is_complete and not found.boxes)
+    hits = _hits(space, counts)
+    return CoverageReport(
+        table=compiled.name,
+        n_rows=compiled.n_rows,
+        n_conditions=len(compiled.conditions),
+        covered=covered.value,
+        lower=covered.lower,
+        upper=covered.upper,
+        method=covered.method,
+        gaps=tuple(described(space, compiled, found.boxes, possible, max_gaps, min(work, SHARE_WORK))),
+        gaps_complete=found.is_complete and len(found.boxes) <= max_gaps,
+        findings=tuple(findings),
+        findings_complete=judge.is_complete,
+        overlap=_overlap(counts, hits, whole is not None),
+        certain=(certain.lower, certain.upper) if middle else (covered.lower, covered.upper),
+        seed=int(seed),
+        n_samples=0 if whole else counts.n_contexts,
+        work=possible.work + left.work,
+        hits=_of_all_rows(hits, space, compiled.n_rows),
+        assumed=space.assumed,
+        weighted=space.weighted,
+    )
+
+
+def search_steps(work: int, n_boxes: int) -> int:
+    """Search steps for the gaps, that take about as long as so many row visits."""
+    return 4 * work // (500 + n_boxes)
+
+
+def finding_steps(work: int, n_boxes: int) -> int:
+    """Search steps for the findings: some for every row, fewer where rows are so many that each step is long."""
+    return search_steps(work, n_boxes) + min(n_boxes * (work // 1_000_000), 16 * work // max(1, n_boxes))
+
+
+def _certain(space: Space, possible: Bounds, left: Bounds) -> Bounds:
+    """The covered share of the possible contexts, for certain; never 0 or 1 by rounding."""
+    if possible.upper == 0.0:
+        return Bounds(0.0, 1.0)
+    lower = 1.0 - min(1.0, left.upper / possible.lower) if possible.lower > 0.0 else 0.0
+    upper = 1.0 - min(1.0, left.lower / possible.upper)
+    least = 0.0 if space.impossible else max((space.volume(box) for box in space.boxes), default=0.0)
+    most = math.nextafter(1.0, 0.0) if left.lower > 0.0 else 1.0
+    lower, upper = (min(max(share, least), most) for share in (lower, upper))
+    if possible.is_exact and left.is_exact:
+        return Bounds(lower, lower)
+    return Bounds(lower, upper)
+
+
+def _covered(
+    certain: Bounds, counts: Counts, is_sampled: bool, sampler: Sampler, possible: Bounds, rng: np.random.Generator, samples: int
+) -> Covered:
+    if certain.is_exact:
+        return Covered(certain.lower, certain.lower, certain.upper, "exact")
+    bounds = Covered((certain.lower + certain.upper) / 2.0, certain.lower, certain.upper, "bounds")
+    if not is_sampled or counts.n_contexts == 0:
+        return bounds
+    n = counts.n_contexts
+    n_covered = n - round(float(counts.histogram[0]))
+    value, (lower, upper) = n_covered / n, wilson(n_covered, n)
+    if value < LITTLE and possible.is_exact:
+        value, lower, upper = (share / possible.lower for share in sampler.out_of_rows(samples, rng))
+    lower, upper = max(lower, certain.lower), min(upper, certain.upper)
+    if upper - lower >= certain.upper - certain.lower or lower > upper:
+        return bounds
+    return Covered(min(max(value, lower), upper), lower, upper, "estimate")
+
+
+def _of_nothing(is_all_covered: bool) -> Covered:
+    """The share when the possible contexts have no measure: all of nothing, unless single points are open."""
+    share = 1.0 if is_all_covered else 0.0
+    return Covered(share, share, share, "exact")
+
+
+def _hits(space: Space, counts: Counts) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    if not space.impossible:
+        return np.array([space.volume(box) for box in space.boxes])
+    total = counts.histogram.sum()
+    return counts.hits / total if total else np.zeros(len(space.boxes))
+
+
+def _overlap(counts: Counts, hits: np.ndarray[tuple[int], np.dtype[np.float64]], is_exact: bool) -> Overlap:
+    total = float(counts.histogram.sum())
+    histogram = np.trim_zeros(counts.histogram, "b") / total if total else np.zeros(0)
+    return Overlap(float(hits.sum()), tuple(histogram.tolist()), "exact" if is_exact else "estimate")
+
+
+def _of_all_rows(hits: np.ndarray[tuple[int], np.dtype[np.float64]], space: Space, n_rows: int) -> tuple[float, ...]:
+    all_rows = np.zeros(n_rows)
+    all_rows[list(space.rows)] = hits
+    return tuple(all_rows.tolist())

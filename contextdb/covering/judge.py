@@ -1,0 +1,211 @@
+"""What coverage finds wrong with rows: each rule is a question about boxes that has an exact answer.
+
+    equal-row        valid in just the contexts of an earlier row, but not written alike (those are `check`'s identical-rows)
+    subsumed-row     another row is valid wherever this one is, and elsewhere too
+    redundant-row    several rows together are valid wherever this one is
+    dead-row         all its contexts are impossible
+    never-chosen     by the table's policy another row always comes first
+    policy-overlap   the policy is "unique" and another row can be valid at the same time
+    no-context       no context at all is possible
+
+Single points count: a row that alone holds the number 5 is not redundant. A row has one of equal, subsumed, redundant and dead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from contextdb.check import check
+from contextdb.compiled import CompiledTable
+from contextdb.covering.space import Box, Space
+from contextdb.covering.witness import BoxSet, OutOfSteps
+from contextdb.errors import in_quotes, plural
+from contextdb.findings import Finding, Level
+from contextdb.table import Table
+
+MOST_CAUSES = 24
+"""Up to so many rows the causes of a redundant row are thinned out to those that are needed."""
+QUESTIONS = 40
+"""One question may use this part of the steps."""
+
+
+@dataclass(eq=False)
+class Judge:
+    """Asks the questions of one table, with so many search steps for all of them."""
+
+    space: Space
+    compiled: CompiledTable
+    table: Table | None
+    steps: int
+    is_complete: bool = True
+    """False when the steps ended before an answer."""
+    _held: dict[tuple[int, int], int] = field(default_factory=dict)
+    _met: dict[tuple[int, int], int] = field(default_factory=dict)
+
+    def findings(self) -> list[Finding]:
+        """Every finding, those of the whole table first, then by row."""
+        if self.space.impossible and not self._is_possible(self.space.full):
+            return [
+                self._whole("no-context", "error", "no context is possible under the assumptions; do they contradict each other?")
+            ]
+        found = [*self._identical, *self._rows(), *self._policy()]
+        return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+
+    @cached_property
+    def boxes(self) -> BoxSet:
+        """The rows, then the impossible contexts, as bits."""
+        return BoxSet.of(self.space.full, self.space.boxes + self.space.impossible)
+
+    @cached_property
+    def _impossible(self) -> int:
+        return self.boxes.all & ~((1 << len(self.space.boxes)) - 1)
+
+    @cached_property
+    def _identical(self) -> list[Finding]:
+        return [] if self.table is None else [f for f in check(self.table) if f.rule == "identical-rows"]
+
+    @cached_property
+    def _equal(self) -> dict[Box, int]:
+        """For each distinct box the rows that have it, as bits."""
+        groups: dict[Box, int] = {}
+        for i, box in enumerate(self.space.boxes):
+            groups[box] = groups.get(box, 0) | 1 << i
+        return groups
+
+    def _rows(self) -> Iterator[Finding]:
+        told = {f.row for f in self._identical}
+        for i, box in enumerate(self.space.boxes):
+            equal = self._equal[box]
+            if self.space.impossible and not self._is_possible(box):
+                yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions rule out.")
+                continue
+            first = (equal & -equal).bit_length() - 1
+            if first != i:
+                if self.space.rows[i] not in told:
+                    yield self._at(i, "equal-row", "warning", f"is valid in just the contexts of {self._named(first)}.", 1 << first)
+                continue
+            yield from self._contained(i, box, equal)
+
+    def _contained(self, i: int, box: Box, equal: int) -> Iterator[Finding]:
+        over = self._holders(box) & ~equal & ~self._impossible
+        if over:
+            other = (over & -over).bit_length() - 1
+            yield self._at(i, "subsumed-row", "warning", f"wherever it is valid, {self._named(other)} is valid too.", 1 << other)
+            return
+        others = self._meeting(box) & ~equal
+        if others & ~self._impossible and self._covered(box, others):
+            causes = self._thinned(box, others) & ~self._impossible
+            message = f"wherever it is valid, one of {plural(causes.bit_count(), 'other row')} is valid too."
+            yield self._at(i, "redundant-row", "info", message, causes)
+
+    def _policy(self) -> Iterator[Finding]:
+        if self.compiled.policy == "unique":
+            yield from self._overlapping()
+        if self.compiled.policy in ("first", "priority"):
+            for i, box in enumerate(self.space.boxes):
+                before = self._before(i) & self._meeting(box)
+                if before and self._covered(box, before | self._impossible) and self._is_possible(box):
+                    why = "stands above it" if self.compiled.policy == "first" else "has a higher priority"
+                    message = f"the row is never chosen: wherever it is valid, a valid row {why}."
+                    yield self._at(
+                        i, "never-chosen", "warning", message, self._thinned(box, before | self._impossible) & ~self._impossible
+                    )
+
+    def _before(self, i: int) -> int:
+        """The rows that the policy prefers to row i."""
+        if self.compiled.policy == "first":
+            return (1 << i) - 1
+        return self._higher[int(self.compiled.priorities[self.space.rows[i]])]
+
+    @cached_property
+    def _higher(self) -> dict[int, int]:
+        """For each priority the rows with a higher one that can be picked."""
+        own = [int(self.compiled.priorities[row]) for row in self.space.rows]
+        picked = [self.compiled.row_weights[row] > 0.0 for row in self.space.rows]
+        higher, so_far = {}, 0
+        for priority in sorted(set(own), reverse=True):
+            higher[priority] = so_far
+            so_far |= sum(1 << i for i, p in enumerate(own) if p == priority and picked[i])
+        return higher
+
+    def _overlapping(self) -> Iterator[Finding]:
+        for i, box in enumerate(self.space.boxes):
+            others, joint = 0, None
+            for j in _bits(self._meeting(box) & ((1 << i) - 1)):
+                shared = tuple(a & b for a, b in zip(box, self.space.boxes[j], strict=True))
+                if self._is_possible(shared):
+                    others |= 1 << j
+                    joint = joint or (j, shared)
+            if joint:
+                cells = ", ".join(f"{name}: {cell}" for name, cell in self.space.cells(joint[1]).items()) or "every context"
+                message = f'the policy is "unique", and {self._named(joint[0])} can be valid at the same time: {cells}.'
+                yield self._at(i, "policy-overlap", "error", message, others)
+
+    def _is_possible(self, box: Box) -> bool:
+        return not (self.space.impossible and self._covered(box, self._impossible))
+
+    def _covered(self, box: Box, by: int) -> bool:
+        """Whether some boxes hold all of a box; "no" where that cannot be told within the steps."""
+        allowed = min(self.steps, max(200, self.steps // QUESTIONS))
+        left = [allowed]
+        try:
+            answer = self.boxes.outside(by, box, left) is None
+        except OutOfSteps:
+            self.is_complete, answer = False, False
+        self.steps -= allowed - left[0]
+        return answer
+
+    def _thinned(self, box: Box, by: int) -> int:
+        """Boxes that together hold a box, without those that are not needed."""
+        by &= self._meeting(box)
+        if by.bit_count() <= MOST_CAUSES:
+            for j in reversed(list(_bits(by))):
+                if self._covered(box, by & ~(1 << j)):
+                    by &= ~(1 << j)
+        return by
+
+    def _meeting(self, box: Box) -> int:
+        found = self.boxes.all
+        for f, side in enumerate(box):
+            if side != self.space.full[f]:
+                if (f, side) not in self._met:
+                    self._met[f, side] = self.boxes.meeting(f, side)
+                found &= self._met[f, side]
+        return found
+
+    def _holders(self, box: Box) -> int:
+        found = self.boxes.all
+        for f, side in enumerate(box):
+            if (f, side) not in self._held:
+                self._held[f, side] = self.boxes.holding(f, side)
+            found &= self._held[f, side]
+            if found.bit_count() == 1:
+                break
+        return found
+
+    def _named(self, i: int) -> str:
+        row = self.space.rows[i]
+        line = None if self.table is None else self.table.place(row).line
+        return f"{f'row {row}' if line is None else f'line {line}'} ({in_quotes(self.compiled.assets[row])})"
+
+    def _at(self, i: int, rule: str, level: Level, message: str, by: int = 0) -> Finding:
+        row = self.space.rows[i]
+        causes = tuple(self.space.rows[j] for j in _bits(by))
+        asset = self.compiled.assets[row]
+        if self.table is None:
+            return Finding(rule, level, message, self.compiled.name, row=row, asset=asset, by=causes)
+        place = self.table.place(row)
+        return Finding(rule, level, message, self.table.name, place.file, row, asset, place.line, None, causes)
+
+    def _whole(self, rule: str, level: Level, message: str) -> Finding:
+        file = str(self.table.path) if self.table is not None and self.table.path else None
+        return Finding(rule, level, message, self.compiled.name, file)
+
+
+def _bits(bits: int) -> Iterator[int]:
+    while bits:
+        lowest = bits & -bits
+        yield lowest.bit_length() - 1
+        bits ^= lowest

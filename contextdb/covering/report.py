@@ -1,0 +1,139 @@
+"""What coverage tells of a table: numbers, gaps and findings. Data only; `to_json` is what `coverage --format json` prints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from contextdb.covering.shares import format_percent
+from contextdb.findings import Finding
+
+Method = Literal["exact", "bounds", "estimate"]
+
+
+@dataclass(frozen=True, slots=True)
+class Nearest:
+    """The row that needs fewest changes to hold a gap: how many cells, and the first of them with what it would say."""
+
+    row: int
+    asset: str
+    n_changes: int
+    condition: str
+    cell: str
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {"row": self.row, "asset": self.asset, "changes": self.n_changes, "condition": self.condition, "cell": self.cell}
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A box of contexts without a valid row. `cells` leaves out the conditions that it does not restrict."""
+
+    id: str
+    share: float
+    """Of the possible contexts; 0 for single points."""
+    new_share: float
+    """What no earlier gap of the list holds."""
+    cells: dict[str, str]
+    nearest: Nearest | None = None
+    is_exact: bool = True
+    """False where a share needed too much work: it is then the middle of certain bounds."""
+
+    @property
+    def text(self) -> str:
+        """The cells on one line."""
+        return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        nearest = None if self.nearest is None else self.nearest.to_json()
+        return {
+            "id": self.id,
+            "share": self.share,
+            "new_share": self.new_share,
+            "exact": self.is_exact,
+            "cells": self.cells,
+            "nearest": nearest,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Overlap:
+    """How many rows are valid at once: the mean, and the share of contexts that have 0, 1, 2, … valid rows."""
+
+    mean: float
+    histogram: tuple[float, ...]
+    method: Literal["exact", "estimate"]
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {"mean": self.mean, "histogram": list(self.histogram), "method": self.method}
+
+
+@dataclass(frozen=True, slots=True)
+class CoverageReport:
+    """The context coverage of one table.
+
+    `covered` lies between `lower` and `upper`: all equal when `method` is "exact"; with "bounds" it is their middle and they are
+    certain; with "estimate" it was sampled and they are its 99 % interval (Wilson). All are shares of the possible contexts.
+    """
+
+    table: str
+    n_rows: int
+    n_conditions: int
+    covered: float
+    lower: float
+    upper: float
+    method: Method
+    gaps: tuple[Gap, ...]
+    gaps_complete: bool
+    findings: tuple[Finding, ...]
+    findings_complete: bool
+    """False when the work budget ended before every row was decided."""
+    overlap: Overlap
+    certain: tuple[float, float]
+    """Bounds that hold whatever the samples say."""
+    seed: int
+    n_samples: int
+    work: int
+    """Row visits spent on counting."""
+    hits: tuple[float, ...]
+    """For each row the share of the possible contexts in which it is valid."""
+    assumed: dict[str, str]
+    """What had to be assumed of conditions without bounds or declared values."""
+    weighted: tuple[str, ...]
+    """The conditions whose values do not all count the same."""
+
+    @property
+    def headline(self) -> str:
+        """The covered share in one sentence that says how it is known."""
+        if self.method == "exact":
+            return f"{format_percent(self.covered)} of the contexts have a valid row (exact)."
+        ends = f"{format_percent(self.lower)} and {format_percent(self.upper)}"
+        how = "certain bounds" if self.method == "bounds" else f"99 % interval, {self.n_samples:,} samples, seed {self.seed}"
+        return f"Between {ends} of the contexts have a valid row ({how})."
+
+    def to_json(self) -> dict[str, object]:
+        """The report as plain data: one entry of `tables` in `coverage --format json`."""
+        return {
+            "table": self.table,
+            "rows": self.n_rows,
+            "conditions": self.n_conditions,
+            "covered": {
+                "method": self.method,
+                "value": self.covered,
+                "lower": self.lower,
+                "upper": self.upper,
+                "certain": list(self.certain),
+                "seed": self.seed,
+                "samples": self.n_samples,
+                "work": self.work,
+                "assumed": self.assumed,
+                "weighted": list(self.weighted),
+            },
+            "gaps": {"complete": self.gaps_complete, "items": [gap.to_json() for gap in self.gaps]},
+            "findings": [finding.to_json() for finding in self.findings],
+            "findings_complete": self.findings_complete,
+            "overlap": self.overlap.to_json(),
+        }

@@ -1,0 +1,224 @@
+"""Coverage by samples: contexts drawn by their weights and looked up in masks, the same for the same seed.
+
+Where little is covered, contexts are drawn out of the rows instead (Karp and Luby): a row by its measure, a context in it; the
+share of draws whose row is the first that holds the context, times the sum of the rows' measures, is the covered share.
+
+Source: Karp, Luby and Madras, "Monte-Carlo approximation algorithms for enumeration problems", Journal of Algorithms 10, 1989.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.bitmask import Words
+from contextdb.covering.count import runs_of
+from contextdb.covering.shares import wilson
+from contextdb.covering.space import Box, Space
+from contextdb.covering.witness import Point
+
+Codes = NDArray[np.int32]
+CHUNK = 4096
+MOST_SEEDS = 2000
+LITTLE = 0.1
+"""Below this covered share contexts are drawn out of the rows."""
+MOST_CONTEXTS = 100_000
+"""A space of so few classes is gone through whole, instead of sampled, for the overlap."""
+
+
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """What a set of contexts showed: weights per number of valid rows, weight of each box, points without a row."""
+
+    n_contexts: int
+    histogram: NDArray[np.float64]
+    hits: NDArray[np.float64]
+    uncovered: tuple[Point, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Sampler:
+    """Masks of the rows of a space for each class, to look contexts up in."""
+
+    space: Space
+
+    @cached_property
+    def _sides(self) -> list[tuple[NDArray[np.int64], list[int]]]:
+        """For each factor which side each box has, by number, and the sides."""
+        return [_numbered([box[f] for box in self.space.boxes]) for f in range(len(self.space.factors))]
+
+    @cached_property
+    def masks(self) -> tuple[Words, NDArray[np.int64]]:
+        """uint64 [classes of all factors, words], and where each factor's begin."""
+        return _masks(self.space, self.space.boxes)
+
+    @cached_property
+    def _impossible(self) -> tuple[Words, NDArray[np.int64]]:
+        return _masks(self.space, self.space.impossible)
+
+    def sampled(self, n_samples: int, rng: np.random.Generator) -> Counts:
+        """Look random possible contexts up; those drawn that are impossible do not count."""
+        sums = [np.cumsum(f.weights) for f in self.space.factors]
+        chunks = ((self._draw(sums, min(CHUNK, n_samples - at), rng), None) for at in range(0, n_samples, CHUNK))
+        return self._counted(chunks)
+
+    def all_contexts(self) -> Counts | None:
+        """Look every class of the space up, by its weight; None where there are too many."""
+        sizes = [len(f.weights) for f in self.space.factors]
+        total = 1
+        for size in sizes:
+            total *= size
+            if total > MOST_CONTEXTS:
+                return None
+        return self._counted(self._grid(sizes, total))
+
+    def _grid(self, sizes: list[int], total: int) -> Iterator[tuple[Codes, NDArray[np.float64]]]:
+        for at in range(0, total, CHUNK):
+            numbers = np.arange(at, min(at + CHUNK, total))
+            codes, shares = np.zeros((len(numbers), len(sizes)), np.int32), np.ones(len(numbers))
+            for f, size in enumerate(sizes):
+                codes[:, f] = numbers % size
+                numbers = numbers // size
+                shares *= self.space.factors[f].weights[codes[:, f]]
+            yield codes, shares
+
+    def _draw(self, sums: list[NDArray[np.float64]], n: int, rng: np.random.Generator) -> Codes:
+        codes = np.zeros((n, len(sums)), np.int32)
+        for f, cumulative in enumerate(sums):
+            if len(cumulative) > 1:
+                codes[:, f] = _drawn(cumulative, rng.random(n))
+        return codes
+
+    def _counted(self, chunks: Iterator[tuple[Codes, NDArray[np.float64] | None]]) -> Counts:
+        histogram, hits = np.zeros(1), np.zeros(len(self.space.boxes))
+        uncovered: dict[Point, None] = {}
+        n_contexts = 0
+        for codes, shares in chunks:
+            possible = self._is_possible(codes)
+            codes = codes[possible]
+            weights = np.ones(len(codes)) if shares is None else shares[possible]
+            counts, found = lookup(codes, self.masks, len(self.space.boxes), shares is None)
+            n_contexts += len(codes)
+            histogram = _summed(histogram, np.bincount(counts, weights).astype(np.float64))
+            if isinstance(found, np.ndarray) and found.ndim == 1:
+                hits += found
+            else:
+                hits += weights @ found
+            for i in np.flatnonzero(counts == 0).tolist() if len(uncovered) < MOST_SEEDS else ():
+                uncovered[tuple(codes[i].tolist())] = None
+        return Counts(n_contexts, histogram, hits, tuple(uncovered))
+
+    def _is_possible(self, codes: Codes) -> NDArray[np.bool_]:
+        if not self.space.impossible:
+            return np.ones(len(codes), np.bool_)
+        return np.equal(lookup(codes, self._impossible, len(self.space.impossible), True)[0], 0)
+
+    def out_of_rows(self, n_samples: int, rng: np.random.Generator) -> tuple[float, float, float]:
+        """The covered and possible share of the whole space and its 99 % interval, by contexts drawn out of the rows."""
+        volumes = np.array([self.space.volume(box) for box in self.space.boxes])
+        total = float(volumes.sum())
+        if total == 0.0:
+            return 0.0, 0.0, 0.0
+        n_first = 0
+        for at in range(0, n_samples, CHUNK):
+            n = min(CHUNK, n_samples - at)
+            drawn = _drawn(np.cumsum(volumes), rng.random(n))
+            codes = self._draw_inside(drawn, rng)
+            words = intersected(codes, self.masks)
+            n_first += int((_first_box(words) == drawn)[self._is_possible(codes)].sum())
+        low, high = wilson(n_first, n_samples)
+        return min(1.0, total * n_first / n_samples), min(1.0, total * low), min(1.0, total * high)
+
+    def _draw_inside(self, drawn: NDArray[np.int64], rng: np.random.Generator) -> Codes:
+        codes = np.zeros((len(drawn), len(self.space.factors)), np.int32)
+        for f, factor in enumerate(self.space.factors):
+            if len(factor.weights) == 1:
+                continue
+            uniform = rng.random(len(drawn))
+            of_box, sides = self._sides[f]
+            for number in np.unique(of_box[drawn]).tolist():
+                members = np.flatnonzero(of_box[drawn] == number)
+                inside = np.where(_flags(sides[number], len(factor.weights)), factor.weights, 0.0)
+                codes[members, f] = _drawn(np.cumsum(inside), uniform[members])
+        return codes
+
+
+def lookup(
+    codes: Codes, masks: tuple[Words, NDArray[np.int64]], n_boxes: int, has_equal_weights: bool
+) -> tuple[NDArray[np.int64], NDArray[np.float64] | NDArray[np.bool_]]:
+    """How many boxes hold each context, int64 [N], and how many contexts each box holds; else which, bool [N, boxes]."""
+    words, starts = masks
+    if not len(starts) or not n_boxes:
+        every = np.ones((len(codes), n_boxes), np.bool_)
+        return np.full(len(codes), n_boxes), every.sum(axis=0).astype(np.float64) if has_equal_weights else every
+    if not has_equal_weights:
+        flags = bitmask.unpack(intersected(codes, masks), n_boxes)
+        return flags.sum(axis=1), flags
+    from contextdb.covering.kernels import IS_COMPILED, count_rows
+
+    if not IS_COMPILED:
+        flags = bitmask.unpack(intersected(codes, masks), n_boxes)
+        return flags.sum(axis=1), flags.sum(axis=0).astype(np.float64)
+    counts, hits = np.zeros(len(codes), np.int64), np.zeros(n_boxes, np.int64)
+    count_rows(codes, starts, words, counts, hits)
+    return counts, hits.astype(np.float64)
+
+
+def intersected(codes: Codes, masks: tuple[Words, NDArray[np.int64]]) -> Words:
+    """The boxes that hold each context: uint64 [N, words]."""
+    words, starts = masks
+    found: Words = words[starts[0] + codes[:, 0]]
+    for f in range(1, codes.shape[1]):
+        found &= words[starts[f] + codes[:, f]]
+    return found
+
+
+def _masks(space: Space, boxes: tuple[Box, ...]) -> tuple[Words, NDArray[np.int64]]:
+    starts = np.cumsum([0, *(len(f.weights) for f in space.factors)])
+    parts = []
+    for f, factor in enumerate(space.factors):
+        of_box, sides = _numbered([box[f] for box in boxes])
+        turns = np.zeros((len(factor.weights) + 1, bitmask.n_words(len(boxes))), np.uint64)
+        for number, side in enumerate(sides):
+            bits = bitmask.pack(of_box == number)
+            for first, stop in runs_of(side):
+                turns[first] ^= bits
+                turns[stop] ^= bits
+        parts.append(np.bitwise_xor.accumulate(turns, axis=0)[:-1])
+    return (np.concatenate(parts) if parts else np.zeros((0, 0), np.uint64)), starts[:-1]
+
+
+def _summed(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The sum of two histograms of any lengths."""
+    joint = np.zeros(max(len(one), len(other)))
+    joint[: len(one)] += one
+    joint[: len(other)] += other
+    return joint
+
+
+def _numbered(sides: list[int]) -> tuple[NDArray[np.int64], list[int]]:
+    """The number of each side among the distinct ones, and these."""
+    numbers: dict[int, int] = {}
+    return np.array([numbers.setdefault(side, len(numbers)) for side in sides], np.int64), list(numbers)
+
+
+def _drawn(sums: NDArray[np.float64], uniform: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Where uniform numbers fall among weights whose sums are given; never on one of weight 0."""
+    last = int(np.searchsorted(sums, sums[-1], "left"))
+    return np.asarray(np.minimum(np.searchsorted(sums, uniform * sums[-1], "right"), last), np.int64)
+
+
+def _first_box(words: Words) -> NDArray[np.int64]:
+    at = (words != 0).argmax(axis=1)
+    word = words[np.arange(len(words)), at]
+    lowest = word & (~word + np.uint64(1))
+    return np.asarray(at * 64 + np.bitwise_count(lowest - np.uint64(1)), np.int64)
+
+
+def _flags(side: int, n: int) -> NDArray[np.bool_]:
+    return np.array([side >> k & 1 for k in range(n)], np.bool_)

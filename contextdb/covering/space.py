@@ -1,0 +1,213 @@
+"""The space of contexts of a table, and its rows as boxes in it.
+
+F factors (`contextdb.covering.factors`) make up the space: one for each condition, for tags one for each group of tags that hang
+together. A box holds for each factor the set of classes that it accepts, as a Python integer. Soft cells accept everything; rows
+that are disabled, or that accept no context at all, are no boxes. The measure of a box is the product of its factors' weights.
+
+Boxes say which contexts are valid exactly; that facts of several conditions, derived ones too, come independently of each other is
+assumed, but for the contexts named as impossible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from contextdb import bitmask
+from contextdb.cells import Accepted, Cell, TagSet, format_cell, parse_cell
+from contextdb.compiled import CompiledTable
+from contextdb.conditions import Condition
+from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
+from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, some
+
+Box = tuple[int, ...]
+CellBox = Mapping[str, Cell | str]
+WeightsOf = Mapping[str, Mapping[object, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Factors, and the rows and impossible contexts as boxes."""
+
+    conditions: tuple[Condition, ...]
+    factors: tuple[Factor, ...]
+    of_condition: tuple[tuple[int, ...], ...]
+    """For each condition the numbers of its factors."""
+    rows: tuple[int, ...]
+    """The row of each box of `boxes`, ascending."""
+    boxes: tuple[Box, ...]
+    impossible: tuple[Box, ...]
+    weighted: tuple[str, ...] = ()
+    """The conditions whose weights were given."""
+
+    @classmethod
+    def of(cls, compiled: CompiledTable, impossible: Sequence[CellBox] = (), weights: WeightsOf | None = None) -> Space:
+        """The space of a compiled table; see `contextdb.covering.coverage` for the arguments."""
+        excluded = [_read_box(box, compiled.conditions) for box in impossible]
+        given = {name: _read_weights(name, parts, compiled.conditions) for name, parts in (weights or {}).items()}
+        factors: list[Factor] = []
+        of_condition: list[tuple[int, ...]] = []
+        for at, condition in enumerate(compiled.conditions):
+            is_text = condition.domain.kind == "text"  # its values are those that cells name, soft ones too
+            accepted = [c.accepts for c in compiled.cells(at) if c.accepts is not None and (is_text or not c.is_soft)]
+            accepted += [cell.accepts for box in excluded for name, cell in box.items() if name == condition.name and cell.accepts]
+            accepted += [cell.accepts for cell in given.get(condition.name, {}) if cell.accepts]
+            new = _factors(accepted, condition, given.get(condition.name))
+            of_condition.append(tuple(range(len(factors), len(factors) + len(new))))
+            factors += new
+        space = cls(compiled.conditions, tuple(factors), tuple(of_condition), (), (), (), tuple(given))
+        return space._with_boxes(compiled, excluded)
+
+    def _with_boxes(self, compiled: CompiledTable, excluded: Sequence[Mapping[str, Cell]]) -> Space:
+        columns = [
+            [self.sides(at, None if c.is_soft else c.accepts) for c in compiled.cells(at)] for at in range(len(self.conditions))
+        ]
+        codes = [compiled.texts[at].codes.tolist() for at in range(len(self.conditions))]
+        found: list[tuple[int, Box]] = []
+        for row in np.flatnonzero(bitmask.unpack(compiled.enabled, compiled.n_rows)).tolist():
+            box = tuple(side for at in range(len(columns)) for side in columns[at][codes[at][row]])
+            if 0 not in box and not any(self._is_void(columns[at][codes[at][row]], at) for at in range(len(columns))):
+                found.append((row, box))
+        impossible = [self.box(cells) for cells in excluded]
+        rows, boxes = tuple(r for r, _ in found), tuple(b for _, b in found)
+        return Space(
+            self.conditions,
+            self.factors,
+            self.of_condition,
+            rows,
+            boxes,
+            tuple(b for b in impossible if b is not None),
+            self.weighted,
+        )
+
+    def _is_void(self, sides: Sequence[int], at: int) -> bool:
+        """Whether a cell of tags accepts nothing where the condition has no factor to say so."""
+        return len(sides) != len(self.of_condition[at])
+
+    @cached_property
+    def full(self) -> Box:
+        """The box of every context."""
+        return tuple((1 << len(f.weights)) - 1 for f in self.factors)
+
+    def sides(self, at: int, accepts: Accepted | None) -> tuple[int, ...]:
+        """The sides of a cell of condition number `at`, one for each of its factors; one 0 too many where nothing is accepted."""
+        numbers = self.of_condition[at]
+        if accepts is None:
+            return tuple(self.full[f] for f in numbers)
+        if accepts.is_empty:
+            return tuple(0 for _ in numbers) or (0,)
+        return tuple(self._side(f, accepts) for f in numbers)
+
+    def _side(self, f: int, accepts: Accepted) -> int:
+        factor = self.factors[f]
+        if isinstance(factor, TagFactor) and isinstance(accepts, TagSet) and accepts.is_complement:
+            return factor.classes(accepts) if (accepts.needs | accepts.bans) <= frozenset(factor.tags) else self.full[f]
+        return factor.classes(accepts)
+
+    def box(self, cells: Mapping[str, Cell]) -> Box | None:
+        """The box of some cells; None where it holds nothing."""
+        sides: list[int] = []
+        for at, condition in enumerate(self.conditions):
+            cell = cells.get(condition.name)
+            own = self.sides(at, None if cell is None else cell.accepts)
+            if self._is_void(own, at) or 0 in own:
+                return None
+            sides += own
+        return tuple(sides)
+
+    def cells(self, box: Box) -> dict[str, str]:
+        """A box as cells, without the conditions that it does not restrict."""
+        found: dict[str, str] = {}
+        for at, condition in enumerate(self.conditions):
+            accepts = self.accepted(at, box)
+            if accepts is not None:
+                found[condition.name] = format_cell(Cell(accepts), condition.domain)
+        return found
+
+    def accepted(self, at: int, box: Box) -> Accepted | None:
+        """What a box accepts of condition number `at`; None for everything."""
+        limited = [f for f in self.of_condition[at] if box[f] != self.full[f]]
+        if not limited:
+            return None
+        if self.conditions[at].domain.kind != "tags":
+            return self.factors[limited[0]].accepts(box[limited[0]])
+        parts = [self.factors[f].accepts(box[f]) for f in limited]
+        tags = [p for p in parts if isinstance(p, TagSet)]
+        return TagSet(frozenset().union(*(p.needs for p in tags)), frozenset().union(*(p.bans for p in tags)))
+
+    def volume(self, box: Box) -> float:
+        """The measure of a box."""
+        share = 1.0
+        for factor, full, side in zip(self.factors, self.full, box, strict=True):
+            if side != full:
+                share *= weight_of(factor, side)
+        return share
+
+    @property
+    def assumed(self) -> dict[str, str]:
+        """What had to be assumed of each condition that is not fully declared."""
+        return {
+            self.conditions[at].name: text
+            for at, numbers in enumerate(self.of_condition)
+            if (text := "; ".join(t for f in numbers if (t := self.factors[f].assumed)))
+        }
+
+
+def weight_of(factor: Factor, side: int) -> float:
+    """The share of a factor that some classes make up."""
+    return float(sum(w for k, w in enumerate(factor.weights.tolist()) if side >> k & 1))
+
+
+def _factors(accepted: Sequence[Accepted], condition: Condition, parts: Mapping[Cell, float] | None) -> list[Factor]:
+    domain = condition.domain
+    if domain.kind == "tags":
+        return list(tag_factors(accepted, domain))
+    is_number = domain.kind in ("int", "number", "angle")
+    factor: Factor = NumberFactor.of(accepted, domain) if is_number else ValueFactor.of(accepted, domain)
+    if parts is None:
+        return [factor]
+    full = (1 << len(factor.weights)) - 1
+    sides: dict[int, float] = {}
+    for cell, weight in parts.items():
+        side = full if cell.accepts is None else factor.classes(cell.accepts)
+        sides[side] = sides.get(side, 0.0) + weight
+    if sides.get(0, 0.0) > 0.0 or sum(sides.values()) <= 0.0:
+        place = Place(column=condition.name)
+        raise ContextError(Fault("the weights lie outside the domain, or are all 0.", "a weight above 0 inside", place=place))
+    return [weighted(factor, {s: w for s, w in sides.items() if w > 0.0})]
+
+
+def _condition(name: str, conditions: Sequence[Condition]) -> Condition:
+    for condition in conditions:
+        if condition.name == name:
+            return condition
+    known = [c.name for c in conditions]
+    near = nearest(name, known)
+    raise ContextError(Fault(f"there is no condition {in_quotes(name)}.", some(known), in_quotes(near) if near else ""))
+
+
+def _read_box(box: CellBox, conditions: Sequence[Condition]) -> dict[str, Cell]:
+    read = ((name, cell, _condition(name, conditions)) for name, cell in box.items())
+    return {name: cell if isinstance(cell, Cell) else parse_cell(cell, condition.domain) for name, cell, condition in read}
+
+
+def _read_weights(name: str, parts: Mapping[object, float], conditions: Sequence[Condition]) -> dict[Cell, float]:
+    condition = _condition(name, conditions)
+    place = Place(column=name)
+    if condition.domain.kind == "tags":
+        raise ContextError(Fault("tags take no weights.", "a condition of another type", place=place))
+    read: dict[Cell, float] = {}
+    for text, weight in parts.items():
+        if not (isinstance(weight, (int, float)) and 0.0 <= weight < float("inf")):
+            raise ContextError(Fault(f"the weight {weight!r} is no share.", "a number from 0 up", place=place))
+        cell = parse_cell(str(text), condition.domain)
+        read[cell] = read.get(cell, 0.0) + float(weight)
+    return read
+
+
+def used_factors(boxes: Iterable[Box], full: Box) -> list[int]:
+    """The factors that some box restricts."""
+    return sorted({f for box in boxes for f, side in enumerate(box) if side != full[f]})

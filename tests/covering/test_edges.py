@@ -1,0 +1,243 @@
+"""Coverage where it is easily wrong: ends that touch, numbers that nearly round, domains without bounds, input that cannot be."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+
+import pytest
+
+import contextdb as cdb
+from contextdb.covering import coverage, format_percent
+from contextdb.covering.shares import wilson
+from contextdb.schema import TableSettings
+
+SPEED = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}
+
+
+def report_of(
+    columns: Mapping[str, list[str]], schema: Mapping[str, Mapping[str, object]], **options: object
+) -> cdb.CoverageReport:
+    n_rows = len(next(iter(columns.values())))
+    policy = options.pop("policy", "collect")
+    table = cdb.Table.from_columns(
+        {"Asset": [f"A{r}" for r in range(n_rows)], **columns}, schema, TableSettings("table", policy=policy)
+    )
+    return coverage(table, **options)
+
+
+def gaps(report: cdb.CoverageReport) -> list[dict[str, str]]:
+    return [gap.cells for gap in report.gaps]
+
+
+def test_a_closed_end_and_an_open_one_leave_nothing_open():
+    report = report_of({"speed": ["..5", "(5.."]}, SPEED)
+    assert (report.covered, report.method, gaps(report), report.gaps_complete) == (1.0, "exact", [], True)
+
+
+def test_two_open_ends_leave_one_point_of_no_volume():
+    report = report_of({"speed": ["..5)", "(5.."]}, SPEED)
+    assert (report.covered, gaps(report), report.gaps[0].share, report.gaps_complete) == (1.0, [{"speed": "5"}], 0.0, True)
+
+
+def test_ends_touch_without_declared_bounds_too():
+    assert gaps(report_of({"speed": ["..5)", "(5.."]}, {"speed": {"type": "number"}})) == [{"speed": "5"}]
+    assert gaps(report_of({"speed": ["..5", "(5.."]}, {"speed": {"type": "number"}})) == []
+
+
+def test_half_turns_touch_across_180_degrees():
+    assert gaps(report_of({"heading": ["(90..-90)", "-90..90"]}, {"heading": {"type": "angle"}})) == []
+    assert gaps(report_of({"heading": ["(90..180)", "(180..-90)", "-90..90"]}, {"heading": {"type": "angle"}})) == [
+        {"heading": "180"}
+    ]
+
+
+def test_whole_numbers_are_counted_one_by_one():
+    report = report_of({"count": ["0..2", "5"]}, {"count": {"type": "int", "min": 0, "max": 9}})
+    assert report.covered == pytest.approx(0.4)
+    assert gaps(report) == [{"count": "3..4 | 6..9"}]
+
+
+def test_a_gap_between_neighbouring_doubles_is_not_rounded_away():
+    report = report_of(
+        {"speed": ["20, 9.99", "29.990000000000002..100", "..10"]}, {"speed": {"type": "number", "min": 0, "max": 100}}
+    )
+    assert report.covered < 1.0
+    assert len(report.gaps) == 1
+    assert 0.0 < report.gaps[0].share < 1e-3
+
+
+def test_tags_follow_their_hierarchy_in_shares_and_gaps():
+    schema = {"tags": {"type": "tags", "values": ["Move", "Move.Run", "InAir"]}}
+    report = report_of({"tags": ["+Move.Run", "-Move"]}, schema)
+    assert report.covered == 0.75
+    assert gaps(report) == [{"tags": "+Move -Move.Run"}]
+
+
+def test_impossible_contexts_belong_to_no_share():
+    schema = {"in_air": {"type": "bool"}, "on_wall": {"type": "bool"}}
+    report = report_of({"in_air": ["True"], "on_wall": ["False"]}, schema, impossible=[{"in_air": "True", "on_wall": "True"}])
+    assert report.covered == pytest.approx(1 / 3)
+    assert gaps(report) == [{"in_air": "False"}]
+
+
+def test_assumptions_that_leave_no_context_are_an_error():
+    report = report_of({"in_air": ["True"]}, {"in_air": {"type": "bool"}}, impossible=[{"in_air": "True"}, {"in_air": "False"}])
+    assert [(f.rule, f.level) for f in report.findings] == [("no-context", "error")]
+    assert (report.covered, gaps(report)) == (1.0, [])
+
+
+def test_weights_say_how_often_values_come_up():
+    schema = {"gait": {"type": "enum", "values": ["Walk", "Run", "Stand"]}, **SPEED}
+    columns = {"gait": ["Walk", "Any"], "speed": ["Any", "..5)"]}
+    weights = {"gait": {"Walk": 6, "Run": 1, "Stand": 1}, "speed": {"..5)": 1, "5..": 3}}
+    report = report_of(columns, schema, weights=weights)
+    assert report.covered == pytest.approx(0.75 + 0.25 * 0.25)
+    assert report.weighted == ("gait", "speed")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"weights": {"sped": {"1": 1}}},
+        {"weights": {"speed": {"1": -1}}},
+        {"weights": {"speed": {"20..30": 1}}},
+        {"weights": {"speed": {"1 to 2": 1}}},
+        {"impossible": [{"sped": "1"}]},
+        {"impossible": [{"speed": "1 to 2"}]},
+        {"samples": -1},
+        {"work": 1.5},
+    ],
+)
+def test_arguments_that_cannot_be_meant_are_refused(options):
+    with pytest.raises(cdb.ContextDBError, match=r"\w"):
+        report_of({"speed": ["..5"]}, SPEED, **options)
+
+
+def test_a_table_without_rows_covers_nothing():
+    report = report_of({"speed": []}, SPEED)
+    assert (report.covered, report.method, gaps(report)) == (0.0, "exact", [{}])
+    assert report.gaps[0].nearest is None
+
+
+def test_a_table_without_conditions_covers_everything():
+    report = report_of({"Note": ["x"]}, {}, max_gaps=3)
+    assert coverage(cdb.Table.from_columns({"Asset": ["A"]})).covered == 1.0
+    assert coverage(cdb.Table.from_columns({"Asset": []})).covered == 0.0
+    assert report.n_conditions == 1
+
+
+def test_what_is_assumed_of_a_domain_without_bounds_is_said():
+    report = report_of({"speed": ["0..10"], "word": ["A B"]}, {"speed": {"type": "number"}, "word": {"type": "text"}})
+    assert report.covered == pytest.approx(0.5 * 2 / 3)
+    assert report.assumed["speed"] == "..0) counts 5, (10.. counts 5"
+    assert "any other text" in report.assumed["word"]
+
+
+def test_the_nearest_row_is_named_with_its_change():
+    report = report_of({"speed": ["..5", "7.."], "run": ["Any", "True"]}, SPEED | {"run": {"type": "bool"}})
+    nearest = report.gaps[0].nearest
+    assert nearest is not None
+    assert (nearest.asset, nearest.n_changes, nearest.condition, nearest.cell) == ("A0", 1, "speed", "..10")
+
+
+def test_a_broken_promise_of_one_row_shows_the_overlap():
+    report = report_of({"speed": ["..5", "4..6"]}, SPEED, policy="unique")
+    found = [f for f in report.findings if f.rule == "policy-overlap"]
+    assert [(f.row, f.by, f.level) for f in found] == [(1, (0,), "error")]
+    assert "speed: 4..5" in found[0].message
+
+
+def test_little_covered_is_estimated_out_of_the_rows():
+    names = [f"n{i}" for i in range(12)]
+    schema = {name: {"type": "number", "min": 0, "max": 100} for name in names}
+    columns = {name: [f"{(7 * i + 13 * r) % 61}..{(7 * i + 13 * r) % 61 + 39}" for r in range(40)] for i, name in enumerate(names)}
+    exact = report_of(columns, schema, samples=0)
+    report = report_of(columns, schema, work=0, samples=50_000)
+    assert exact.method == "exact"
+    assert report.method == "estimate"
+    assert report.lower <= exact.covered <= report.upper
+    assert report.upper - report.lower < 0.1 * exact.covered
+
+
+def test_an_estimate_holds_the_exact_share_and_depends_on_the_seed_alone():
+    names = [f"b{i}" for i in range(40)]
+    schema = {name: {"type": "bool"} for name in names}
+    columns = {name: ["True" if (r * 31 + i * 17) % 13 == 0 else "Any" for r in range(30)] for i, name in enumerate(names)}
+    exact = report_of(columns, schema, samples=0)
+    one, two = (report_of(columns, schema, work=0, seed=5) for _ in range(2))
+    assert one == two
+    assert (exact.method, one.method) == ("exact", "estimate")
+    assert one.lower <= exact.covered <= one.upper
+
+
+def test_more_gaps_than_asked_for_are_not_called_complete():
+    schema = {"speed": {"type": "number", "min": 0, "max": 10}, "run": {"type": "bool"}}
+    columns = {"speed": ["..3", "3..", "5"], "run": ["True", "False", "Any"]}
+    assert len(report_of(columns, schema).gaps) == 2
+    cut = report_of(columns, schema, max_gaps=1)
+    assert (len(cut.gaps), cut.gaps_complete) == (1, False)
+    assert cut.gaps[0].share == max(g.share for g in report_of(columns, schema).gaps)
+
+
+def test_the_report_as_json_has_the_fixed_fields():
+    data = json.loads(json.dumps(report_of({"speed": ["..5"]}, SPEED).to_json()))
+    assert {"table", "rows", "conditions", "covered", "gaps", "findings", "overlap"} <= data.keys()
+    assert {"method", "value", "lower", "upper"} <= data["covered"].keys()
+    assert data["gaps"]["complete"] is True
+    assert {"id", "share", "new_share", "cells"} <= data["gaps"]["items"][0].keys()
+    assert {"mean", "histogram"} <= data["overlap"].keys()
+
+
+def test_more_than_64_conditions_are_counted():
+    names = [f"b{i}" for i in range(70)]
+    columns = {name: ["True" if i == r else "Any" for r in range(70)] for i, name in enumerate(names)}
+    report = report_of(columns, {name: {"type": "bool"} for name in names}, samples=100)
+    assert report.method == "exact"
+    assert report.covered == 1.0 - 2.0**-53
+    assert report.covered < 1.0
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0, "0 %"),
+        (1.0, "100 %"),
+        (0.5, "50.00 %"),
+        (0.999999, "99.9999 %"),
+        (0.99999, "99.999 %"),
+        (1.0 - 2.0**-53, "> 99.9999999999 %"),
+        (1e-9, "1e-07 %"),
+        (0.00004, "0.004 %"),
+    ],
+)
+def test_a_percentage_never_rounds_to_0_or_100(share, text):
+    assert format_percent(share) == text
+
+
+def test_an_interval_of_samples_holds_the_share_that_was_seen():
+    for n_hits in (0, 1, 50, 99, 100):
+        low, high = wilson(n_hits, 100)
+        assert 0.0 <= low <= n_hits / 100 <= high <= 1.0
+    assert wilson(0, 0) == (0.0, 1.0)
+
+
+def test_without_numba_the_report_is_the_same():
+    script = """
+import sys, json
+if sys.argv[1] == "without":
+    sys.modules["numba"] = None
+import contextdb as cdb
+from contextdb.covering import coverage
+columns = {"Asset": ["a", "b", "c"], "speed": ["..5", "4..9", "Any"], "gait": ["Walk", "Run", "Any"], "up": ["Any", "Any", "True"]}
+schema = {"speed": {"type": "number", "min": 0, "max": 10}, "gait": {"type": "enum", "values": ["Walk", "Run", "Idle"]}}
+report = coverage(cdb.Table.from_columns(columns, schema | {"up": {"type": "bool"}}), samples=1000)
+print(json.dumps(report.to_json()))
+"""
+    out = [
+        subprocess.run([sys.executable, "-W", "error", "-c", script, how], capture_output=True, text=True, check=True).stdout
+        for how in ("with", "without")
+    ]
+    assert out[0] == out[1] != ""

@@ -12,7 +12,8 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
 
 The metadata hold `contextdb` (the version of this layout), `about` (JSON: name, policy, fallback, conditions and the kind of each
-column) and `digest`, BLAKE2b-128 of `about` and of all tensors in the order of their names. Opening checks all of it.
+column; where facts are derived also the conditions that they are computed from) and `digest`, BLAKE2b-128 of `about` and of all
+tensors in the order of their names. Opening checks all of it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contextdb.cells import TagSet
 from contextdb.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
@@ -28,7 +29,11 @@ from contextdb.columns import TextColumn
 from contextdb.compiled import CompiledTable, SoftMasks
 from contextdb.conditions import Condition
 from contextdb.domains import Domain
+from contextdb.schema import Schema
 from contextdb.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+
+if TYPE_CHECKING:
+    from contextdb.expressions import Derivation
 
 __all__ = ["SUFFIX", "open_artefact", "save"]
 
@@ -63,6 +68,7 @@ def save(compiled: CompiledTable, path: Path) -> None:
             "conditions": [_condition_to_json(c) for c in compiled.conditions],
             "columns": kinds,
         }
+        | ({"computed_from": [_condition_to_json(c) for c in _computed_from(compiled)]} if compiled.derivation else {})
     )
     write_tensors(path, COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about)})
 
@@ -104,7 +110,22 @@ def _table(about: dict[str, Any], tensors: Tensors) -> CompiledTable:
         ),
         policy=about["policy"],
         fallback=about["fallback"],
+        derivation=_derivation(about, conditions),
     )
+
+
+def _derivation(about: dict[str, Any], conditions: tuple[Condition, ...]) -> Derivation | None:
+    if "computed_from" not in about:
+        return None
+    others = [_condition_from_json(c) for c in about["computed_from"]]
+    known = Schema(conditions={c.name: c for c in (*conditions, *others)})
+    return known.derivation_of(c.name for c in conditions)
+
+
+def _computed_from(compiled: CompiledTable) -> list[Condition]:
+    """The conditions that derived facts are computed from and that are no columns of the table."""
+    computed = compiled.derivation.conditions if compiled.derivation else ()
+    return [condition for condition in computed if condition.name not in compiled.places]
 
 
 def _add(tensors: Tensors, prefix: str, masks: ColumnMasks) -> dict[str, object]:

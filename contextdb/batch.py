@@ -205,12 +205,14 @@ def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "
     check_mode(unknown)
     columns = _columns_of(contexts)
     n_contexts = _common_length(columns)
-    absent = [c.name for c in compiled.conditions if c.name not in columns]
-    extra = [n for n in columns if n not in compiled.single_lookups] if absent else []
+    if compiled.derivation is not None:
+        columns = compiled.derivation.complete_frame(columns, n_contexts)
+    absent = [n for n in compiled.asked if n not in columns]
+    extra = [n for n in columns if n not in compiled.asked and n not in compiled.places] if absent else []
     if absent and (error := misspelt(absent, extra)) is not None:
         raise error
-    if absent and unknown == "error":
-        raise missing_error(absent, extra)
+    if unknown == "error" and (plain := [n for n in absent if n in compiled.places]):
+        raise missing_error(plain, extra)
     return _Encoder(compiled, n_contexts, unknown).encode(columns)
 
 
@@ -227,9 +229,11 @@ class _Encoder:
         self.bounds: list[NDArray[np.float64]] = []
         self.firsts: list[int] = []
         self.missing: list[int] = []
+        self.columns: Mapping[str, Any] = {}
 
     def encode(self, columns: Mapping[str, Any]) -> ManyMatches:
         """Every condition's column, in the order of slots."""
+        self.columns = columns
         stack = self.compiled.stack
         slot, wide_slot = 0, stack.n_plain
         for at, masks in enumerate(self.compiled.masks):
@@ -320,6 +324,9 @@ class _Encoder:
         if missing.any():
             rows = np.flatnonzero(missing)
             name = self.compiled.conditions[at].name
+            derivation = self.compiled.derivation
+            if derivation is not None and name in derivation.names:
+                raise derivation.no_values(name, self.columns, rows)
             found = f"the fact is missing in {plural(len(rows), 'context')}."
             raise ContextError(
                 Fault(

@@ -31,7 +31,7 @@ from contextdb.conditions import Condition
 from contextdb.errors import ContextError, Fault, Place
 from contextdb.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact
 from contextdb.intervals import EVERYTHING
-from contextdb.live import LiveContext, SoftLiveContext
+from contextdb.live import LiveContext, live_context
 from contextdb.lookup import SingleLookup, build_ask, single_lookup
 from contextdb.matches import Answering, Matches, SetMatches
 from contextdb.stack import MaskStack
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from contextdb.batch import ManyMatches
     from contextdb.explain import Explanation
+    from contextdb.expressions import Derivation
     from contextdb.pick import Memory, Rng
     from contextdb.shapes import Policy
     from contextdb.table import Table
@@ -67,6 +68,8 @@ class CompiledTable:
     """The cells of each condition as they are written, for explanations."""
     policy: Policy = "collect"
     fallback: str | None = None
+    derivation: Derivation | None = None
+    """How the conditions that are derived are computed; None where none is."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -87,12 +90,21 @@ class CompiledTable:
             texts=tuple(c.texts for c in table.conditions),
             policy=table.settings.policy,
             fallback=table.settings.fallback,
+            derivation=table.schema.derivation_of(c.condition.name for c in table.conditions),
         )
 
     @property
     def n_rows(self) -> int:
         """How many rows the table has."""
         return len(self.assets)
+
+    @cached_property
+    def asked(self) -> dict[str, Condition]:
+        """The conditions whose facts a caller gives: those of the table, and for derived ones those that they are computed from."""
+        if self.derivation is None:
+            return {c.name: c for c in self.conditions}
+        own = {c.name: c for c in self.conditions if c.name not in self.derivation.names}
+        return own | {c.name: c for c in self.derivation.inputs}
 
     @cached_property
     def enabled_bits(self) -> int:
@@ -105,15 +117,16 @@ class CompiledTable:
         Parameters
         ----------
         context : mapping of str to fact
-            A value for each condition; a set of values as `cdb.cell("0 ± 90")`. Facts that the table does not ask for are passed
-            over.
+            A value for each condition of `asked`; a set of values as `cdb.cell("0 ± 90")`. Facts that the table does not ask for
+            are passed over.
         unknown : {"error", "any", "never"}
             What a missing fact (absent, None or NaN) does: raises; its condition is ignored; only cells that are Any accept it.
 
         Raises
         ------
         ContextError
-            A fact is missing (named, with a misspelt one near it), of the wrong type, or outside an enum's or tag's domain.
+            A fact is missing (named, with a misspelt one near it), of the wrong type, or outside an enum's or tag's domain; a
+            derived fact is given, or cannot be computed.
 
         Notes
         -----
@@ -146,7 +159,7 @@ class CompiledTable:
     def live(self, facts: Context | None = None, unknown: Unknown = "error") -> LiveContext:
         """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`."""
         check_mode(unknown)
-        live = SoftLiveContext(self, unknown) if any(self.soft) else LiveContext(self, unknown)
+        live = live_context(self, unknown)
         live.update(facts or {})
         return live
 
@@ -220,20 +233,37 @@ class CompiledTable:
             raise ContextError(Fault(f"a context is a mapping of facts, not {type(context).__name__}.", "a dict"))
         facts: dict[str, Fact] = {}
         faults: list[Fault] = []
+        derived: Mapping[str, object] = {}
+        try:
+            derived = self.derivation.compute(context) if self.derivation else {}
+        except ContextError as error:
+            faults += error.faults
         for condition in self.conditions:
+            name = condition.name
             try:
-                facts[condition.name] = read_fact(context.get(condition.name), condition)
+                facts[name] = read_fact(derived.get(name) if name in derived else context.get(name), condition)
             except ContextError as error:
-                faults += error.faults
+                faults += [fault for fault in error.faults if fault not in faults]
         if faults:
             raise ContextError(*faults)
-        missing = [name for name, fact in facts.items() if fact is None]
-        extra = [name for name in context if name not in facts] if missing else []
-        if missing and (slip := misspelt(missing, extra)):
-            raise slip
-        if missing and unknown == "error":
-            raise missing_error(missing, extra)
+        if missing := [name for name, fact in facts.items() if fact is None]:
+            self.refuse_missing(missing, context, unknown)
         return facts
+
+    def refuse_missing(self, missing: Sequence[str], context: Context, unknown: Unknown) -> None:
+        """Raise ContextError for missing facts of conditions, unless they are treated in another way; a misspelt one always."""
+        derivation = self.derivation
+        plain = [name for name in missing if derivation is None or name not in derivation.names]
+        for name in missing:
+            if derivation is not None and name in derivation.names:
+                plain += [n for n in derivation.lacking(name, context) if n not in plain]
+        extra = [name for name in context if name not in self.asked]
+        if slip := misspelt(plain, extra):
+            raise slip
+        if unknown == "error" and derivation is not None and not plain:
+            raise derivation.no_value(missing[0], context)
+        if unknown == "error":
+            raise missing_error(plain, extra)
 
     def condition_bits(self, at: int, fact: Fact, unknown: Unknown = "error") -> tuple[int, int]:
         """Rows whose cell accepts some, and rows whose cell accepts every, value of a fact in canonical form."""
@@ -303,6 +333,8 @@ class CompiledTable:
     def _build_and_ask(self, context: Context) -> Matches:
         """The first question builds the function that answers all others."""
         plain = build_ask(list(zip(self.conditions, self.masks, strict=True)), self.enabled_bits, self.answering)
+        if self.derivation is not None:
+            plain = _composed(plain, self.derivation.complete)
         ask = (lambda context: self.with_penalties(plain(context), context)) if any(self.soft) else plain
         object.__setattr__(self, "_ask", ask)
         return ask(context)
@@ -315,6 +347,10 @@ class CompiledTable:
             some_bits &= one
             every &= all_
         return some_bits, every
+
+
+def _composed(ask: Callable[[Context], Matches], complete: Callable[[Context], Context]) -> Callable[[Context], Matches]:
+    return lambda context: ask(complete(context))
 
 
 def nbytes(masks: ColumnMasks) -> int:

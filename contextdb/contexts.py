@@ -78,12 +78,13 @@ def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
     if path.suffix.lower() == ".parquet":
         return Contexts(path, _read_parquet(path, compiled))
     source, columns = read_texts(path)
+    known = _known(compiled)
     series, faults = [], []
     for column in columns:
-        if column.name not in compiled.places:
+        condition = known.get(column.name)
+        if condition is None:
             series.append(_nothing(column.name, column.n_rows))
             continue
-        condition = compiled.conditions[compiled.places[column.name]]
         values, wrong = _read_column(column.texts, condition)
         faults += [f.at(Place(str(path), source.line(int((column.codes == i).argmax())), column.name)) for i, f in wrong]
         distinct = pl.Series(column.name, values, dtype=_dtype(condition), strict=False)
@@ -91,6 +92,11 @@ def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
     if faults:
         raise ContextError(*sorted(faults, key=lambda fault: fault.place.line or 0))
     return Contexts(path, pl.DataFrame(series), source)
+
+
+def _known(compiled: CompiledTable) -> dict[str, Condition]:
+    """The conditions that columns may be about; derived ones too, which the table then refuses."""
+    return compiled.asked | {c.name: c for c in compiled.conditions}
 
 
 def _read_column(texts: Sequence[str], condition: Condition) -> tuple[list[object], list[tuple[int, Fault]]]:
@@ -120,12 +126,13 @@ def _read_parquet(path: Path, compiled: CompiledTable) -> pl.DataFrame:
         scan = pl.scan_parquet(path, glob=False)
         names = scan.collect_schema().names()
         n_rows = scan.select(pl.len()).collect().item()
-        asked = [n for n in names if n in compiled.places]
+        known = _known(compiled)
+        asked = [n for n in names if n in known]
         facts = scan.select(by_name(asked)).collect().get_columns() if asked else []
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         read_texts(path)  # says what is wrong with the file
         raise TableError(Fault(f"cannot read the file: {error}.", "a whole Parquet file", place=Place(str(path)))) from None
-    return pl.DataFrame([*facts, *(_nothing(n, n_rows) for n in names if n not in compiled.places)])
+    return pl.DataFrame([*facts, *(_nothing(n, n_rows) for n in names if n not in known)])
 
 
 def _nothing(name: str, n_rows: int) -> pl.Series:

@@ -14,7 +14,7 @@ from math import ldexp
 from operator import and_
 from typing import TYPE_CHECKING, Any
 
-from contextdb.facts import Unknown, missing_error, no_condition
+from contextdb.facts import Unknown, no_condition, read_fact
 from contextdb.lookup import SingleLookup
 from contextdb.matches import Matches
 
@@ -148,7 +148,7 @@ class LiveContext:
     def _refuse_missing(self) -> None:
         missing = [c.name for c in self._compiled.conditions if self._odd.get(c.name, (0, False))[1]]
         if missing and self._unknown == "error":
-            raise missing_error(missing, ())
+            self._compiled.refuse_missing(missing, self.facts, self._unknown)
 
     def _set_matches(self, bits: int) -> Matches:
         masks = {**self._masks, **self._moving}
@@ -163,4 +163,85 @@ class SoftLiveContext(LiveContext):
 
     def matches(self) -> Matches:
         """The valid rows for the facts as they are now."""
-        return self._compiled.with_penalties(copy(super().matches()), self._facts, self._unknown)
+        return self._compiled.with_penalties(copy(super().matches()), self.facts, self._unknown)
+
+
+class DerivedLiveContext(LiveContext):
+    """The same for a table with derived facts: they are computed anew when one that they need was set since the last question."""
+
+    __slots__ = ("_given", "_is_stale", "_others")
+
+    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+        assert compiled.derivation is not None
+        super().__init__(compiled, unknown)
+        self._others = {c.name: c for c in compiled.derivation.inputs}
+        """The conditions that derived facts are computed from."""
+        self._given: dict[str, object] = dict.fromkeys(compiled.asked)
+        self._is_stale = True
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        """Set one fact; a derived one is refused."""
+        condition = self._others.get(name)
+        if condition is not None:
+            if name not in self._lookups:
+                read_fact(value, condition)
+            self._is_stale = True
+        elif name not in self._given:
+            self._refuse(name)
+        if name in self._lookups:
+            super().__setitem__(name, value)
+        self._given[name] = value
+
+    def __getitem__(self, name: str) -> object:
+        """One fact; a derived one is computed."""
+        if name in self._given:
+            return self._given[name]
+        self._compute()
+        return self._facts[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in (self._given.keys() | self._facts) and self[name] is not None
+
+    def update(self, facts: Mapping[str, object]) -> None:
+        """Set several facts; those that the table does not ask for are passed over, derived ones refused."""
+        for name, value in facts.items():
+            if name in self._given or (name in self._lookups and value is not None):
+                self[name] = value
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """The facts as they were set, without derived ones; None where one is missing."""
+        return dict(self._given)
+
+    def matches(self) -> Matches:
+        """The valid rows for the facts as they are now."""
+        self._compute()
+        return super().matches()
+
+    def _compute(self) -> None:
+        if self._is_stale:
+            assert self._compiled.derivation is not None
+            for name, value in self._compiled.derivation.compute(self._given).items():
+                if name in self._lookups and value != self._facts[name]:
+                    super().__setitem__(name, value)
+            self._is_stale = False
+
+    def _refuse(self, name: str) -> None:
+        derivation = self._compiled.derivation
+        if derivation is not None:
+            derivation.refuse([name])
+        raise no_condition(name, self._given)
+
+
+class SoftDerivedLiveContext(SoftLiveContext, DerivedLiveContext):
+    """For a table with both."""
+
+    __slots__ = ()
+
+
+def live_context(compiled: CompiledTable, unknown: Unknown = "error") -> LiveContext:
+    """A context of the kind that a table needs."""
+    is_soft, is_derived = any(compiled.soft), compiled.derivation is not None
+    if is_derived:
+        return SoftDerivedLiveContext(compiled, unknown) if is_soft else DerivedLiveContext(compiled, unknown)
+    return SoftLiveContext(compiled, unknown) if is_soft else LiveContext(compiled, unknown)

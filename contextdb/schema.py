@@ -8,10 +8,11 @@ data, for `contextdb.motion` to read. Nothing here reads a file.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Set
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contextdb.conditions import Condition
 from contextdb.disk import TABLE_SUFFIXES
@@ -19,6 +20,9 @@ from contextdb.domains import Domain
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
 from contextdb.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
 from contextdb.toml_lines import Path, key_lines, line_of, read_toml
+
+if TYPE_CHECKING:
+    from contextdb.expressions import Derivation
 
 Found = tuple[Path, Fault]
 Section = Mapping[str, Any]
@@ -75,6 +79,30 @@ class Schema:
     controllers: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     file: str | None = None
 
+    def __getstate__(self) -> dict[str, object]:
+        """What is pickled: not `derivation`, which is functions."""
+        return {key: value for key, value in self.__dict__.items() if key != "derivation"}
+
+    @cached_property
+    def derivation(self) -> Derivation | None:
+        """How the conditions with an `expr` are computed from the others; None where there are none.
+
+        Raises
+        ------
+        SchemaError
+            An expression cannot be used. `read_schema` has checked that already; a schema made in Python has not.
+        """
+        if not any(condition.expr for condition in self.conditions.values()):
+            return None
+        from contextdb.expressions import derive
+
+        return derive(self.conditions)
+
+    def derivation_of(self, names: Iterable[str]) -> Derivation | None:
+        """What is needed to compute those of some conditions that are derived; None where none is."""
+        derived = self.derivation.only(names) if self.derivation else None
+        return derived if derived and derived.steps else None
+
     @property
     def motion(self) -> dict[str, Mapping[str, object]]:
         """The sections that `MotionConfig.from_dict` reads."""
@@ -107,6 +135,8 @@ def read_schema(text: str, file: str) -> Schema:
     text = text.removeprefix("\ufeff")
     document = read_toml(text, file)
     found = list(_document_faults(document))
+    if not any(path[0] == "conditions" for path, _ in found):
+        found += _expressions_of(document)
     if found:
         lines = key_lines(text)
         placed = (fault.at(Place(file, line_of(path, lines))) for path, fault in found)
@@ -117,15 +147,22 @@ def read_schema(text: str, file: str) -> Schema:
 def conditions_from_dict(mapping: Mapping[str, Mapping[str, object]]) -> dict[str, Condition]:
     """Conditions from what `[conditions.NAME]` of contextdb.toml would hold: `{"speed": {"type": "number"}}`.
 
+    What an `expr` says is not looked at: it may name conditions that stand elsewhere.
+
     Raises
     ------
     SchemaError
         With every fault, as from a file but without a line.
     """
-    found = list(_section_faults("conditions", mapping))
-    if found:
+    if found := list(_section_faults("conditions", mapping)):
         raise SchemaError(*(fault for _, fault in found))
     return {name: _condition(name, section) for name, section in mapping.items()}
+
+
+def expression_faults(schema: Schema) -> Iterator[Fault]:
+    """What is wrong with the derived facts and assumptions of a schema, as `read_schema` tells it, without lines."""
+    assumed = {name: settings.assume for name, settings in schema.tables.items()}
+    yield from (fault for _, fault in _expression_faults(schema.conditions, assumed))
 
 
 # ---- faults, each with the path of the key it is about
@@ -143,6 +180,36 @@ def _document_faults(document: Section) -> Iterator[Found]:
     yield from _file_faults(_parts(document, "tables"))
     for name, part in _parts(document, "blueprints").items():
         yield from _blueprint_faults(("blueprints", name), _fitting("blueprints", part), conditions)
+
+
+def _expressions_of(document: Section) -> Iterator[Found]:
+    """What is wrong with derived facts and assumptions, for a document whose conditions are sound."""
+    conditions = {name: _condition(name, part) for name, part in _parts(document, "conditions").items()}
+    assumed = {name: _fitting("tables", part).get("assume", ()) for name, part in _parts(document, "tables").items()}
+    yield from _expression_faults(conditions, assumed)
+
+
+def _expression_faults(conditions: Mapping[str, Condition], assumed: Mapping[str, Sequence[str]]) -> Iterator[Found]:
+    """An assumption may name a column that no condition declares; whether the table has it shows when the table is read."""
+    yield from _derivation_faults(conditions)
+    for name, assume in assumed.items():
+        if assume:
+            from contextdb.expressions import assumption_faults
+
+            path = ("tables", name)
+            for fault in assumption_faults(assume, conditions):
+                if fault.rule != "unknown-fact":
+                    yield (*path, "assume"), replace(fault, found=f"{_header(path)} assume {fault.found}")
+
+
+def _derivation_faults(conditions: Mapping[str, Condition]) -> Iterator[Found]:
+    if any(condition.expr for condition in conditions.values()):
+        from contextdb.expressions import derivation_faults
+
+        for name, fault in derivation_faults(conditions):
+            path = ("conditions", name)
+            mend = fault.mend or ("to declare it, in a section [conditions.NAME]" if fault.rule == "unknown-fact" else "")
+            yield (*path, "expr"), replace(fault, found=f"{_header(path)} expr {fault.found}", mend=mend, rule="unreadable")
 
 
 def _no_section(name: str, section: object) -> Fault:

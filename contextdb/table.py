@@ -22,8 +22,8 @@ from contextdb.cells import ANY, Cell, parse_cell
 from contextdb.classes import ColumnMasks, column_masks
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition, infer_condition
-from contextdb.errors import CellError, Fault, Place, TableError, in_quotes, nearest, some
-from contextdb.schema import EMPTY, Schema, TableSettings, conditions_from_dict
+from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.schema import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
@@ -124,6 +124,8 @@ class Table:
         """
         if not isinstance(schema, Schema):
             schema = replace(EMPTY, conditions=conditions_from_dict(schema or {}))
+            if faults := list(expression_faults(schema)):
+                raise SchemaError(*faults)
         texts = [TextColumn.of(n, map(str, values)) for n, values in columns.items()]
         lengths = {c.name: c.n_rows for c in texts}
         if len(set(lengths.values())) > 1:

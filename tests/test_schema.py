@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from contextdb.conditions import Condition
 from contextdb.domains import KINDS, Domain
 from contextdb.errors import Fault, SchemaError
+from contextdb.expressions.tokens import written_text
 from contextdb.schema import EMPTY, Schema, TableSettings, conditions_from_dict, read_schema
 from contextdb.shapes import SECTIONS
 from contextdb.toml_lines import key_lines
@@ -38,6 +39,10 @@ unit = "m/s"
 [conditions."Defender.Tags"]
 type = "tags"
 values = ["InAir", "Stunned"]
+
+[conditions.target_speed]
+type = "number"
+unit = "m/s"
 
 [conditions.closing_speed]
 type = "number"
@@ -95,6 +100,7 @@ def test_a_whole_file_is_read_as_it_says():
         "heading": Condition("heading", Domain("angle"), description="From the tackler to the target"),
         "speed": Condition("speed", Domain("number", None, 0.0, 10.5), unit="m/s"),
         "Defender.Tags": Condition("Defender.Tags", Domain("tags", ("InAir", "Stunned"))),
+        "target_speed": Condition("target_speed", Domain("number"), unit="m/s"),
         "closing_speed": Condition("closing_speed", Domain("number"), expr="speed - target_speed"),
     }
     assert schema.tables == {
@@ -131,6 +137,7 @@ def test_a_byte_order_mark_and_windows_line_ends_change_nothing():
 
 def test_a_schema_can_be_pickled_for_other_processes():
     schema = read_schema(FULL, "contextdb.toml")
+    assert schema.derivation is not None
     assert pickle.loads(pickle.dumps(schema)) == schema
 
 
@@ -477,6 +484,10 @@ WORD_LISTS = st.lists(WORDS, unique=True, max_size=4)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
+ASSUMED = st.lists(st.sampled_from(["True", "not `of no table`", "1 < 2"]), unique=True)
+CONSTANTS = {"bool": "1 < 2", "int": "2 ** 3", "number": "0.5", "angle": "wrap_angle(270)"}
+
+
 @st.composite
 def condition_sections(draw: st.DrawFn) -> dict[str, object]:
     kind = draw(st.sampled_from(KINDS))
@@ -486,8 +497,8 @@ def condition_sections(draw: st.DrawFn) -> dict[str, object]:
         section["min"], section["max"] = sorted((draw(numbers), draw(numbers)))
     elif kind in ("enum", "tags"):
         section["values"] = draw(WORD_LISTS.filter(bool))
-    if draw(st.booleans()):
-        section["expr"] = draw(WORDS)
+    if kind != "tags" and draw(st.booleans()):
+        section["expr"] = CONSTANTS.get(kind) or written_text(draw(st.sampled_from(section.get("values", ["any text"]))))
     return section
 
 
@@ -496,7 +507,7 @@ def documents(draw: st.DrawFn) -> dict[str, dict[str, dict[str, object]]]:
     conditions = draw(st.dictionaries(WORDS, condition_sections(), max_size=5))
     columns = draw(st.lists(WORDS.filter(lambda w: w not in conditions), unique=True, min_size=4, max_size=7))
     table = {"asset": columns[0], "enabled": columns[1], "priority": columns[2], "weight": columns[3], "outputs": columns[4:]}
-    table |= {"file": draw(st.sampled_from(["a.csv", "b/c.parquet"])), "fallback": draw(WORDS), "assume": draw(WORD_LISTS)}
+    table |= {"file": draw(st.sampled_from(["a.csv", "b/c.parquet"])), "fallback": draw(WORDS), "assume": draw(ASSUMED)}
     table["policy"] = draw(st.sampled_from(["collect", "first", "unique", "priority"]))
     names = st.lists(st.sampled_from(sorted(conditions)), unique=True) if conditions else st.just([])
     return {"conditions": conditions, "tables": {draw(WORDS): table}, "blueprints": {draw(WORDS): {"conditions": draw(names)}}}

@@ -166,7 +166,7 @@ def facts_of(given: Sequence[str], tables: Mapping[str, CompiledTable]) -> dict[
 
 
 def _is_fact_of(text: str, table: CompiledTable) -> bool:
-    return any(text[:i] in table.places for i, character in enumerate(text) if character == "=")
+    return any(text[:i] in table.asked for i, character in enumerate(text) if character == "=")
 
 
 def clip_at(text: str) -> tuple[str, float]:

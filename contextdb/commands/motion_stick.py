@@ -115,7 +115,7 @@ class Moments:
             Facts that a table cannot be asked with; with file, line and fact.
         """
         read = {name: read_contexts(path, table) for name, table in tables.items()}
-        known = {name: [c for c in each.facts.columns if c in tables[name].places] for name, each in read.items()}
+        known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}
         if not any(known.values()):
             return None
         for name, each in read.items():
@@ -136,7 +136,7 @@ def _given(rows: Sequence[Mapping[str, object]]) -> dict[str, object]:
 
 def conditions_of(tables: Mapping[str, CompiledTable]) -> list[str]:
     """The facts that some tables ask for; a column of the stick's is none."""
-    names = [name for table in tables.values() for name in table.places]
+    names = [name for table in tables.values() for name in table.asked]
     taken = [name for name in names if name in STICK]
     if taken:
         found = f"the condition {in_quotes(taken[0])} has the name of a column of the stick's."

@@ -71,7 +71,7 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
             name, value = _split(text, compiled)
             if name in facts:
                 raise ContextError(Fault(f"the fact {in_quotes(name)} is given twice.", "each fact once"))
-            facts[name] = read_fact_text(value, compiled.conditions[compiled.places[name]])
+            facts[name] = read_fact_text(value, compiled.asked[name])
         except ContextError as error:
             faults += error.faults
     if faults:
@@ -83,10 +83,12 @@ def _split(text: str, compiled: CompiledTable) -> tuple[str, str]:
     """Name and value of FACT=VALUE; a name may hold a "=" itself."""
     ends = [at for at, character in enumerate(text) if character == "="]
     for at in reversed(ends):
-        if text[:at] in compiled.places:
+        if text[:at] in compiled.asked:
             return text[:at], text[at + 1 :]
+    if compiled.derivation is not None:
+        compiled.derivation.refuse(text[:at] for at in ends)
     if ends:
-        raise no_condition(text[: ends[0]], compiled.places)
+        raise no_condition(text[: ends[0]], compiled.asked)
     raise ContextError(Fault(f"{in_quotes(text)} is no fact.", "FACT=VALUE, without spaces round the =", in_quotes(f"{text}=…")))
 
 

@@ -1,0 +1,172 @@
+"""Assumptions: expressions that hold in every context that can happen.
+
+What they rule out is told as boxes of cells where each comparison is about one condition and constants; an assumption that computes
+with facts, or compares them with each other, can only be asked context by context.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells import NumberSet, ValueSet
+from contextdb.conditions import Condition
+from contextdb.domains import BOOL
+from contextdb.errors import Fault, in_quotes
+from contextdb.expressions.boxes import Box, NoBoxes, Sets, all_of
+from contextdb.expressions.expression import Expression, read_expression
+from contextdb.expressions.faults import ExpressionError
+from contextdb.expressions.tokens import written_name
+
+if TYPE_CHECKING:
+    from contextdb.table import Table
+
+_WANTS = Condition("", BOOL)
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """What is assumed of a table's contexts."""
+
+    expressions: tuple[Expression, ...]
+    conditions: tuple[Condition, ...]
+    """The conditions of the table."""
+    derived: tuple[Expression, ...] = ()
+    """That derived bools of the table are what they are computed as, where boxes can tell."""
+
+    @cached_property
+    def boxes(self) -> list[Box]:
+        """Contexts that cannot happen, as boxes over the conditions of the table: what `coverage(..., impossible=...)` takes.
+
+        A box that also restricts a condition which the table does not have is left out: some context in its shadow can happen.
+        """
+        names = {condition.name for condition in self.conditions}
+        ruled_out = [*self._ruled_out, *(expression.as_boxes(False) for expression in self.derived)]
+        return [box for found in ruled_out for box in found or () if box.keys() <= names]
+
+    @cached_property
+    def unboxed(self) -> tuple[Expression, ...]:
+        """The assumptions that no boxes can tell exactly; `holds` knows them."""
+        return tuple(e for e, found in zip(self.expressions, self._ruled_out, strict=True) if found is None)
+
+    @cached_property
+    def _ruled_out(self) -> list[list[Box] | None]:
+        return [expression.as_boxes(False) for expression in self.expressions]
+
+    def holds(self, columns: Mapping[str, Any], n_contexts: int) -> NDArray[np.bool_]:
+        """Whether each of N contexts can happen: bool [N]. One where facts are missing can, unless those it has rule it out.
+
+        Parameters
+        ----------
+        columns : mapping of str to list, flat numpy array or polars Series, each of length N
+            Facts by the name of the condition, such as one value for each class; a column that is absent is missing.
+        """
+        flags = np.ones(n_contexts, np.bool_)
+        for expression in self.expressions:
+            flags &= expression.flags(columns, n_contexts, missing=True)
+        return flags
+
+    @cached_property
+    def contradictions(self) -> list[Fault]:
+        """Assumptions that no context of the declared domains satisfies, alone or together with those before them.
+
+        Only those that boxes can tell are compared.
+        """
+        whole = [_domain_box({c.name: c for e in self.expressions for c in e.conditions})]
+        held = whole
+        faults: list[Fault] = []
+        for expression in self.expressions:
+            holds = _sets_of(expression)
+            if holds is None:
+                continue
+            try:
+                alone, together = all_of([whole, holds]), all_of([held, holds])
+            except NoBoxes:
+                continue
+            if together:
+                held = together
+            elif not faults:
+                faults.append(_contradiction(expression.text, bool(alone)))
+        return faults
+
+
+def _contradiction(text: str, holds_alone: bool) -> Fault:
+    if holds_alone:
+        found = f"{in_quotes(text)} contradicts the assumptions before it: no context satisfies them all."
+        return Fault(found, "assumptions that hold together in some context")
+    found = f"{in_quotes(text)} holds in no context of the declared values and bounds."
+    return Fault(found, "an assumption that holds in some context")
+
+
+def _sets_of(expression: Expression) -> list[Sets] | None:
+    boxes = expression.as_boxes(True)
+    return None if boxes is None else [{n: c.accepts for n, c in box.items() if c.accepts is not None} for box in boxes]
+
+
+def _domain_box(conditions: Mapping[str, Condition]) -> Sets:
+    """The declared bounds and values as one box."""
+    box: Sets = {}
+    for name, condition in conditions.items():
+        domain = condition.domain
+        if domain.kind in ("int", "number"):
+            box[name] = NumberSet(((domain.minimum, domain.maximum),))
+        elif domain.kind == "enum":
+            box[name] = ValueSet(frozenset(domain.known))
+    return box
+
+
+def read_assumptions(
+    assume: Sequence[str], conditions: Sequence[Condition], declared: Mapping[str, Condition] | None = None
+) -> Assumptions:
+    """Read the assumptions of a table.
+
+    Parameters
+    ----------
+    assume : sequence of str
+        Bool expressions, as `[tables.NAME] assume` of contextdb.toml holds them.
+    conditions : sequence of Condition
+        The conditions of the table, declared or inferred.
+    declared : mapping of str to Condition, optional
+        Others that the assumptions may name.
+
+    Raises
+    ------
+    ExpressionError
+        With every fault of every assumption.
+    """
+    known = {**(declared or {}), **{condition.name: condition for condition in conditions}}
+    if faults := list(assumption_faults(assume, known)):
+        raise ExpressionError(*faults)
+    return Assumptions(tuple(read_expression(text, known, _WANTS) for text in assume), tuple(conditions))
+
+
+def assumptions_of(table: Table) -> Assumptions:
+    """The assumptions of a table, as its settings in contextdb.toml say, and what its derived bools imply.
+
+    Raises
+    ------
+    ExpressionError
+        An assumption names what is neither a condition of the table nor declared.
+    """
+    conditions = [column.condition for column in table.conditions]
+    assumed = read_assumptions(table.settings.assume, conditions, table.schema.conditions)
+    derived = [_definition(c, table.schema.conditions) for c in conditions if c.expr and c.domain.kind == "bool"]
+    return replace(assumed, derived=tuple(e for e in derived if e.as_boxes(False) is not None))
+
+
+def _definition(condition: Condition, declared: Mapping[str, Condition]) -> Expression:
+    return read_expression(f"{written_name(condition.name)} == ({condition.expr})", declared, _WANTS)
+
+
+def assumption_faults(assume: Sequence[str], conditions: Mapping[str, Condition]) -> Iterator[Fault]:
+    """Why assumptions cannot be read; the rule is "unknown-fact" where one names what is no condition of these."""
+    for text in assume:
+        try:
+            read_expression(text, conditions, _WANTS)
+        except ExpressionError as error:
+            yield from error.faults

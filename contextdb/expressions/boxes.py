@@ -1,0 +1,214 @@
+"""The contexts in which an expression over conditions holds, or does not, as boxes of cells.
+
+A box maps conditions to cells and holds the contexts whose facts are all in their cells; what it does not name is free. An
+expression whose comparisons are each about one condition and constants is turned into boxes exactly, open and closed ends told
+apart, for facts that are known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from itertools import chain, islice, product
+
+from contextdb import intervals
+from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, parse_cell
+from contextdb.conditions import Condition
+from contextdb.domains import Domain, Kind
+from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
+from contextdb.expressions.scalar import runner
+
+MOST_BOXES = 4096
+"""With more boxes than this, also on the way, an expression has none."""
+
+MOST_PAIRS = 1 << 16
+"""So many pairs of boxes are intersected for one `and` at most."""
+
+Box = Mapping[str, Cell]
+Sets = dict[str, Accepted]
+"""A box as sets; a set of tags here is never a complement."""
+
+_TURNED = {"==": "==", "!=": "!=", "<": ">", "<=": ">=", ">": "<", ">=": "<="}
+_OF_CELLS = {"==": "=", "!=": "="}
+
+
+class NoBoxes(Exception):
+    """The expression computes with facts, compares them with each other, or would need too many boxes."""
+
+
+def boxes_of(plan: Part, conditions: Mapping[str, Condition], truth: bool) -> list[Box] | None:
+    """The boxes in which a bool plan is `truth`; None where there are none to tell exactly."""
+    try:
+        found = _Boxes(conditions).of(plan, truth)
+    except NoBoxes:
+        return None
+    return [{name: Cell(accepts) for name, accepts in box.items()} for box in found]
+
+
+class _Boxes:
+    def __init__(self, conditions: Mapping[str, Condition]) -> None:
+        self.conditions = conditions
+
+    def of(self, plan: Part, truth: bool) -> list[Sets]:
+        """The boxes of a truth."""
+        if isinstance(plan, Const):
+            return [{}] if plan.value is truth else []
+        if isinstance(plan, Given):
+            return [{plan.name: ValueSet(frozenset((truth,)))}]
+        if isinstance(plan, Negation):
+            return self.of(plan.part, not truth)
+        if isinstance(plan, Logic):
+            found = [self.of(part, truth) for part in plan.parts]
+            return all_of(found) if (plan.word == "and") is truth else any_of(found)
+        if isinstance(plan, Held):
+            return self._held(plan.part, plan.cell, truth)
+        if isinstance(plan, Select):
+            yes = all_of([self.of(plan.condition, True), self.of(plan.then, truth)])
+            return any_of([yes, all_of([self.of(plan.condition, False), self.of(plan.otherwise, truth)])])
+        if isinstance(plan, Compare):
+            links = zip(plan.parts, plan.links, plan.parts[1:], strict=False)
+            found = [self._link(left, link, right, truth) for left, link, right in links]
+            return all_of(found) if truth else any_of(found)
+        raise NoBoxes
+
+    def _held(self, part: Part, cell: Cell, truth: bool) -> list[Sets]:
+        if isinstance(part, Const):
+            return [{}] if cell.holds(part.value) is truth else []
+        if _is_truth(part):
+            return any_of([self.of(part, value) for value in (False, True) if cell.holds(value) is truth])
+        if not isinstance(part, Given):
+            raise NoBoxes
+        if cell.accepts is None:
+            return [{}] if truth else []
+        return _alternatives(part.name, cell.accepts, self.conditions[part.name].domain, truth)
+
+    def _link(self, left: Part, link: Link, right: Part, truth: bool) -> list[Sets]:
+        """The boxes of one comparison of a chain."""
+        if isinstance(left, Const) and isinstance(right, Const):
+            return [{}] if runner(Compare((left, right), (link,)))({}) is truth else []
+        if _is_truth(left):
+            is_alike = (link.sign == "==") is truth
+            return any_of([all_of([self.of(left, value), self.of(right, value is is_alike)]) for value in (False, True)])
+        if isinstance(left, Const):
+            left, right, link = right, left, replace(link, sign=_TURNED[link.sign])
+        if not (isinstance(left, Given) and isinstance(right, Const)):
+            raise NoBoxes
+        is_on_circle = link.is_wrapped or link.left_is_high or link.right_is_high
+        if is_on_circle and left.kind != "angle":
+            raise NoBoxes
+        accepts, is_other = _compared(left.kind, link.sign, right.value)
+        return _alternatives(left.name, accepts, self.conditions[left.name].domain, truth is not is_other)
+
+
+def _is_truth(plan: Part) -> bool:
+    if isinstance(plan, Select):
+        return _is_truth(plan.then)
+    if isinstance(plan, (Const, Given)):
+        return isinstance(plan.value, bool) if isinstance(plan, Const) else plan.kind == "bool"
+    return not isinstance(plan, Apply)
+
+
+def _compared(kind: Kind, sign: str, value: float | str | bool) -> tuple[Accepted, bool]:
+    """The values that a comparison accepts, or (True) those that it does not."""
+    if isinstance(value, (str, bool)):
+        return ValueSet(frozenset((value,))), sign == "!="
+    accepts = parse_cell(f"{_OF_CELLS.get(sign, sign)}{value!r}", Domain(kind)).accepts
+    assert accepts is not None
+    return accepts, sign == "!="
+
+
+def _alternatives(name: str, accepts: Accepted, domain: Domain, truth: bool) -> list[Sets]:
+    """The boxes that hold what a set of one condition accepts, or what it does not."""
+    if isinstance(accepts, TagSet):
+        return [{name: tags} for tags in _tag_sets(accepts, truth) if not tags.is_empty]
+    found = accepts if truth else _complement(accepts, domain)
+    return [] if found.is_empty else [{name: found}]
+
+
+def _tag_sets(tags: TagSet, truth: bool) -> list[TagSet]:
+    if tags.is_complement is not truth:
+        return [TagSet(tags.needs, tags.bans)]
+    none: frozenset[str] = frozenset()
+    lacking = [TagSet(none, frozenset((need,))) for need in sorted(tags.needs)]
+    return lacking + [TagSet(frozenset((ban,))) for ban in sorted(tags.bans)]
+
+
+def _complement(accepts: NumberSet | ValueSet, domain: Domain) -> NumberSet | ValueSet:
+    if isinstance(accepts, NumberSet):
+        low, high = intervals.CIRCLE if domain.kind == "angle" else intervals.EVERYTHING[0]
+        rest = intervals.complement(accepts.spans, low, high)
+        return NumberSet(intervals.whole(rest) if domain.kind == "int" else rest, accepts.is_circular)
+    everything = (False, True) if domain.kind == "bool" else domain.values
+    if everything is None:
+        return ValueSet(accepts.values, not accepts.is_complement)
+    return ValueSet(frozenset(v for v in everything if not accepts.holds(v)))
+
+
+def all_of(found: Iterable[list[Sets]]) -> list[Sets]:
+    """The boxes of what is in each of some lists of boxes."""
+    common: list[Sets] = [{}]
+    for boxes in found:
+        pairs = product(common, boxes)
+        common = any_of([[both] for a, b in islice(pairs, MOST_PAIRS) if (both := _intersection(a, b)) is not None])
+        if next(pairs, None) is not None:
+            raise NoBoxes
+    return common
+
+
+def any_of(found: Iterable[list[Sets]]) -> list[Sets]:
+    """The boxes of some lists together; those on the same single condition are joined where one set can tell them."""
+    single: dict[str, Accepted] = {}
+    others: dict[tuple[tuple[str, Accepted], ...], Sets] = {}
+    for box in chain.from_iterable(found):
+        if not box:
+            return [{}]
+        (name, accepts), *more = sorted(box.items(), key=_first)
+        if more or isinstance(accepts, TagSet):
+            others.setdefault(((name, accepts), *more), box)
+        else:
+            single[name] = _union(single[name], accepts) if name in single else accepts
+    if len(single) + len(others) > MOST_BOXES:
+        raise NoBoxes
+    return [*({name: accepts} for name, accepts in single.items()), *others.values()]
+
+
+def _first(pair: tuple[str, Accepted]) -> str:
+    return pair[0]
+
+
+def _intersection(a: Sets, b: Sets) -> Sets | None:
+    """What two boxes share; None where that is nothing."""
+    both = dict(a)
+    for name, accepts in b.items():
+        both[name] = _shared(both[name], accepts) if name in both else accepts
+        if both[name].is_empty:
+            return None
+    return both
+
+
+def _shared(a: Accepted, b: Accepted) -> Accepted:
+    if isinstance(a, NumberSet) and isinstance(b, NumberSet):
+        spans = intervals.union((max(low, first), min(high, last)) for low, high in a.spans for first, last in b.spans)
+        return NumberSet(spans, a.is_circular)
+    if isinstance(a, TagSet) and isinstance(b, TagSet):
+        return TagSet(a.needs | b.needs, a.bans | b.bans)
+    assert isinstance(a, ValueSet)
+    assert isinstance(b, ValueSet)
+    if a.is_complement and b.is_complement:
+        return ValueSet(a.values | b.values, True)
+    if a.is_complement:
+        a, b = b, a
+    return ValueSet(frozenset(v for v in a.values if b.holds(v)))
+
+
+def _union(a: Accepted, b: Accepted) -> Accepted:
+    if isinstance(a, NumberSet) and isinstance(b, NumberSet):
+        spans = intervals.union((*a.spans, *b.spans))
+        return NumberSet(spans, a.is_circular)
+    assert isinstance(a, ValueSet)
+    assert isinstance(b, ValueSet)
+    if not (a.is_complement or b.is_complement):
+        return ValueSet(a.values | b.values)
+    rest = _shared(*(ValueSet(s.values, not s.is_complement) for s in (a, b)))
+    assert isinstance(rest, ValueSet)
+    return ValueSet(rest.values, not rest.is_complement)

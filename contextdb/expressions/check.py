@@ -1,0 +1,290 @@
+"""Check a tree against the conditions it is about, and turn it into a plan.
+
+Every name is a condition's, every word that an enum or tags are compared with is one of theirs, and every operator gets what it
+can work with. Parts without facts are computed here, once; one that would always be missing (`9 ** 9 ** 9`, `1 / 0`) is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import singledispatchmethod
+
+from contextdb.cells import format_number
+from contextdb.conditions import Condition
+from contextdb.domains import Kind
+from contextdb.errors import in_quotes, nearest, plural, some
+from contextdb.expressions.faults import Refusal, UnknownName
+from contextdb.expressions.functions import FUNCTIONS, MOST_POWER, NEGATIVE, OPERATORS, Function, power_of
+from contextdb.expressions.membership import holding, require_value, said
+from contextdb.expressions.plan import Apply, Compare, Const, Given, Link, Logic, Negation, Part, Select, Type
+from contextdb.expressions.scalar import constant
+from contextdb.expressions.tokens import written_name, written_text
+from contextdb.expressions.tree import (
+    Arithmetic,
+    Call,
+    Comparison,
+    Conditional,
+    Membership,
+    Name,
+    Node,
+    Number,
+    Text,
+    Truth,
+    Unary,
+)
+from contextdb.expressions.tree import (
+    Logic as LogicNode,
+)
+
+Checked = tuple[Part, Type]
+
+_TRUTH = Type("bool")
+
+
+class Checker:
+    """Checks the parts of one expression."""
+
+    def __init__(self, conditions: Mapping[str, Condition]) -> None:
+        self.conditions = conditions
+        self.names: list[str] = []
+        """The conditions it is about, in the order of their first mention."""
+
+    @singledispatchmethod
+    def check(self, node: Node) -> Checked:
+        """The plan and the type of a node.
+
+        Raises
+        ------
+        Refusal
+            The node does not fit the conditions.
+        """
+        raise AssertionError(node)
+
+    @check.register
+    def _(self, node: Number) -> Checked:
+        return Const(node.value), Type("int" if node.value.is_integer() else "number")
+
+    @check.register
+    def _(self, node: Text) -> Checked:
+        return Const(node.value), Type("text", frozenset((node.value,)))
+
+    @check.register
+    def _(self, node: Truth) -> Checked:
+        return Const(node.value), _TRUTH
+
+    @check.register
+    def _(self, node: Name) -> Checked:
+        condition = self.conditions.get(node.name)
+        if condition is None:
+            raise self._no_condition(node)
+        if node.name not in self.names:
+            self.names.append(node.name)
+        domain = condition.domain
+        unit = condition.unit if condition.unit and domain.kind in ("int", "number") else None
+        values = domain.known if domain.kind == "enum" else None
+        return Given(node.name, domain.kind), Type(domain.kind, values, unit)
+
+    @check.register
+    def _(self, node: Unary) -> Checked:
+        part, found = self.check(node.part)
+        if node.sign == "not":
+            self._need_truth(node.part, found, '"not"')
+            return self._folded(node, Negation(part)), _TRUTH
+        self._need_number(node.part, found, in_quotes(node.sign))
+        kind = "number" if found.kind == "angle" else found.kind
+        plan = part if node.sign == "+" else self._folded(node, Apply(NEGATIVE, (part,)))
+        return plan, Type(kind, None, found.unit)
+
+    @check.register
+    def _(self, node: Arithmetic) -> Checked:
+        if node.sign == "**":
+            return self._power(node)
+        function = OPERATORS[node.sign]
+        parts = [self.check(part) for part in node.parts]
+        for part, (_, found) in zip(node.parts, parts, strict=True):
+            self._need_number(part, found, in_quotes(node.sign))
+        if node.sign in ("/", "//", "%") and parts[1][0] == Const(0.0):
+            raise Refusal(node.right.start, node.right.stop, "nothing can be divided by 0", "a divisor that is not always 0")
+        return self._applied(node, function, parts)
+
+    @check.register
+    def _(self, node: Call) -> Checked:
+        function = FUNCTIONS.get(node.name)
+        if function is None:
+            raise self._no_function(node)
+        n_given = len(node.arguments)
+        if n_given < function.least or (function.most is not None and n_given > function.most):
+            told = plural(n_given, "argument")
+            raise Refusal(node.start, node.stop, f"{in_quotes(node.name)} is given {told}", function.form)
+        parts = [self.check(part) for part in node.arguments]
+        for part, (_, found) in zip(node.arguments, parts, strict=True):
+            self._need_number(part, found, in_quotes(node.name))
+        return self._applied(node, function, parts)
+
+    @check.register
+    def _(self, node: LogicNode) -> Checked:
+        plans = []
+        for operand in node.operands:
+            plan, found = self.check(operand)
+            self._need_truth(operand, found, in_quotes(node.word))
+            plans.append(plan)
+        return self._folded(node, Logic(node.word, tuple(plans))), _TRUTH
+
+    @check.register
+    def _(self, node: Comparison) -> Checked:
+        parts = [self.check(part) for part in node.operands]
+        links = []
+        for i, sign in enumerate(node.signs):
+            links.append(self._link(sign, node.operands[i], parts[i], node.operands[i + 1], parts[i + 1]))
+        return self._folded(node, Compare(tuple(plan for plan, _ in parts), tuple(links))), _TRUTH
+
+    @check.register
+    def _(self, node: Membership) -> Checked:
+        item = self.check(node.item)
+        choices = node.choices if isinstance(node.choices, tuple) else (node.choices,)
+        held = holding(node, item, [(choice, *self.check(choice)) for choice in choices], self.conditions)
+        return self._folded(node, Negation(held) if node.is_negated else held), _TRUTH
+
+    @check.register
+    def _(self, node: Conditional) -> Checked:
+        condition, found = self.check(node.condition)
+        self._need_truth(node.condition, found, '"if"')
+        (then, a), (otherwise, b) = self.check(node.then), self.check(node.otherwise)
+        kind = _common_kind(a, b)
+        if kind is None:
+            why = f'before "if" stands {said(a)}, after "else" {said(b)}'
+            raise Refusal(node.start, node.stop, why, "two values of one type")
+        values = a.values | b.values if a.values is not None and b.values is not None else None
+        result = Type(kind, values, self._common_unit(node, [a, b]))
+        return self._folded(node, Select(condition, then, otherwise)), result
+
+    # ---- names
+
+    def _no_condition(self, node: Name) -> Refusal:
+        if node.is_bare and node.name.casefold() in ("true", "false"):
+            meant = node.name.capitalize()
+            return Refusal(node.start, node.stop, f"{in_quotes(node.name)} is no name", "True or False", meant)
+        why = f"there is no condition {in_quotes(node.name)}"
+        if node.is_bare and node.name in FUNCTIONS:
+            return Refusal(node.start, node.stop, f"{in_quotes(node.name)} is a function", FUNCTIONS[node.name].form)
+        accepted = some(self.conditions) or "numbers only: no condition is declared"
+        if any(node.name in c.domain.known for c in self.conditions.values()):
+            return UnknownName(node.start, node.stop, why, accepted, written_text(node.name))
+        near = nearest(node.name, self.conditions)
+        return UnknownName(node.start, node.stop, why, accepted, written_name(near) if near else None)
+
+    def _no_function(self, node: Call) -> Refusal:
+        stop = node.start + len(node.name)
+        near = nearest(node.name, FUNCTIONS)
+        why = f"there is no function {in_quotes(node.name)}"
+        if node.name in self.conditions:
+            why = f"{in_quotes(node.name)} is a condition, not a function"
+        return Refusal(node.start, stop, why, ", ".join(FUNCTIONS), near)
+
+    # ---- types
+
+    def _need_number(self, node: Node, found: Type, who: str) -> None:
+        if found.is_number:
+            return
+        meant = None
+        if found.kind == "bool" and isinstance(node, Name):
+            meant = f"(1 if {written_name(node.name)} else 0)"
+        elif isinstance(node, Text) and node.value in self.conditions:
+            meant = written_name(node.value)
+        raise Refusal(node.start, node.stop, f"{who} takes numbers, and this is {said(found)}", "a number", meant)
+
+    def _need_truth(self, node: Node, found: Type, who: str) -> None:
+        if found.kind == "bool":
+            return
+        meant = {Number: {0.0: "False", 1.0: "True"}.get(node.value)} if isinstance(node, Number) else {}
+        accepted = 'True or False: a bool, a comparison such as speed > 0, or such as "InAir" in Tags'
+        raise Refusal(node.start, node.stop, f"{who} takes True or False, and this is {said(found)}", accepted, meant.get(Number))
+
+    def _common_unit(self, node: Node, found: list[Type]) -> str | None:
+        units = list(dict.fromkeys(t.unit for t in found if t.unit))
+        if len(units) > 1:
+            why = f"{in_quotes(units[0])} and {in_quotes(units[1])} are two units"
+            raise Refusal(node.start, node.stop, why, "one unit; a factor, as in * 3.6, takes a number out of its unit")
+        return units[0] if units else None
+
+    def _applied(self, node: Node, function: Function, parts: list[Checked]) -> Checked:
+        types = [found for _, found in parts]
+        unit = self._common_unit(node, types) if function.keeps_unit else None
+        is_whole = all(t.kind == "int" for t in types)
+        kind: Kind = "angle" if function.gives == "angle" else "number"
+        if function.gives == "whole" or (function.gives == "whole if whole" and is_whole):
+            kind = "int"
+        return self._folded(node, Apply(function, tuple(plan for plan, _ in parts))), Type(kind, None, unit)
+
+    def _power(self, node: Arithmetic) -> Checked:
+        parts = [self.check(part) for part in node.parts]
+        for part, (_, found) in zip(node.parts, parts, strict=True):
+            self._need_number(part, found, '"**"')
+        exponent = parts[1][0]
+        if not (isinstance(exponent, Const) and exponent.value in range(MOST_POWER + 1)):
+            why = f'after "**" stands a whole number from 0 to {MOST_POWER}, written out'
+            raise Refusal(node.right.start, node.right.stop, why, "sqrt(x) for a root, 1 / x ** 2 for a negative power")
+        return self._applied(node, power_of(int(exponent.value)), parts[:1])
+
+    def _folded(self, node: Node, plan: Part) -> Part:
+        """The plan, or its value where no fact has a say in it."""
+        value = constant(plan)
+        if value is None:
+            return plan
+        if value != value:
+            raise Refusal(node.start, node.stop, "this has no finite value", "numbers up to 1.79e308")
+        return Const(value)
+
+    # ---- comparisons
+
+    def _link(self, sign: str, left: Node, a: Checked, right: Node, b: Checked) -> Link:
+        if a[1].is_number and b[1].is_number:
+            return self._number_link(sign, left, a, right, b)
+        for node, (_, found) in ((left, a), (right, b)):
+            if found.kind == "tags":
+                accepted = '"InAir" in Tags, or Tags in "+InAir -Stunned"'
+                raise Refusal(node.start, node.stop, f"a set of tags is not compared with {in_quotes(sign)}", accepted)
+        if a[1].is_number or b[1].is_number or a[1].is_text is not b[1].is_text:
+            raise self._two_kinds(left, a[1], right, b[1])
+        if sign not in ("==", "!="):
+            what = "names have no order" if a[1].is_text else "True and False have no order"
+            accepted = '==, != or in ["Walk", "Run"]' if a[1].is_text else "== or !="
+            raise Refusal(left.start, right.stop, f"{in_quotes(sign)} asks for an order, and {what}", accepted)
+        for word, (_, other) in ((left, b), (right, a)):
+            require_value(word, other)
+        return Link(sign)
+
+    def _two_kinds(self, left: Node, a: Type, right: Node, b: Type) -> Refusal:
+        for node in (left, right):
+            if isinstance(node, Text) and node.value in self.conditions:
+                why = f"{said(a)} is compared with {said(b)}"
+                return Refusal(node.start, node.stop, why, "two values of one type", written_name(node.value))
+        return Refusal(left.start, right.stop, f"{said(a)} is compared with {said(b)}", "two values of one type")
+
+    def _number_link(self, sign: str, left: Node, a: Checked, right: Node, b: Checked) -> Link:
+        self._common_unit_of_link(left, right, a[1], b[1])
+        n_angles = (a[1].kind == "angle") + (b[1].kind == "angle")
+        if sign in ("==", "!="):
+            return Link(sign, is_wrapped=n_angles > 0)
+        if n_angles == 2:
+            why = "two angles have no order, for they go round"
+            raise Refusal(left.start, right.stop, why, "wrap_angle(a - b) > 0 where a lies to the left of b")
+        if n_angles == 0:
+            return Link(sign)
+        for node, (plan, _) in ((left, a), (right, b)):
+            if isinstance(plan, Const) and not -180.0 <= float(plan.value) <= 180.0:
+                told = format_number(float(plan.value))
+                raise Refusal(node.start, node.stop, f"an angle lies from -180 to 180, and {told} outside", 'heading in "170..190"')
+        is_upper = sign in (">", ">=")
+        return Link(sign, left_is_high=is_upper and a[1].kind == "angle", right_is_high=not is_upper and b[1].kind == "angle")
+
+    def _common_unit_of_link(self, left: Node, right: Node, a: Type, b: Type) -> None:
+        self._common_unit(Node(left.start, right.stop), [a, b])
+
+
+def _common_kind(a: Type, b: Type) -> Kind | None:
+    if a.kind == b.kind:
+        return a.kind
+    if a.is_number and b.is_number:
+        return "number"
+    return "text" if a.is_text and b.is_text else None

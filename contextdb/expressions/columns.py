@@ -1,0 +1,200 @@
+"""Columns of facts, as a plan computes with them for many contexts at once. N contexts.
+
+    numbers               float64 [N], NaN where missing, -0.0 as 0.0, angles wrapped
+    truths                int8 [N]: 0 False, 1 missing, 2 True, so that `and` is the least and `or` the greatest
+    texts, sets of tags   `Coded`: each distinct value once, and int32 codes [N], -1 where missing
+
+A plainly typed column is read without a Python step for each fact; anything else fact by fact, each distinct one once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from contextdb.cells import Cell
+from contextdb.conditions import Condition
+from contextdb.domains import NUMERIC, Kind
+from contextdb.errors import ContextError, Fault, Place
+from contextdb.expressions.arithmetic import all_wrapped
+from contextdb.facts import read_fact
+
+Doubles = NDArray[np.float64]
+Truths = NDArray[np.int8]
+Codes = NDArray[np.int32]
+
+NO, UNKNOWN, YES = np.int8(0), np.int8(1), np.int8(2)
+
+
+@dataclass(frozen=True, eq=False)
+class Coded:
+    """Texts or sets of tags: context i has values[codes[i]]; -1 is missing."""
+
+    codes: Codes
+    values: tuple[Any, ...]
+
+    def looked_up(self, table: Sequence[Any], missing: Any, dtype: Any) -> NDArray[Any]:
+        """What a table says of each context's value."""
+        return np.array([*table, missing], dtype)[self.codes]
+
+
+Column = Doubles | Truths | Coded
+
+
+def read_column(given: Any, condition: Condition, n_contexts: int) -> Column:
+    """One column of facts; None is a column that was not given, all of it missing.
+
+    Raises
+    ------
+    ContextError
+        A fact is of the wrong type, outside the domain, or a set of values; names its row.
+    """
+    kind = condition.domain.kind
+    if given is None:
+        return _all_missing(kind, n_contexts)
+    plain = _plain_numbers(given, kind) if kind in NUMERIC else _plain_truths(given) if kind == "bool" else None
+    if plain is None and kind in ("enum", "text"):
+        return _texts(given, condition)
+    return plain if plain is not None else _column_of(*_read_each(given, condition), kind)
+
+
+def _all_missing(kind: Kind, n_contexts: int) -> Column:
+    if kind in NUMERIC:
+        return np.full(n_contexts, np.nan)
+    return np.full(n_contexts, UNKNOWN) if kind == "bool" else Coded(np.full(n_contexts, -1, np.int32), ())
+
+
+def _plain_numbers(given: Any, kind: Kind) -> Doubles | None:
+    """A column of plain numbers; None when it must be read fact by fact."""
+    series = _series(given, pl.Float64)
+    if series is None or not series.dtype.is_numeric() or series.dtype.is_decimal():
+        return None
+    facts = series.cast(pl.Float64).fill_null(np.nan).to_numpy() + 0.0
+    if kind == "int" and not series.dtype.is_integer() and not (np.isnan(facts) | (facts == np.trunc(facts))).all():
+        return None
+    if kind == "angle":
+        return None if np.isinf(facts).any() else all_wrapped(facts) + 0.0
+    return facts
+
+
+def _plain_truths(given: Any) -> Truths | None:
+    series = _series(given, pl.Boolean)
+    if series is None or series.dtype != pl.Boolean:
+        return None
+    truths: Truths = (series.cast(pl.Int8) * 2).fill_null(int(UNKNOWN)).to_numpy()
+    return truths
+
+
+def _texts(given: Any, condition: Condition) -> Coded:
+    """A column of texts; only the distinct ones are read."""
+    series = _series(given, pl.String)
+    if series is not None and isinstance(series.dtype, (pl.Categorical, pl.Enum)):
+        series = series.cast(pl.String)
+    if series is None or series.dtype != pl.String:
+        return _coded(*_read_each(given, condition))
+    distinct = series.drop_nulls().unique(maintain_order=True)
+    listed = distinct.to_list()
+    for value in listed:
+        try:
+            read_fact(value, condition)
+        except ContextError as error:
+            row = series.index_of(value)
+            raise _placed(error, row or 0, condition) from None
+    codes = series.cast(pl.Enum(distinct)).to_physical().cast(pl.Int32).fill_null(-1)
+    return Coded(codes.to_numpy(), tuple(listed))
+
+
+def _series(given: Any, listed: type[pl.DataType]) -> pl.Series | None:
+    """A column as a polars series; None when it has no single plain type. What is listed must be of the type `listed`."""
+    if isinstance(given, pl.Series):
+        return given
+    try:
+        if isinstance(given, np.ndarray) and given.dtype.kind in "biuf":
+            return pl.Series(given, nan_to_null=False)
+        return pl.Series(list(given), dtype=listed, strict=True, nan_to_null=False)
+    except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
+        return None
+
+
+def _read_each(given: Any, condition: Condition) -> tuple[list[int], list[Any]]:
+    """The distinct facts in canonical form, and which one each context has, -1 where missing."""
+    listed = given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
+    known: dict[object, int] = {}
+    codes: list[int] = []
+    values: list[Any] = []
+    for row, value in enumerate(listed):
+        key = (type(value), tuple(value) if isinstance(value, (list, set)) else value)
+        try:
+            if key not in known:
+                fact = _one(read_fact(value, condition))
+                known[key] = -1 if fact is None else len(values)
+                values += [] if fact is None else [fact]
+        except (ContextError, TypeError) as error:
+            raise _placed(error, row, condition) from None
+        codes.append(known[key])
+    return codes, values
+
+
+def _one(fact: Any) -> Any:
+    if isinstance(fact, Cell):
+        raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context"))
+    return fact
+
+
+def _placed(error: Exception, row: int, condition: Condition) -> ContextError:
+    place = Place(row=row, column=condition.name)
+    if isinstance(error, ContextError):
+        return ContextError(*(fault.at(place) for fault in error.faults))
+    return ContextError(Fault("this is no fact.", "one value in each context", place=place))
+
+
+def _column_of(codes: list[int], values: list[Any], kind: Kind) -> Column:
+    coded = _coded(codes, values)
+    if kind in NUMERIC:
+        return coded.looked_up(coded.values, np.nan, np.float64)
+    return coded.looked_up([YES if v else NO for v in coded.values], UNKNOWN, np.int8) if kind == "bool" else coded
+
+
+def _coded(codes: list[int], values: list[Any]) -> Coded:
+    """Codes of distinct values: two ways to write one fact are one."""
+    distinct: dict[Any, int] = {}
+    table = [distinct.setdefault(v, len(distinct)) for v in values]
+    return Coded(np.array([*table, -1], np.int32)[np.array(codes, np.int64)], tuple(distinct))
+
+
+def as_array(column: Column) -> NDArray[Any]:
+    """A column as plain numpy: float64 with NaN for numbers, else objects with None where missing."""
+    if isinstance(column, Coded):
+        values = np.empty(len(column.values) + 1, object)
+        values[:-1] = column.values
+        return values[column.codes]
+    if column.dtype == np.int8:
+        return np.array([False, None, True], object)[column]
+    return column
+
+
+def as_facts(column: Column) -> Any:
+    """A column as `query_many` takes it: doubles, or a series or list with None where missing."""
+    if isinstance(column, Coded):
+        is_text = all(isinstance(value, str) for value in column.values)
+        return _text_series(column) if is_text else as_array(column).tolist()
+    if column.dtype != np.int8:
+        return column
+    return pl.select(pl.when(pl.lit(pl.Series(column)) != 1).then(pl.lit(pl.Series(column)) == 2)).to_series()
+
+
+def _text_series(column: Coded) -> pl.Series:
+    texts = pl.Series([*column.values, None], dtype=pl.String)
+    return texts.gather(np.where(column.codes < 0, len(column.values), column.codes))
+
+
+def is_missing_in(column: Column, row: int) -> bool:
+    """Whether a column has no value in one context."""
+    if isinstance(column, Coded):
+        return bool(column.codes[row] < 0)
+    return bool(column[row] == UNKNOWN) if column.dtype == np.int8 else bool(np.isnan(column[row]))

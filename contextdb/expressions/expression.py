@@ -1,0 +1,172 @@
+"""An expression over conditions, read and checked once, computed for one context or for millions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells import Cell
+from contextdb.conditions import Condition
+from contextdb.domains import NUMERIC, Kind
+from contextdb.errors import ContextError, Fault, Place, plural
+from contextdb.expressions.boxes import Box, boxes_of
+from contextdb.expressions.check import Checker
+from contextdb.expressions.columns import UNKNOWN, YES, Column, as_array, read_column
+from contextdb.expressions.faults import ExpressionError, Refusal, fault_of
+from contextdb.expressions.frame import run_frame
+from contextdb.expressions.parse import parse
+from contextdb.expressions.plan import Part, Type
+from contextdb.expressions.results import require_result
+from contextdb.expressions.scalar import Run, Value, is_missing, runner
+from contextdb.facts import read_fact
+
+NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A checked expression. Made by `read_expression`."""
+
+    text: str
+    conditions: tuple[Condition, ...]
+    """The conditions that it names, in the order of their first mention."""
+    type: Type = field(repr=False)
+    plan: Part = field(repr=False)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Other processes read the text again: what computes it is functions."""
+        return read_expression, (self.text, self.conditions)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the facts that it needs."""
+        return tuple(condition.name for condition in self.conditions)
+
+    @property
+    def kind(self) -> Kind:
+        """The kind of its values: bool, int, number, angle, enum, text or tags."""
+        return self.type.kind
+
+    def evaluate(self, facts: Mapping[str, object]) -> float | bool | str | frozenset[str] | None:
+        """The value in one context; None where it is missing.
+
+        `facts` are as a game gives them to a query. One that is absent, None, NaN or a set of values counts as missing.
+
+        Raises
+        ------
+        ContextError
+            A fact is of the wrong type, or outside an enum's or tag's domain.
+        """
+        value = self.run({c.name: canonical(facts.get(c.name), c) for c in self.conditions})
+        return None if is_missing(value) else value
+
+    def evaluate_frame(self, columns: Mapping[str, Any], n_contexts: int) -> NDArray[Any]:
+        """The value in each of many contexts, the same to the last bit as `evaluate` gives.
+
+        Parameters
+        ----------
+        columns : mapping of str to list, flat numpy array or polars Series, each of length N
+            Facts by the name of the condition. A column that is absent is missing; others may stand beside.
+        n_contexts : int
+            N.
+
+        Returns
+        -------
+        array, shape (N,)
+            float64, NaN where missing, for int, number and angle; else objects, None where missing.
+
+        Raises
+        ------
+        ContextError
+            A fact is of the wrong type or outside the domain; a column is not N long.
+        """
+        return as_array(self.run_frame(columns, n_contexts))
+
+    def flags(self, columns: Mapping[str, Any], n_contexts: int, missing: bool = False) -> NDArray[np.bool_]:
+        """Whether a bool expression holds in each context: bool [N]; `missing` where that is not known."""
+        truths = self.run_frame(columns, n_contexts)
+        assert isinstance(truths, np.ndarray)
+        assert self.kind == "bool"
+        return truths >= UNKNOWN if missing else truths == YES
+
+    def as_boxes(self, truth: bool = False) -> list[Box] | None:
+        """The contexts in which a bool expression is `truth`, as boxes: a context lies in one of them, or more, exactly then.
+
+        A box gives a cell for each condition that it restricts; `{}` holds every context. Facts are taken as known, and numbers
+        from -inf to inf, whatever the condition's bounds. None where a comparison mixes conditions or computes with one, or where
+        more than `boxes.MOST_BOXES` would be needed.
+        """
+        return boxes_of(self.plan, {c.name: c for c in self.conditions}, truth) if self.kind == "bool" else None
+
+    @cached_property
+    def run(self) -> Run:
+        """Computes the value from facts in canonical form: NaN for a missing number, None for another missing fact."""
+        return runner(self.plan)
+
+    def run_frame(self, columns: Mapping[str, Any], n_contexts: int) -> Column:
+        """`evaluate_frame`, as a column that can be computed with."""
+        read: dict[str, Column] = {}
+        for condition in self.conditions:
+            given = columns.get(condition.name)
+            check_length(given, condition, n_contexts)
+            read[condition.name] = read_column(given, condition, n_contexts)
+        return run_frame(self.plan, read, n_contexts)
+
+
+def read_expression(
+    text: str, conditions: Mapping[str, Condition] | Sequence[Condition], wants: Condition | None = None
+) -> Expression:
+    """Read an expression over some conditions.
+
+    Parameters
+    ----------
+    text : str
+        Such as "speed - target_speed" or 'not (IsInMidAirAnim and gait in ["Walk", "Run"])'; the language is told in
+        `contextdb.expressions`.
+    conditions : mapping of str to Condition
+        The conditions that it may name.
+    wants : Condition, optional
+        What it computes: its values must fit the type, the declared values and the unit of this condition.
+
+    Raises
+    ------
+    ExpressionError
+        With the character where the fault stands, what is accepted and, where one is near, a text that would be read.
+    """
+    known = conditions if isinstance(conditions, Mapping) else {c.name: c for c in conditions}
+
+    def read(text: str) -> Expression:
+        tree = parse(text)
+        checker = Checker(known)
+        plan, found = checker.check(tree)
+        if wants is not None:
+            require_result(tree, found, wants)
+        return Expression(text, tuple(known[name] for name in checker.names), found, plan)
+
+    try:
+        return read(text)
+    except Refusal as refusal:
+        fault = fault_of(text, refusal, read)
+    raise ExpressionError(fault)
+
+
+def canonical(value: object, condition: Condition) -> Value:
+    """A fact as plans take it: NaN for a missing number, None for any other missing fact or a set of values."""
+    if type(value) is float and condition.domain.kind == "number":
+        return value + 0.0
+    fact = read_fact(value, condition)
+    if fact is None or isinstance(fact, Cell):
+        return NAN if condition.domain.kind in NUMERIC else None
+    return fact
+
+
+def check_length(given: Any, condition: Condition, n_contexts: int) -> None:
+    """Raise ContextError unless a column, where it is given, is so long."""
+    if given is not None and len(given) != n_contexts:
+        told = f"the column has {plural(len(given), 'fact')}."
+        raise ContextError(Fault(told, plural(n_contexts, "fact"), place=Place(column=condition.name)))

@@ -1,0 +1,115 @@
+"""What may stand after `in`: a list of constants, the tags of a fact, or the text of a cell. Each becomes a cell that is asked.
+
+gait in ["Walk", "Run"]      "InAir" in Defender.Tags      heading in "170..-170"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from contextdb import intervals
+from contextdb.cells import ACCEPTED, Accepted, Cell, NumberSet, TagSet, ValueSet, covers, parse_cell
+from contextdb.conditions import Condition
+from contextdb.domains import Domain, wrap_angle
+from contextdb.errors import CellError, in_quotes, nearest, some
+from contextdb.expressions.faults import Refusal
+from contextdb.expressions.plan import Const, Given, Held, Part, Type
+from contextdb.expressions.tokens import written_text
+from contextdb.expressions.tree import Membership, Node, Text
+
+Choice = tuple[Node, Part, Type]
+
+_SAID = {
+    "bool": "True or False", "int": "a number", "number": "a number", "angle": "an angle", "enum": "a value of an enum",
+    "text": "a text", "tags": "a set of tags",
+}  # fmt: skip
+_AFTER_IN = 'a list such as ["Walk", "Run"], a fact of type tags, or a cell such as "0..5"'
+
+
+def said(found: Type) -> str:
+    """What a part gives, for a message."""
+    return _SAID[found.kind]
+
+
+def require_value(node: Node, other: Type) -> None:
+    """Raise Refusal when a text is compared with an enum that has no such value."""
+    if not isinstance(node, Text) or other.kind != "enum" or other.values is None or node.value in other.values:
+        return
+    raise _undeclared(node, node.value, sorted(other.values), "value")
+
+
+def holding(node: Membership, item: tuple[Part, Type], choices: Sequence[Choice], conditions: Mapping[str, Condition]) -> Held:
+    """The plan of `item in choices`.
+
+    Raises
+    ------
+    Refusal
+        What stands after `in` does not fit the item.
+    """
+    if isinstance(node.choices, tuple):
+        return Held(item[0], Cell(_listed(node, item[1], choices)))
+    choice, plan, found = choices[0]
+    if found.kind == "tags":
+        return Held(plan, Cell(_tag(node.item, item[0], plan, conditions)))
+    if not isinstance(choice, Text):
+        raise Refusal(choice.start, choice.stop, f'after "in" stands {said(found)}', _AFTER_IN)
+    if isinstance(item[0], Const):
+        raise Refusal(node.start, node.stop, 'no fact stands beside "in"', 'a fact: speed in "0..5", "InAir" in Tags')
+    return Held(item[0], _cell(choice, _domain(*item, conditions)))
+
+
+def _listed(node: Membership, item: Type, choices: Sequence[Choice]) -> Accepted:
+    if item.kind == "tags" or not choices:
+        what = "a set of tags is in no list" if choices else "the list is empty"
+        raise Refusal(node.start, node.stop, what, '"InAir" in Tags' if choices else 'gait in ["Walk", "Run"]')
+    values = [_constant(item, *choice) for choice in choices]
+    if not item.is_number:
+        return ValueSet(frozenset(v for v in values if isinstance(v, (str, bool))))
+    numbers = [float(v) for v in values]
+    if item.kind == "angle":
+        numbers = [wrap_angle(v) for v in numbers]
+    spans = intervals.union((v, v) for v in numbers)
+    return NumberSet(intervals.whole(spans) if item.kind == "int" else spans, item.kind == "angle")
+
+
+def _constant(item: Type, choice: Node, plan: Part, found: Type) -> float | str | bool:
+    is_alike = (item.is_number and found.is_number) or (item.is_text and found.is_text) or item.kind == found.kind
+    if not is_alike:
+        raise Refusal(choice.start, choice.stop, f"{said(item)} is looked for, and this is {said(found)}", said(item))
+    if not isinstance(plan, Const):
+        raise Refusal(choice.start, choice.stop, "a list holds constants", "a == b or a == c for facts")
+    require_value(choice, item)
+    return plan.value
+
+
+def _tag(node: Node, item: Part, tags: Part, conditions: Mapping[str, Condition]) -> TagSet:
+    if not isinstance(node, Text) or not isinstance(item, Const):
+        raise Refusal(node.start, node.stop, "a tag is written out", 'a text in quotes: "InAir" in Tags')
+    domain = conditions[tags.name].domain if isinstance(tags, Given) else None
+    if domain and domain.values is not None and not covers(node.value, domain.known):
+        raise _undeclared(node, node.value, domain.values, "tag")
+    return TagSet(frozenset((node.value,)))
+
+
+def _undeclared(node: Node, value: str, known: Sequence[str], what: str) -> Refusal:
+    near = nearest(value, known)
+    why = f"{in_quotes(value)} is not a declared {what}"
+    return Refusal(node.start, node.stop, why, some(known), written_text(near) if near else None)
+
+
+def _domain(item: Part, found: Type, conditions: Mapping[str, Condition]) -> Domain:
+    if isinstance(item, Given):
+        return conditions[item.name].domain
+    return Domain("text" if found.is_text else found.kind)
+
+
+def _cell(node: Text, domain: Domain) -> Cell:
+    try:
+        cell = parse_cell(node.value, domain)
+    except CellError as error:
+        fault = error.faults[0]
+        raise Refusal(node.start, node.stop, fault.found.rstrip("."), fault.accepted, fault.mend or None) from None
+    if cell.is_soft or cell.is_empty:
+        why = "a cell here has no penalty" if cell.is_soft else "no value is in this cell"
+        raise Refusal(node.start, node.stop, why, ACCEPTED[domain.kind])
+    return cell

@@ -1,0 +1,148 @@
+"""The words of an expression, each with its place.
+
+number   3  0.5  .5  1e-3
+text     "CB" or 'CB'; a quote inside is doubled
+name     speed  Defender.DepthChart; any other name stands in backquotes: `Asset Name`
+sign     + - * / // % ** == != < <= > >= ( ) [ ] ,
+end      after the last character
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from contextdb.errors import in_quotes
+from contextdb.expressions.faults import Refusal
+
+MOST_CHARACTERS = 4000
+"""A longer expression is refused: nobody could read it, and the work on it stays bounded."""
+
+RESERVED = frozenset(("and", "or", "not", "in", "if", "else", "True", "False"))
+"""Words of the language; a condition of such a name stands in backquotes."""
+
+TokenKind = Literal["number", "text", "name", "sign", "end"]
+
+_SPACE = re.compile(r"\s*")
+_NUMBER = re.compile(r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_NAME = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
+_QUOTED = re.compile(r'"(?:[^"]|"")*"|' r"'(?:[^']|'')*'|" r"`(?:[^`]|``)*`")
+_SIGN = re.compile(r"\*\*|//|==(?!=)|!=(?!=)|<=(?![>=])|>=(?!=)|<(?!>)|[-+*/%>(),\[\]]")
+_SLIP = re.compile(r"===|!==|&&|\|\||<>|<=>|=>|=<|:=|\.\.+|.", re.DOTALL)
+
+_MEANT = {
+    "=": "==", "===": "==", "!==": "!=", "<>": "!=", "≠": "!=", "=>": ">=", "≥": ">=", "=<": "<=", "≤": "<=", "&&": "and",
+    "&": "and", "||": "or", "|": "or", "!": "not ", "~": "not ", "¬": "not ", "∧": "and", "\u2228": "or", "∈": "in", "^": "**",
+    "²": "**2", "³": "**3", "×": "*", "·": "*", "÷": "/", "−": "-", "–": "-", "“": '"', "”": '"', "„": '"', "\u2018": "'", "’": "'",
+    "{": "(", "}": ")", "°": "", ";": "", "$": "", "@": "",
+}  # fmt: skip
+_WHY = {
+    "=": '"=" would set a value, and nothing is set here',
+    ":=": '":=" would set a value, and nothing is set here',
+    "?": '"?" is no operator',
+    ":": '":" is no operator',
+    ".": "a dot stands inside the name of a condition only",
+    "#": "there are no comments inside an expression",
+}
+_ACCEPTED = {
+    "?": "A if CONDITION else B",
+    ":": "A if CONDITION else B",
+    "..": 'an interval as a cell, such as speed in "0..5"',
+    ".": "a name such as Defender.DepthChart",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """One word: `text` as it is written, `value` what it stands for (a name without backquotes, a text without quotes)."""
+
+    kind: TokenKind
+    text: str
+    start: int
+    value: str = ""
+
+    @property
+    def stop(self) -> int:
+        """Where the next character stands."""
+        return self.start + len(self.text)
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether it is a name without backquotes, which may be a word of the language."""
+        return self.kind == "name" and self.text[0] != "`"
+
+
+def tokens_of(text: str) -> list[Token]:
+    """Take an expression apart; the last token is the end.
+
+    Raises
+    ------
+    Refusal
+        The text is too long, or a character has no place in an expression.
+    """
+    if len(text) > MOST_CHARACTERS:
+        raise Refusal(0, len(text), f"the expression has {len(text):,} characters", f"at most {MOST_CHARACTERS:,}")
+    found: list[Token] = []
+    at = _next(text, 0)
+    while at < len(text):
+        token = _token(text, at)
+        found.append(token)
+        at = _next(text, token.stop)
+    return [*found, Token("end", "", len(text.rstrip()))]
+
+
+def _next(text: str, at: int) -> int:
+    space = _SPACE.match(text, at)
+    return space.end() if space else at
+
+
+def _token(text: str, at: int) -> Token:
+    if number := _NUMBER.match(text, at):
+        return _number(text, number)
+    if name := _NAME.match(text, at):
+        return Token("name", name[0], at, name[0])
+    if quoted := _QUOTED.match(text, at):
+        mark, body = quoted[0][0], quoted[0][1:-1]
+        value = body.replace(mark * 2, mark)
+        return Token("name" if mark == "`" else "text", quoted[0], at, value)
+    if sign := _SIGN.match(text, at):
+        return Token("sign", sign[0], at, sign[0])
+    raise _slip(text, at)
+
+
+def _number(text: str, number: re.Match[str]) -> Token:
+    after = text[number.end() : number.end() + 1]
+    if after == "." or after == "_" or after.isalnum():
+        rest = re.compile(r"[\w.]*").match(text, number.end())
+        stop = rest.end() if rest else number.end()
+        word = text[number.start() : stop]
+        plain = word.replace("_", "")
+        meant = plain if plain != word and _NUMBER.fullmatch(plain) else None
+        accepted = _ACCEPTED[".."] if ".." in word else "a number such as 3, 0.5 or 1e-3"
+        raise Refusal(number.start(), stop, f"{in_quotes(word)} is no number", accepted, meant)
+    return Token("number", number[0], number.start(), number[0])
+
+
+def _slip(text: str, at: int) -> Refusal:
+    found = _SLIP.match(text, at)
+    sign = found[0] if found else text[at]
+    if sign in ('"', "'", "`"):
+        return Refusal(
+            at, len(text), f"the quote {sign} is not closed", "a text in quotes; a quote inside is doubled", text[at:] + sign
+        )
+    why = _WHY.get(sign, f"{in_quotes(sign)} is no sign of an expression")
+    meant = _MEANT.get(sign)
+    accepted = _ACCEPTED.get(sign[:2], "" if meant else "+ - * / // % ** == != < <= > >= and or not in if else")
+    return Refusal(at, at + len(sign), why, accepted, meant)
+
+
+def written_name(name: str) -> str:
+    """The name of a condition as an expression has it: bare where it can be, else in backquotes."""
+    is_bare = bool(_NAME.fullmatch(name)) and name not in RESERVED
+    return name if is_bare else "`" + name.replace("`", "``") + "`"
+
+
+def written_text(value: str) -> str:
+    """A text as an expression has it."""
+    return '"' + value.replace('"', '""') + '"'

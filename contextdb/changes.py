@@ -3,6 +3,7 @@
     Rows      which rows there are and in what order: insert, delete, duplicate, move, sort
     Cells     texts of some cells
     Columns   which columns there are, in what order and under what name: insert, delete, move, rename
+    Sections  what contextdb.toml says: the table's settings, conditions, blueprints, selectors
 
 A change never changes a table: `apply` gives a new one, and columns that it does not touch are shared. Texts are taken as they are,
 readable or not. Nothing here touches the disk.
@@ -13,15 +14,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.columns import TextColumn
-from contextdb.conditions import infer_condition
-from contextdb.errors import Fault, TableError
-from contextdb.schema import Schema, TableSettings, conditions_from_dict
+from contextdb.conditions import Condition, infer_condition
+from contextdb.errors import Fault, SchemaError, TableError
+from contextdb.schema import Schema, TableSettings, expression_faults
+from contextdb.sections import (
+    EDITED_SECTIONS,
+    blueprint_faults,
+    differences,
+    job_faults,
+    schema_to_dict,
+    schema_with,
+    settings_to_dict,
+    settings_with,
+)
 from contextdb.source import name_faults
 from contextdb.table import ConditionColumn, Table
 
@@ -83,34 +94,71 @@ class Columns:
     """Which columns there are: the name of each, and what it was named before; None for a new, empty one."""
 
     layout: tuple[tuple[str, str | None], ...]
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    """What the table's settings say anew: `{"enabled": "Enabled"}`."""
-    declared: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
-    """Conditions declared with it, as `[conditions.NAME]` of contextdb.toml."""
 
     def apply(self, table: Table) -> Table:
-        """The table with these columns. Its settings and schema follow: what was renamed, and what is declared anew."""
+        """The table with these columns. Its settings and schema follow what was renamed."""
         faults = list(name_faults([name for name, _ in self.layout]))
         if faults or not self.layout:
             raise TableError(*faults or [Fault("the table has no columns.", "at least one column, the assets")])
         before = {c.name: c for c in table.columns}
         renamed = {old: new for new, old in self.layout if old is not None}
-        settings = _settings_after(table.settings, renamed, self.settings)
-        conditions = dict(table.schema.conditions) | conditions_from_dict(self.declared)
+        settings = _settings_after(table.settings, renamed)
+        conditions = dict(table.schema.conditions)
         for old, new in renamed.items():
             if old != new and old in conditions and new not in conditions:
                 conditions[new] = replace(conditions[old], name=new)
         columns = [_column(table, before, new, old) for new, old in self.layout]
         schema = replace(table.schema, conditions=conditions)
-        cells = _condition_columns(table, columns, dict(self.layout), schema, settings)
-        return replace(table, columns=tuple(columns), conditions=cells, settings=settings, schema=schema)
+        return _under(table, columns, dict(self.layout), schema, settings)
 
     def to_json(self) -> dict[str, object]:
         """The change as plain data."""
-        return {"change": "columns", "layout": self.layout, "settings": dict(self.settings), "declared": dict(self.declared)}
+        return {"change": "columns", "layout": self.layout}
 
 
-Change = Rows | Cells | Columns
+@dataclass(frozen=True)
+class Sections:
+    """What contextdb.toml says anew, as plain data in its own form; what is not named stays.
+
+    It becomes part of the file when the table is saved: see `contextdb.schema_file`.
+    """
+
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Keys of the table's own section: `{"enabled": "Enabled", "fallback": None}`; None takes a key away."""
+    parts: Mapping[str, Mapping[str, Mapping[str, object] | None]] = field(default_factory=dict)
+    """Section to name to all keys: `{"conditions": {"speed": {"type": "number"}}}`; None takes the name away."""
+
+    @classmethod
+    def between(cls, before: Table, after: Table) -> Sections:
+        """What leads from what one table says to what another says."""
+        settings = differences(settings_to_dict(before.settings), settings_to_dict(after.settings))
+        old, new = schema_to_dict(before.schema), schema_to_dict(after.schema)
+        parts = {section: cast(Any, differences(old[section], new[section])) for section in EDITED_SECTIONS}
+        return cls(settings, {section: part for section, part in parts.items() if part})
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is said anew."""
+        return not self.settings and not any(self.parts.values())
+
+    def apply(self, table: Table) -> Table:
+        """The table under these settings and this schema; columns whose meaning stays are not read again."""
+        schema = schema_with(table.schema, self.parts)
+        settings = settings_with(table.settings, self.settings)
+        names = [c.name for c in table.columns]
+        faults = [*job_faults(settings, names, schema), *blueprint_faults(schema)]
+        if "conditions" in self.parts or "assume" in self.settings:
+            faults += expression_faults(replace(schema, tables={**schema.tables, settings.name: settings}))
+        if faults:
+            raise SchemaError(*faults)
+        return _under(table, table.columns, {name: name for name in names}, schema, settings)
+
+    def to_json(self) -> dict[str, object]:
+        """The change as plain data."""
+        return {"change": "sections", "settings": dict(self.settings), "parts": {k: dict(v) for k, v in self.parts.items()}}
+
+
+Change = Rows | Cells | Columns | Sections
 
 
 def change_from_json(data: Mapping[str, Any]) -> Change:
@@ -118,8 +166,9 @@ def change_from_json(data: Mapping[str, Any]) -> Change:
     if data["change"] == "cells":
         return Cells({name: dict(zip(rows, texts, strict=True)) for name, rows, texts in data["cells"]})
     if data["change"] == "columns":
-        layout = tuple((new, old) for new, old in data["layout"])
-        return Columns(layout, data["settings"], data["declared"])
+        return Columns(tuple((new, old) for new, old in data["layout"]))
+    if data["change"] == "sections":
+        return Sections(data["settings"], data["parts"])
     parts = [np.arange(n) + first if first >= 0 else np.full(n, -1) for first, n in data["runs"]]
     return Rows(np.concatenate([np.empty(0, np.int64), *parts]))
 
@@ -173,33 +222,37 @@ def _column(table: Table, before: Mapping[str, TextColumn], name: str, old: str 
     return before[old] if old == name else before[old].renamed(name)
 
 
-def _condition_columns(
+def _under(
     table: Table, columns: Sequence[TextColumn], came_from: Mapping[str, str | None], schema: Schema, settings: TableSettings
-) -> tuple[ConditionColumn, ...]:
-    """The columns that are conditions now; one that was one before, of the same type, is not read again."""
+) -> Table:
+    """The table of these columns under another schema and other settings."""
     before = {c.condition.name: c for c in table.conditions}
     plain = {settings.asset or columns[0].name, settings.enabled, settings.priority, settings.weight, *settings.outputs}
-    found = []
-    for column in (c for c in columns if c.name not in plain):
-        old, declared = before.get(came_from[column.name] or ""), schema.conditions.get(column.name)
-        if old is None:
-            found.append(ConditionColumn.read(column, declared or infer_condition(column)))
-        elif declared in (None, old.condition) and column is old.texts:
-            found.append(old)
-        elif declared is None or replace(declared, name="") == replace(old.condition, name=""):
-            condition = replace(old.condition, name=column.name)
-            found.append(ConditionColumn(condition, column, old.cells, old.faults))
-        else:
-            found.append(ConditionColumn.read(column, declared))
-    return tuple(found)
+    found = tuple(
+        _condition_column(column, before.get(came_from[column.name] or ""), schema.conditions.get(column.name))
+        for column in columns
+        if column.name not in plain
+    )
+    return replace(table, columns=tuple(columns), conditions=found, settings=settings, schema=schema)
 
 
-def _settings_after(settings: TableSettings, renamed: Mapping[str, str], said: Mapping[str, Any]) -> TableSettings:
+def _condition_column(column: TextColumn, before: ConditionColumn | None, declared: Condition | None) -> ConditionColumn:
+    """A column as a condition; one that was one before, with the same domain, is not read again."""
+    if before is None or (declared is None and before.condition.is_declared):
+        return ConditionColumn.read(column, declared or infer_condition(column))
+    condition = declared or replace(before.condition, name=column.name)
+    if condition == before.condition and column is before.texts:
+        return before
+    if condition.domain == before.condition.domain:
+        return ConditionColumn(condition, column, before.cells, before.faults)
+    return ConditionColumn.read(column, condition)
+
+
+def _settings_after(settings: TableSettings, renamed: Mapping[str, str]) -> TableSettings:
     """The settings under the new names; a column that is gone has no job."""
-    jobs = {key: renamed.get(name or "") for key in ("asset", "enabled", "priority", "weight") for name in [getattr(settings, key)]}
-    outputs = tuple(renamed[name] for name in settings.outputs if name in renamed)
-    said = {key: tuple(value) if key == "outputs" else value for key, value in said.items()}
-    return replace(settings, **({**jobs, "outputs": outputs} | said))
+    now: dict[str, Any] = {key: renamed.get(getattr(settings, key) or "") for key in ("asset", "enabled", "priority", "weight")}
+    now["outputs"] = tuple(renamed[name] for name in settings.outputs if name in renamed)
+    return replace(settings, **now)
 
 
 def _runs(taken: CameFrom) -> Iterator[list[int]]:

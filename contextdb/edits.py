@@ -9,16 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from contextdb.cell_words import truth_of
 from contextdb.cells import parse_cell
-from contextdb.changes import CameFrom, Cells, Change, Columns, Rows, change_from_json
+from contextdb.changes import CameFrom, Cells, Change, Columns, Rows, Sections, change_from_json
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
-from contextdb.errors import CellError, Fault, Place, TableError, in_quotes, plural, shown
+from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
+from contextdb.schema import conditions_from_dict
+from contextdb.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
 from contextdb.source import name_faults
 from contextdb.table import Table
 
@@ -88,7 +90,7 @@ def check_cell(table: Table, column: str, text: str) -> Fault | None:
     if column == settings.enabled and text.strip() and truth_of(text) is None:
         return Fault(f"cannot read {in_quotes(text)}.", '"True" or "False"', rule="unreadable-cell")
     if column in (settings.priority, settings.weight) and text.strip():
-        alone = Columns(((column, column),), {"asset": None}).apply(table.with_rows_taken([]))
+        alone = Columns(((column, column),)).apply(table.with_rows_taken([]))
         faults = Cells({column: {0: text}}).apply(Rows(np.array([-1])).apply(alone)).faults
         return replace(faults[0], place=Place(column=column)) if faults else unwritable(text)
     return unwritable(text)
@@ -184,7 +186,7 @@ def enable_rows(table: Table, rows: Sequence[int], is_enabled: bool) -> Edit:
     changes: list[Change] = []
     if column is None:
         column = _free_name("Enabled", table)
-        changes.append(Columns((*_layout(table), (column, None)), {"enabled": column}))
+        changes += [Columns((*_layout(table), (column, None))), Sections({"enabled": column})]
     texts = dict.fromkeys(chosen.tolist(), str(is_enabled))
     name = f"{'Enable' if is_enabled else 'Disable'} {_named(table, chosen)}"
     return Edit(name, (*changes, Cells({column: texts})))
@@ -193,23 +195,40 @@ def enable_rows(table: Table, rows: Sequence[int], is_enabled: bool) -> Edit:
 # ---- edits of columns
 
 
+@dataclass(frozen=True)
+class NewColumn:
+    """A column to insert: its name, what it is, and what every row holds in it."""
+
+    name: str
+    job: Job = "condition"
+    declared: Mapping[str, object] | None = None
+    """What `[conditions.NAME]` of contextdb.toml shall say of it; None: what it says already, else the cells decide."""
+    text: str = ""
+
+
 def insert_column(
     table: Table, at: int, column: str, job: Job = "condition", declared: Mapping[str, object] | None = None, text: str = ""
 ) -> Edit:
-    """Insert a column before column `at`, with `text` in every row.
+    """Insert a column before column `at`, with `text` in every row; the rest as in `NewColumn`."""
+    return insert_columns(table, at, [NewColumn(column, job, declared, text)])
 
-    `declared` is what `[conditions.NAME]` of contextdb.toml shall say of it: `{"type": "number"}`. Without it the column is what
-    the schema says already, or a text.
-    """
+
+def insert_columns(table: Table, at: int, columns: Sequence[NewColumn]) -> Edit:
+    """Insert columns before column `at`, in this order: those of a blueprint, say."""
     layout = list(_layout(table))
     _require_place(table, at, len(layout))
-    layout.insert(at, (column, None))
-    settings: dict[str, Any] = {} if job in ("condition", "output") else {job: column}
-    if job == "output":
-        settings["outputs"] = [*table.settings.outputs, column]
-    change = Columns(tuple(layout), settings, {column: declared} if declared else {})
-    fill = (Cells({column: dict.fromkeys(range(table.n_rows), text)}),) if text and table.n_rows else ()
-    return Edit(f"Insert the column {shown(column)}", (change, *fill))
+    layout[at:at] = [(column.name, None) for column in columns]
+    settings: dict[str, Any] = {c.job: c.name for c in columns if c.job not in ("condition", "output")}
+    if outputs := [c.name for c in columns if c.job == "output"]:
+        settings["outputs"] = [*table.settings.outputs, *outputs]
+    declared = {c.name: c.declared for c in columns if c.declared}
+    said = Sections(settings, {"conditions": declared} if declared else {})
+    changes: list[Change] = [Columns(tuple(layout))]
+    changes += [] if said.is_empty else [said]
+    filled = {c.name: dict.fromkeys(range(table.n_rows), c.text) for c in columns if c.text and table.n_rows}
+    changes += [Cells(filled)] if filled else []
+    what = f"the column {shown(columns[0].name)}" if len(columns) == 1 else plural(len(columns), "column")
+    return Edit(f"Insert {what}", tuple(changes) if columns else ())
 
 
 def delete_columns(table: Table, columns: Sequence[str]) -> Edit:
@@ -234,14 +253,83 @@ def move_column(table: Table, column: str, to: int) -> Edit:
     return Edit(f"Move the column {shown(column)}", (Columns(tuple(layout)),))
 
 
-def rename_column(table: Table, column: str, name: str) -> Edit:
-    """Give a column another name. What contextdb.toml declares of it holds for the new name, unless that is declared itself."""
+def rename_column(table: Table, column: str, name: str, keep_declared: bool = True) -> Edit:
+    """Give a column another name. What contextdb.toml declares of it holds for the new name, unless that is declared itself.
+
+    `keep_declared`: the old name stays declared too, for others that use it: see `contextdb.schema_file.users_of`.
+    """
     table.text_column(column)
     layout = tuple((name if old == column else new, old) for new, old in _layout(table))
     faults = list(name_faults([new for new, _ in layout]))
     if faults:
         raise TableError(*faults)
-    return Edit(f"Rename {shown(column)} to {shown(name)}", (Columns(layout),))
+    is_left = keep_declared or column not in table.schema.conditions or name == column
+    undeclared = () if is_left else (Sections(parts={"conditions": {column: None}}),)
+    return Edit(f"Rename {shown(column)} to {shown(name)}", (Columns(layout), *undeclared))
+
+
+# ---- edits of what contextdb.toml says
+
+
+def set_settings(table: Table, **said: Any) -> Edit:
+    """Set keys of the table's section, such as `policy="first"` or `outputs=["Slots"]`; None takes a key away."""
+    after = settings_to_dict(settings_with(table.settings, said))
+    changed = differences(settings_to_dict(table.settings), after)
+    keys = ", ".join(changed)
+    edit = Edit(f"Set {keys} of the table", (Sections(changed),) if changed else ())
+    if changed.get("assume"):
+        _require_known(table, cast("list[str]", changed["assume"]))
+    return _checked(table, edit)
+
+
+def _require_known(table: Table, assume: Sequence[str]) -> None:
+    """Raise SchemaError where an assumption cannot be read, or names what is no condition of the table and not declared."""
+    from contextdb.expressions import assumption_faults
+
+    known = {**table.schema.conditions, **{c.condition.name: c.condition for c in table.conditions}}
+    if faults := list(assumption_faults(assume, known)):
+        raise SchemaError(*faults)
+
+
+def set_condition(table: Table, name: str, **said: Any) -> Edit:
+    """Set keys of a condition's section, such as `min=0.0` or `values=["A"]`; None takes a key away.
+
+    A condition whose type was inferred is declared by it. Keys that have no place under the type are taken away with it.
+    """
+    column = table.condition(name).condition
+    before = condition_to_dict(column)
+    part = {key: value for key, value in (before | said).items() if value is not None}
+    part = {key: value for key, value in part.items() if key in said or has_place(key, part.get("type"))}
+    if column.is_declared and conditions_from_dict({name: part})[name] == column:
+        return Edit(f"Declare {shown(name)}", ())
+    keys = ", ".join(differences(before, part))
+    what = f"Set {keys} of {shown(name)}" if column.is_declared and keys else f"Declare {shown(name)}"
+    return _checked(table, Edit(what, (Sections(parts={"conditions": {name: part}}),)))
+
+
+def set_blueprint(table: Table, name: str, conditions: Sequence[str] | None) -> Edit:
+    """Keep conditions as a blueprint, or with None take it away. Conditions of the table that nobody has declared are declared."""
+    undeclared = [n for n in conditions or () if n not in table.schema.conditions]
+    declared = {n: condition_to_dict(table.condition(n).condition) for n in undeclared}
+    parts: dict[str, Mapping[str, Any]] = {"conditions": declared} if declared else {}
+    parts["blueprints"] = {name: None if conditions is None else {"conditions": list(conditions)}}
+    verb = "Remove" if conditions is None else "Keep"
+    return _checked(table, Edit(f"{verb} the blueprint {shown(name)}", (Sections(parts=parts),)))
+
+
+def set_selector(table: Table, name: str, order: Sequence[tuple[str, float | None]] | None, what: str = "") -> Edit:
+    """Set a selector's databases in order, each with its threshold (the last: None), or with None take the selector away."""
+    steps = [{"database": one} | ({} if threshold is None else {"threshold": threshold}) for one, threshold in order or ()]
+    part = None if order is None else {**table.schema.selectors.get(name, {}), "order": steps}
+    if table.schema.selectors.get(name) == part:
+        return Edit(what, ())
+    return _checked(table, Edit(what or f"Change the selector {shown(name)}", (Sections(parts={"selectors": {name: part}}),)))
+
+
+def _checked(table: Table, edit: Edit) -> Edit:
+    """The edit, if contextdb.toml could hold what it says; SchemaError if not."""
+    edit.apply(table.with_rows_taken([]))
+    return edit
 
 
 # ---- what leads from one table to another
@@ -254,15 +342,14 @@ def edit_between(before: Table, after: Table, came_from: CameFrom, name: str) ->
         changes.append(Rows(came_from))
     names = [c.name for c in before.columns]
     layout = tuple((c.name, c.name if c.name in names else None) for c in after.columns)
-    if [c.name for c in after.columns] != names or after.settings != before.settings:
-        changes.append(Columns(layout, {key: getattr(after.settings, key) for key in _JOBS}))
+    if [c.name for c in after.columns] != names:
+        changes.append(Columns(layout))
+    said = Sections.between(Edit(name, tuple(changes)).apply(before), after)
+    changes += [] if said.is_empty else [said]
     middle = Edit(name, tuple(changes)).apply(before)
     texts = {c.name: _differences(middle.text_column(c.name), c) for c in after.columns}
     texts = {column: cells for column, cells in texts.items() if cells}
     return Edit(name, (*changes, Cells(texts)) if texts else tuple(changes))
-
-
-_JOBS = ("asset", "outputs", "enabled", "priority", "weight")
 
 
 def _differences(before: TextColumn, after: TextColumn) -> dict[int, str]:

@@ -21,8 +21,8 @@ MOST_CHARACTERS = 65_536
 MOST_FAULTS = 20
 """Faults of one kind that are listed."""
 
-CONFLICT = b"<<<<<<<"
-"""What git writes at the start of a line where two versions of a file disagree."""
+CONFLICT, CONFLICT_END = b"<<<<<<<", b">>>>>>>"
+"""What git writes at the start of the lines round two versions of a file that disagree."""
 
 Found = tuple[int | None, Fault]
 """A fault, and the byte that it is about."""
@@ -41,13 +41,16 @@ def record_faults(raw: bytes, records: Records, strays: list[Stray], file: str) 
 
 def _conflict_faults(raw: bytes, records: Records) -> Iterator[Found]:
     """Unresolved git conflicts. Nothing else is reported with them: which rows there are is not decided yet."""
-    at = records.starts[np.frombuffer(raw, np.uint8)[records.starts] == CONFLICT[0]]
+    firsts = np.frombuffer(raw, np.uint8)[records.starts]
+    at = records.starts[(firsts == CONFLICT[0]) | (firsts == CONFLICT_END[0])]
     for start in at.tolist():
         if raw.startswith(CONFLICT, start):
             end = raw.find(b"\n>>>>>>>", start)
             extent = f" and ends on line {line_of(raw, end + 1)}" if end >= 0 else ""
             mend = 'to keep one side and delete the lines "<<<<<<<", "=======" and ">>>>>>>"'
             yield start, Fault(f"an unresolved git conflict starts here{extent}.", "one version of each row", mend)
+        elif raw.startswith(CONFLICT_END + b" ", start) and not raw.startswith(CONFLICT) and b"\n" + CONFLICT not in raw[:start]:
+            yield start, Fault("a mark that git leaves in a conflict stands here.", "one version of each row", "to delete the line")
 
 
 def _stray_faults(raw: bytes, strays: list[Stray]) -> Iterator[Found]:

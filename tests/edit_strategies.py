@@ -25,6 +25,8 @@ TEXTS = [
     "+A -B",
 ]
 KINDS = ["cells", "insert", "delete", "duplicate", "move", "reorder", "enable", "column", "drop", "shift", "rename"]
+KINDS += ["settings", "declare", "blueprint", "columns"]
+PARTS = [{"type": "number", "min": 0.0, "max": 9.5}, {"type": "enum", "values": ["CB", "FS"]}, {"type": "tags"}, {"type": "text"}]
 
 
 @st.composite
@@ -58,6 +60,21 @@ def edits_of(draw: st.DrawFn, table: Table) -> Edit:
         declared = draw(st.none() | st.just({"type": "number", "min": 0.0}))
         job = draw(st.sampled_from(["condition", "output"] if declared is None else ["condition"]))
         return edits.insert_column(table, draw(place), draw(st.sampled_from(free)), job, declared, draw(st.sampled_from(["", "5"])))
+    if kind == "columns" and free:
+        new = [edits.NewColumn(name, "condition", draw(st.none() | st.sampled_from(PARTS))) for name in free[:2]]
+        return edits.insert_columns(table, draw(place), new)
+    if kind == "settings":
+        plain = [n for n in others if n not in table.schema.conditions]
+        first, second, *rest = [*(draw(st.permutations(plain)) if plain else []), None, None]
+        said = {"enabled": first, "priority": second, "outputs": [name for name in rest if name]}
+        chosen = {key: said.get(key) for key in draw(st.sets(st.sampled_from(["enabled", "priority", "outputs"])))}
+        others_too = dict.fromkeys({"enabled", "priority", "weight", "outputs"} - chosen.keys())
+        return edits.set_settings(table, **chosen, **others_too, policy=draw(st.sampled_from(["collect", "first"])))
+    conditions = [c.condition.name for c in table.conditions]
+    if kind == "declare" and conditions:
+        return edits.set_condition(table, draw(st.sampled_from(conditions)), **draw(st.sampled_from(PARTS)))
+    if kind == "blueprint" and conditions:
+        return edits.set_blueprint(table, "b", draw(st.none() | st.lists(st.sampled_from(conditions), unique=True)))
     if kind == "drop":
         return edits.delete_columns(table, [draw(st.sampled_from(others))])
     if kind == "shift":

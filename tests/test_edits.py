@@ -15,10 +15,11 @@ from contextdb import edits
 from contextdb.conditions import Condition
 from contextdb.domains import Domain
 from contextdb.edits import Edit, edit_between
-from contextdb.errors import TableError
+from contextdb.errors import SchemaError, TableError
 from contextdb.history import History
 from contextdb.rewrite import write_csv
-from contextdb.schema import EMPTY, TableSettings
+from contextdb.schema import EMPTY, TableSettings, read_schema
+from contextdb.sections import schema_to_dict
 from contextdb.source import read_csv
 from contextdb.table import Table, build_table
 
@@ -107,6 +108,8 @@ def test_an_edit_read_back_from_json_does_the_same(data):
         again = Edit.from_json(json.loads(json.dumps(edit.to_json())))
         assert again.name == edit.name
         assert bytes_of(again.apply(table)) == bytes_of(edit.apply(table))
+        assert again.apply(table).settings == edit.apply(table).settings
+        assert again.apply(table).schema == edit.apply(table).schema
         table = edit.apply(table)
 
 
@@ -137,6 +140,7 @@ def test_the_edit_between_two_tables_leads_from_one_to_the_other(data):
     edit = edit_between(before, history.table, came_from, "back")
     assert texts_of(edit.apply(before)) == texts_of(history.table)
     assert edit.apply(before).settings == history.table.settings
+    assert schema_to_dict(edit.apply(before).schema) == schema_to_dict(history.table.schema)
 
 
 @given(tables(), st.data())
@@ -226,6 +230,100 @@ def test_settings_follow_their_columns():
     assert first.assets == table.assets
 
 
+def test_a_condition_is_declared_as_it_was_understood_with_what_is_said_of_it():
+    table = table_of()
+    now = edits.set_condition(table, "speed", unit="m/s", min=0).apply(table)
+    assert now.schema.conditions["speed"] == Condition("speed", Domain("number", minimum=0.0), "m/s")
+    assert now.condition("speed").condition.is_declared
+    assert edits.set_condition(now, "speed", unit="m/s").changes == ()
+
+
+def test_what_has_no_place_under_a_new_type_goes_with_the_old_one():
+    table = table_of()
+    number = edits.set_condition(table, "speed", type="number", min=0, max=9).apply(table)
+    text = edits.set_condition(number, "speed", type="text").apply(number)
+    assert text.schema.conditions["speed"] == Condition("speed", Domain("text"))
+
+
+def test_a_column_that_is_no_condition_any_more_keeps_its_texts():
+    table = table_of()
+    now = edits.set_settings(table, outputs=["speed"]).apply(table)
+    assert [c.condition.name for c in now.conditions] == ["hit"]
+    assert texts_of(now) == texts_of(table)
+    back = edits.set_settings(now, outputs=None).apply(now)
+    assert back.settings == table.settings
+    assert [c.condition.name for c in back.conditions] == ["speed", "hit"]
+
+
+def test_a_declared_condition_gets_no_other_job():
+    table = Table.from_columns({"Asset": ["a"], "speed": ["1..2"]}, {"speed": {"type": "number"}})
+    with pytest.raises(SchemaError, match="declares as a condition"):
+        edits.set_settings(table, outputs=["speed"])
+
+
+def test_an_assumption_must_read_and_a_type_must_leave_those_there_are():
+    table = table_of()
+    with pytest.raises(SchemaError, match="hitt"):
+        edits.set_settings(table, assume=["not hitt"])
+    now = edits.set_settings(table, assume=["not hit"]).apply(table)
+    with pytest.raises(SchemaError, match="not hit"):
+        edits.set_condition(now, "hit", type="number")
+    assert edits.set_condition(now, "hit", type="bool").apply(now).schema.conditions["hit"].domain.kind == "bool"
+
+
+def test_a_description_reads_no_cell_again():
+    table = Table.from_columns({"Asset": ["a"], "speed": ["1..2"]}, {"speed": {"type": "number"}})
+    now = edits.set_condition(table, "speed", description="how fast").apply(table)
+    assert now.condition("speed").cells is table.condition("speed").cells
+    assert now.condition("speed").condition.description == "how fast"
+
+
+def test_the_columns_of_a_blueprint_come_in_one_step():
+    table = table_of()
+    new = [edits.NewColumn("a"), edits.NewColumn("b", "output", text="-"), edits.NewColumn("c", declared={"type": "angle"})]
+    edit = edits.insert_columns(table, 2, new)
+    assert edit.name == "Insert 3 columns"
+    now = edit.apply(table)
+    assert [c.name for c in now.columns] == ["Asset Name", "speed", "a", "b", "c", "hit"]
+    assert now.settings.outputs == ("b",)
+    assert now.text_column("b").to_list() == ["-"] * 3
+    assert now.condition("c").condition.domain.kind == "angle"
+
+
+def test_a_blueprint_of_undeclared_conditions_declares_them():
+    table = table_of()
+    now = edits.set_blueprint(table, "base", ["speed", "hit"]).apply(table)
+    assert now.schema.blueprints == {"base": ("speed", "hit")}
+    assert {name: c.domain.kind for name, c in now.schema.conditions.items()} == {"speed": "number", "hit": "bool"}
+    gone = edits.set_blueprint(now, "base", None).apply(now)
+    assert gone.schema.blueprints == {}
+
+
+MOTION = """
+[features.f]
+rate = 30
+channels = [{ type = "position", bone = "Foot", weight = 1 }]
+[databases.a]
+clips = "a/*.bvh"
+features = "f"
+[databases.b]
+clips = "b/*.bvh"
+features = "f"
+[selectors.s]
+order = [{ database = "a", threshold = 2 }, { database = "b" }]
+"""
+
+
+def test_a_selector_takes_another_order_and_another_threshold():
+    table = build_table("t", read_csv(RAW, "t.csv")[1], read_schema(MOTION, "contextdb.toml"))
+    now = edits.set_selector(table, "s", [("b", 0.5), ("a", None)]).apply(table)
+    assert now.schema.selectors["s"] == {"order": [{"database": "b", "threshold": 0.5}, {"database": "a"}]}
+    assert edits.set_selector(now, "s", [("b", 0.5), ("a", None)]).changes == ()
+    assert edits.set_selector(now, "s", None).apply(now).schema.selectors == {}
+    with pytest.raises(SchemaError, match="threshold"):
+        edits.set_selector(table, "s", [("a", None), ("b", None)])
+
+
 @pytest.mark.parametrize(
     "make",
     [
@@ -242,10 +340,26 @@ def test_settings_follow_their_columns():
         lambda t: edits.delete_rows(t, []),
         lambda t: edits.move_rows(t, [0], 4),
         lambda t: edits.reorder_rows(t, [0, 0, 1]),
+        lambda t: edits.set_settings(t, policy="all"),
+        lambda t: edits.set_settings(t, polcy="first"),
+        lambda t: edits.set_settings(t, enabled="sped"),
+        lambda t: edits.set_settings(t, enabled="hit", priority="hit"),
+        lambda t: edits.set_settings(t, assume=["a", "a"]),
+        lambda t: edits.set_condition(t, "speed", type="numbr"),
+        lambda t: edits.set_condition(t, "speed", type="number", min=3, max=2),
+        lambda t: edits.set_condition(t, "speed", type="number", values=["a"]),
+        lambda t: edits.set_condition(t, "speed", type="enum"),
+        lambda t: edits.set_condition(t, "sped", type="text"),
+        lambda t: edits.set_blueprint(t, "b", ["sped"]),
+        lambda t: edits.set_blueprint(t, " ", ["speed"]),
+        lambda t: edits.set_blueprint(t, "b", ["speed", "speed"]),
+        lambda t: edits.set_selector(t, "s", [("loco", None)]),
+        lambda t: edits.insert_columns(t, 1, [edits.NewColumn("a"), edits.NewColumn("a")]).apply(t),
+        lambda t: edits.insert_columns(t, 1, [edits.NewColumn("a", declared={"type": "enum"})]).apply(t),
     ],
 )
 def test_an_edit_that_does_not_fit_is_refused_with_what_is_accepted(make):
-    with pytest.raises(TableError) as refused:
+    with pytest.raises((TableError, SchemaError)) as refused:
         make(table_of())
     assert refused.value.faults[0].accepted
 

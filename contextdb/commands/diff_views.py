@@ -1,0 +1,133 @@
+"""Differences of two tables for people: as text for a terminal, as Markdown for a pull request.
+
+Text from tables cannot move a cursor or become markup.
+"""
+
+from __future__ import annotations
+
+import sys
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from itertools import accumulate, groupby
+
+from contextdb.console import aligned, printable, styled
+from contextdb.diff import CellChange, Diff
+from contextdb.errors import shown
+from contextdb.report.render_markdown import MOST_BYTES, escaped
+from contextdb.table import Table
+
+MARKS = {"added": ("+", "green"), "removed": ("-", "red"), "renamed": ("~", "yellow"), "moved": (">", "cyan")}
+MOST = 40
+"""Differences of one kind that are shown, unless all are asked for."""
+MOST_CHARACTERS = 40
+"""Of a cell's text in a terminal."""
+
+Told = tuple[str, str]
+"""What became of a row or a column, and which."""
+
+
+def as_text(found: Diff, colour: bool, shows_all: bool = False) -> str:
+    """Differences as aligned lines."""
+    name = printable(str(found.after.path or found.after.name))
+    lines = [styled(f"{name}: {found.summary}", "bold", colour)]
+    for title, parts in (("columns", _columns(found)), ("rows", _rows(found))):
+        if parts:
+            told = [styled(f"  {MARKS[verb][0]} {printable(text)}", MARKS[verb][1], colour) for verb, text in parts]
+            lines += ["", title, *_first(told, shows_all)]
+    lines += _cell_lines(found, colour, shows_all)
+    return "".join(f"{line}\n" for line in lines)
+
+
+def as_markdown(found: Diff, shows_all: bool = False) -> str:
+    """Differences as Markdown, small enough for a comment."""
+    name = str(found.after.path or found.after.name)
+    lines = [f"### {escaped(name)}", "", f"{escaped(found.summary)}"]
+    parts = [f"- column {verb}: {escaped(text)}" for verb, text in _columns(found)]
+    parts += [f"- row {verb}: {escaped(text)}" for verb, text in _rows(found)]
+    rows = [f"| {' | '.join(escaped(shown(t, 200)) for t in _markdown_texts(c))} |" for c in found.cells]
+    room = sys.maxsize if shows_all else MOST_BYTES
+    for head, listed in (([], parts), (["| asset | column | before | after |", "| --- | --- | --- | --- |"], rows)):
+        kept = _fitting(listed, room)
+        room -= sum(map(_size, kept))
+        left = len(listed) - len(kept)
+        lines += ["", *head, *kept] if kept else []
+        lines += ["", f"… and {left:,} more; `contextdb diff --all` shows every one."] if left else []
+    return "\n".join(lines) + "\n"
+
+
+def _fitting(lines: Sequence[str], room: int) -> Sequence[str]:
+    """The first lines that go into so many bytes."""
+    ends = list(accumulate(map(_size, lines)))
+    return lines[: bisect_right(ends, room)]
+
+
+def _size(line: str) -> int:
+    return len(line.encode()) + 1
+
+
+def _markdown_texts(change: CellChange) -> tuple[str, str, str, str]:
+    after = change.after if change.is_meaning else f"{change.after} (means the same)"
+    return change.asset, change.column, change.before, after
+
+
+def _columns(found: Diff) -> list[Told]:
+    told = [("added", shown(name)) for name in found.columns_added]
+    told += [("removed", shown(name)) for name in found.columns_removed]
+    told += [("renamed", f"{shown(one.before)} → {shown(one.after)}") for one in found.columns_renamed]
+    return told + [
+        ("moved", f"{shown(c.name)}, from column {c.place_before + 1} to {c.place_after + 1}") for c in found.columns_moved
+    ]
+
+
+def _rows(found: Diff) -> list[Told]:
+    before, after = found.before, found.after
+    told = [("added", f"{_asset(after.assets[row])}, {_place(after, row)}") for row in found.rows_added]
+    told += [("removed", f"{_asset(before.assets[row])}, {_place(before, row)} before") for row in found.rows_removed]
+    told += [("renamed", f"{_asset(one.before)} → {_asset(one.after)}") for one in found.rows_renamed]
+    places = ((one.name, _place(before, one.place_before), _place(after, one.place_after)) for one in found.rows_moved)
+    return told + [("moved", f"{_asset(name)}, from {old} to {new}") for name, old, new in places]
+
+
+def _place(table: Table, row: int) -> str:
+    line = table.place(row).line
+    return f"row {row}" if line is None else f"line {line}"
+
+
+def _cell_lines(found: Diff, colour: bool, shows_all: bool) -> Iterator[str]:
+    changes = list(found.cells)
+    for title, part in (
+        ("cells", [c for c in changes if c.is_meaning]),
+        ("written otherwise", [c for c in changes if not c.is_meaning]),
+    ):
+        if not part:
+            continue
+        yield from ("", title)
+        kept = part if shows_all else part[:MOST]
+        yield from _assets(kept, colour)
+        if len(part) > len(kept):
+            yield f"  … and {len(part) - len(kept):,} more; --all shows every one"
+
+
+def _assets(changes: Sequence[CellChange], colour: bool) -> Iterator[str]:
+    """Changes under their assets, aligned across all of them."""
+    rows = [(shown(c.column), _text(c.before), "→", _text(c.after)) for c in changes]
+    lines = iter(aligned(rows, indent="    "))
+    for _, group in groupby(changes, key=lambda c: c.row):
+        same = list(group)
+        yield styled(f"  {printable(_asset(same[0].asset))}", "bold", colour)
+        for _ in same:
+            yield next(lines)
+
+
+def _text(text: str) -> str:
+    return shown(text, MOST_CHARACTERS) if text else "(empty)"
+
+
+def _asset(name: str) -> str:
+    return shown(name) if name.strip() else "(no name)"
+
+
+def _first(lines: list[str], shows_all: bool) -> list[str]:
+    if shows_all or len(lines) <= MOST:
+        return lines
+    return [*lines[:MOST], f"  … and {len(lines) - MOST:,} more; --all shows every one"]

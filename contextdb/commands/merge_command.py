@@ -1,0 +1,136 @@
+"""Join what two sides made of one table, cell by cell, with rows and columns that came, went and moved. A git merge driver.
+
+A contextdb.toml is merged key by key. The result is written over OURS, or into FILE. What the sides disagree about stands in it
+between git's marks, row by row, for a person or the editor to decide; a Parquet file then stays as it was. Exits with 0 when all
+went together, with 1 when something is to be decided, with 2 when a file cannot be read.
+
+  contextdb merge base.csv ours.csv theirs.csv --out merged.csv
+  contextdb merge base.csv ours.csv theirs.csv --take theirs
+
+As a merge driver of git, docs/ci.md tells how it is set up:
+
+  contextdb merge %O %A %B --path %P
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from contextdb.console import printable
+from contextdb.diff import Merge, Side, merge
+from contextdb.diffing.markers import with_markers
+from contextdb.diffing.reading import merged_bytes, table_of
+from contextdb.diffing.toml_merging import merge_toml
+from contextdb.disk import read_bytes, write_atomic
+from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
+from contextdb.exit_codes import ExitCode
+from contextdb.parquet import ParquetSource
+from contextdb.project import schema_for
+from contextdb.schema import EMPTY, Schema, TableSettings
+from contextdb.table import Table
+
+MOST_TOLD = 20
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("base", metavar="BASE", help="the table before both changed it")
+    parser.add_argument("ours", metavar="OURS", help="our version; the result is written over it")
+    parser.add_argument("theirs", metavar="THEIRS", help="the other version")
+    parser.add_argument("-o", "--out", metavar="FILE", help="write the result here, and leave OURS as it is")
+    parser.add_argument("--path", metavar="PATH", help="the table's file, whose contextdb.toml holds (git: %%P; default: OURS)")
+    parser.add_argument("--take", choices=("ours", "theirs"), help="decide all conflicts for one side")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Merge three files."""
+    path = Path(arguments.path or arguments.ours)
+    if path.suffix.lower() == ".toml":
+        return _merge_toml(path, arguments)
+    base, ours, theirs = _tables(path, arguments)
+    found = merge(base, ours, theirs)
+    if arguments.take:
+        found = _decided(found, arguments.take)
+    out = Path(arguments.out or arguments.ours)
+    is_parquet = isinstance(ours.source, ParquetSource)
+    if not (found.conflicts and is_parquet):
+        write_atomic(out, with_markers(found) if found.conflicts else merged_bytes(found))
+    _tell(found, path, is_parquet)
+    return ExitCode.FOUND if found.conflicts else ExitCode.OK
+
+
+def _merge_toml(path: Path, arguments: argparse.Namespace) -> ExitCode:
+    """Merge three versions of contextdb.toml, key by key."""
+    files = arguments.base, arguments.ours, arguments.theirs
+    base, ours, theirs = (_toml_text(file) for file in files)
+    found = merge_toml(base, ours, theirs, files)
+    if found.conflicts and arguments.take:
+        raise ContextDBError(Fault("--take decides conflicts of tables.", "a .csv or .parquet file", place=Place(str(path))))
+    write_atomic(Path(arguments.out or arguments.ours), found.with_markers.encode())
+    for key in found.conflicts:
+        said = f"{in_quotes('.'.join(key))} changed on both sides."
+        fault = Fault(said, mend="to keep one of the versions between the marks", place=Place(str(path)))
+        print(printable(f"contextdb: {fault}"), file=sys.stderr)
+    return ExitCode.FOUND if found.conflicts else ExitCode.OK
+
+
+def _toml_text(file: str) -> str:
+    try:
+        return read_bytes(file).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(file))) from None
+
+
+def _tables(path: Path, arguments: argparse.Namespace) -> list[Table]:
+    schema, settings = _schema(path)
+    tables: list[Table] = []
+    faults: list[Fault] = []
+    for file in (arguments.base, arguments.ours, arguments.theirs):
+        try:
+            tables.append(table_of(read_bytes(file), file, schema, settings))
+        except TableError as error:
+            faults += error.faults
+    if faults:
+        raise TableError(*faults)
+    return tables
+
+
+def _schema(path: Path) -> tuple[Schema, TableSettings]:
+    """What is declared of the table; nothing where contextdb.toml cannot be read, as in the middle of a merge."""
+    try:
+        folder, schema = schema_for(path)
+        root, whole = folder.resolve(), path.parent.resolve() / path.name
+        return schema, schema.settings_for(whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path.name)
+    except ContextDBError as error:
+        print(printable(f"contextdb: {error.faults[0]} Merging without it."), file=sys.stderr)
+        return EMPTY, TableSettings(path.stem)
+
+
+def _decided(found: Merge, side: Side) -> Merge:
+    while found.conflicts:  # a row that comes back can bring new ones
+        found = found.resolved(dict.fromkeys(range(len(found.conflicts)), side))
+    return found
+
+
+def _tell(found: Merge, path: Path, is_parquet: bool) -> None:
+    for one in found.conflicts[:MOST_TOLD]:
+        texts = ", ".join(
+            f"{name} {_said(text)}" for name, text in (("ours", one.ours), ("theirs", one.theirs), ("before", one.base))
+        )
+        print(printable(f"contextdb: {Place(str(path))}: {one.place}: {texts}."), file=sys.stderr)
+    if len(found.conflicts) > MOST_TOLD:
+        print(f"contextdb: … and {len(found.conflicts) - MOST_TOLD:,} more.", file=sys.stderr)
+    if found.conflicts:
+        mend = (
+            "to decide with --take ours or --take theirs"
+            if is_parquet
+            else "to open the file with contextdb edit, or to keep one of each"
+        )
+        said = f"{plural(len(found.conflicts), 'place')} changed on both sides."
+        print(printable(f"contextdb: {Fault(said, mend=mend, place=Place(str(path)))}"), file=sys.stderr)
+
+
+def _said(text: str | None) -> str:
+    return "nothing" if text is None else f'"{shown(text)}"'

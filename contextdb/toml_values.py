@@ -1,0 +1,157 @@
+"""Values of a TOML text: written, and changed in place so that what stays in a list or an inline table keeps its text and comments.
+
+Strings are written, and inline tables changed, by tomlkit. Nothing here knows where in a file a value stands.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+Path = tuple[str, ...]
+
+TOKEN = re.compile(
+    r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+'  # strings over several lines
+    r'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\''
+    r"|#[^\n]*|[\[\]{},=\n]|[^\s\[\]{},=#\"']+|[^\S\n]+",
+    re.DOTALL,
+)
+
+
+def as_toml(value: object) -> str:
+    """A value as TOML writes it, on one line."""
+    import tomlkit
+
+    if isinstance(value, Mapping):
+        inner = ", ".join(f"{dotted((key,))} = {as_toml(item)}" for key, item in value.items())
+        return f"{{ {inner} }}" if inner else "{}"
+    if isinstance(value, (list, tuple)):
+        inner = ", ".join(map(as_toml, value))
+        return f"[ {inner} ]" if any(isinstance(item, Mapping) for item in value) else f"[{inner}]"
+    return tomlkit.item(value).as_string()
+
+
+def dotted(path: Path) -> str:
+    """A path as a header writes it: conditions."Defender.Tags"."""
+    return ".".join(key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else as_toml(key) for key in path)
+
+
+def end_of_line(text: str) -> str:
+    """How the lines of a text end."""
+    first = text.partition("\n")
+    return "\r\n" if first[1] and first[0].endswith("\r") else "\n"
+
+
+def merged(old: str, keys: Path, value: object) -> str:
+    """The text of a value set anew, or of an inline table with a key of it set, or with None taken away."""
+    if keys:
+        return _inline(old, keys, value)
+    if isinstance(value, (list, tuple)) and old.startswith("["):
+        return _list(old, value)
+    return as_toml(value)
+
+
+def _inline(old: str, keys: Path, value: object) -> str:
+    import tomlkit
+
+    document = tomlkit.parse(f"x = {old}\n")
+    inner: Any = document["x"]
+    for key in keys[:-1]:
+        if key not in inner:
+            inner[key] = tomlkit.inline_table()
+        inner = inner[key]
+    if value is None:
+        inner.pop(keys[-1], None)
+    elif keys[-1] in inner or not isinstance(value, Mapping):
+        inner[keys[-1]] = value
+    else:
+        inner.append(keys[-1], tomlkit.item(value))
+    return document.as_string().removeprefix("x = ").removesuffix("\n")
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    """An item of a list, and its comments: on lines of their own above it, and behind it."""
+
+    text: str
+    above: tuple[str, ...] = ()
+    behind: str = ""
+
+    @property
+    def said(self) -> Any:
+        return tomllib.loads(f"x = {self.text}")["x"]
+
+
+def _list(old: str, values: Sequence[object]) -> str:
+    """The text of a list set anew; items that stay keep their text and their comments."""
+    items, below = _items(old)
+    if not items:
+        return as_toml(values)
+    taken = [_taken(items, value) for value in values]
+    if "\n" not in old:
+        first, last = re.match(r"\[[ \t]*", old), re.search(r"[ \t]*\]\Z", old)
+        assert first
+        assert last
+        return f"{first[0]}{', '.join(item.text for item in taken)}{last[0]}" if taken else "[]"
+    end, indent, closing = end_of_line(old), re.search(r"\n([ \t]*)[^\s\]]", old), re.search(r"\n([ \t]*)\]\Z", old)
+    margin = indent[1] if indent else "  "
+    lines = [line for item in taken for line in (*item.above, f"{item.text},{item.behind}")] + below
+    return f"[{end}{''.join(margin + line + end for line in lines)}{closing[1] if closing else ''}]"
+
+
+def _taken(items: list[_Item], value: Any) -> _Item:
+    """The item that says this, or of tables the one whose first key says it, with the rest changed; else a new one."""
+    item = next((item for item in items if type(item.said) is type(value) and item.said == value), None)
+    if item is None and isinstance(value, Mapping):
+        item = next((item for item in items if _is_like(item.said, value)), None)
+    if item is None:
+        return _Item(as_toml(value))
+    items.remove(item)
+    said, text = item.said, item.text
+    if said == value:
+        return item
+    if said.keys() != value.keys():
+        return replace(item, text=as_toml(value))
+    for key in (key for key in said if said[key] != value[key]):
+        text = _inline(text, (key,), value[key])
+    return replace(item, text=text)
+
+
+def _is_like(said: object, value: Mapping[str, object]) -> bool:
+    first = next(iter(value), None)
+    return first is not None and isinstance(said, Mapping) and said.get(first) == value[first]
+
+
+def _items(old: str) -> tuple[list[_Item], list[str]]:
+    """The items of a list, and the comments below the last one."""
+    items: list[_Item] = []
+    above: list[str] = []
+    depth, start, stop, is_new_line, space = 0, 0, 0, False, ""
+
+    def close() -> None:
+        nonlocal start, stop
+        if stop > start:
+            items.append(_Item(old[start:stop], tuple(above)))
+            above.clear()
+        start = stop
+
+    for match in TOKEN.finditer(old, 1, len(old) - 1):
+        token = match[0]
+        if depth == 0 and token[0] == "#":
+            close()
+            if is_new_line or not items:
+                above.append(token.rstrip())
+            else:
+                items[-1] = replace(items[-1], behind=space + token.rstrip())
+        elif depth == 0 and token == ",":
+            close()
+        elif not token.isspace():
+            start = start if stop > start else match.start()
+            stop, is_new_line = match.end(), False
+        is_new_line, space = is_new_line or token == "\n", token if token.isspace() else ""
+        depth += (token in ("[", "{")) - (token in ("]", "}"))
+    close()
+    return items, above

@@ -169,6 +169,69 @@ def test_the_sample_tables_pass(monkeypatch: pytest.MonkeyPatch):
     assert {f["rule"] for f in result.json["findings"]} <= {"identical-rows"}
 
 
+# ---- saved contexts
+
+
+CASES = "Case,Expected,speed\nslow,run,1\nfast,run,9\nbroken,run,quick\n"
+
+
+@pytest.mark.parametrize("path", ["game", "game/jog.csv", "game/jog.cases.csv", "./game/jog.cases.csv"])
+def test_saved_contexts_are_checked_with_their_table(here: Path, path: str):
+    write(here, CASES, "jog.cases.csv")
+    result = run("check", path, "--json")
+    assert result.code == 1
+    places = [(f["rule"], f["level"], f["table"], f["file"], f["line"], f["column"]) for f in result.json["findings"]]
+    assert [(*place[:3], Path(place[3]).as_posix(), *place[4:]) for place in places] == [
+        ("case-failed", "error", "jog", "game/jog.cases.csv", 3, "Expected"),
+        ("unreadable-case", "error", "jog", "game/jog.cases.csv", 4, "speed"),
+    ]
+
+
+def test_saved_contexts_that_hold_say_nothing(here: Path):
+    write(here, "".join(CASES.splitlines(keepends=True)[:2]), "jog.cases.csv")
+    assert run("check", "game").lines == ["jog: 1 row, 1 condition, nothing found", "", "1 table checked: nothing found."]
+
+
+def test_saved_contexts_are_not_asked_of_a_table_that_cannot_be_read(here: Path):
+    write(here, "Asset,speed\nrun,fast\n")
+    write(here, CASES, "jog.cases.csv")
+    assert found("game/jog.cases.csv") == [("error", "unreadable-cell", "jog")]
+
+
+@pytest.mark.parametrize("path", ["game", "game/jgo.cases.csv"])
+def test_saved_contexts_without_a_table_are_an_error(here: Path, path: str):
+    write(here, CASES, "jgo.cases.csv")
+    [finding] = run("check", path, "--json").json["findings"]
+    assert (finding["rule"], finding["level"], finding["file"]) == ("unreadable-case", "error", "game/jgo.cases.csv")
+    assert 'Accepted: "jgo.csv" or "jgo.parquet". Did you mean "jog.cases.csv"?' in finding["message"]
+
+
+@pytest.mark.parametrize("path", ["game", "game/jog.csv", "game/jog.cases.csv"])
+def test_a_file_of_cases_that_cannot_be_read_is_an_error(here: Path, path: str):
+    write(here, "case,speed\nslow,1\n", "jog.cases.csv")
+    [finding] = run("check", path, "--json").json["findings"]
+    assert (finding["rule"], finding["table"], finding["line"]) == ("unreadable", "jog", 1)
+    assert finding["message"].endswith('Try to rename "case".')
+
+
+def test_a_file_of_cases_that_is_not_there_is_no_such_path():
+    result = run("check", "game/jog.cases.csv")
+    assert (result.code, result.out) == (2, "")
+
+
+def test_saved_contexts_of_a_declared_table_lie_beside_its_file(here: Path):
+    (here / "game" / "deep").mkdir()
+    (here / "game" / "contextdb.toml").write_text(TOML.replace("moved.csv", "deep/moved.csv"), encoding="utf-8")
+    write(here, CLEAN, "deep/moved.csv")
+    write(here, CASES, "deep/moved.cases.csv")
+    write(here, CASES, "deep/stray.cases.csv")
+    assert found() == [
+        ("error", "case-failed", "gone"),
+        ("error", "unreadable-case", "gone"),
+        ("error", "unreadable-case", None),
+    ]
+
+
 # ---- formats
 
 

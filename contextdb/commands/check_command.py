@@ -1,9 +1,10 @@
-"""What is wrong with the tables: cells that cannot be read, empty cells, identical rows, undeclared conditions.
+"""What is wrong with the tables: cells that cannot be read, empty cells, rows that others make needless, saved contexts that fail.
 
 Exits with 1 when there are findings at the level of --fail-on, with 2 when there is no such path.
 
   contextdb check tables/
   contextdb check tables/ --format github --fail-on warning
+  contextdb check tables/hit_mid_air.cases.csv
 """
 
 from __future__ import annotations
@@ -11,23 +12,29 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from contextdb import report
+from contextdb.cases import cases_path, check_cases, read_cases
 from contextdb.check import check
 from contextdb.console import output, progress, terminal_width, wants_colour
-from contextdb.errors import ContextDBError, Fault
+from contextdb.covering.check_rows import check_rows, unused_conditions
+from contextdb.disk import TABLE_SUFFIXES, read_bytes
+from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.exit_codes import ExitCode
 from contextdb.findings import LEVELS, Finding
 from contextdb.places import table_path
-from contextdb.project import SCHEMA_FILE, folder_of, load_table, read_folder_schema, table_files, twice_named
+from contextdb.project import CASES_SUFFIX, SCHEMA_FILE, folder_of, load_table, read_folder_schema, table_files, twice_named
 from contextdb.report.results import CheckReport, TableSummary
+from contextdb.schema import Schema
+from contextdb.table import Table
+from contextdb.toml_lines import key_lines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
-    parser.add_argument("path", metavar="PATH", help="a folder of tables, or one table")
+    parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or its cases")
     formats = ", ".join(report.FORMATS)
     parser.add_argument("--format", choices=report.FORMATS, default="text", metavar="FORMAT", help=f"{formats} (default: text)")
     parser.add_argument("--json", action="store_const", const="json", dest="format", help="the same as --format json")
@@ -55,13 +62,16 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def check_path(text: str) -> CheckReport:
-    """Check everything under a path; what cannot be read at all is a finding too."""
+    """Check everything under a path, saved contexts too; what cannot be read at all is a finding."""
     path = Path(text)
     if not os.path.isdir(text) and path.name != SCHEMA_FILE:
-        return _check_files([(None, table_path(text))])
+        file = table_path(text)
+        table = _table_of(file) if _is_cases(file) else file
+        return CheckReport((), (_stray(file),)) if table is None else _check_files([(None, table)])
     folder = folder_of(path)
     try:
-        files = list(table_files(folder, read_folder_schema(folder)))
+        schema = read_folder_schema(folder)
+        files = list(table_files(folder, schema))
     except ContextDBError as error:
         return CheckReport((), tuple(_as_findings(error, None)))
     if not files:
@@ -69,11 +79,14 @@ def check_path(text: str) -> CheckReport:
         return CheckReport(
             (), (Finding("no-tables", "error", f"the folder holds no table. Accepted: {accepted}.", file=str(folder)),)
         )
-    return _check_files(files)
+    found = _check_files(files, schema)
+    return CheckReport(found.tables, (*found.findings, *_strays(folder, [file for _, file in files])))
 
 
-def _check_files(files: Sequence[tuple[str | None, Path]]) -> CheckReport:
+def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None = None) -> CheckReport:
+    """Check some tables; `schema` is given when they are all of its folder."""
     tables: list[TableSummary] = []
+    read: list[Table] = []
     findings = [Finding.of(fault) for fault in twice_named((name, path) for name, path in files if name is not None)]
     for name, path in progress(files, "checking"):
         try:
@@ -82,8 +95,57 @@ def _check_files(files: Sequence[tuple[str | None, Path]]) -> CheckReport:
             findings += _as_findings(error, name)
             continue
         tables.append(TableSummary(table.name, str(path), table.n_rows, len(table.conditions)))
+        read.append(table)
         findings += check(table)
+        findings += check_rows(table)
+        findings += _check_cases(table, cases_path(path))
+    if schema is not None and len(read) == len(files):
+        findings += unused_conditions(schema, read, _lines_of(schema))
     return CheckReport(tuple(tables), tuple(findings))
+
+
+def _lines_of(schema: Schema) -> dict[tuple[str, ...], int]:
+    return key_lines(read_bytes(Path(schema.file)).decode("utf-8-sig")) if schema.file else {}
+
+
+def _check_cases(table: Table, path: Path) -> list[Finding]:
+    try:
+        return check_cases(table, read_cases(path), str(path))
+    except ContextDBError as error:
+        return _as_findings(error, table.name)
+
+
+def _strays(folder: Path, tables: Sequence[Path]) -> Iterator[Finding]:
+    """A finding for every file of cases beside the tables that is none of theirs."""
+    taken = {os.path.abspath(cases_path(table)) for table in tables}
+    for beside in sorted({folder, *(table.parent for table in tables if table.parent.is_dir())}):
+        for path in sorted(beside.iterdir()):
+            if _is_cases(path) and path.is_file() and os.path.abspath(path) not in taken:
+                taken.add(os.path.abspath(path))
+                yield _stray(path)
+
+
+def _stray(path: Path) -> Finding:
+    stem = path.name[: -len(CASES_SUFFIX)]
+    stems = [p.stem for p in path.parent.iterdir() if _is_table(p)]
+    near = nearest(stem, stems)
+    mend = f" Did you mean {in_quotes(near + CASES_SUFFIX)}?" if near else ""
+    accepted = " or ".join(in_quotes(stem + suffix) for suffix in TABLE_SUFFIXES)
+    message = f"its cases cannot be asked: there is no table beside it. Accepted: {accepted}.{mend}"
+    return Finding("unreadable-case", "error", message, file=str(path))
+
+
+def _table_of(cases: Path) -> Path | None:
+    """The table that a file of cases belongs to."""
+    return next((p for p in sorted(cases.parent.iterdir()) if _is_table(p) and cases_path(p) == cases), None)
+
+
+def _is_cases(path: Path) -> bool:
+    return path.name.lower().endswith(CASES_SUFFIX) and not path.name.startswith(".")
+
+
+def _is_table(path: Path) -> bool:
+    return path.suffix.lower() in TABLE_SUFFIXES and not _is_cases(path)
 
 
 def _as_findings(error: ContextDBError, table: str | None) -> list[Finding]:

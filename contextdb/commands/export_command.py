@@ -1,0 +1,66 @@
+"""Export a table for other programs: CSV, TSV, Excel, Parquet, JSON, DMN, Unreal. The suffix of DST says which, or --as.
+
+What the format cannot hold is told with its place. A workbook keeps what contextdb.toml says of the table, so that importing it
+again loses nothing.
+
+  contextdb export tables/hit_mid_air.csv moves.xlsx
+  contextdb export hit_mid_air moves.json
+  contextdb export hit_mid_air - --as tsv | pbcopy
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from contextdb.console import drop_output, printable
+from contextdb.disk import write_atomic
+from contextdb.errors import Fault, FileError, Place, plural
+from contextdb.exchange.formats import FORMATS, format_of, write
+from contextdb.exit_codes import ExitCode
+from contextdb.places import table_path
+from contextdb.project import load_table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("source", metavar="SRC", help="a table file, or the name of a table")
+    parser.add_argument("target", metavar="DST", help="the file to write; - for standard output")
+    names = [name for name, one in FORMATS.items() if one.is_written]
+    parser.add_argument("--as", dest="format", metavar="FORMAT", choices=names, help=f"the format of DST: {', '.join(names)}")
+    parser.add_argument("--force", action="store_true", help="write over a file that is there")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Write one table; what could not be kept is told on standard error."""
+    is_standard = arguments.target == "-"
+    if is_standard and arguments.format is None:
+        raise FileError(Fault("standard output has no suffix that tells a format.", "--as with a format", "--as tsv"))
+    kind = format_of(arguments.target, arguments.format, for_writing=True)
+    if not is_standard and os.path.exists(arguments.target) and not arguments.force:
+        raise FileError(
+            Fault("the file is there already.", "a new name, or --force to write over it", place=Place(arguments.target))
+        )
+    table = load_table(table_path(arguments.source), strict=False)
+    raw, remarks = write(table, kind)
+    for remark in remarks:
+        print(printable(f"{table.name}: {remark}"), file=sys.stderr)
+    if is_standard:
+        _print(raw)
+        return ExitCode.OK
+    write_atomic(Path(arguments.target), raw)
+    print(printable(arguments.target))
+    said = f"{table.name}: {plural(table.n_rows, 'row')} as {kind.about.split(';')[0]}, {len(raw):,} bytes"
+    print(printable(said), file=sys.stderr)
+    return ExitCode.OK
+
+
+def _print(raw: bytes) -> None:
+    try:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(raw)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        drop_output()

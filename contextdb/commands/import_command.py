@@ -1,0 +1,180 @@
+"""Import a table from another program into a folder of tables: CSV in any dialect, TSV, Excel, Parquet, JSON, DMN, Unreal.
+
+Columns are matched with the conditions that contextdb.toml declares; for others a type is proposed from their cells, and declared
+there with the new table. What was decided, and why, is printed; --dry-run prints it alone.
+
+  contextdb import moves.xlsx tables/moves.csv --dry-run
+  contextdb import moves.xlsx tables/moves.csv --sheet Moves --map Sped=speed --map Notes=
+  contextdb import german.csv tables/jog.csv --decimal comma --type heading=angle
+  pbpaste | contextdb import - tables/pasted.csv --as tsv
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from contextdb.console import aligned, output, printable
+from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
+from contextdb.domains import KINDS
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural
+from contextdb.exchange.formats import FORMATS, ReadOptions, read
+from contextdb.exchange.importing import Plan, declared_differently, plan_import, project_of
+from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
+from contextdb.exchange.reading import Reading, listed
+from contextdb.exit_codes import ExitCode
+from contextdb.project import SCHEMA_FILE
+from contextdb.shapes import KIND_SYNONYMS
+
+DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|"}
+MOST_TEXT = 100
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("source", metavar="SRC", help="the file to import; - for standard input")
+    parser.add_argument("target", metavar="DST", help="the table file to write: .csv or .parquet, in a folder of tables")
+    names = [name for name, one in FORMATS.items() if one.is_read]
+    parser.add_argument("--as", dest="format", metavar="FORMAT", choices=names, help=f"the format of SRC: {', '.join(names)}")
+    parser.add_argument(
+        "--sheet", metavar="NAME", help="a sheet of a workbook, or cells of it (Moves!A1:F20); a decision of a DMN file"
+    )
+    parser.add_argument(
+        "--map", metavar="COLUMN=NAME", action="append", default=[], help="what a column is called here; COLUMN= leaves it out"
+    )
+    parser.add_argument(
+        "--type", metavar="NAME=TYPE", action="append", default=[], help="the type of a new condition, or output, priority, …"
+    )
+    parser.add_argument("--encoding", help="the encoding of a text file (default: told from its bytes)")
+    parser.add_argument("--delimiter", choices=DELIMITERS, help="what stands between fields (default: told from the file)")
+    parser.add_argument("--decimal", choices=("comma", "point"), help="what stands in 3,5 (default: told from the cells)")
+    parser.add_argument("--dry-run", action="store_true", help="write nothing")
+    parser.add_argument("--force", action="store_true", help="write over a table that is there")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Read, decide, say what was decided, write."""
+    target = _target(arguments.target, arguments.force or arguments.dry_run)
+    raw, name = _bytes(arguments.source)
+    reading = read(raw, name, _options(arguments))
+    for remark in reading.remarks:
+        print(printable(f"{name}: {remark}"), file=sys.stderr)
+    plan = _plan(reading, target, arguments)
+    if not arguments.dry_run:
+        plan.write()
+    with output():
+        print(*_lines(plan, reading, name, arguments.dry_run), sep="\n")
+    return ExitCode.OK
+
+
+def _target(text: str, may_overwrite: bool) -> Path:
+    target = Path(text)
+    place = Place(text)
+    if target.suffix.lower() not in TABLE_SUFFIXES:
+        mend = path_in_quotes(target.with_suffix(".csv")) if target.name else ""
+        raise FileError(Fault("a table file does not end so.", f"a name that ends in {' or '.join(TABLE_SUFFIXES)}", mend, place))
+    if not os.path.isdir(target.parent):
+        folder = path_in_quotes(target.parent)
+        raise FileError(Fault(f"there is no folder {folder}.", "a folder of tables", place=place, rule="no-such-path"))
+    if os.path.exists(target) and not may_overwrite:
+        raise FileError(Fault("the file is there already.", "a new name, or --force to write over it", place=place))
+    return target
+
+
+def _bytes(source: str) -> tuple[bytes, str]:
+    return (sys.stdin.buffer.read(), "standard input") if source == "-" else (read_bytes(source), source)
+
+
+def _options(arguments: argparse.Namespace) -> ReadOptions:
+    is_comma = None if arguments.decimal is None else arguments.decimal == "comma"
+    delimiter = None if arguments.delimiter is None else DELIMITERS[arguments.delimiter]
+    return ReadOptions(arguments.format, arguments.sheet, arguments.encoding, delimiter, is_comma)
+
+
+def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> Plan:
+    schema, settings = project_of(target)
+    mapped = propose(reading, schema, settings, _pairs(arguments.map, "--map", "COLUMN=NAME"))
+    for name in declared_differently(reading, schema):
+        told = f"the file declares {in_quotes(name)} otherwise than contextdb.toml, which holds."
+        print(printable(told), file=sys.stderr)
+    return plan_import(reading, target, mapped=_typed(mapped, reading, _pairs(arguments.type, "--type", "NAME=TYPE")))
+
+
+def _pairs(given: Sequence[str], option: str, form: str) -> dict[str, str]:
+    faults = [Fault(f"{option} {in_quotes(text)} has no =.", form) for text in given if "=" not in text]
+    if faults:
+        raise ContextDBError(*faults)
+    return dict(text.rsplit("=", 1) for text in given)
+
+
+def _typed(mapped: Sequence[Mapped], reading: Reading, types: dict[str, str]) -> list[Mapped]:
+    """The columns with the types that were asked for, by their names here or in the file."""
+    names = {column.name: column for column in mapped} | {column.source: column for column in mapped}
+    wanted: dict[str, Mapped] = {}
+    for name, given in types.items():
+        kind = KIND_SYNONYMS.get(given.casefold(), given)
+        if name not in names:
+            near = nearest(name, names)
+            raise ContextDBError(
+                Fault(f"--type: there is no column {in_quotes(name)}.", listed(list(names)), in_quotes(near) if near else "")
+            )
+        column = names[name]
+        if kind in KINDS:
+            if column.job == "condition" and not column.is_new:
+                raise ContextDBError(
+                    Fault(f"--type: contextdb.toml declares {in_quotes(name)} already.", "a condition that is new")
+                )
+            wanted[column.source] = as_type(column, reading.column(column.source), kind)
+        elif kind in JOBS:
+            wanted[column.source] = as_job(column, kind)
+        else:
+            words = [*KINDS, *JOBS]
+            near = nearest(kind, words)
+            raise ContextDBError(
+                Fault(f"--type: there is no type {in_quotes(given)}.", ", ".join(words), in_quotes(near) if near else "")
+            )
+    return [wanted.get(column.source, column) for column in mapped]
+
+
+# ---- what is said
+
+
+def _lines(plan: Plan, reading: Reading, name: str, is_dry: bool) -> list[str]:
+    table = plan.table
+    done = "would become" if is_dry else "became"
+    head = f"{name} ({FORMATS[reading.format].about.split(';')[0]}) {done} {plan.path}: {plural(table.n_rows, 'row')}."
+    rows = [("column", "becomes", "why"), *(_row(column) for column in plan.columns)]
+    return [printable(head), *aligned(rows, indent="  "), *_toml_lines(plan, is_dry), *_fault_lines(plan)]
+
+
+def _row(column: Mapped) -> tuple[str, str, str]:
+    if column.job == "left out":
+        return column.source, "(left out)", column.why
+    name = "" if column.name == column.source else f" {column.name}"
+    if column.job != "condition":
+        return column.source, f"{column.job}{name}", column.why
+    kind = f"new condition{name}, {column.kind}" if column.is_new else f"condition{name}"
+    meant = f'; is "{column.near}" meant? --map "{column.source}={column.near}"' if column.near else ""
+    return column.source, kind, f"{column.why}{meant}"
+
+
+def _toml_lines(plan: Plan, is_dry: bool) -> list[str]:
+    if plan.change is None:
+        return [f"{SCHEMA_FILE} says all of it already."]
+    new = plan.new_conditions
+    what = f"{plural(len(new), 'condition')} ({listed(new)}) and the table" if new else "the table"
+    return [
+        printable(f"{plan.change.path} {'would declare' if is_dry else 'declares'} {what} {in_quotes(plan.table.settings.name)}.")
+    ]
+
+
+def _fault_lines(plan: Plan) -> list[str]:
+    faults = plan.table.faults
+    if not faults:
+        return []
+    shown = [f"  {f.place.column}, row {f.place.row}: {f.message}" for f in faults[:3]]
+    more = f"  and {len(faults) - 3:,} more: contextdb check {plan.path}" if len(faults) > 3 else ""
+    return [f"{plural(len(faults), 'cell')} cannot be read:", *map(printable, shown), *([more] if more else [])]

@@ -1,0 +1,218 @@
+"""Texts with delimiters, in the dialects that Excel and other programs write: which one a file is in, and its grid.
+
+Commas, semicolons, tabs or vertical bars; fields in double quotes with quotes doubled; "sep=;" as the first line, which Excel
+obeys. Numbers with decimal commas are told from pairs (centre, tolerance) by what else the file holds. What was decided, and why,
+stands in the remarks.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+from contextdb.columns import TextColumn
+from contextdb.errors import Fault, Place, TableError, in_quotes, plural
+from contextdb.exchange.conflicts import require_no_conflicts
+from contextdb.exchange.grid import Block, columns_of
+from contextdb.exchange.reading import Reading, Remark, listed
+from contextdb.record_faults import MOST_CHARACTERS
+
+DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "vertical bars"}
+SAMPLE = 100
+"""Records that tell which delimiter a file has."""
+
+_SEP_LINE = re.compile(r'"?sep=(.)"?\r?\n?', re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+_DECIMAL_POINT = re.compile(r"(?<!\.)\d*\.(?!\.)\d")
+_NUMERIC = re.compile(r"(?:not\b|[\d\s.,+\-±<>=()\[\]|~])+", re.IGNORECASE)
+_BROKEN = {
+    "unexpected end of data": "a quoted field is never closed",
+    "'\"' expected after '\"'": "a field goes on after a quote that closes it",
+    "delimiter": "a field goes on after a quote that closes it",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How a text is cut into fields."""
+
+    delimiter: str
+    first: int = 0
+    """Where its first record starts: behind a "sep=;" line."""
+    remarks: tuple[Remark, ...] = ()
+
+
+def read_delimited(
+    text: str, file: str, wanted: str | None = None, block: Block | None = None, is_decimal_comma: bool | None = None
+) -> Reading:
+    """Read a text with delimiters.
+
+    Parameters
+    ----------
+    wanted : str, optional
+        The delimiter; default: the one that fits best.
+    is_decimal_comma : bool, optional
+        Whether 3,5 is a number with a decimal comma; default: told from the cells.
+
+    Raises
+    ------
+    TableError
+        An unresolved git conflict, quotes that do not close, rows of different length, or no table; with the line.
+    """
+    require_no_conflicts(text, file)
+    dialect = dialect_of(text, wanted)
+    grid, notes = _records(text[dialect.first :], dialect.delimiter, file)
+    columns, more = columns_of(grid, file, block or _whole(grid), "line")
+    columns, decimals = with_points(columns, dialect.delimiter, is_decimal_comma)
+    name = "tsv" if dialect.delimiter == "\t" else "csv"
+    return Reading(tuple(columns), name, (*dialect.remarks, *notes, *more, *decimals))
+
+
+def dialect_of(text: str, wanted: str | None = None) -> Dialect:
+    """The dialect of a text; the remarks say what it was told from."""
+    if wanted is not None:
+        return Dialect(wanted)
+    if found := _SEP_LINE.match(text):
+        named = DELIMITERS.get(found[1], in_quotes(found[1]))
+        return Dialect(
+            found[1], found.end(), (Remark(f"{named} between the fields, as the line {in_quotes(found[0].strip())} says."),)
+        )
+    counts = {mark: _field_counts(text, mark) for mark in DELIMITERS}
+    best = max(DELIMITERS, key=lambda mark: _fitness(counts[mark]))
+    if _fitness(counts[best])[0] == 0:
+        return Dialect(",", 0, (Remark("one column: no delimiter stands in the first line."),))
+    header, agreeing, total = _fit(counts[best])
+    told = f"{DELIMITERS[best]} between the fields: {header} in the first line and in {agreeing:,} of the next {total:,}."
+    return Dialect(
+        best, 0, (Remark(told),) if total else (Remark(f"{DELIMITERS[best]} between the fields: {header} in the first line."),)
+    )
+
+
+def _field_counts(text: str, delimiter: str) -> list[int]:
+    """How many fields each of the first records has under a delimiter; blank lines have none."""
+    records = csv.reader(io.StringIO(text[: SAMPLE * 4096], newline=""), delimiter=delimiter)
+    try:
+        return [len(record) for record in islice(records, SAMPLE + 1) if any(record)]
+    except csv.Error:
+        return []
+
+
+def _fit(counts: Sequence[int]) -> tuple[int, int, int]:
+    """The fields of the header, how many other records have as many, and how many others there are."""
+    header, rest = counts[0], counts[1:]
+    return header, sum(n == header for n in rest), len(rest)
+
+
+def _fitness(counts: Sequence[int]) -> tuple[float, int]:
+    """How well a delimiter fits: the share of records that have as many fields as the header, and how many those are."""
+    if not counts or counts[0] < 2:
+        return 0.0, 0
+    header, agreeing, total = _fit(counts)
+    return (1 + agreeing) / (1 + total), header
+
+
+def _whole(grid: Sequence[Sequence[str]]) -> Block:
+    """All of a text is one table, from its first record on; only a sheet has several."""
+    return Block(0, 0, len(grid), len(grid[0]) if grid else 0)
+
+
+def _records(text: str, delimiter: str, file: str) -> tuple[list[list[str]], list[Remark]]:
+    """The records of a text, all as wide as its header."""
+    csv.field_size_limit(max(csv.field_size_limit(), 2 * MOST_CHARACTERS))
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    grid, lines, line = list[list[str]](), list[int](), 1
+    try:
+        for record in reader:
+            if record or grid:
+                grid.append(record)
+                lines.append(line)
+            line = reader.line_num + 1
+    except csv.Error as error:
+        raise TableError(_broken(str(error), text, line, file)) from None
+    while grid and not any(grid[-1]):
+        grid.pop()
+    return _evened(grid, lines, file)
+
+
+def _evened(grid: list[list[str]], lines: Sequence[int], file: str) -> tuple[list[list[str]], list[Remark]]:
+    """Records as wide as the header: empty fields at the end may be missing or too many; others are faults."""
+    if not grid:
+        return grid, []
+    while len(grid[0]) > 1 and not grid[0][-1].strip() and not any(any(record[len(grid[0]) - 1 :]) for record in grid):
+        grid[0].pop()
+    width = len(grid[0])
+    wrong = [at for at, record in enumerate(grid) if len(record) > width and any(record[width:])]
+    if wrong:
+        faults = [_too_wide(len(grid[at]), width, Place(file, lines[at])) for at in wrong[:20]]
+        raise TableError(*faults)
+    short = [at for at, record in enumerate(grid) if 0 < len(record) < width and any(record)]
+    grid = [record if len(record) == width else (record + [""] * (width - len(record)))[:width] for record in grid]
+    if not short:
+        return grid, []
+    return grid, [
+        Remark(
+            f"{plural(len(short), 'line')} with fewer than {width} fields; the missing ones are empty.", f"line {lines[short[0]]}"
+        )
+    ]
+
+
+def _too_wide(n_fields: int, width: int, place: Place) -> Fault:
+    found = f"found {plural(n_fields, 'field')}, the first line has {width}."
+    return Fault(found, "a field with the delimiter in it in double quotes", "to name the delimiter with --delimiter", place)
+
+
+def _broken(why: str, text: str, line: int, file: str) -> Fault:
+    said = next((told for part, told in _BROKEN.items() if part in why), why)
+    shown_line = next(islice(io.StringIO(text), line - 1, None), "").rstrip("\r\n")
+    accepted = "a field in double quotes from its start to its end, each quote in it doubled"
+    return Fault(f"{said}: {in_quotes(shown_line)}.", accepted, place=Place(file, line))
+
+
+# ---- decimal commas
+
+
+def with_points(
+    columns: Iterable[TextColumn], delimiter: str, is_decimal_comma: bool | None
+) -> tuple[list[TextColumn], list[Remark]]:
+    """Columns with decimal points for decimal commas, and what was decided.
+
+    Left to itself, a comma between two digits is a decimal one in a file with semicolons or bars where no number has a point: "3,5"
+    in a file with "3.5" is a pair, centre and tolerance, and so it is in a file with tabs, which contextdb writes too.
+    """
+    columns = list(columns)
+    if is_decimal_comma is False or (delimiter == "," and not is_decimal_comma):
+        return columns, []
+    numeric = [_numeric_texts(column) for column in columns]
+    has_comma = [any(_DECIMAL_COMMA.search(text) for text in texts) for texts in numeric]
+    if not any(has_comma):
+        return columns, []
+    pointed = next((text for texts in numeric for text in texts if _DECIMAL_POINT.search(text)), None)
+    where = listed([c.name for c, has in zip(columns, has_comma, strict=True) if has])
+    example = next(text for texts in numeric for text in texts if _DECIMAL_COMMA.search(text))
+    if is_decimal_comma is None and (pointed is not None or delimiter == "\t"):
+        why = (
+            f": other numbers have points, such as {in_quotes(pointed)}."
+            if pointed is not None
+            else "; say so if it is a decimal comma."
+        )
+        return columns, [Remark(f"{in_quotes(example)} is taken as centre and tolerance{why}", f"column {where}")]
+    changed = [_pointed(column, texts) if has else column for column, texts, has in zip(columns, numeric, has_comma, strict=True)]
+    told = f"decimal commas became points: {in_quotes(example)} is now {in_quotes(_DECIMAL_COMMA.sub('.', example))}."
+    return changed, [Remark(told, f"column {where}")]
+
+
+def _numeric_texts(column: TextColumn) -> list[str]:
+    return [text for text in column.texts if text and _NUMERIC.fullmatch(text)]
+
+
+def _pointed(column: TextColumn, numeric: Sequence[str]) -> TextColumn:
+    new = {text: _DECIMAL_COMMA.sub(".", text) for text in numeric}
+    texts = [new.get(text, text) for text in column.texts]
+    if len(Counter(texts)) < len(texts):  # two texts became one
+        return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))
+    return replace(column, texts=tuple(texts))

@@ -1,0 +1,120 @@
+"""A table as a DMN 1.3 decision table: conditions are inputs, the asset the first output, other columns further outputs.
+
+What unary tests cannot say is told with its place: a row that can never match or is disabled is left out, a soft cell excludes
+nothing, a column of tags becomes an annotation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from contextdb.console import printable
+from contextdb.domains import Domain
+from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.exchange.feel import literal, unary_tests
+from contextdb.exchange.reading import Remark, capped
+from contextdb.exchange.xlsx_parts import DECLARATION, NEVER, attribute
+from contextdb.table import ConditionColumn, Table
+
+NAMESPACE = "https://www.omg.org/spec/DMN/20191111/MODEL/"
+_POLICIES = {"unique": "UNIQUE", "first": "FIRST", "collect": "COLLECT", "priority": "PRIORITY"}
+_TYPES = {"bool": "boolean", "int": "number", "number": "number", "angle": "number", "enum": "string", "text": "string"}
+
+
+def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
+    """The DMN file of a table, and what could not be said in it.
+
+    Raises
+    ------
+    TableError
+        Cells that cannot be read, or texts that XML cannot hold.
+    """
+    table.require_readable()
+    _require_xml(table)
+    inputs = [column for column in table.conditions if column.condition.domain.kind != "tags"]
+    tags = [column for column in table.conditions if column.condition.domain.kind == "tags"]
+    rows, remarks = _rows(table, inputs)
+    outputs = [table.asset_column, *(name for name in _plain(table) if name != table.asset_column)]
+    parts = [
+        *(_input(column) for column in inputs),
+        *(f'<output id="output_{at}" name="{attribute(name)}" typeRef="string"/>' for at, name in enumerate(outputs, 1)),
+        *(f'<annotation name="{attribute(column.condition.name)}"/>' for column in tags),
+        *(_rule(table, row, inputs, outputs, tags) for row in rows),
+    ]
+    body = "\n      ".join(parts)
+    text = (
+        f'{DECLARATION}<definitions xmlns="{NAMESPACE}" id="definitions" name="{attribute(table.name)}" namespace="contextdb">\n'
+        f'  <decision id="decision" name="{attribute(table.name)}">\n'
+        f'    <decisionTable id="table" hitPolicy="{_POLICIES[table.settings.policy]}">\n      {body}\n'
+        "    </decisionTable>\n  </decision>\n</definitions>\n"
+    )
+    return text.encode(), (*remarks, *_about(table, tags))
+
+
+def _require_xml(table: Table) -> None:
+    for column in table.columns:
+        for text in (column.name, *column.texts):
+            if NEVER.search(text) or any(ord(c) < 32 and c not in "\t\n\r" for c in text):
+                found = f"{in_quotes(text)} has a character that XML cannot hold."
+                raise TableError(Fault(found, "text without it", place=Place(column=printable(column.name))))
+
+
+def _plain(table: Table) -> list[str]:
+    """The columns that are no conditions; the enabled one is told by which rows there are."""
+    conditions = {column.condition.name for column in table.conditions}
+    return [c.name for c in table.columns if c.name not in conditions and c.name != table.settings.enabled]
+
+
+def _rows(table: Table, inputs: Sequence[ConditionColumn]) -> tuple[list[int], tuple[Remark, ...]]:
+    """The rows that become rules, and what is lost of others."""
+    rows, remarks = [], []
+    for row in range(table.n_rows):
+        place = f"row {row}, {in_quotes(table.assets[row])}"
+        empty = next((c.condition.name for c in inputs if c.cell(row).is_empty and not c.cell(row).is_soft), None)
+        if not table.enabled[row] or empty is not None:
+            why = "it is disabled" if empty is None else f"its cell of {in_quotes(empty)} accepts nothing"
+            remarks.append(Remark(f"left out: {why}.", place, True))
+            continue
+        rows.append(row)
+        remarks += [
+            Remark(f"{in_quotes(c.texts[row])} becomes -: DMN has {why}.", f"{place}, column {in_quotes(c.condition.name)}", True)
+            for c in inputs
+            if unary_tests(c.cell(row)) is None
+            for why in ("no penalties" if c.cell(row).is_soft else "no infinite numbers",)
+        ]
+    return rows, capped(remarks, "losses")
+
+
+def _input(column: ConditionColumn) -> str:
+    name, domain = attribute(column.condition.name), column.condition.domain
+    values = ",".join(map(literal, domain.values)) if domain.values else ""
+    allowed = f"<inputValues><text>{attribute(values)}</text></inputValues>" if values else ""
+    expression = f'<inputExpression typeRef="{_TYPES[domain.kind]}"><text>{name}</text></inputExpression>'
+    return f'<input label="{name}">{expression}{allowed}</input>'
+
+
+def _rule(
+    table: Table, row: int, inputs: Sequence[ConditionColumn], outputs: Sequence[str], tags: Sequence[ConditionColumn]
+) -> str:
+    entries = [("inputEntry", unary_tests(column.cell(row)) or "-") for column in inputs]
+    entries += [("outputEntry", literal(table.text(row, name))) for name in outputs]
+    entries += [("annotationEntry", column.texts[row]) for column in tags]
+    return f"<rule>{''.join(f'<{tag}><text>{attribute(text)}</text></{tag}>' for tag, text in entries)}</rule>"
+
+
+def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
+    """What DMN has no words for in the whole table."""
+    for column in tags:
+        said = "tags become an annotation, which excludes nothing: DMN has no tests of sets."
+        yield Remark(said, f"column {in_quotes(column.condition.name)}", True)
+    if any(_is_angle(column.condition.domain) for column in table.conditions):
+        yield Remark("angles are told from -180 to 180; give the decision angles within these.")
+    if table.settings.policy == "priority":
+        yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
+    for key in ("fallback", "assume"):
+        if getattr(table.settings, key):
+            yield Remark(f"{key} is not kept: a decision table has no such thing.", is_loss=True)
+
+
+def _is_angle(domain: Domain) -> bool:
+    return domain.kind == "angle"

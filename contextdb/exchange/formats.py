@@ -1,0 +1,244 @@
+"""Which format a file is in, and who reads and writes it. Each format's module is loaded when it is first needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+
+from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest
+from contextdb.exchange.reading import Reading, Remark
+from contextdb.foreign import seems_to_be
+from contextdb.table import Table
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format: what it is called, and the endings of its files."""
+
+    name: str
+    about: str
+    suffixes: tuple[str, ...]
+    is_read: bool = True
+    is_written: bool = True
+
+
+FORMATS: Mapping[str, Format] = {
+    one.name: one
+    for one in (
+        Format("csv", "CSV; commas, semicolons or tabs are told apart when it is read", (".csv", ".txt")),
+        Format("tsv", "tab-separated text, as on the clipboard", (".tsv", ".tab")),
+        Format("xlsx", "an Excel workbook", (".xlsx", ".xlsm", ".xls")),
+        Format("parquet", "Parquet", (".parquet", ".pq")),
+        Format("jsonl", "JSON lines, an object for each row", (".jsonl", ".ndjson")),
+        Format("json", "JSON, a list of objects", (".json",)),
+        Format("dmn", "a DMN decision table", (".dmn",)),
+        Format("unreal-csv", "an Unreal DataTable as CSV", ()),
+        Format("unreal-json", "an Unreal DataTable as JSON", ()),
+    )
+}
+_BINARY_SIGNS = {"an Excel workbook (.xlsx)": "xlsx", "an old Excel workbook (.xls)": "xlsx", "a Parquet file": "parquet"}
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOptions:
+    """What a person may say of a file that is read; None: it is told from the file."""
+
+    format: str | None = None
+    sheet: str | None = None
+    """A sheet or cells of a workbook, or a decision of a DMN file."""
+    encoding: str | None = None
+    delimiter: str | None = None
+    is_decimal_comma: bool | None = None
+
+    @property
+    def says_how(self) -> bool:
+        """Whether it is said how a text is to be read."""
+        return (self.encoding, self.delimiter, self.is_decimal_comma) != (None, None, None)
+
+
+def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writing: bool = False) -> Format:
+    """The format of a file: the one that is wanted, else by its first bytes, else by its suffix.
+
+    Raises
+    ------
+    FileError
+        There is no such format, or the suffix tells of none.
+    """
+    known = {key: one for key, one in FORMATS.items() if (one.is_written if for_writing else one.is_read)}
+    if wanted is not None:
+        if wanted not in known:
+            near = nearest(wanted, known)
+            raise FileError(Fault(f"there is no format {in_quotes(wanted)}.", ", ".join(known), in_quotes(near) if near else ""))
+        return known[wanted]
+    if sign := _BINARY_SIGNS.get(seems_to_be(raw[:10_000]) or ""):
+        return known[sign]
+    suffix = PurePath(name).suffix.lower()
+    found = next((one for one in known.values() if suffix in one.suffixes), None)
+    if found and not (for_writing and suffix not in found.suffixes[:1] and found.name == "xlsx"):
+        return found
+    suffixes = [one.suffixes[0] for one in known.values() if one.suffixes]
+    near = nearest(suffix, suffixes)
+    said = (
+        f"a file that ends in {in_quotes(suffix)} is of no known format."
+        if suffix
+        else "the name has no suffix that tells a format."
+    )
+    raise FileError(Fault(said, f"{', '.join(suffixes)}, or --as with a format", in_quotes(near) if near else "", Place(name)))
+
+
+def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading:
+    """Read a table of any format.
+
+    Parameters
+    ----------
+    raw : bytes
+        The file.
+    name : str
+        Its name: for its suffix, and for messages.
+
+    Raises
+    ------
+    TableError
+        The file cannot be read as what it is, with the place of every fault.
+    FileError
+        It is of no known format, or what reads it is not installed.
+    """
+    kind = format_of(name, options.format, raw)
+    reading = _read(kind.name, raw, name, options)
+    suffix = PurePath(name).suffix.lower()
+    if options.format is None and suffix and suffix not in kind.suffixes:
+        told = Remark(f"by its first bytes this is {kind.about}, though its name ends in {suffix}.")
+        return replace(reading, remarks=(told, *reading.remarks))
+    return reading
+
+
+def sheet_names(raw: bytes, name: str) -> list[str]:
+    """The sheets of a workbook that may hold a table.
+
+    Raises
+    ------
+    TableError, FileError
+        It is no workbook that can be read, or what reads it is not installed.
+    """
+    from contextdb.exchange.xlsx_read import sheets_of
+
+    return sheets_of(raw, name)
+
+
+def _read(kind: str, raw: bytes, name: str, options: ReadOptions) -> Reading:
+    if kind == "xlsx":
+        from contextdb.exchange.xlsx_read import read_workbook
+
+        return read_workbook(raw, name, options.sheet)
+    if kind == "dmn":
+        from contextdb.exchange.dmn_read import read_dmn
+
+        return read_dmn(raw, name, options.sheet)
+    if options.sheet is not None:
+        raise TableError(Fault(f"{FORMATS[kind].about} has no sheets.", "no --sheet", place=Place(name)))
+    if kind == "parquet":
+        return _read_parquet(raw, name)
+    if kind == "csv" and not options.says_how and (ours := _own_csv(raw, name)):
+        return ours
+    return _read_text(kind, raw, name, options)
+
+
+def _read_parquet(raw: bytes, name: str) -> Reading:
+    from contextdb.parquet import read_parquet
+
+    source, columns = read_parquet(raw, name)
+    return Reading(tuple(columns), "parquet", source=source)
+
+
+def _own_csv(raw: bytes, name: str) -> Reading | None:
+    """A CSV that contextdb reads as it stands, so that it is written as it stands; None for every other."""
+    from contextdb.exchange.conflicts import begins_like_a_mark
+    from contextdb.exchange.unreal import is_unreal_header
+    from contextdb.source import read_csv
+
+    try:
+        source, columns = read_csv(raw, name)
+    except TableError:
+        return None
+    if any(map(begins_like_a_mark, columns[0].texts)):
+        return None
+    if (len(columns) == 1 and any(mark in columns[0].name for mark in ";\t|")) or is_unreal_header([c.name for c in columns]):
+        return None
+    return Reading(tuple(columns), "csv", source=source)
+
+
+def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions) -> Reading:
+    from contextdb.exchange import unreal
+    from contextdb.exchange.delimited import read_delimited
+    from contextdb.exchange.encodings import decoded
+    from contextdb.exchange.json_rows import read_json
+
+    text, remarks = decoded(raw, name, options.encoding)
+    if kind in ("json", "jsonl", "unreal-json"):
+        reading = read_json(text, name, kind)
+        if kind == "unreal-json":
+            reading = unreal.from_json(reading)
+    else:
+        delimiter = options.delimiter or ("\t" if kind == "tsv" else "," if kind == "unreal-csv" else None)
+        reading = read_delimited(text, name, delimiter, is_decimal_comma=options.is_decimal_comma)
+        if kind == "unreal-csv" or (kind == "csv" and unreal.is_unreal_header(reading.names)):
+            reading = unreal.from_csv(reading)
+    return replace(reading, remarks=(*remarks, *reading.remarks))
+
+
+def write(table: Table, kind: Format) -> tuple[bytes, tuple[Remark, ...]]:
+    """The bytes of a table in a format, and what could not be kept.
+
+    Raises
+    ------
+    TableError
+        The table has what the format cannot hold, with its place.
+    """
+    try:
+        return _written(table, kind.name)
+    except UnicodeEncodeError:
+        raise TableError(Fault("a text has half a surrogate pair.", "text in UTF-8")) from None
+
+
+def _written(table: Table, kind: str) -> tuple[bytes, tuple[Remark, ...]]:
+    columns = table.columns
+    if kind == "xlsx":
+        from contextdb.exchange.xlsx_write import write_xlsx
+
+        return write_xlsx(table), ()
+    if kind in ("csv", "parquet"):
+        return _rewritten(table, kind), ()
+    if kind == "tsv":
+        from contextdb.exchange.tab_text import write_tab_text
+
+        return write_tab_text(columns), ()
+    if kind in ("json", "jsonl"):
+        from contextdb.exchange.json_rows import write_json, write_json_lines
+
+        lost = () if table.n_rows else (Remark("a table without rows leaves no names of columns in JSON.", is_loss=True),)
+        return (write_json if kind == "json" else write_json_lines)(columns), lost
+    if kind == "dmn":
+        from contextdb.exchange.dmn_write import write_dmn
+
+        return write_dmn(table)
+    from contextdb.exchange import unreal
+
+    return unreal.write_json(table) if kind == "unreal-json" else unreal.write_csv(table)
+
+
+def _rewritten(table: Table, kind: str) -> bytes:
+    """The table's own file as it would be saved: what nobody changed keeps its bytes."""
+    import numpy as np
+
+    from contextdb.parquet import ParquetSource, rewritten_parquet
+    from contextdb.rewrite import rewritten
+    from contextdb.source import Source
+
+    fresh = np.full(table.n_rows, -1)
+    if kind == "csv":
+        is_own = isinstance(table.source, Source)
+        return rewritten(table.columns, table.source, table.origin).raw if is_own else rewritten(table.columns, None, fresh).raw  # type: ignore[arg-type]
+    if isinstance(table.source, ParquetSource):
+        return rewritten_parquet(table.columns, table.source, table.origin).raw
+    return rewritten_parquet(table.columns, None, fresh).raw

@@ -1,0 +1,144 @@
+"""Import: what a reading becomes as a table of a project, decided first, then written. An edge: this touches the disk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contextdb.columns import TextColumn
+from contextdb.errors import Fault, Place, TableError
+from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, propose
+from contextdb.exchange.reading import Reading
+from contextdb.files import write_texts
+from contextdb.project import schema_for
+from contextdb.schema import Schema, TableSettings, conditions_from_dict
+from contextdb.schema_file import SchemaChange, schema_change
+from contextdb.sections import condition_to_dict, job_faults
+from contextdb.table import Table, build_table
+
+if TYPE_CHECKING:
+    from contextdb.files import AnySource
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A table that is about to be written, and what contextdb.toml will say of it."""
+
+    path: Path
+    columns: tuple[Mapped, ...]
+    table: Table
+    change: SchemaChange | None
+    """What contextdb.toml becomes; None where it says all of it already."""
+    field_of: tuple[int, ...]
+    """The column of the reading that each column of the table came from."""
+
+    @property
+    def new_conditions(self) -> list[str]:
+        """The conditions that contextdb.toml will declare anew."""
+        return [column.name for column in self.columns if column.is_new and column.job == "condition"]
+
+    def write(self) -> None:
+        """Write the table, then contextdb.toml.
+
+        Raises
+        ------
+        FileError, TableError
+            The disk refuses, or a text cannot be written; what stood there before is then whole.
+        """
+        write_texts(self.path, self.table.columns, self.table.source, self.table.origin, self.field_of)
+        if self.change is not None:
+            self.change.write()
+
+
+def plan_import(
+    reading: Reading, path: Path, renames: Mapping[str, str] | None = None, mapped: Sequence[Mapped] | None = None
+) -> Plan:
+    """Decide what a reading becomes as the table file `path`.
+
+    Parameters
+    ----------
+    renames : mapping of str to str, optional
+        As in `contextdb.exchange.mapping.propose`.
+    mapped : sequence of Mapped, optional
+        What becomes of each column, where a person decided; default: what is proposed.
+
+    Raises
+    ------
+    ContextDBError
+        contextdb.toml cannot be read or could not say this; or the columns do not make a table.
+    """
+    schema, settings = project_of(path)
+    columns = tuple(mapped) if mapped is not None else propose(reading, schema, settings, renames)
+    table, field_of = table_of(reading, columns, schema, settings, path)
+    before = replace(table, schema=schema, settings=settings)
+    return Plan(path, columns, table, schema_change(before, table), field_of)
+
+
+def project_of(path: Path) -> tuple[Schema, TableSettings]:
+    """What contextdb.toml declares for a table file that is there or not yet, and what it says of this table."""
+    folder, schema = schema_for(path)
+    whole, root = path.parent.resolve() / path.name, folder.resolve()
+    return schema, schema.settings_for(whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path.name)
+
+
+def table_of(
+    reading: Reading, mapped: Sequence[Mapped], schema: Schema, settings: TableSettings, path: Path | None = None
+) -> tuple[Table, tuple[int, ...]]:
+    """The table that columns become, and the column of the reading that each came from.
+
+    Raises
+    ------
+    TableError
+        No column names the assets, or two do; a column has no place under its name.
+    SchemaError
+        A new condition that contextdb.toml could not hold.
+    """
+    kept = [(at, column) for at, column in enumerate(mapped) if column.job != "left out"]
+    assets = [column for _, column in kept if column.job == "asset"]
+    if len(assets) != 1:
+        found = "no column names the assets." if not assets else f"{len(assets)} columns name the assets."
+        raise TableError(Fault(found, "one column of names", place=Place(str(path) if path else None)))
+    declared = {c.name: c.declared for _, c in kept if c.is_new and c.job == "condition" and c.declared is not None}
+    schema = replace(schema, conditions={**schema.conditions, **conditions_from_dict(declared)})
+    settings = _settings(settings, [column for _, column in kept], reading)
+    faults = list(job_faults(settings, [column.name for _, column in kept], schema))
+    if faults:
+        raise TableError(*(fault.at(Place(str(path) if path else None)) for fault in faults))
+    texts = [_renamed(reading.columns[at], column.name) for at, column in kept]
+    source, field_of = _source(reading, path), tuple(at for at, _ in kept)
+    table = build_table(settings.name, texts, schema, settings, path, source)
+    return replace(table, origin=np.arange(table.n_rows) if source else np.full(table.n_rows, -1)), field_of if source else (
+        -1,
+    ) * len(kept)
+
+
+def _renamed(column: TextColumn, name: str) -> TextColumn:
+    return column if column.name == name else column.renamed(name)
+
+
+def _source(reading: Reading, path: Path | None) -> AnySource | None:
+    """The bytes that the file is written over, where it has the same format."""
+    is_same = path is not None and path.suffix.lower() == f".{reading.format}"
+    return reading.source if is_same else None
+
+
+def _settings(settings: TableSettings, kept: Sequence[Mapped], reading: Reading) -> TableSettings:
+    """The settings under the jobs of the columns; what the file itself keeps of fallback, policy and assumptions is taken over."""
+    said: dict[str, Any] = {"outputs": tuple(column.name for column in kept if column.job == "output")}
+    said["asset"] = next(column.name for column in kept if column.job == "asset")
+    for job in PLAIN_JOBS:
+        said[job] = next((column.name for column in kept if column.job == job), None)
+    own = next(iter(reading.schema.tables.values()), None)
+    if own is not None and settings == TableSettings(settings.name, settings.file):
+        said |= {"fallback": own.fallback, "policy": own.policy, "assume": own.assume}
+    return replace(settings, **said)
+
+
+def declared_differently(reading: Reading, schema: Schema) -> list[str]:
+    """Conditions that the file itself declares otherwise than the project, which goes first."""
+    ours, theirs = schema.conditions, reading.schema.conditions
+    return [name for name in theirs if name in ours and condition_to_dict(ours[name]) != condition_to_dict(theirs[name])]

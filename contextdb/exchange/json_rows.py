@@ -1,0 +1,173 @@
+"""JSON both ways: a list of objects, or one object a line, each a row by the names of its columns."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from contextdb.columns import TextColumn
+from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.exchange.conflicts import require_no_conflicts
+from contextdb.exchange.reading import Reading, Remark, listed
+from contextdb.exchange.values import text_of_value
+from contextdb.record_faults import MOST_CHARACTERS
+from contextdb.shapes import what
+from contextdb.source import name_faults
+
+_ACCEPTED = 'a list of objects, [{"Asset Name": "jog", "speed": "2..4"}], or one object a line'
+MOST_FAULTS = 20
+
+
+def read_json(text: str, file: str, format_name: str = "json") -> Reading:
+    """Read rows from a JSON document or from JSON lines; which one it is, is told from the text.
+
+    A key that a row leaves out, and null, is an empty cell. A list is a set of names; an object inside an object becomes columns
+    with a dot: {"Defender": {"speed": 3}} is the column Defender.speed.
+
+    Raises
+    ------
+    TableError
+        The text is no JSON, with its line; or no list of objects; or a git conflict stands in it.
+    """
+    require_no_conflicts(text, file)
+    rows, lines = parsed_rows(text, file)
+    flat = [_flat(row, Place(file, line)) for row, line in zip(rows, lines, strict=True)]
+    columns = columns_of_rows(flat, file)
+    missing = [name for name in (c.name for c in columns) if any(name not in row for row in flat)]
+    remarks = [Remark(f"some rows have no {listed(missing)}; those cells are empty.")] if missing else []
+    return Reading(tuple(columns), format_name, tuple(remarks))
+
+
+def parsed_rows(text: str, file: str) -> tuple[list[dict[str, Any]], list[int | None]]:
+    """The objects of a JSON document or of JSON lines, and the line of each where it is known."""
+    stripped = text.strip()
+    if not stripped:
+        raise TableError(Fault("the file is empty.", _ACCEPTED, place=Place(file)))
+    if stripped.startswith("["):
+        rows = _loaded(text, file)
+        return _objects(rows, [None] * len(rows), file)
+    lines = [(number, line) for number, line in enumerate(text.split("\n"), 1) if line.strip()]
+    document = _tried(stripped)
+    inner = _only_list(document)
+    if inner is not None:
+        return _objects(inner, [None] * len(inner), file)
+    if isinstance(document, dict) or isinstance(_tried(lines[0][1]), dict):
+        found = (
+            [_loaded(line, file, number) for number, line in lines]
+            if len(lines) > 1 and document is None
+            else [_loaded(text, file)]
+        )
+        return _objects(found, [number for number, _ in lines][: len(found)], file)
+    document = _loaded(text, file)
+    raise TableError(Fault(f"the document is {what(document)} without one list of rows.", _ACCEPTED, place=Place(file)))
+
+
+def _only_list(document: object) -> list[Any] | None:
+    """The rows of a document such as {"rows": [...]}, whose only list of objects they are."""
+    lists = [value for value in document.values() if isinstance(value, list)] if isinstance(document, dict) else []
+    return lists[0] if len(lists) == 1 and lists[0] and all(isinstance(row, dict) for row in lists[0]) else None
+
+
+def _tried(line: str) -> object:
+    try:
+        return json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _loaded(text: str, file: str, line: int | None = None) -> Any:
+    try:
+        return json.loads(
+            text, object_pairs_hook=_without_twins, parse_constant=lambda name: None if name == "NaN" else float(name)
+        )
+    except json.JSONDecodeError as error:
+        place = Place(file, error.lineno if line is None else line)
+        raise TableError(Fault(f"this is no JSON: {error.msg} at character {error.colno}.", _ACCEPTED, place=place)) from None
+    except RecursionError:
+        raise TableError(Fault("lists or objects stand in each other too deep.", _ACCEPTED, place=Place(file, line))) from None
+    except ValueError as error:
+        raise TableError(Fault(f"{error}.", "each key once in an object", place=Place(file, line))) from None
+
+
+def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        seen = set[str]()
+        twin = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
+        raise ValueError(f"the key {in_quotes(twin)} stands twice in one object")
+    return found
+
+
+def _objects(rows: Sequence[Any], lines: Sequence[int | None], file: str) -> tuple[list[dict[str, Any]], list[int | None]]:
+    faults = [
+        Fault(f"row {at} is {what(row)}, no object.", _ACCEPTED, place=Place(file, line))
+        for at, (row, line) in enumerate(zip(rows, lines, strict=True))
+        if not isinstance(row, dict)
+    ]
+    if faults:
+        raise TableError(*faults[:MOST_FAULTS])
+    return list(rows), list(lines)
+
+
+def _flat(row: Mapping[str, Any], place: Place, prefix: str = "") -> dict[str, str]:
+    found: dict[str, str] = {}
+    for key, value in row.items():
+        name = prefix + key
+        texts = _flat(value, place, f"{name}.") if isinstance(value, dict) else {name: _text(value, name, place)}
+        for twin in texts.keys() & found.keys():
+            raise TableError(Fault(f"the key {in_quotes(twin)} stands twice in one row.", "each key once", place=place))
+        found |= texts
+    return found
+
+
+def _text(value: object, name: str, place: Place) -> str:
+    if isinstance(value, list) and any(isinstance(item, (list, dict)) for item in value):
+        found = f"{in_quotes(name)} holds a list with lists or objects in it."
+        raise TableError(Fault(found, "texts, numbers, true, false, null, and lists of texts", place=place))
+    if isinstance(value, list) and not value:
+        return ""
+    text = text_of_value(value)
+    if len(text) > MOST_CHARACTERS:
+        fault = Fault(
+            f"{in_quotes(name)} has {len(text):,} characters.", f"at most {MOST_CHARACTERS:,} characters in a cell", place=place
+        )
+        raise TableError(fault)
+    return text
+
+
+def columns_of_rows(rows: Sequence[Mapping[str, str]], file: str) -> list[TextColumn]:
+    """Columns of rows, in the order in which their names first appear.
+
+    Raises
+    ------
+    TableError
+        There is no row, or a name that no column can have.
+    """
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    faults = [fault.at(Place(file)) for fault in name_faults(names)]
+    if not names:
+        faults = [Fault("there is no row.", _ACCEPTED, place=Place(file))]
+    if faults:
+        raise TableError(*faults)
+    return [TextColumn.of(name, [row.get(name, "") for row in rows]) for name in names]
+
+
+def write_json(columns: Sequence[TextColumn]) -> bytes:
+    """Columns as one JSON document: a list with an object for each row, every cell a text."""
+    return ("[\n" + ",\n".join(_row_lines(columns)) + "\n]\n" if columns[0].n_rows else "[]\n").encode()
+
+
+def write_json_lines(columns: Sequence[TextColumn]) -> bytes:
+    """Columns as JSON lines: an object for each row, every cell a text."""
+    return "".join(f"{line}\n" for line in _row_lines(columns)).encode()
+
+
+def _row_lines(columns: Sequence[TextColumn]) -> Iterator[str]:
+    fields = [[f"{_string(c.name)}: {_string(text)}" for text in c.texts] for c in columns]
+    cells = [[texts[code] for code in column.codes.tolist()] for texts, column in zip(fields, columns, strict=True)]
+    return (f"{{{', '.join(row)}}}" for row in zip(*cells, strict=True))
+
+
+def _string(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

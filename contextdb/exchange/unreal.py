@@ -1,0 +1,144 @@
+"""Unreal DataTables, as CSV and as JSON: the row names are the assets, a field that is a set is (A,B) there and A B here.
+
+Unreal's CSV begins with a header whose first name is "---" or empty; its JSON is a list of objects with a "Name". A name of a
+column there is a C++ identifier, so a dot becomes two underscores and back.
+
+Source: Unreal Engine documentation, "Data Driven Gameplay Elements": CSV and JSON of a DataTable.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+from contextdb.cell_words import quoted
+from contextdb.columns import TextColumn
+from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.exchange.reading import Reading, Remark, capped
+from contextdb.table import Table
+
+CSV_NAMES = ("---", "")
+JSON_NAME = "Name"
+_SET = re.compile(r'\(\s*(?:"(?:[^"\\]|\\.)*"|[\w.:/\-]+)(?:\s*,\s*(?:"(?:[^"\\]|\\.)*"|[\w.:/\-]+))*\s*\)')
+_ITEM = re.compile(r'"((?:[^"\\]|\\.)*)"|([\w.:/\-]+)')
+_STRUCT = re.compile(r"\(\s*\w+\s*=")
+_LOCALISED = re.compile(r'(?:NSLOCTEXT|INVTEXT|LOCTEXT)\(.*?"((?:[^"\\]|\\.)*)"\s*\)')
+
+
+def is_unreal_header(names: Sequence[str]) -> bool:
+    """Whether the first name of a header is the one that Unreal writes."""
+    return bool(names) and names[0] == CSV_NAMES[0]
+
+
+def from_csv(reading: Reading) -> Reading:
+    """What was read from an Unreal CSV, with cells as contextdb writes them."""
+    return _from_unreal(reading, "unreal-csv")
+
+
+def from_json(reading: Reading) -> Reading:
+    """What was read from an Unreal JSON, with cells as contextdb writes them."""
+    return _from_unreal(reading, "unreal-json")
+
+
+def _from_unreal(reading: Reading, kind: str) -> Reading:
+    first, *rest = reading.columns
+    remarks = [Remark("the row names of an Unreal DataTable name the assets.", f"column {in_quotes(first.name)}")]
+    columns = [first.renamed("Asset Name")]
+    for column in rest:
+        texts, lost = _cells(column)
+        columns.append(TextColumn.of(column.name.replace("__", "."), (texts[code] for code in column.codes.tolist())))
+        remarks += lost
+    return replace(reading, columns=tuple(columns), format=kind, remarks=(*reading.remarks, *remarks))
+
+
+def _cells(column: TextColumn) -> tuple[list[str], tuple[Remark, ...]]:
+    """Each distinct text as a cell, and those that are no value of ours."""
+    texts = [_cell(text) for text in column.texts]
+    place = f"column {in_quotes(column.name)}"
+    lost = [
+        Remark(f"{in_quotes(text)} is a struct; it is kept as text.", place, is_loss=True) for text in texts if _STRUCT.match(text)
+    ]
+    return texts, capped(lost, "structs")
+
+
+def _cell(text: str) -> str:
+    if found := _LOCALISED.fullmatch(text.strip()):
+        return found[1].replace('\\"', '"')
+    if text == "()":
+        return ""
+    if _SET.fullmatch(text.strip()) and ".." not in text:  # (10..30) is an open interval
+        return " ".join(quoted(bare or inner.replace('\\"', '"')) for inner, bare in _ITEM.findall(text))
+    return text
+
+
+# ---- writing
+
+
+def write_csv(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
+    """A table as the CSV of an Unreal DataTable: the assets as row names, every cell as text in quotes.
+
+    Raises
+    ------
+    TableError
+        An asset stands twice or is empty: Unreal's row names are unique.
+    """
+    columns, remarks = _unreal_columns(table)
+    out = io.StringIO(newline="")
+    writer = csv.writer(out, quoting=csv.QUOTE_ALL, lineterminator="\r\n")
+    out.write(",".join([CSV_NAMES[0], *(c.name for c in columns[1:])]) + "\r\n")
+    writer.writerows(zip(*(c.to_list() for c in columns), strict=True))
+    return out.getvalue().encode(), remarks
+
+
+def write_json(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
+    """A table as the JSON of an Unreal DataTable.
+
+    Raises
+    ------
+    TableError
+        As `write_csv`.
+    """
+    columns, remarks = _unreal_columns(table)
+    names = [JSON_NAME, *(c.name for c in columns[1:])]
+    rows = [dict(zip(names, row, strict=True)) for row in zip(*(c.to_list() for c in columns), strict=True)]
+    return (json.dumps(rows, ensure_ascii=False, indent="\t") + "\n").encode(), remarks
+
+
+def _unreal_columns(table: Table) -> tuple[list[TextColumn], tuple[Remark, ...]]:
+    """The columns under names that Unreal takes, the assets first."""
+    _require_unique(table)
+    rest = [c for c in table.columns if c.name != table.asset_column]
+    names = [_identifier(c.name) for c in rest]
+    twice = sorted(name for name, n in Counter([*names, JSON_NAME]).items() if n > 1)
+    if twice:
+        raise TableError(
+            Fault(f"two columns would be called {in_quotes(twice[0])} in Unreal.", "names that differ in letters and digits")
+        )
+    pairs = zip(rest, names, strict=True)
+    renamed = [Remark(f"is called {in_quotes(new)} in Unreal.", f"column {in_quotes(c.name)}") for c, new in pairs if new != c.name]
+    columns = [table.text_column(table.asset_column), *(c.renamed(n) for c, n in zip(rest, names, strict=True))]
+    return columns, capped(renamed, "renamed columns")
+
+
+def _require_unique(table: Table) -> None:
+    faults, rows = [], dict[str, int]()
+    for row, asset in enumerate(table.assets):
+        if not asset.strip() or asset in rows:
+            said = f"the asset {in_quotes(asset)} stands in row {rows[asset]} too." if asset in rows else "the row names no asset."
+            faults.append(
+                Fault(said, "a name of its own for each row, as Unreal wants it", place=Place(row=row, column=table.asset_column))
+            )
+        rows.setdefault(asset, row)
+    if faults:
+        raise TableError(*faults[:20])
+
+
+def _identifier(name: str) -> str:
+    """A name as C++ may have it: a dot as two underscores, any other character as one."""
+    word = re.sub(r"[^A-Za-z0-9_]", "_", name.replace(".", "__"))
+    return word if word[:1].isalpha() or word[:1] == "_" else f"_{word}"

@@ -1,0 +1,221 @@
+"""A sheet of a workbook as columns: of .xlsx, .xlsm and .xls, read by python-calamine.
+
+Values are read, never formulas; a merged area holds its value in each of its cells; dates, which Excel likes to make of `1-2`, are
+told. A workbook that contextdb wrote gives back its texts and its types.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from contextdb.columns import TextColumn
+from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes, nearest, plural, shown, some
+from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
+from contextdb.exchange.reading import Reading, Remark, capped, listed
+from contextdb.exchange.values import DATES, text_of_value
+from contextdb.exchange.xlsx_parts import FIRST_LINE, TYPES_SHEET
+from contextdb.exchange.xlsx_scan import formulas_of, require_workbook
+from contextdb.schema import EMPTY, Schema, read_schema
+
+if TYPE_CHECKING:
+    from python_calamine import CalamineWorkbook
+
+INSTALL = 'to install it: pip install "contextdb[xlsx]"'
+_ERRORS = frozenset(("#N/A", "#REF!", "#VALUE!", "#DIV/0!", "#NAME?", "#NULL!", "#NUM!"))
+_TEXT = {str}
+
+
+def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
+    """Read one sheet of a workbook.
+
+    Parameters
+    ----------
+    sheet : str, optional
+        The name of a sheet, or of cells in one: "Moves", "Moves!A1:F20", "A1:F20". Default: the only one with cells in it.
+
+    Raises
+    ------
+    TableError
+        The workbook is locked or broken, has no such sheet, or several of which none is named; or the sheet holds no table.
+    FileError
+        python-calamine is not installed.
+    """
+    require_workbook(raw, file)
+    book = _opened(raw, file)
+    names = [name for name in book.sheet_names if name.casefold() != TYPES_SHEET]
+    name, block = _wanted(sheet, names, file)
+    sheets = {each: _Sheet.read(book, each, file) for each in ([name] if name else names)}
+    name = name or _only(sheets, file)
+    values = sheets[name].values
+    kept, remarks = _kept_types(book, file)
+    remarks = [*remarks, *_oddities(values, raw, name)]
+    grid = [row if {*map(type, row)} == _TEXT else [text_of_value(value) for value in row] for row in values]
+    remarks += _fill_merged(grid, sheets[name].merged)
+    own = _own_block(grid) if kept is not None and block is None else None
+    columns, more = (_own_columns(grid, own), []) if own else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block)
+    told = [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
+    return Reading(tuple(columns), "xlsx", (*told, *remarks, *more), kept or EMPTY, sheets=tuple(names))
+
+
+def sheets_of(raw: bytes, file: str) -> list[str]:
+    """The sheets of a workbook that may hold a table.
+
+    Raises
+    ------
+    TableError, FileError
+        As `read_workbook`.
+    """
+    require_workbook(raw, file)
+    return [name for name in _opened(raw, file).sheet_names if name.casefold() != TYPES_SHEET]
+
+
+def _opened(raw: bytes, file: str) -> CalamineWorkbook:
+    try:
+        import python_calamine as calamine
+    except ImportError:
+        raise FileError(
+            Fault("workbooks are read by python-calamine, which is not installed.", mend=INSTALL, place=Place(file))
+        ) from None
+    try:
+        return calamine.CalamineWorkbook.from_filelike(io.BytesIO(raw))
+    except calamine.PasswordError:
+        fault = Fault("the workbook is locked with a password.", "one without", "to save it without a password", Place(file))
+    except BaseException as error:  # a class of its own for each kind of damage; at some it panics, which is no Exception
+        fault = _damaged(error, file)
+    raise TableError(fault)
+
+
+def _damaged(error: BaseException, file: str) -> Fault:
+    """What is said of a workbook that calamine cannot read; an interruption is passed on."""
+    if isinstance(error, (KeyboardInterrupt, SystemExit)):
+        raise error
+    found = f"the workbook is broken: {shown(str(error), 200)}."
+    return Fault(found, "a workbook as Excel saves it", "to open it in Excel and save it again", Place(file))
+
+
+# ---- which sheet
+
+
+def _wanted(sheet: str | None, names: Sequence[str], file: str) -> tuple[str | None, Block | None]:
+    """The sheet and the cells that are asked for, as far as they are."""
+    if not names:
+        raise TableError(Fault("the workbook has no sheet.", "a sheet with a table", place=Place(file)))
+    if sheet is None or sheet in names:
+        return sheet, None
+    name, mark, cells = sheet.rpartition("!")
+    block = parse_block(cells)
+    name = name.strip("'") or names[0]
+    if block is not None and name in names and (mark or len(names) == 1):
+        return name, block
+    near = nearest(sheet.partition("!")[0], names)
+    raise TableError(Fault(f"there is no sheet {in_quotes(sheet)}.", some(names), in_quotes(near) if near else "", Place(file)))
+
+
+def _only(sheets: dict[str, _Sheet], file: str) -> str:
+    """The only sheet that has cells in it."""
+    filled = [name for name, sheet in sheets.items() if any(value != "" for row in sheet.values for value in row)]
+    if len(filled) > 1:
+        found = f"{len(filled)} sheets hold cells: {listed(filled)}."
+        raise TableError(Fault(found, "one of them", f"to name it: --sheet {in_quotes(filled[0])}", Place(file)))
+    return filled[0] if filled else next(iter(sheets))
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """The values of a sheet, and its merged areas as ((top, left), (bottom, right)), the ends counted in."""
+
+    values: list[list[Any]]
+    merged: Sequence[tuple[tuple[int, int], tuple[int, int]]] = ()
+
+    @classmethod
+    def read(cls, book: CalamineWorkbook, name: str, file: str) -> _Sheet:
+        try:
+            sheet = book.get_sheet_by_name(name)
+            return cls(sheet.to_python(skip_empty_area=False), sheet.merged_cell_ranges or ())
+        except BaseException as error:  # as above
+            fault = _damaged(error, f"{file}, sheet {in_quotes(name)}")
+        raise TableError(fault)
+
+
+# ---- a workbook of our own
+
+
+def _kept_types(book: CalamineWorkbook, file: str) -> tuple[Schema | None, list[Remark]]:
+    """What the sheet of types says, nothing where that cannot be used; None where there is no such sheet."""
+    name = next((name for name in book.sheet_names if name.casefold() == TYPES_SHEET), None)
+    if name is None:
+        return None, []
+    lines = [text_of_value(row[0]) if row else "" for row in _Sheet.read(book, name, file).values]
+    if not lines or lines[0] != FIRST_LINE:
+        return None, [Remark("left out: it is not as contextdb writes it.", f"sheet {in_quotes(name)}")]
+    try:
+        return read_schema("\n".join(lines), f'{file}, sheet "{name}"'), []
+    except ContextDBError as error:
+        why = f"the types it keeps cannot be used: {error.faults[0].message}"
+        return EMPTY, [Remark(why, f"sheet {in_quotes(name)}", is_loss=True)]
+
+
+def _own_block(grid: Sequence[Sequence[str]]) -> Block | None:
+    """All of the sheet, as far as its first row has names; None where somebody put cells beside the table."""
+    if not grid:
+        return None
+    width = max((at for at, name in enumerate(grid[0], 1) if name), default=0)
+    is_alone = all(grid[0][:width]) and not any(any(row[width:]) for row in grid)
+    return Block(0, 0, len(grid), width) if width and is_alone and len(set(grid[0][:width])) == width else None
+
+
+def _own_columns(grid: Sequence[Sequence[str]], block: Block) -> list[TextColumn]:
+    """Every row and every text as it is, blank ones too."""
+    columns = zip(*(row[: block.right] for row in grid), strict=True)
+    return [TextColumn.of(name, texts) for name, *texts in columns]
+
+
+# ---- what a person should know
+
+
+def _fill_merged(grid: list[list[str]], merged: Sequence[tuple[tuple[int, int], tuple[int, int]]]) -> list[Remark]:
+    """Give every cell of a merged area the value of its first, and say so."""
+    remarks = []
+    for (top, left), (bottom, right) in merged:
+        if top >= len(grid) or left >= len(grid[top]):
+            continue
+        block, text = Block(top, left, min(bottom + 1, len(grid)), min(right + 1, len(grid[0]))), grid[top][left]
+        for row in grid[block.top : block.bottom]:
+            row[block.left : block.right] = [text] * (block.right - block.left)
+        remarks.append(Remark(f"merged cells; each now holds {in_quotes(text)}.", f"cells {block}"))
+    return list(capped(remarks, "merged areas"))
+
+
+def _oddities(values: Sequence[Sequence[Any]], raw: bytes, name: str) -> list[Remark]:
+    dates, errors = list[Remark](), list[Remark]()
+    for at, row in enumerate(values, 1):
+        if {*map(type, row)} > _TEXT:  # a row of texts alone, as most are, costs nothing
+            dates += [_date(value, at, column) for column, value in enumerate(row) if isinstance(value, DATES)]
+        if not _ERRORS.isdisjoint(row):
+            errors += [_error(value, at, column) for column, value in enumerate(row) if value in _ERRORS]
+    return [*capped(dates, "dates"), *capped(errors, "errors"), *_formulas(formulas_of(raw, name))]
+
+
+def _date(value: object, row: int, column: int) -> Remark:
+    told = f"a date, {text_of_value(value)}, as Excel makes of texts such as 1-2; write it as text there."
+    return Remark(told, f"cell {column_letters(column)}{row}", is_loss=True)
+
+
+def _error(value: object, row: int, column: int) -> Remark:
+    return Remark(f"an error of Excel, {value}.", f"cell {column_letters(column)}{row}", is_loss=True)
+
+
+def _formulas(found: Iterable[tuple[str, str, bool]]) -> list[Remark]:
+    found = list(found)
+    without = [
+        Remark(f"the formula ={shown(text)} has no value saved with it: the cell is empty.", f"cell {cell}", True)
+        for cell, text, has in found
+        if not has
+    ]
+    n_read = len(found) - len(without)
+    example = next((f"cell {cell}, ={shown(text)}" for cell, text, has in found if has and text), "")
+    said = f"{plural(n_read, 'formula')} read as the values that they had when the file was saved."
+    return ([Remark(said, example)] if n_read else []) + list(capped(without, "formulas without a value"))

@@ -1,0 +1,103 @@
+"""JSON documents and JSON lines, of ours and of others, as rows."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from contextdb.errors import TableError
+from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
+from contextdb.exchange.reading import Reading
+from contextdb.table import Table
+
+
+def texts(reading: Reading) -> dict[str, list[str]]:
+    return {column.name: column.to_list() for column in reading.columns}
+
+
+def refused(text: str, name: str = "x.json") -> str:
+    with pytest.raises(TableError) as caught:
+        read(text.encode(), name)
+    return str(caught.value)
+
+
+def test_values_of_json_become_cells():
+    rows = [{"Asset": "jog", "on": True, "speed": 2.5, "n": 5, "pos": ["CB", "Half Back"], "none": None}]
+    expected = {"Asset": ["jog"], "on": ["True"], "speed": ["2.5"], "n": ["5"], "pos": ['CB "Half Back"'], "none": [""]}
+    assert texts(read(json.dumps(rows).encode(), "x.json")) == expected
+
+
+def test_lines_documents_and_a_named_list_are_told_apart_whatever_the_suffix():
+    rows = [{"a": "x"}, {"a": "y"}]
+    lines = "\n".join(map(json.dumps, rows))
+    for text in (json.dumps(rows), lines, lines + "\n\n", json.dumps({"rows": rows}), json.dumps({"rows": rows}, indent=1)):
+        assert texts(read(text.encode(), "x.json")) == {"a": ["x", "y"]}
+        assert texts(read(text.encode(), "x.jsonl")) == {"a": ["x", "y"]}
+
+
+def test_keys_that_rows_leave_out_are_empty_and_told():
+    reading = read(b'[{"a": "x", "b": "1"}, {"c": "2", "a": "y"}]', "x.json")
+    assert texts(reading) == {"a": ["x", "y"], "b": ["1", ""], "c": ["", "2"]}
+    assert 'some rows have no "b", "c"; those cells are empty.' in str(reading.remarks[0])
+
+
+def test_an_object_in_an_object_becomes_columns_of_a_role():
+    assert texts(read(b'[{"a": "x", "Defender": {"pos": "CB", "at": {"y": 1}}}]', "x.json")) == {
+        "a": ["x"],
+        "Defender.pos": ["CB"],
+        "Defender.at.y": ["1"],
+    }
+
+
+def test_nan_is_empty_and_infinity_is_a_number():
+    assert texts(read(b'[{"a": "x", "b": NaN, "c": -Infinity}]', "x.json")) == {"a": ["x"], "b": [""], "c": ["-inf"]}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "the file is empty"),
+        ("[1, 2]", "row 0 is a number, no object."),
+        ('[{"a": 1},\n {"a": }]', "line 2: this is no JSON: Expecting value at character 8."),
+        ('{"a": 1}\n{"a": \n', "line 2: this is no JSON"),
+        ('[{"a": 1, "a": 2}]', 'the key "a" stands twice in one object'),
+        ('[{"a": {"b": 1}, "a.b": 2}]', 'the key "a.b" stands twice in one row'),
+        ('[{"a": [[1]]}]', '"a" holds a list with lists or objects in it'),
+        ("[" * 100_000, "too deep"),
+        ('"text"', "the document is text without one list of rows"),
+        ("[]", "there is no row"),
+        ('[{"": 1}]', "column names is empty"),
+    ],
+)
+def test_what_is_no_list_of_rows_is_refused_in_words(text: str, said: str):
+    assert said in refused(text)
+
+
+def test_every_cell_is_written_as_text_and_an_empty_table_says_what_is_lost():
+    table = Table.from_columns({"Asset": ["jog"], "speed": ["5"]})
+    assert json.loads(write(table, FORMATS["json"])[0]) == [{"Asset": "jog", "speed": "5"}]
+    raw, remarks = write(table.with_rows_taken([]), FORMATS["json"])
+    assert (json.loads(raw), remarks[0].is_loss) == ([], True)
+
+
+def test_an_unreal_table_keeps_structs_as_text_and_says_so():
+    raw = b'---,speed,tags,where\njog,"5","(""A"",""B"")","(X=1,Y=2)"\n'
+    reading = read(raw, "x.csv")
+    assert texts(reading) == {"Asset Name": ["jog"], "speed": ["5"], "tags": ["A B"], "where": ["(X=1,Y=2)"]}
+    assert 'column "where": "(X=1,Y=2)" is a struct; it is kept as text.' in "\n".join(map(str, reading.remarks))
+    rows = [{"Name": "jog", "speed": 5, "on": True}]
+    assert texts(read(json.dumps(rows).encode(), "x.json", ReadOptions("unreal-json")))["on"] == ["True"]
+
+
+def test_unreal_wants_each_asset_once():
+    table = Table.from_columns({"Asset": ["jog", "jog"], "speed": ["5", "6"]})
+    with pytest.raises(TableError, match='row 1, column "Asset": the asset "jog" stands in row 0 too'):
+        write(table, FORMATS["unreal-csv"])
+
+
+def test_names_that_unreal_does_not_take_are_changed_and_told():
+    table = Table.from_columns({"Asset": ["jog"], "Defender.pos 2": ["A"]})
+    raw, remarks = write(table, FORMATS["unreal-json"])
+    assert json.loads(raw) == [{"Name": "jog", "Defender__pos_2": "A"}]
+    assert 'is called "Defender__pos_2" in Unreal.' in str(remarks[0])

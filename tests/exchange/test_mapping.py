@@ -1,0 +1,166 @@
+"""What a column becomes: a declared condition by its name, a new one by its cells, or a job; and what contextdb.toml then says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from contextdb.columns import TextColumn
+from contextdb.errors import ContextDBError
+from contextdb.exchange.importing import plan_import
+from contextdb.exchange.mapping import Mapped, as_condition, as_job, as_type, propose
+from contextdb.exchange.proposals import propose_type
+from contextdb.exchange.reading import Reading
+from contextdb.project import Project
+from contextdb.schema import TableSettings, read_schema
+
+TOML = """# our game
+[conditions.speed]        # how fast
+type = "number"
+unit = "m/s"
+
+[conditions."Defender.Depth_Chart"]
+type = "enum"
+values = ["CB", "FS"]
+"""
+SCHEMA = read_schema(TOML, "contextdb.toml")
+
+
+def reading(**columns: list[str]) -> Reading:
+    return Reading(tuple(TextColumn.of(name.replace("__", " "), texts) for name, texts in columns.items()), "csv")
+
+
+def mapped(read: Reading, settings: TableSettings | None = None, **renames: str) -> dict[str, Mapped]:
+    return {column.source: column for column in propose(read, SCHEMA, settings or TableSettings("t"), renames)}
+
+
+@pytest.mark.parametrize(
+    ("name", "cells", "declared"),
+    [
+        ("on", ["True", "no", "Any"], {"type": "bool"}),
+        ("n", ["0", "1", "1"], {"type": "int"}),
+        ("n", ["5", "1..3", "20, 9"], {"type": "int"}),
+        ("n", ["5", "1.5..3"], {"type": "number"}),
+        ("n", ["1e-3"], {"type": "number"}),
+        ("dir_to_target", ["20, 9.99", "-20, 9"], {"type": "angle"}),
+        ("Direction", ["400..500"], {"type": "int"}),
+        ("x", ["170..-170", "5"], {"type": "angle"}),
+        ("heading", ["170..-170", "2026-01-02", "-30..30"], {"type": "angle"}),
+        ("pos", ['"5"', "CB", "FS", "CB"], {"type": "enum", "values": ["5", "CB", "FS"]}),
+        ("t", ["+InAir -Stunned", "-Move.Run"], {"type": "tags", "values": ["InAir", "Move.Run", "Stunned"]}),
+        ("pos", ["CB FS", "CB", "not SS", '"Half Back"'], {"type": "enum", "values": ["CB", "FS", "SS", "Half Back"]}),
+        ("pos", [f"N{i % 50}" for i in range(200)], {"type": "text"}),
+        ("x", ["", "-", "Any"], {"type": "text"}),
+        ("note", ["walk, then run!", "stop; sit!"], None),
+        ("id", [f"A{i}" for i in range(200)], None),
+    ],
+)
+def test_a_type_is_proposed_from_the_cells_and_the_name(name: str, cells: list[str], declared: dict[str, object] | None):
+    proposal = propose_type(TextColumn.of(name, cells))
+    assert proposal.declared == declared or (proposal.declared and declared and _same(proposal.declared, declared))
+    assert proposal.why
+
+
+def _same(found: object, wanted: dict[str, object]) -> bool:
+    assert isinstance(found, dict)
+    return found["type"] == wanted["type"] and sorted(found.get("values", ())) == sorted(wanted.get("values", ()))  # type: ignore[call-overload]
+
+
+def test_names_that_contextdb_toml_could_not_hold_make_a_text():
+    assert propose_type(TextColumn.of("x", ['""', '" a "', "b", "b"])).declared == {"type": "text"}
+    assert propose_type(TextColumn.of("x", ['+" a"', '+" a" -b', "-b"])).declared == {"type": "tags"}
+
+
+def test_a_few_cells_that_cannot_be_read_do_not_change_the_type_and_are_counted():
+    proposal = propose_type(TextColumn.of("n", [*(str(i) for i in range(19)), "5;3"]))
+    assert (proposal.declared, proposal.n_unreadable) == ({"type": "int"}, 1)
+    assert "1 cell cannot be read so" in proposal.why
+
+
+def test_columns_are_matched_by_name_whatever_their_case_and_spaces():
+    found = mapped(reading(Name=["x"], SPEED=["5"], **{"defender_depth_chart": ["CB"]}))
+    assert (found["Name"].job, found["SPEED"].name, found["defender_depth_chart"].name) == (
+        "asset",
+        "speed",
+        "Defender.Depth_Chart",
+    )
+    assert not any(column.is_new for column in found.values())
+
+
+def test_a_near_name_is_proposed_and_not_taken():
+    found = mapped(reading(Name=["x"], sped=["5"]))["sped"]
+    assert (found.name, found.is_new, found.near) == ("sped", True, "speed")
+
+
+def test_cells_that_the_declared_type_cannot_read_are_counted_and_shown():
+    found = mapped(reading(Name=["x", "y"], speed=["5", "5;3"]))["speed"]
+    assert found.n_unreadable == 1
+    assert '1 cell cannot be read as number, such as "5;3"' in found.why
+
+
+def test_columns_of_a_job_are_known_by_their_names_when_their_cells_fit():
+    found = mapped(reading(Name=["x"], enabled=["True"], Priority=["5"], Weight=["heavy"]))
+    assert [found[name].job for name in ("enabled", "Priority", "Weight")] == ["enabled", "priority", "condition"]
+
+
+def test_the_asset_is_the_column_that_is_named_so_else_the_first():
+    assert mapped(reading(id=["1"], Asset__Name=["x"]))["Asset Name"].job == "asset"
+    assert mapped(reading(id=["1"], other=["x"]))["id"].job == "asset"
+    assert mapped(reading(id=["1"], who=["x"]), TableSettings("t", asset="Who"))["who"].name == "Who"
+
+
+def test_a_person_may_rename_a_column_and_leave_one_out():
+    found = mapped(reading(Name=["x"], sped=["5"], junk=["?"]), sped="speed", junk="")
+    assert (found["sped"].name, found["sped"].is_new, found["junk"].job) == ("speed", False, "left out")
+    with pytest.raises(ContextDBError, match='the file has no column "spd"'):
+        mapped(reading(Name=["x"], sped=["5"]), spd="speed")
+    with pytest.raises(ContextDBError, match='"sped" and "speed" would both be "speed"'):
+        mapped(reading(Name=["x"], sped=["5"], speed=["6"]), sped="speed")
+
+
+def test_a_decision_can_be_changed_to_a_type_a_condition_or_a_job():
+    read = reading(Name=["x", "y"], pos=["A", "B"])
+    column, found = read.columns[1], mapped(read)["pos"]
+    assert as_type(found, column, "text").declared == {"type": "text"}
+    assert as_type(found, column, "number").n_unreadable == 2
+    assert as_type(found, column, "enum").declared == {"type": "enum", "values": ["A", "B"]}
+    with pytest.raises(ContextDBError, match="no cell holds a name"):
+        as_type(found, TextColumn.of("n", ["5", "6"]), "enum")
+    assert as_condition(found, column, "speed", SCHEMA).n_unreadable == 2
+    assert as_condition(found, column, "new", SCHEMA).declared == {"type": "enum", "values": ["A", "B"]}
+    assert as_job(found, "output").kind == "output"
+
+
+def test_contextdb_toml_gets_the_new_conditions_and_the_table_and_keeps_its_comments(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    read = reading(Name=["x", "y"], speed=["5", "6"], pos=["A", "A B"], note=["a, b!", "c; d!"])
+    plan = plan_import(read, tmp_path / "jog.csv")
+    assert plan.new_conditions == ["pos"]
+    assert not (tmp_path / "jog.csv").exists()
+    plan.write()
+    text = (tmp_path / "contextdb.toml").read_text(encoding="utf-8")
+    assert text.startswith("# our game\n[conditions.speed]        # how fast\n")
+    project = Project.load(tmp_path)
+    assert project["jog"].settings == TableSettings("jog", "jog.csv", "Name", outputs=("note",))
+    assert project["jog"].condition("pos").condition.domain.values == ("A", "B")
+
+
+def test_a_table_that_is_imported_again_changes_what_contextdb_toml_says_of_it(tmp_path: Path):
+    path = tmp_path / "jog.csv"
+    plan_import(reading(Name=["x", "y"], note=["a, b!", "c; d!"]), path).write()
+    plan_import(reading(Name=["x"], speed=["5"], enabled=["True"], note=["q, r!"]), path).write()
+    settings = Project.load(tmp_path).schema.tables["jog"]
+    assert (settings.outputs, settings.enabled) == (("note",), "enabled")
+
+
+def test_a_folder_without_contextdb_toml_gets_one(tmp_path: Path):
+    plan_import(reading(Name=["x"], speed=["2.5"]), tmp_path / "jog.csv").write()
+    assert Project.load(tmp_path).schema.conditions["speed"].domain.kind == "number"
+
+
+def test_a_table_needs_one_column_that_names_the_assets(tmp_path: Path):
+    read = reading(Name=["x"], speed=["5"])
+    columns = [as_job(column, "output") for column in propose(read, SCHEMA, TableSettings("t"))]
+    with pytest.raises(ContextDBError, match="no column names the assets"):
+        plan_import(read, tmp_path / "jog.csv", mapped=columns)

@@ -19,9 +19,14 @@ from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, s
 from contextdb.exit_codes import ExitCode
 
 COMMANDS = {
+    "edit": "the terminal editor",
     "query": "which assets are valid for one context",
     "evaluate": "every context of a file: how many assets are valid in each",
     "check": "what is wrong with the tables",
+    "diff": "what changed between two versions of a table",
+    "merge": "join what two sides made of one table",
+    "import": "bring in a table from another program: CSV, Excel, JSON, DMN, Unreal",
+    "export": "write a table for another program",
     "compile": "write the binary artefact for the game",
     "motion": "motion databases: build, search, select, run, replay",
     "demo": "the whole way on the sample tables",
@@ -90,7 +95,7 @@ class Group:
         near = nearest(name, self.commands)
         mend = in_quotes(" ".join((*self.words, near))) if near else ""
         found = f"there is no command {in_quotes(' '.join((*self.words, name)))}."
-        raise ContextDBError(Fault(found, ", ".join(self.commands), mend))
+        raise ContextDBError(Fault(found, _some(list(self.commands)), mend))
 
     def parser(self, name: str, command: ModuleType) -> Parser:
         """What reads the arguments of a command."""
@@ -159,6 +164,12 @@ def _run(group: Group, given: Sequence[str]) -> int:
 def _new_parser(words: Sequence[str], about: str | None) -> Parser:
     prog = " ".join(("contextdb", *words))
     return Parser(prog=prog, description=about, formatter_class=Help, allow_abbrev=False)
+
+
+def _some(commands: Sequence[str], most: int = 6) -> str:
+    """The first commands, and how many more there are."""
+    n_more = len(commands) - most
+    return ", ".join(commands[:most]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
 def _overview(commands: Mapping[str, str]) -> str:

@@ -1,1 +1,1 @@
-"""The terminal editor of contextdb's tables, opened by `contextdb edit`. It imports contextdb, never the other way round."""
+"""The terminal editor of contextdb's tables. `tui.model` knows no terminal; everything else is a view of it, in Textual."""

@@ -16,8 +16,10 @@ from contextdb import edits
 from contextdb.disk import write_atomic
 from contextdb.rewrite import write_csv
 from contextdb.table import Table
-from tui.model.journal import Holder, Journal, Lock, digest_of, journal_path, recover
+from tui.model.journal import Journal, base_path, journal_path, recover
+from tui.model.lock import Holder, Lock
 from tui.model.sheet import Sheet
+from tui.model.watched import digest_of
 
 RAW = b"Asset,speed,hit\nwalk,0..5,True\nrun,5..9,Any\njump,Any,False\n"
 
@@ -149,7 +151,7 @@ def test_a_folder_that_cannot_be_written_is_told_and_editing_goes_on(tmp_path):
 
 
 def test_a_second_editor_is_told_who_has_the_table_and_a_killed_one_holds_nothing(tmp_path):
-    script = "import sys; from pathlib import Path; from tui.model.journal import Lock\n"
+    script = "import sys; from pathlib import Path; from tui.model.lock import Lock\n"
     script += "lock = Lock(Path(sys.argv[1])); print(lock.acquire(), lock.id, flush=True); sys.stdin.read()"
     path = tmp_path / "t.csv"
     command = [sys.executable, "-c", script, str(path)]
@@ -170,3 +172,57 @@ def test_a_second_editor_is_told_who_has_the_table_and_a_killed_one_holds_nothin
     assert mine.acquire() is None
     assert mine.is_held
     mine.release()
+
+
+# ---- a file that others replace
+
+
+def test_edits_come_back_on_the_file_as_it_was_when_it_was_replaced_after_a_kill(tmp_path):
+    sheet = open_sheet(tmp_path)
+    sheet.recorder.keep_base()
+    sheet.apply(edits.delete_rows(sheet.table, [0]))
+    write_atomic(sheet.path, RAW + b"new,Any,Any\n")
+    found = recover(cdb.load(sheet.path))
+    assert (found.n_edits, found.problem) == (1, None)
+    assert found.history.table.assets == ["run", "jump"]
+    assert bytes_of(found.base) == RAW
+
+
+def test_a_link_that_was_written_through_brings_nothing_back_wrongly(tmp_path):
+    sheet = open_sheet(tmp_path)
+    sheet.recorder.keep_base()
+    sheet.apply(edits.delete_rows(sheet.table, [0]))
+    sheet.path.write_bytes(RAW + b"new,Any,Any\n")  # in place: the link holds these bytes too
+    found = recover(cdb.load(sheet.path))
+    assert (found.n_edits, found.base) == (0, None)
+    assert "1 unsaved edit" in found.problem.found
+
+
+def test_the_link_to_the_file_goes_with_the_journal(tmp_path):
+    sheet = open_sheet(tmp_path)
+    sheet.recorder.keep_base()
+    assert base_path(sheet.path).read_bytes() == RAW
+    sheet.apply(edits.delete_rows(sheet.table, [0]))
+    save(sheet)
+    assert base_path(sheet.path).read_bytes() == sheet.path.read_bytes() != RAW
+    sheet.recorder.discard()
+    assert not base_path(sheet.path).exists()
+
+
+@given(st.data())
+def test_edits_after_a_merge_and_back_past_it_come_back(data):
+    with TemporaryDirectory() as folder:
+        sheet = open_sheet(folder)
+        for _ in range(data.draw(st.integers(0, 2))):
+            sheet.apply(data.draw(edits_of(sheet.table)))
+        raw = bytes_of(sheet.table)
+        write_atomic(sheet.path, RAW)
+        table = cdb.load(sheet.path, strict=False)
+        unsaved = edits.edit_between(table, sheet.table, sheet.table.origin, "Unsaved edits")
+        sheet.recorder.rebased(RAW, unsaved, sheet.history.position)
+        assert bytes_of(reopened(sheet.path).table) == raw
+        for _ in range(data.draw(st.integers(1, 6))):
+            step = data.draw(st.sampled_from(["do", "undo", "redo"]))
+            sheet.apply(data.draw(edits_of(sheet.table))) if step == "do" else getattr(sheet, step)()
+        expected = {c.name: c.to_list() for c in sheet.table.columns}
+        assert {c.name: c.to_list() for c in reopened(sheet.path).table.columns} == expected

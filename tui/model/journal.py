@@ -1,39 +1,47 @@
-"""Unsaved edits kept beside the table, so that they come back after a crash or a kill; and a lock, so that two editors know.
+"""Unsaved edits kept beside the table, so that they come back after a crash or a kill.
 
-Both stand in the folder `.contextdb-journal` next to the table, which ignores itself in git by a .gitignore of its own. A journal
+They stand in the folder `.contextdb-journal` next to the table, which ignores itself in git by a .gitignore of its own. A journal
 is lines of a check sum, a space and JSON. The first names the file and the digest of the bytes that the edits were made for:
 
     {"format": 1, "file": "hit_mid_air.csv", "digest": "…"}
     {"do": {"name": …, "changes": […]}}      an edit was made
     {"go": 3}                                undo or redo, to where 3 edits lie behind
-    {"saving": "…"}                          the file is about to become the bytes of this digest
+    {"saving": "…"}                          the file is about to become the bytes of this digest, and then "schema", where it is
+                                             said, the text of contextdb.toml
 
 A line is handed to the system as its edit happens, so a kill loses at most the edit in progress. It is not forced onto the disk: a
 power failure may lose the last seconds. A line that is cut or altered ends the journal.
+
+Beside a journal stands a second link to the file that its edits were made for. Where the file was replaced after a crash, by a pull
+say, the edits come back on the file as it was, and are then merged with what stands on the disk.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import secrets
 import zlib
-from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from contextdb.disk import make_folder, write_atomic
+from contextdb.disk import read_bytes, write_atomic
 from contextdb.edits import Edit, edit_between
 from contextdb.errors import ContextDBError, Fault, Place, plural
+from contextdb.files import AnySource
 from contextdb.history import History, Step
-from contextdb.table import Table
+from contextdb.parquet import read_parquet
+from contextdb.schema_file import SchemaChange
+from contextdb.source import read_csv
+from contextdb.table import Table, build_table
+from tui.model.file_history import FileHistory
+from tui.model.lock import FOLDER, own_folder
+from tui.model.watched import digest_of
 
-FOLDER = ".contextdb-journal"
 FORMAT = 1
 
 Record = Mapping[str, Any]
@@ -44,9 +52,9 @@ def journal_path(table: Path) -> Path:
     return table.parent / FOLDER / f"{table.name}.journal"
 
 
-def digest_of(raw: bytes) -> str:
-    """What tells two files apart."""
-    return hashlib.sha256(raw).hexdigest()
+def base_path(table: Path) -> Path:
+    """The link to the file that the edits of a journal were made for."""
+    return table.parent / FOLDER / f"{table.name}.base"
 
 
 class Journal:
@@ -62,6 +70,8 @@ class Journal:
         self._digest = digest
         self._first = 0
         """The position of the history that the journal starts from."""
+        self._least = 0
+        """The first position of the journal that is a state of the history: 1 after a merge, which starts from the disk."""
         self._is_straight = True
         """Whether the journal holds the edits of the history from there on; no longer once a step went back past a save."""
         self._position = recovered.position if recovered else 0
@@ -78,7 +88,7 @@ class Journal:
     def went(self, before: Table, history: History, step: Step) -> None:
         """Write that the history went to where it is; as an edit where a reader could not follow."""
         position = history.position - self._first
-        if self._is_straight and 0 <= position <= self._n_edits:
+        if self._is_straight and self._least <= position <= self._n_edits:
             self._position = position
             self._write({"go": position})
             return
@@ -86,49 +96,83 @@ class Journal:
         came_from = np.arange(before.n_rows) if step.came_from is None else step.came_from
         self._write({"do": edit_between(before, history.table, came_from, step.name).to_json()})
 
-    def saving(self, raw: bytes) -> None:
-        """Write that the file is about to have these bytes."""
+    def saving(self, raw: bytes, schema: SchemaChange | None = None) -> None:
+        """Write that the file is about to have these bytes, and then contextdb.toml those."""
         if self._is_begun:
-            self._write({"saving": digest_of(raw)})
+            record: dict[str, object] = {"saving": digest_of(raw)}
+            if schema is not None:
+                was = digest_of(read_bytes(schema.path)) if schema.path.exists() else None
+                record["schema"] = {"path": str(schema.path.resolve()), "was": was, "text": schema.raw.decode()}
+            self._write(record)
 
     def saved(self, raw: bytes, position: int) -> None:
         """The file has these bytes, at this position of the history: begin anew with the next edit."""
         self._digest, self._first, self._is_straight = digest_of(raw), position, True
-        self._position = self._n_edits = 0
+        self._position = self._n_edits = self._least = 0
         self.discard()
+        self.keep_base()
+
+    def rebased(self, raw: bytes, unsaved: Edit, position: int) -> None:
+        """The file has these bytes, which somebody else wrote, and `unsaved` leads from them to this position of the history."""
+        if not unsaved.changes or not self._is_begun:
+            self.saved(raw, position)
+        if not unsaved.changes:
+            return
+        self._digest, self._first, self._is_straight = digest_of(raw), position - 1, True
+        self._position = self._n_edits = self._least = 1
+        with self._told():
+            self._begin(_line({"do": unsaved.to_json()}))
+        self.keep_base()
+
+    def keep_base(self) -> None:
+        """Keep the file as it is now beside the journal, whoever may replace it. It was just read or written: it has the digest."""
+        base = base_path(self._table)
+        with suppress(OSError, ContextDBError):  # a disk without links: the edits then come back on the same bytes only
+            own_folder(base.parent)
+            base.unlink(missing_ok=True)
+            os.link(os.path.realpath(self._table), base)
 
     def discard(self) -> None:
         """Take the journal away: nothing is unsaved, or nobody wants it."""
         self._is_begun = False
-        with suppress(OSError):
-            self.path.unlink(missing_ok=True)
+        for path in (self.path, base_path(self._table)):
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
 
     def _write(self, record: Record) -> None:
-        try:
+        with self._told():
             if not self._is_begun:
                 self._begin()
             _append(self.path, _line(record))
+
+    def _begin(self, first: bytes = b"") -> None:
+        own_folder(self.path.parent)
+        head = _line({"format": FORMAT, "file": self._table.name, "digest": self._digest})
+        write_atomic(self.path, head + first)
+        self._is_begun = True
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Editing goes on when the disk refuses; `problem` says so."""
+        try:
+            yield
         except (OSError, ContextDBError) as error:
             why = error.strerror if isinstance(error, OSError) else str(error)
             self.problem = Fault(f"unsaved edits are not kept: {why}.", mend="to save often", place=Place(str(self.path)))
-
-    def _begin(self) -> None:
-        own_folder(self.path.parent)
-        write_atomic(self.path, _line({"format": FORMAT, "file": self._table.name, "digest": self._digest}))
-        self._is_begun = True
-
-
-def own_folder(folder: Path) -> None:
-    """Make the folder of journals, which git passes over."""
-    make_folder(folder)
-    ignore = folder / ".gitignore"
-    if not ignore.exists():
-        write_atomic(ignore, b"*\n")
 
 
 def _line(record: Record) -> bytes:
     body = json.dumps(record, ensure_ascii=True, separators=(",", ":")).encode()
     return b"%08x %s\n" % (zlib.crc32(body), body)
+
+
+def set_aside(table: Path) -> Path:
+    """Move a journal that cannot be read back out of the way of the next one, for a person to look at; gives where it is."""
+    path = journal_path(table)
+    kept = path.with_name(f"{table.name}.unread.journal")
+    with suppress(OSError):
+        os.replace(path, kept)
+    return kept
 
 
 def _append(path: Path, line: bytes) -> None:
@@ -147,11 +191,13 @@ def _append(path: Path, line: bytes) -> None:
 class Recovery:
     """What a journal brings back."""
 
-    history: History
+    history: FileHistory
     """The table with the unsaved edits made, and undo for them."""
     n_edits: int
     problem: Fault | None = None
     """Why edits could not be brought back, or not all of them."""
+    base: Table | None = None
+    """The table that the edits were made for, where the file on the disk is another by now: the two are then to be merged."""
 
 
 def read_records(raw: bytes) -> tuple[list[Record], int]:
@@ -184,17 +230,48 @@ def recover(table: Table) -> Recovery | None:
         return None
     if any(r.get("saving") == digest for r in records):
         return None  # killed between the save and the end of the journal: all of it is in the file
-    if records[0].get("format") != FORMAT or records[0].get("digest") != digest:
+    base = table if records[0].get("digest") == digest else _base_of(table, records[0].get("digest"))
+    if records[0].get("format") != FORMAT or base is None:
         n_edits = sum("do" in r for r in records)
         found = f"the file has changed since {plural(n_edits, 'unsaved edit')} of it were kept, so they cannot be made again."
-        return Recovery(History(table), 0, Fault(found, "the file as it was then", place=Place(str(path))))
+        return Recovery(FileHistory(table), 0, Fault(found, "the file as it was then", place=Place(str(path))))
     if n_bytes < len(raw):
         with suppress(OSError):
             os.truncate(path, n_bytes)
-    return _replayed(History(table), records[1:], path)
+    found_again = _replayed(FileHistory(base), records[1:], path)
+    return found_again if base is table else replace(found_again, base=base)
 
 
-def _replayed(history: History, records: list[Record], path: Path) -> Recovery:
+def finish_save(table: Table) -> bool:
+    """Write the contextdb.toml of a save that was killed when only the table stood on the disk; gives whether there was one."""
+    if table.path is None or table.source is None or not journal_path(table.path).is_file():
+        return False
+    records, _ = read_records(journal_path(table.path).read_bytes())
+    digest = digest_of(table.source.raw)
+    for schema in (r["schema"] for r in records if r.get("saving") == digest and "schema" in r):
+        path = Path(schema["path"])
+        if (digest_of(read_bytes(path)) if path.exists() else None) == schema["was"]:
+            write_atomic(path, schema["text"].encode())
+            return True
+    return False
+
+
+def _base_of(table: Table, digest: object) -> Table | None:
+    """The table as it was when the edits were made, from the link beside the journal; None where it is not that any more."""
+    assert table.path is not None
+    try:
+        raw = read_bytes(base_path(table.path))
+        if digest_of(raw) != digest:
+            return None
+        is_csv = table.path.suffix.lower() == ".csv"
+        source: AnySource
+        source, columns = read_csv(raw, str(table.path)) if is_csv else read_parquet(raw, str(table.path))
+        return build_table(table.name, columns, table.schema, table.settings, table.path, source)
+    except ContextDBError:
+        return None
+
+
+def _replayed(history: FileHistory, records: list[Record], path: Path) -> Recovery:
     for record in records:
         try:
             if "do" in record:
@@ -205,91 +282,3 @@ def _replayed(history: History, records: list[Record], path: Path) -> Recovery:
             found = f"only {plural(history.position, 'unsaved edit')} could be made again: {error}"
             return Recovery(history, history.position, Fault(found, place=Place(str(path))))
     return Recovery(history, history.position)
-
-
-# ---- two editors
-
-
-@dataclass(frozen=True)
-class Holder:
-    """The editor that has a table open."""
-
-    pid: int
-    id: str
-
-    def __str__(self) -> str:
-        return f"process {self.pid}" if self.pid else "another process"
-
-
-class Lock:
-    """A table held open by this editor. The system lets go of it when the process ends, however it ends, so none is stale."""
-
-    def __init__(self, table: Path) -> None:
-        self.path = table.parent / FOLDER / f"{table.name}.lock"
-        self.id = secrets.token_hex(8)
-        self._descriptor = -1
-
-    def acquire(self) -> Holder | None:
-        """Take the lock; gives who has it when somebody else does. Where the disk cannot lock, nobody is told."""
-        try:
-            own_folder(self.path.parent)
-            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
-        except (OSError, ContextDBError):
-            return None
-        try:
-            _lock(descriptor)
-        except BlockingIOError:
-            holder = _holder(os.read(descriptor, 1000))
-            os.close(descriptor)
-            return holder
-        except OSError:
-            os.close(descriptor)
-            return None
-        os.truncate(descriptor, 0)
-        os.write(descriptor, json.dumps({"pid": os.getpid(), "id": self.id}).encode())
-        self._descriptor = descriptor
-        return None
-
-    @property
-    def is_held(self) -> bool:
-        """Whether this editor has the lock."""
-        return self._descriptor >= 0
-
-    def release(self) -> None:
-        """Let go of the table."""
-        if self.is_held:
-            os.close(self._descriptor)
-            self._descriptor = -1
-
-    def __enter__(self) -> Lock:
-        self.acquire()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.release()
-
-
-def _lock(descriptor: int) -> None:
-    """Lock an open file or raise BlockingIOError."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: there the lock is on a byte far behind the text, which others may then still read
-        import msvcrt
-
-        os.lseek(descriptor, 1 << 30, os.SEEK_SET)
-        try:
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
-        except PermissionError as error:
-            raise BlockingIOError from error
-        finally:
-            os.lseek(descriptor, 0, os.SEEK_SET)
-    else:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-def _holder(raw: bytes) -> Holder:
-    try:
-        said = json.loads(raw)
-        return Holder(int(said["pid"]), str(said["id"]))
-    except (ValueError, KeyError, TypeError):  # it is just writing who it is
-        return Holder(0, "")

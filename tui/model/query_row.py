@@ -8,6 +8,7 @@ mask of rows that accept its fact is kept, so a key pressed in one fact, or an e
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import reduce
 from operator import and_
 
@@ -38,12 +39,14 @@ class QueryRow:
         self._bits: dict[str, int] = {}
         self._words: dict[str, NDArray[np.uint64]] = {}
         self._readable: dict[str, int] = {}
+        self._valid: int | None = None
+        """The valid rows, once they were asked for."""
         self._table = table
         self.show(table)
 
     def show(self, table: Table) -> None:
         """Answer for this table from now on; columns that are the same as before are not looked at again."""
-        before, self._table = self._columns, table
+        before, self._table, self._valid = self._columns, table, None
         self._columns = {c.condition.name: c for c in table.conditions}
         for gone in before.keys() - self._columns.keys():
             self._forget(gone)
@@ -73,8 +76,10 @@ class QueryRow:
     @property
     def bits(self) -> int:
         """The valid rows as an integer."""
-        enabled = bitmask.to_int(bitmask.pack(self._table.enabled))
-        return reduce(and_, (*self._bits.values(), *self._readable.values()), enabled)
+        if self._valid is None:
+            enabled = bitmask.to_int(bitmask.pack(self._table.enabled))
+            self._valid = reduce(and_, (*self._bits.values(), *self._readable.values()), enabled)
+        return self._valid
 
     @property
     def n_valid(self) -> int:
@@ -103,14 +108,14 @@ class QueryRow:
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
         """The rows nearest to valid, each with its failing cells and what would mend them."""
-        compiled = CompiledTable.of(self._table)
+        compiled = replace(CompiledTable.of(self._table), derivation=None)  # here a derived fact is given like any other
         context = {name: fact for name, fact in self.facts.items() if fact is not None}
         n_unreadable = self._table.n_rows - reduce(and_, self._readable.values(), (1 << self._table.n_rows) - 1).bit_count()
         found = compiled.explain(context, unknown="any").nearest(most + min(n_unreadable, 1000))
         return [row for row in found if all(bits >> row.row & 1 for bits in self._readable.values())][:most]
 
     def _answer(self, name: str) -> None:
-        column, text = self._columns[name], self.texts.get(name, "")
+        column, text, self._valid = self._columns[name], self.texts.get(name, ""), None
         self.faults.pop(name, None)
         self._words.pop(name, None)
         try:

@@ -1,87 +1,287 @@
-"""One table open in an editor: its sheet, its file, its journal and its lock. An edge: this reads and writes the disk."""
+"""One table open in an editor: its sheet, its file, its journal and its lock. An edge: this reads and writes the disk.
+
+Others may write the file, or contextdb.toml, while it is open. `poll` says so; `merge_from_disk` and `take` bring what they did
+into the sheet as one step, and `reload_schema` reads contextdb.toml anew. Unsaved edits stay, and a journal keeps them.
+"""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from contextdb.disk import read_bytes
-from contextdb.errors import Fault, FileError, Place
+from contextdb.diff import Merge, diff, merge
+from contextdb.diffing.alignment import align
+from contextdb.disk import path_in_quotes, read_bytes
+from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, plural
 from contextdb.parquet import ParquetSource, rewritten_parquet
+from contextdb.project import SCHEMA_FILE, load_table, schema_for
 from contextdb.rewrite import rewritten
+from contextdb.schema_file import schema_change
 from contextdb.source import Source
-from contextdb.table import Table, load
-from tui.model.journal import Holder, Journal, Lock, digest_of, recover
-from tui.model.sheet import Sheet
+from contextdb.table import Table
+from tui.model.file_history import FileHistory
+from tui.model.journal import Journal, finish_save, recover, set_aside
+from tui.model.leftovers import clear_leftovers
+from tui.model.lock import Holder, Lock
+from tui.model.read_only import why_read_only
+from tui.model.schemas import under_schema, with_settings
+from tui.model.sheet import Done, Sheet
+from tui.model.watched import Seen, State, Watched, digest_of
+
+MERGE_NAME = "Merge changes on disk"
+
+
+@dataclass(frozen=True, slots=True)
+class OnDisk:
+    """What others did since the last time it was asked. False when nothing."""
+
+    table: State = "same"
+    """The table's file."""
+    schema: State = "same"
+    """The contextdb.toml that holds for it."""
+    taken_by: Holder | None = None
+    """Another machine that has taken the table over: nothing is saved here any more."""
+    is_free: bool = False
+    """The editor that had the table has ended, so that it can be opened again for editing."""
+
+    def __bool__(self) -> bool:
+        return self != OnDisk()
 
 
 class Session:
     """A table from when it is opened until it is closed."""
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, takes_over: bool = False) -> None:
         """Open a table, with the unsaved edits of an editor that was killed.
+
+        `takes_over`: take the table from an editor on another machine, which a person says has ended.
 
         Raises
         ------
         FileError, SchemaError, TableError
             The file cannot be read at all; cells that cannot be read are no hindrance.
         """
-        table = load(path, strict=False)
+        table = load_table(Path(path), strict=False)
         assert table.path is not None
-        assert table.source is not None
         self.path: Path = table.path
         self.lock = Lock(self.path)
-        self.holder: Holder | None = self.lock.acquire()
-        """The other editor that has the table open. Then nothing is brought back, and no journal is kept."""
+        self.holder: Holder | None = self.lock.acquire(takes_over)
+        """The other editor that has the table open. Then nothing is brought back or saved, and no journal is kept."""
+        self._clear_leftovers()
+        if self.holder is None and finish_save(table):
+            table = load_table(self.path, strict=False)
         found = recover(table) if self.holder is None else None
         self.n_recovered = found.n_edits if found else 0
         """How many unsaved edits were brought back."""
         self.problem: Fault | None = found.problem if found else None
         """Why unsaved edits could not be brought back, or not all of them."""
-        self._digest = digest_of(table.source.raw)
-        history = found.history if found and found.n_edits else None
-        self.journal = Journal(self.path, self._digest, history)
-        self.sheet = Sheet(table, self.journal if self.holder is None else None, history)
+        self.saved_table = found.base if found and found.base else table
+        """The table as it stands in the file: what edits are compared with when they are saved."""
+        self._history = found.history if found and found.n_edits else FileHistory(self.saved_table)
+        self._watch_files()
+        self.journal = Journal(self.path, self._digest, self._history if self.n_recovered else None)
+        if self.holder is None:
+            self._begin_journal()
+        self.sheet = Sheet(self._history.table, self.journal if self.holder is None else None, self._history)
+
+    # ---- what others do
+
+    def poll(self) -> OnDisk:
+        """What others did to the files; cheap enough for once a second. A file that is being written counts when it is done."""
+        is_free = self.holder is not None and self._is_free()
+        taken_by = self.lock.taken_by()
+        if taken_by is not None:
+            self.sheet.recorder = None  # the journal is the other's now
+        return OnDisk(self._file.look(), self._schema_file.look(), taken_by, is_free)
+
+    @property
+    def disk_stamp(self) -> Seen:
+        """What `poll` saw of the file last: another one after each write."""
+        return self._file.stamp
 
     @property
     def is_changed_on_disk(self) -> bool:
         """Whether somebody else has written the file, or taken it away, since it was read or saved here."""
-        try:
-            return digest_of(read_bytes(self.path)) != self._digest
-        except FileError:
-            return True
+        return self._file.state != "same"
+
+    @property
+    def why_read_only(self) -> str:
+        """Why nothing can be saved to the file, for a person; empty when it can."""
+        holder = self.holder or self.lock.taken_by()
+        return f"{holder} has it open for editing" if holder is not None else why_read_only(self.path)
+
+    @property
+    def is_read_only(self) -> bool:
+        """Whether nothing can be saved to the file."""
+        return bool(self.why_read_only)
+
+    def merge_from_disk(self) -> Merge:
+        """Merge what stands on the disk with the sheet. Without conflicts it is taken at once, as one step.
+
+        With conflicts nothing has changed yet: decide them with `Merge.resolved`, and `take` the result.
+
+        Raises
+        ------
+        FileError, SchemaError, TableError
+            What stands on the disk is gone, no table, or another one.
+        """
+        if self._schema_file.state != "same":
+            self.reload_schema()
+        on_disk = load_table(self.path, strict=False)
+        if self.saved_table.n_rows and not (align(self.saved_table, on_disk).rows >= 0).any():
+            said = "what stands in the file now has no row in common with the table that was read from it."
+            mend = "to open it anew, or to save over it"
+            raise TableError(Fault(said, "the table as it was, with changes", mend, Place(str(self.path)), "merge-conflict"))
+        found = merge(self.saved_table, self.sheet.table, on_disk)
+        if not found.conflicts:
+            self.take(found)
+        return found
+
+    def take(self, merged: Merge) -> Done:
+        """Make a merge of `merge_from_disk` the sheet's, as one step. What is not decided stays as in the sheet."""
+        if merged.ours is not self.sheet.table:
+            merged = merge(merged.base, self.sheet.table, merged.theirs, merged.decided)
+        on_disk = merged.theirs
+        assert on_disk.source is not None
+        done = self.sheet.apply(merged.edit_of_ours(MERGE_NAME))
+        unsaved = with_settings(merged.edit_of_theirs("Unsaved edits"), on_disk, self.sheet.table)
+        now = unsaved.apply(on_disk)
+        self._history.based_on(replace(self.sheet.table, source=now.source, origin=now.origin), is_saved=not unsaved.changes)
+        self._show()
+        self.saved_table = on_disk
+        self._file.know(digest_of(on_disk.source.raw))
+        if self.holder is None:
+            self.journal.rebased(on_disk.source.raw, unsaved, self._history.position)
+        return done
+
+    def reload_schema(self) -> None:
+        """Read contextdb.toml anew. What was edited here of it stays; all other conditions and settings are as the file has them.
+
+        Raises
+        ------
+        FileError, SchemaError
+            The file cannot be read, or says what this table cannot be: then nothing has changed.
+        """
+        folder, schema = schema_for(self.path)
+        change = under_schema(self.saved_table, self.sheet.table, self.path, folder, schema)
+        self.saved_table = change(self.saved_table)
+        self._history.renewed(change)
+        self._schema_file = _watched(folder / SCHEMA_FILE)
+        self._show()
+
+    def schema_written(self) -> None:
+        """contextdb.toml was written here: what stands in it is known."""
+        self._schema_file = _watched(self._schema_file.path)
+
+    # ---- save and close
 
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> None:
         """Write the table to its file, or to another one, which is then its file.
 
+        What others wrote since is merged first (`overwrite`: written over). A file that is gone is made anew.
+
         Raises
         ------
         FileError
-            The disk refuses, or (unless `overwrite`) the file has been changed by somebody else. The old file is then whole.
+            The disk refuses, another editor has the table, or what others wrote disagrees with edits here (rule "merge-conflict"):
+            see `merge_from_disk`. The old file is then whole.
         TableError
             A text that such a file cannot hold.
+        SchemaError
+            What contextdb.toml shall say anew disagrees with what others wrote into it: then nothing is written.
         """
         target = self.path if path is None else Path(path)
-        if target == self.path and not overwrite and self.path.exists() and self.is_changed_on_disk:
-            found = "the file has been changed since it was read."
-            raise FileError(Fault(found, "the file as it was read", "to reload it, or to save over it", Place(str(target))))
+        is_own = target == self.path
+        if is_own:
+            self._require_own()
+            if not overwrite:
+                self._merge_first()
         table = self.sheet.table
-        if target == self.path and self.holder is None:
-            self.journal.saving(bytes_for(table, target))
+        schema = schema_change(self.saved_table if is_own else None, replace(table, path=target))
+        if is_own:
+            self.journal.saving(bytes_for(table, target), schema)
         saved = table.save(target)
+        if schema is not None:
+            schema.write()
+            self.schema_written()
         assert saved.source is not None
         self.sheet.saved(saved)
         self._moved_to(target)
-        self._digest = digest_of(saved.source.raw)
+        self.saved_table = self.sheet.table
+        self._file.know(digest_of(saved.source.raw))
         self.journal.saved(saved.source.raw, self.sheet.history.position)
 
     def close(self, keep_journal: bool = False) -> None:
         """Let go of the table. Unsaved edits are gone then, unless the journal is kept for the next time."""
-        if not keep_journal and self.holder is None:
+        if not keep_journal and self.holder is None and self.lock.taken_by() is None:
             self.journal.discard()
         self.lock.release()
+
+    # ---- parts
+
+    @property
+    def _raw(self) -> bytes:
+        assert self.saved_table.source is not None
+        return self.saved_table.source.raw
+
+    @property
+    def _digest(self) -> str:
+        return digest_of(self._raw)
+
+    def _begin_journal(self) -> None:
+        if self.problem is not None:
+            kept = set_aside(self.path)
+            self.problem = replace(self.problem, mend=f"to look at what was kept, in {path_in_quotes(kept)}")
+            table = self._history.table
+            unsaved = with_settings(diff(self.saved_table, table).edit("Unsaved edits"), self.saved_table, table)
+            self.journal.rebased(self._raw, unsaved, self._history.position)
+        elif not self.n_recovered:
+            self.journal.keep_base()
+
+    def _watch_files(self) -> None:
+        self._file = Watched(self.path, self._digest)
+        self._schema_file = _watched(_schema_path(self.path))
+
+    def _show(self) -> None:
+        self.sheet.query.show(self.sheet.table)
+        self.sheet.version += 1
+
+    def _clear_leftovers(self) -> None:
+        if not self.lock.is_held:
+            return
+        with suppress(OSError):
+            now_s = self.lock.path.stat().st_mtime  # just written: the time of that disk, whatever the clock here says
+            for folder in (Path(os.path.realpath(self.path)).parent, self.lock.path.parent):
+                clear_leftovers(folder, now_s)
+
+    def _is_free(self) -> bool:
+        with Lock(self.path) as other:
+            return other.is_held
+
+    def _require_own(self) -> None:
+        holder = self.holder or self.lock.taken_by()
+        if holder is not None:
+            found = f"{holder} has this table open, so it is not saved here."
+            raise FileError(Fault(found, "another file", "to save it under another name", Place(str(self.path)), "table-held"))
+
+    def _merge_first(self) -> None:
+        if self._file.state != "changed":
+            return
+        place = Place(str(self.path))
+        try:
+            found = self.merge_from_disk()
+        except ContextDBError as error:
+            said = f"the file has been changed since it was read, and cannot be read any more: {error.faults[0].found}"
+            mend = "to save under another name, or over it"
+            raise FileError(Fault(said, "a table", mend, place, "merge-conflict")) from None
+        if found.conflicts:
+            said = f"the file has been changed since it was read, in {plural(len(found.conflicts), 'place')} otherwise than here."
+            raise FileError(Fault(said, mend="to decide which hold", place=place, rule="merge-conflict"))
 
     def _moved_to(self, target: Path) -> None:
         if target == self.path:
@@ -89,6 +289,8 @@ class Session:
         self.close()
         self.path, self.lock = target, Lock(target)
         self.holder = self.lock.acquire()
+        self.saved_table = self.sheet.table
+        self._watch_files()
         self.journal = Journal(target, self._digest)
         self.sheet.recorder = self.journal if self.holder is None else None
 
@@ -100,3 +302,19 @@ def bytes_for(table: Table, path: Path) -> bytes:
     kind = Source if path.suffix.lower() == ".csv" else ParquetSource
     is_same = isinstance(table.source, kind)
     return write(table.columns, table.source if is_same else None, table.origin if is_same else fresh).raw
+
+
+def _schema_path(table: Path) -> Path:
+    """The contextdb.toml that holds for a table, or the one that would if it were made."""
+    try:
+        return schema_for(table)[0] / SCHEMA_FILE
+    except ContextDBError:
+        return table.parent / SCHEMA_FILE
+
+
+def _watched(path: Path) -> Watched:
+    """A file whose bytes are known as they are now."""
+    try:
+        return Watched(path, digest_of(read_bytes(path)))
+    except FileError:
+        return Watched(path, None)

@@ -18,6 +18,7 @@ from contextdb.changes import Cells, Change
 from contextdb.edits import Edit, Job
 from contextdb.errors import Fault, TableError, in_quotes, plural, shown
 from contextdb.history import History, Step
+from contextdb.schema_file import users_of
 from contextdb.table import Table
 from tui.model.clipboard import format_tsv, parse_tsv, place_paste
 from tui.model.find import Search, find, next_hit, replace_all
@@ -197,7 +198,11 @@ class Sheet(ShownTable):
 
     def rename_column(self, name: str) -> Done:
         """Give the cursor's column another name."""
-        return self._do(edits.rename_column(self.table, self.table.columns[self.selection.column].name, name))
+        return self._rename(self.table.columns[self.selection.column].name, name)
+
+    def _rename(self, column: str, name: str) -> Done:
+        keeps = self.table.path is not None and bool(users_of(self.table, column))
+        return self._do(edits.rename_column(self.table, column, name, keep_declared=keeps))
 
     # ---- find and replace
 
@@ -207,6 +212,16 @@ class Sheet(ShownTable):
         if (place := next_hit(hits, self.cursor, is_backwards)) is not None:
             self.go(*place)
         return int(hits.sum())
+
+    def count(self, search: Search) -> int:
+        """How many shown cells are found.
+
+        Raises
+        ------
+        PatternError
+            The pattern cannot be read.
+        """
+        return int(find(self.table, search, self.view.rows, [c.name for c in self.table.columns]).sum())
 
     def replace_here(self, search: Search, replacement: str) -> Done:
         """Replace in the cursor's cell, and go to the next one found."""
@@ -237,6 +252,11 @@ class Sheet(ShownTable):
     def redo(self) -> Done:
         """Make the step again that was taken back last."""
         return self._went(self.history.redo, "Redo")
+
+    def go_to_step(self, position: int) -> Done:
+        """Go to the state after so many steps."""
+        verb = "Undo" if position < self.history.position else "Redo"
+        return self._went(lambda: self.history.go(position), verb) if position != self.history.position else Done()
 
     def apply(self, edit: Edit) -> Done:
         """Make any other edit: a gap filled, a merge."""

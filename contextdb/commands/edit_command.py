@@ -1,0 +1,43 @@
+"""Edit tables in the terminal: cells, a test context, coverage, priorities.
+
+  contextdb edit tables/
+  contextdb edit tables/hit_mid_air.csv --theme contextdb-light
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+
+from contextdb.errors import ContextDBError, Fault
+from contextdb.exit_codes import ExitCode
+
+
+class TerminalError(ContextDBError):
+    """There is no terminal that an editor could be shown on."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("path", metavar="PATH", nargs="?", help="a table, or a folder of tables (default: tables/, or here)")
+    parser.add_argument("--theme", metavar="NAME", help="the colours; without it those of the settings")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Open the editor, and stay in it until it is left."""
+    _require_terminal()
+    from tui.run import edit
+
+    edit(arguments.path, arguments.theme)
+    return ExitCode.OK
+
+
+def _require_terminal() -> None:
+    term = os.environ.get("TERM", "" if os.name != "nt" else "windows")
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        found = "standard input and output are no terminal."
+        raise TerminalError(Fault(found, "a terminal", 'to use "contextdb query" and "contextdb check" in scripts'))
+    if term in ("", "dumb", "unknown"):
+        found = f"the terminal cannot move its cursor (TERM is {term or 'not set'})."
+        raise TerminalError(Fault(found, "a terminal such as xterm", "to set TERM=xterm-256color where the terminal is one"))

@@ -1,0 +1,44 @@
+"""A file with git's marks is opened as choices."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from contextdb.errors import TableError
+from tui.model.conflicted import conflicts_in, write_decided
+from tui.model.session import Session
+
+RAW = b"Asset,speed\r\nwalk,0..5\r\n<<<<<<< HEAD\r\nrun,1..2\r\n=======\r\nrun,3..4\r\n>>>>>>> other\r\njump,\r\n"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "t.csv"
+    file.write_bytes(RAW)
+    return file
+
+
+@pytest.mark.parametrize(("side", "text"), [("ours", b"1..2"), ("theirs", b"3..4")])
+def test_a_file_with_marks_is_decided_and_then_opens_as_a_table(path, side, text):
+    with pytest.raises(TableError, match="unresolved git conflict"):
+        Session(path)
+    found = conflicts_in(path)
+    assert [(c.asset, c.column, c.ours, c.theirs) for c in found.conflicts] == [("run", "speed", "1..2", "3..4")]
+    write_decided(path, found.resolved({0: side}))
+    assert path.read_bytes() == b"Asset,speed\r\nwalk,0..5\r\nrun," + text + b"\r\njump,\r\n"
+    session = Session(path)
+    assert session.sheet.table.assets == ["walk", "run", "jump"]
+    session.close()
+
+
+@pytest.mark.parametrize("raw", [b"Asset,speed\nwalk,1\n", RAW[:-20], RAW.replace(b"run,3..4", b"run"), b"\x00"])
+def test_a_file_without_marks_or_without_tables_between_them_has_no_choices(path, raw):
+    path.write_bytes(raw)
+    assert conflicts_in(path) is None
+
+
+def test_a_file_that_is_not_there_has_no_choices(path):
+    path.unlink()
+    assert conflicts_in(path) is None

@@ -1,0 +1,397 @@
+"""The dialogs Import and Export, and the draft behind the first: what a file becomes in the open table."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import openpyxl
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import tables
+from terminal import drive, screen_text
+from textual.app import App
+from textual.pilot import Pilot
+from textual.screen import Screen
+from textual.widgets import Input, Select
+
+import contextdb as cdb
+from contextdb.columns import TextColumn
+from contextdb.errors import ContextDBError
+from contextdb.exchange.formats import FORMATS, ReadOptions, write
+from contextdb.exchange.mapping import as_job
+from contextdb.exchange.reading import Reading
+from contextdb.table import Table
+from tui.model.importing import Draft, Import, Mode
+from tui.model.sheet import Sheet
+from tui.screens.export_table import Export, ExportDialog
+from tui.screens.import_table import ImportDialog
+
+TOML = '[conditions.speed]\ntype = "number"\n[conditions.pos]\ntype = "enum"\nvalues = ["CB", "FS"]\n'
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Table:
+    """A table of three rows, and beside it files to import."""
+    (tmp_path / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    (tmp_path / "moves.csv").write_text("Asset Name,speed\njog,1..2\nrun,4..6\nidle,0\n", encoding="utf-8")
+    work = tmp_path / "work"
+    work.mkdir()
+    (work / "more.csv").write_text("name;Speed;Depth\nrun;5;CB\nsprint;>8;FS\n", encoding="utf-8")
+    (work / "broken.xlsx").write_bytes(b"PK\x03\x04nothing")
+    book = openpyxl.Workbook()
+    for title in ("Moves", "Other"):
+        sheet = book.create_sheet(title)
+        sheet.append(["Asset", "speed"])
+        sheet.append([f"{title}_jog", 5])
+    book.save(work / "book.xlsx")
+    return cdb.load(tmp_path / "moves.csv")
+
+
+def draft(table: Table, text: str, mode: Mode = "merge") -> Draft:
+    found = Draft.read(table, text.encode(), "more.csv", ReadOptions("csv"))
+    found.mode = mode
+    return found
+
+
+def texts(table: Table) -> dict[str, list[str]]:
+    return {column.name: column.to_list() for column in table.columns}
+
+
+# ---- the draft
+
+
+MORE = "name;Speed\nrun;5\nsprint;>8\n"
+
+
+@pytest.mark.parametrize(
+    ("mode", "assets", "speeds"),
+    [
+        ("merge", ["jog", "run", "idle", "sprint"], ["1..2", "5", "0", ">8"]),
+        ("append", ["jog", "run", "idle", "run", "sprint"], ["1..2", "4..6", "0", "5", ">8"]),
+        ("replace", ["run", "sprint"], ["5", ">8"]),
+    ],
+)
+def test_rows_are_merged_by_asset_added_or_put_in_place_of_others(table: Table, mode: Mode, assets: list[str], speeds: list[str]):
+    sheet = Sheet(table)
+    done = sheet.apply(draft(table, MORE, mode).edit())
+    assert done.name == "Import more.csv"
+    assert texts(sheet.table) == {"Asset Name": assets, "speed": speeds}
+    sheet.undo()
+    assert texts(sheet.table) == texts(table)
+
+
+def test_a_merge_changes_only_the_lines_that_it_must(table: Table):
+    assert table.path is not None
+    Sheet(table).apply(draft(table, MORE).edit())
+    after = draft(table, MORE).edit().apply(table).save()
+    assert after.path is not None
+    assert after.path.read_text(encoding="utf-8") == "Asset Name,speed\njog,1..2\nrun,5\nidle,0\nsprint,>8\n"
+
+
+def test_equal_assets_pair_up_in_their_order(table: Table):
+    twice = table.with_rows(3, [{"Asset Name": "run", "speed": "7"}])
+    after = draft(twice, "name;speed\nrun;1\nrun;2\nrun;3\n").edit().apply(twice)
+    assert texts(after) == {"Asset Name": ["jog", "run", "idle", "run", "run"], "speed": ["1..2", "1", "0", "2", "3"]}
+
+
+def test_new_columns_are_added_with_their_declarations(table: Table):
+    found = draft(table, "name;pos;Depth;note;Priority\nrun;CB;A;x, y!;5\njog;FS;B;z, w!;6\n")
+    assert [found.becomes(at) for at in range(5)] == [
+        "Asset Name (asset)",
+        "+ pos (enum)",
+        "+ Depth (new, enum)",
+        "+ note (output)",
+        "+ Priority (priority)",
+    ]
+    after = found.edit().apply(table)
+    assert texts(after)["Depth"] == ["B", "A", ""]
+    assert after.condition("Depth").condition.domain.values == ("A", "B")
+    assert (after.settings.outputs, after.settings.priority) == (("note",), "Priority")
+
+
+def test_a_column_can_be_left_out_or_become_another_condition(table: Table):
+    found = draft(table, "name;velocity\nrun;5\n")
+    assert found.becomes(1) == "+ velocity (new, int)"
+    labels = [choice.label for choice in found.choices(1)]
+    assert labels[:3] == ["(left out)", "Asset Name (asset)", "speed"]
+    assert labels[-1] == "new column of data"
+    found.choose(1, next(choice.mapped for choice in found.choices(1) if choice.label == "speed"))
+    assert texts(found.edit().apply(table))["speed"] == ["1..2", "5", "0"]
+    found.choose(1, found.choices(1)[0].mapped)
+    assert not found.edit().changes
+
+
+def test_two_columns_never_become_the_same(table: Table):
+    found = draft(table, "name;velocity;speed\nrun;5;6\n")
+    found.choose(1, next(choice.mapped for choice in found.choices(1) if choice.label == "speed"))
+    assert [found.becomes(at) for at in range(3)] == ["Asset Name (asset)", "speed", "(left out)"]
+    assert found.label(2) == "(left out)"
+
+
+def test_cells_that_cannot_be_read_are_marked_and_said(table: Table):
+    found = draft(table, "name;speed\nrun;5;5\n".replace("5;5", '"5;5"'))
+    assert found.becomes(1) == "! speed"
+    assert found.is_doubtful(1)
+    assert '1 cell cannot be read as number, such as "5;5"' in found.why(1)
+
+
+def test_without_a_column_of_assets_nothing_can_be_imported(table: Table):
+    found = draft(table, MORE)
+    found.columns[0] = as_job(found.columns[0], "left out")
+    assert found.summary().startswith("no column of the file names the assets.")
+    with pytest.raises(ContextDBError):
+        found.edit()
+
+
+def test_what_the_file_does_not_have_is_told(table: Table):
+    assert 'Not in the file: "speed". New rows are empty there, others stay.' in draft(table, "name\nsprint\n").notes
+
+
+@given(table=tables(least_conditions=1), data=st.data())
+def test_importing_what_was_exported_changes_nothing(table: Table, data: st.DataObject):
+    name = data.draw(st.sampled_from(["xlsx", "tsv", "parquet"]))
+    found = Draft.read(table, write(table, FORMATS[name])[0], f"x.{name}", ReadOptions(name))
+    found.mode = data.draw(st.sampled_from(["merge", "replace"]))
+    assert not found.edit().changes
+
+
+@given(table=tables(least_conditions=1), data=st.data())
+def test_a_merge_gives_every_row_of_the_file_and_keeps_every_other(table: Table, data: st.DataObject):
+    n_rows = data.draw(st.integers(0, 5))
+    assets = data.draw(st.lists(st.sampled_from(["A0", "A1", "new", ""]), min_size=n_rows, max_size=n_rows))
+    column = table.conditions[0].condition.name
+    cells = data.draw(st.lists(st.sampled_from(["Any", "5", "x"]), min_size=n_rows, max_size=n_rows))
+    read = Reading((TextColumn.of("Asset", assets), TextColumn.of(column, cells)), "csv")
+    found = Draft(table, read, "x.csv")
+    edit = found.edit()
+    after = edit.apply(table)
+    pairs = list(zip(after.assets, after.text_column(column).to_list(), strict=True))
+    assert not [pair for pair in zip(assets, cells, strict=True) if pair not in pairs]
+    assert after.assets[: table.n_rows] == table.assets
+    assert np.array_equal(edit.came_from(table.n_rows)[: table.n_rows], np.arange(table.n_rows))
+
+
+# ---- the screens
+
+
+class Editor(App[None]):
+    """A screen with one dialog over it."""
+
+    def __init__(self, make: Callable[[], Screen[Any]]) -> None:
+        super().__init__()
+        self.make = make
+        self.answers: list[Any] = []
+
+    def on_mount(self) -> None:
+        self.push_screen(self.make(), self.answers.append)
+
+
+Script = Callable[[Pilot[Any]], Awaitable[None]]
+
+
+def played(make: Callable[[], Screen[Any]], script: Script, size: tuple[int, int] = (80, 24)) -> tuple[list[Any], str]:
+    """What the dialog gave back, and what the screen showed at the end."""
+    app = Editor(make)
+
+    async def run(pilot: Pilot[Any]) -> str:
+        await script(pilot)
+        await settled(pilot)
+        return screen_text(app)
+
+    return app.answers, drive(app, run, size)
+
+
+async def settled(pilot: Pilot[Any]) -> None:
+    await pilot.app.workers.wait_for_complete()
+    await pilot.pause()
+
+
+async def read_file(pilot: Pilot[Any], path: str) -> None:
+    pilot.app.screen.query_one("#import-path", Input).value = path
+    await pilot.pause()
+    await pilot.press("enter")
+    await settled(pilot)
+
+
+def importing(table: Table) -> Callable[[], ImportDialog]:
+    assert table.path is not None
+    folder = table.path.parent / "work"
+    return lambda: ImportDialog(table, folder)
+
+
+def exporting(table: Table) -> Callable[[], ExportDialog]:
+    assert table.path is not None
+    folder = table.path.parent / "work"
+    return lambda: ExportDialog(table, folder)
+
+
+def test_a_path_is_completed_read_and_imported_with_the_keys_alone(table: Table):
+    async def script(pilot: Pilot[Any]) -> None:
+        await pilot.press("m", "tab")
+        await pilot.pause()
+        assert pilot.app.screen.query_one("#import-path", Input).value == "more.csv"
+        await pilot.press("enter")
+        await settled(pilot)
+        text = screen_text(pilot.app)
+        assert "2 rows in the file: 1 added, 1 here already." in text
+        assert "+ Depth (new, enum)" in text
+        assert "semicolons between the fields" in text
+        await pilot.press("f6")
+
+    [answer], _ = played(importing(table), script)
+    assert isinstance(answer, Import)
+    assert texts(answer.edit.apply(table))["Depth"] == ["", "CB", "", "FS"]
+    assert any("semicolons" in note for note in answer.notes)
+
+
+def test_a_broken_file_stays_in_the_dialog_with_its_reason(table: Table):
+    async def script(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "broken.xlsx")
+        await pilot.press("f6")
+
+    answers, text = played(importing(table), script)
+    assert not answers
+    assert "✗ the workbook is broken" in text
+    _, text = played(importing(table), lambda pilot: read_file(pilot, "moer.csv"))
+    assert "✗ there is no such file. Did you mean" in text
+
+
+def test_without_a_file_nothing_is_imported(table: Table):
+    async def script(pilot: Pilot[Any]) -> None:
+        await pilot.press("f6")
+
+    answers, text = played(importing(table), script)
+    assert not answers
+    assert "✗ Choose a file first." in text
+
+
+def test_a_sheet_is_chosen_where_a_workbook_has_several(table: Table):
+    async def script(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "book.xlsx")
+        assert '✗ 2 sheets hold cells: "Moves", "Other".' in screen_text(pilot.app)
+        assert "--sheet" not in screen_text(pilot.app)
+        pilot.app.screen.query_one("#import-sheet", Select).value = "Other"
+        await pilot.pause()
+        await settled(pilot)
+        await pilot.press("f6")
+
+    [answer], _ = played(importing(table), script)
+    assert answer.edit.apply(table).assets == ["jog", "run", "idle", "Other_jog"]
+
+
+def test_enter_on_a_column_shows_all_that_it_may_become(table: Table):
+    async def script(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "more.csv")
+        await pilot.press("down", "down", "enter")
+        await pilot.pause()
+        text = screen_text(pilot.app)
+        assert "What Depth becomes" in text
+        assert "▸ new condition, enum" in text
+        await pilot.press("home", "enter")
+        await pilot.pause()
+        assert "(left out)" in screen_text(pilot.app)
+        await pilot.press("f6")
+
+    [answer], _ = played(importing(table), script)
+    assert [c.name for c in answer.edit.apply(table).columns] == ["Asset Name", "speed"]
+
+
+def test_the_rows_may_replace_those_of_the_table(table: Table):
+    async def script(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "more.csv")
+        pilot.app.screen.query_one("#import-mode", Select).value = "replace"
+        await pilot.pause()
+        assert "2 rows in the file: 1 added, 1 here already, 2 taken away." in screen_text(pilot.app)
+        await pilot.press("f6")
+
+    [answer], _ = played(importing(table), script)
+    assert answer.edit.apply(table).assets == ["run", "sprint"]
+
+
+def test_a_file_that_changes_nothing_is_told_and_the_dialog_stays(table: Table):
+    async def script(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "../moves.csv")
+        assert "3 rows in the file: 3 here already." in screen_text(pilot.app)
+        await pilot.press("f6")
+
+    answers, text = played(importing(table), script)
+    assert not answers
+    assert "Nothing would change: the table says all of this already." in text
+
+
+def test_the_clipboard_is_imported_without_a_path(table: Table):
+    text = "Asset\tspeed\r\nhop\t[red]3[/]\r\n"
+
+    async def script(pilot: Pilot[Any]) -> None:
+        await settled(pilot)
+        assert "[red]3[/]" in screen_text(pilot.app)
+        await pilot.press("f6")
+
+    [answer], _ = played(lambda: ImportDialog(table, Path(), text), script)
+    assert answer.edit.apply(table).text(3, "speed") == "[red]3[/]"
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 48)])
+def test_escape_leaves_and_everything_has_room(table: Table, size: tuple[int, int]):
+    async def script(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "more.csv")
+        text = screen_text(pilot.app)
+        for part in ("Import into moves", "Speed", "Depth", "Import     Cancel", "F6 import"):
+            assert part in text
+        await pilot.press("escape")
+
+    answers, _ = played(importing(table), script, size)
+    assert answers == [None]
+
+
+def test_an_export_gives_the_bytes_of_the_format_that_the_name_tells(table: Table):
+    async def script(pilot: Pilot[Any]) -> None:
+        entry = pilot.app.screen.query_one("#export-path", Input)
+        assert entry.value == "moves.xlsx"
+        entry.value = "moves.json"
+        await pilot.press("enter")
+
+    [answer], _ = played(exporting(table), script)
+    assert isinstance(answer, Export)
+    assert answer.path.name == "moves.json"
+    assert answer.raw.startswith(b'[\n{"Asset Name": "jog"')
+
+
+@pytest.mark.parametrize(("keys", "is_written"), [(("enter",), True), (("escape", "escape"), False), (("n", "escape"), False)])
+def test_an_export_asks_before_it_writes_over_a_file(table: Table, keys: tuple[str, ...], is_written: bool):
+    async def script(pilot: Pilot[Any]) -> None:
+        pilot.app.screen.query_one("#export-path", Input).value = "more.csv"
+        await pilot.press("enter")
+        await pilot.pause()
+        assert '"more.csv" is there already. Write over it?' in screen_text(pilot.app)
+        for key in keys:
+            await pilot.press(key)
+            await settled(pilot)
+
+    [answer], _ = played(exporting(table), script)
+    assert (answer is not None) is is_written
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("no/x.csv", "✗ There is no folder"),
+        ("x.xslx", "✗ a file that ends in"),
+        (".", "✗ This is a folder; a file is wanted."),
+        ("../moves.csv", "✗ This is the open table itself; Ctrl+S saves it."),
+        ("x\0.csv", "✗ This is no path of a file."),
+    ],
+)
+def test_a_path_that_cannot_be_exported_to_stays_with_its_reason(table: Table, path: str, said: str):
+    async def script(pilot: Pilot[Any]) -> None:
+        pilot.app.screen.query_one("#export-path", Input).value = path
+        await pilot.press("f6")
+        await settled(pilot)
+
+    answers, text = played(exporting(table), script)
+    assert not answers
+    assert said in text

@@ -1,0 +1,215 @@
+"""The Problems tab: findings of the table as it is, errors first, a filter, and the way to the cell."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from terminal import drive, screen_text
+from textual.app import App, ComposeResult
+from textual.pilot import Pilot
+
+import contextdb as cdb
+from tui.messages import GoToCell, Told
+from tui.model.problems import Problem, Problems
+from tui.model.sheet import Sheet
+from tui.panes import problems
+from tui.panes.problems import ProblemsPane
+from tui.widgets.line_list import LineList
+
+TOML = """
+[conditions.speed]
+type = "number"
+min = 0
+max = 10
+
+[conditions.gait]
+type = "enum"
+values = ["Walk", "Run"]
+"""
+ROWS = 'Asset,speed,gait\nJog,5..3,Walk\nRun,1 to 5,Wlk\n[red]odd[/],0..5,Run\nJog,0..99,Run\n"",0..5,Any\n'
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> cdb.Table:
+    (tmp_path / "contextdb.toml").write_text(TOML)
+    (tmp_path / "a.csv").write_text(ROWS)
+    return cdb.load(tmp_path / "a.csv", strict=False)
+
+
+class PaneApp(App[None]):
+    """The tab alone; what it tells is kept."""
+
+    CSS = "ProblemsPane { height: 1fr; }"
+
+    def __init__(self, table: cdb.Table) -> None:
+        super().__init__()
+        self.sheet = Sheet(table)
+        self.pane = ProblemsPane(self.sheet)
+        self.told: list[GoToCell | Told] = []
+
+    def compose(self) -> ComposeResult:
+        yield self.pane
+
+    def on_mount(self) -> None:
+        self.pane.take_focus()
+
+    def on_go_to_cell(self, message: GoToCell) -> None:
+        self.told.append(message)
+
+    def on_told(self, message: Told) -> None:
+        self.told.append(message)
+
+
+def shown(
+    table: cdb.Table,
+    *keys: str,
+    script: Callable[[Pilot[None]], Awaitable[Any]] | None = None,
+    size: tuple[int, int] = (100, 18),
+) -> tuple[PaneApp, str]:
+    app = PaneApp(table)
+
+    async def play(pilot: Pilot[None]) -> str:
+        for key in keys:
+            await pilot.press(key)
+        if script is not None:
+            await script(pilot)
+        await pilot.pause()
+        return screen_text(app)
+
+    return app, drive(app, play, size)
+
+
+def test_errors_come_first_and_rows_count_from_1_as_in_the_grid(table):
+    _, screen = shown(table)
+    lines = screen.splitlines()
+    assert lines[0].strip() == "4 errors, 1 warning, 1 information."
+    assert lines[2].split() == ["1", "All", "6", "2", "Errors", "4", "3", "Warnings", "1", "4", "Information", "1"]
+    assert [line.split()[0] for line in lines[4:10]] == ["▸", "error", "error", "error", "warning", "information"]
+    assert lines[4].split()[2:5] == ["1", "Jog", "speed"]
+
+
+def test_the_detail_has_the_whole_message_and_the_cure(table):
+    _, screen = shown(table, "down")
+    assert 'Error unreadable-cell: row 2, Run, column "speed"' in screen
+    assert 'Did you mean "1..5"?' in screen
+    assert "The text of a cell is not in the grammar of its type." in screen
+
+
+def test_enter_goes_to_the_cell(table):
+    app, _ = shown(table, "down", "down", "enter")
+    assert app.told == [GoToCell(1, "gait")]
+
+
+def test_a_click_goes_to_the_line_and_a_second_one_to_the_cell(table):
+    async def click(pilot: Pilot[None]) -> None:
+        await pilot.click(LineList, offset=(10, 2))
+        assert pilot.app.told == []
+        await pilot.click(LineList, offset=(10, 2))
+
+    app, _ = shown(table, script=click)
+    assert app.told == [GoToCell(1, "speed")]
+
+
+@pytest.mark.parametrize(
+    ("key", "levels"), [("2", {"error"}), ("3", {"warning"}), ("4", {"info"}), ("1", {"error", "warning", "info"})]
+)
+def test_a_number_key_shows_one_level(table, key, levels):
+    app, _ = shown(table, key)
+    assert {p.level for p in app.pane.lines} == levels
+
+
+def test_brackets_and_clicks_change_the_level(table):
+    app, _ = shown(table, "right_square_bracket", "right_square_bracket")
+    assert app.pane.level == "warning"
+
+    async def click(pilot: Pilot[None]) -> None:
+        await pilot.click("#problems-levels", offset=(14, 0))
+
+    app, _ = shown(table, script=click)
+    assert app.pane.level == "error"
+
+
+def test_an_edit_that_mends_a_cell_takes_its_problem_away(table):
+    async def mend(pilot: Pilot[None]) -> None:
+        sheet = pilot.app.sheet
+        sheet.go(0, 1)
+        assert sheet.type_text("3..5") is None
+        pilot.app.pane.show()
+
+    app, screen = shown(table, script=mend)
+    assert screen.splitlines()[0].strip() == "3 errors, 1 warning, 1 information."
+    assert all(p.row != 0 for p in app.pane.lines if p.level == "error")
+
+
+def test_a_fact_of_the_test_row_that_cannot_be_read_is_a_problem_too(table):
+    async def ask(pilot: Pilot[None]) -> None:
+        pilot.app.sheet.query.set("gait", "Wlak")
+        pilot.app.pane.show()
+        await pilot.pause()
+        await pilot.press("home", "enter")
+
+    app, screen = shown(table, script=ask)
+    assert "test row" in screen
+    assert "5 errors" in screen
+    assert "test row" in app.told[0].text
+
+
+def test_a_sound_table_has_nothing_to_show():
+    sound = cdb.Table.from_columns({"Asset": ["A"], "up": ["True"]}, {"up": {"type": "bool"}})
+    app, screen = shown(sound, "enter", "down", "end", "4")
+    assert "Nothing is wrong with this table" in screen
+    assert app.told == []
+
+
+def test_a_problem_of_the_whole_table_has_no_cell_to_go_to():
+    app, _ = shown(cdb.Table.from_columns({"Asset": []}), "enter")
+    assert [type(m) for m in app.told] == [Told]
+
+
+def test_texts_that_look_like_markup_are_shown_as_they_are(table):
+    _, screen = shown(table.with_cell(2, "gait", "[bold]"), "2")
+    assert "[red]odd[/]" in screen
+    assert '"[bold]"' in screen
+
+
+def test_rows_that_cause_a_problem_are_named(table):
+    found = Problems.of(table, {})
+    [twin] = [p for p in found.items if p.rule == "duplicate-asset"]
+    assert "(row 1)" in twin.text
+
+
+def test_a_large_table_is_checked_beside_the_keys():
+    n_rows = 20_001
+    names = [f"b{i}" for i in range(9)]
+    columns = {"Asset": [f"A{r}" for r in range(n_rows)]} | {n: ["True"] * n_rows for n in names}
+    large = cdb.Table.from_columns(columns, {n: {"type": "bool"} for n in names[:8]})
+
+    async def wait(pilot: Pilot[None]) -> None:
+        await pilot.app.workers.wait_for_complete()
+        await pilot.pause()
+
+    _, screen = shown(large, script=wait)
+    assert screen.splitlines()[0].strip() == "1,002 warnings."
+
+
+def test_a_hundred_thousand_problems_are_paged_without_building_their_lines(table, monkeypatch):
+    many = Problems(tuple(Problem("error", "unreadable-cell", f"cannot read {i}.", i, f"A{i}", "speed") for i in range(100_000)))
+    built: list[Problem] = []
+
+    def line(problem: Problem) -> list[str]:
+        built.append(problem)
+        return [problem.level, problem.place, problem.asset, "speed", problem.message]
+
+    monkeypatch.setattr(problems, "_line", line)
+
+    async def page(pilot: Pilot[None]) -> None:
+        pilot.app.pane._fill(many)
+        await pilot.press("pagedown", "end", "pageup", "home", "down", "end")
+
+    _, screen = shown(table, script=page)
+    assert "100,000 errors." in screen
+    assert "cannot read 99999." in screen
+    assert len(built) < 500

@@ -1,0 +1,194 @@
+"""The application: a workspace of tables, one screen for each that is open, themes and keys."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import ClassVar
+
+from textual import events
+from textual.app import App, SystemCommand
+from textual.dom import DOMNode
+from textual.screen import Screen
+from textual.theme import BUILTIN_THEMES
+
+from contextdb.diff import Merge, Side
+from contextdb.errors import ContextDBError
+from tui.commands import COMMANDS, key_name
+from tui.editor_settings import EditorSettings
+from tui.model.conflicted import conflicts_in, write_decided
+from tui.model.session import Session
+from tui.model.workspace import Workspace
+from tui.screens.conflicts import ConflictsDialog
+from tui.screens.leaving import HeldDialog, LeavingDialog
+from tui.screens.main import MainScreen
+from tui.themes import DARK, THEMES
+
+
+WAIT_FOR_PART_S = 2.0
+"""So long a key waits for a part of the screen that is still at work on the key before."""
+
+
+class EditorApp(App[None]):
+    """The terminal editor."""
+
+    TITLE = "contextdb"
+    ENABLE_COMMAND_PALETTE = True
+    COMMAND_PALETTE_BINDING: ClassVar[str] = "ctrl+p"
+
+    def __init__(self, workspace: Workspace, settings: EditorSettings | None = None, theme: str = "") -> None:
+        super().__init__()
+        self.workspace = workspace
+        self.settings = settings or EditorSettings()
+        for one in THEMES:
+            self.register_theme(one)
+        self.theme = theme or self.settings.theme or DARK
+        self.set_keymap(dict(self.settings.keys))
+        self._ahead: deque[events.Event] = deque()
+        """What was typed before the key before it has done all it does."""
+        self._settling: asyncio.Task[None] | None = None
+
+    @staticmethod
+    def theme_names() -> list[str]:
+        """Every theme there is."""
+        return sorted([*(theme.name for theme in THEMES), *BUILTIN_THEMES])
+
+    def on_mount(self) -> None:
+        self.open_table(self.workspace.first)
+
+    # ---- typing faster than the screen
+
+    async def on_event(self, event: events.Event) -> None:
+        """Take one key at a time. A key can open an editor or a dialog, and what is typed after it is meant for that."""
+        is_waiting = self._settling is not None or bool(self._ahead)
+        if is_waiting and isinstance(event, (events.InputEvent, events.Paste)) and not event.is_forwarded:
+            self._ahead.append(event)
+        else:
+            await self._take(event)
+
+    async def _take(self, event: events.Event) -> None:
+        is_typed = isinstance(event, (events.Key, events.Paste)) and not event.is_forwarded
+        await super().on_event(event)
+        if is_typed and self._settling is None:
+            self._settling = asyncio.create_task(self._settle())
+
+    async def _settle(self) -> None:
+        """Wait until the parts that a key may have gone to have done their work, and those that it made are there."""
+        for _ in range(2):
+            for part in self._parts_at_work():
+                await _done(part)
+        self._settling = None
+        self.call_later(self._take_next)
+
+    def _parts_at_work(self) -> list[DOMNode]:
+        if not self.screen_stack:
+            return []
+        new = [part for part in self.screen.walk_children(with_self=True) if not part.is_mounted]
+        return [*(self.focused or self.screen).ancestors_with_self, *new, self]
+
+    async def _take_next(self) -> None:
+        while self._ahead and self._settling is None:
+            await self._take(self._ahead.popleft())
+
+    # ---- tables
+
+    @property
+    def main(self) -> MainScreen:
+        """The screen of the table that is seen."""
+        return next(screen for screen in reversed(self.screen_stack) if isinstance(screen, MainScreen))
+
+    def open_table(self, name: str) -> None:
+        """Show a table; one with a conflict between marks asks first which side holds."""
+        try:
+            session = self.workspace.session(name)
+        except ContextDBError as error:
+            merged = conflicts_in(self.workspace.files[name])
+            if merged is None:
+                self._refused(str(error))
+            else:
+                self._decide(name, merged)
+            return
+        self._show_table(name, session)
+
+    def _show_table(self, name: str, session: Session) -> None:
+        screen = MainScreen(self.workspace, name)
+        if any(isinstance(one, MainScreen) for one in self.screen_stack):
+            self.switch_screen(screen)
+        else:
+            self.push_screen(screen)
+        if session.holder is not None:
+            self.push_screen(HeldDialog(name, session.holder), lambda answer: self._held(name, answer))
+
+    def _held(self, name: str, answer: str | None) -> None:
+        if answer == "take-over":
+            self.workspace.reopen(name, takes_over=True)
+            self.open_table(name)
+
+    def _decide(self, name: str, merged: Merge) -> None:
+        path = self.workspace.files[name]
+
+        def decided(sides: Mapping[int, Side] | None) -> None:
+            if sides is None:
+                self._refused(f"{path.name} holds a merge conflict, so it is not opened.")
+                return
+            write_decided(path, merged.resolved(sides))
+            self.open_table(name)
+
+        self.push_screen(ConflictsDialog(merged.conflicts, path.name), decided)
+
+    def _refused(self, text: str) -> None:
+        if any(isinstance(one, MainScreen) for one in self.screen_stack):
+            self.main.say(text, "error")
+        else:
+            self.exit(return_code=2, message=text)
+
+    def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
+        for command in COMMANDS:
+            if command.is_listed and command.id != "palette":
+                keys = command.keys.split(",")[0]
+                about = f"{command.about}  {key_name(keys)}" if keys else command.about
+                yield SystemCommand(command.label, about, partial(self._run, command.id))
+        yield SystemCommand("Theme", "Other colours.", self.action_change_theme)
+        yield SystemCommand("Screenshot", "Keep a picture of the screen as SVG.", self.deliver_screenshot)
+
+    def _run(self, name: str) -> None:
+        self.call_later(self.main.run_command, name)
+
+    async def action_quit(self) -> None:
+        """Leave; unsaved edits are asked about."""
+        unsaved = self.workspace.unsaved
+        if unsaved:
+            self.push_screen(LeavingDialog(unsaved), self._left)
+        else:
+            self._leave()
+
+    def _left(self, answer: str | None) -> None:
+        if answer == "save" and not self._save_all():
+            return
+        if answer is not None:
+            self._leave()
+
+    def _save_all(self) -> bool:
+        for name in self.workspace.unsaved:
+            try:
+                self.workspace.session(name).save()
+            except ContextDBError as error:
+                self.main.say(f"{name} is not saved: {error}", "error")
+                return False
+        return True
+
+    def _leave(self) -> None:
+        self.workspace.close()
+        self.exit()
+
+
+async def _done(part: DOMNode) -> None:
+    """Wait until a part of the screen has handled all that it was told up to now; one that is being closed is not waited for."""
+    done = asyncio.Event()
+    if part.call_later(done.set):
+        try:
+            await asyncio.wait_for(done.wait(), WAIT_FOR_PART_S)
+        except TimeoutError:
+            return

@@ -1,0 +1,192 @@
+"""Every command of the editor, once: its keys, what it is called, what it does, and what runs. Data only.
+
+Key bindings, the footer, the command palette, the help on F1, the keymap file and docs/keys.md are all made from this list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from textual.binding import Binding, BindingType
+
+from tui.model.selection import Selection
+from tui.model.sheet import Done, Sheet
+
+Scope = Literal["grid", "assets", "screen"]
+"""Where an action runs: in the grid, in the pane round it, or on the screen."""
+Verb = Callable[[Sheet], Done]
+
+
+@dataclass(frozen=True)
+class Command:
+    """One thing that can be done."""
+
+    id: str
+    """Names it in a keymap file."""
+    keys: str
+    """With commas between; empty: only by the palette or the mouse."""
+    label: str
+    about: str
+    """A sentence for the palette and the help."""
+    group: str
+    action: str = ""
+    """The Textual action of its scope; empty: the verb is called."""
+    verb: Verb | None = None
+    """An edit of the sheet."""
+    scope: Scope = "grid"
+    in_footer: bool = False
+    is_listed: bool = True
+    """False: too small for the palette; it stands in the help with its neighbours."""
+
+    def binding(self) -> Binding | None:
+        """The command as a Textual binding; None without keys. The screen has those of the assets' pane, for every tab."""
+        action = f"command('{self.id}')" if self.scope == "assets" else self.run
+        return Binding(self.keys, action, self.label, show=self.in_footer, id=self.id) if self.keys else None
+
+    @property
+    def run(self) -> str:
+        """The Textual action of its scope."""
+        return self.action or f"verb('{self.id}')"
+
+
+def _moves() -> Iterable[Command]:
+    for key, down, right in (("up", -1, 0), ("down", 1, 0), ("left", 0, -1), ("right", 0, 1)):
+        for shift in (False, True):
+            how, held = ("Select", "shift+") if shift else ("Go", "")
+            name = f"{how.lower()}-{key}"
+            move = f"move({down}, {right}, {shift})"
+            yield Command(name, held + key, f"{how} {key}", f"{how} one cell {key}.", "Move", move, is_listed=False)
+            edge = f"edge({down}, {right}, {shift})"
+            about = f"{how} {key} to the end of the filled cells."
+            yield Command(f"{name}-end", f"ctrl+{held}{key}", f"{how} to edge", about, "Move", edge, is_listed=False)
+
+
+def _jumps() -> Iterable[Command]:
+    ends = (
+        ("home", "home", "the row's first cell"),
+        ("end", "end", "the row's last cell"),
+        ("ctrl+home", "first", "the first cell of all"),
+        ("ctrl+end", "last", "the last cell of all"),
+    )
+    for shift in (False, True):
+        how, held = ("Select", "shift+") if shift else ("Go", "")
+        for key, jump, where in ends:
+            keys = key.replace("ctrl+", f"ctrl+{held}") if "ctrl" in key else held + key
+            about = f"{how} to {where}."
+            yield Command(
+                f"{how.lower()}-{jump}", keys, f"{how} to {jump}", about, "Move", f"jump('{jump}', {shift})", is_listed=False
+            )
+        for key, pages in (("pageup", -1), ("pagedown", 1)):
+            name = f"{how.lower()}-page-{'up' if pages < 0 else 'down'}"
+            about = f"{how} a page {'up' if pages < 0 else 'down'}."
+            yield Command(name, held + key, f"{how} a page", about, "Move", f"page({pages}, {shift})", is_listed=False)
+
+
+def _move_down(sheet: Sheet) -> Done:
+    return sheet.move_rows(1)
+
+
+def _move_up(sheet: Sheet) -> Done:
+    return sheet.move_rows(-1)
+
+
+GRID: tuple[Command, ...] = (
+    *_moves(),
+    *_jumps(),
+    Command("select-rows", "shift+space,alt+r", "Select rows", "Select the whole rows of the selection.", "Select", "select_rows"),
+    Command("select-columns", "ctrl+@,ctrl+space,alt+k", "Select columns", "Select the whole columns.", "Select", "select_columns"),
+    Command("select-all", "ctrl+a", "Select all", "Select every cell.", "Select", "select_all"),
+    Command("edit", "f2,enter", "Edit", "Change the cell; Enter takes it, Esc does not.", "Edit", "edit", in_footer=True),
+    Command("choose", "f4,alt+down", "Choose", "Open the list of what the cell may be.", "Edit", "choose"),
+    Command("clear", "delete,backspace", "Clear", "Empty the selected cells; an empty condition is Any.", "Edit", "clear"),
+    Command("copy", "ctrl+c", "Copy", "Copy the selected cells, also for Excel.", "Edit", "copy"),
+    Command("cut", "ctrl+x", "Cut", "Copy the selected cells and empty them.", "Edit", "cut"),
+    Command("paste", "ctrl+v", "Paste", "Paste cells; rows that are missing are added.", "Edit", "paste"),
+    Command("fill-down", "ctrl+d", "Fill down", "Copy the first selected row into the others.", "Edit", verb=Sheet.fill_down),
+    Command("fill-right", "ctrl+r", "Fill right", "Copy the first selected column into the others.", "Edit", verb=Sheet.fill_right),
+    Command("undo", "ctrl+z", "Undo", "Take back the last step.", "Edit", verb=Sheet.undo, in_footer=True),
+    Command("redo", "ctrl+y,ctrl+shift+z", "Redo", "Make the step again that was taken back.", "Edit", verb=Sheet.redo),
+    Command("insert-row", "insert,alt+a", "Insert row", "Insert as many rows above as are selected.", "Rows", "insert_rows(False)"),
+    Command("insert-below", "ctrl+n", "Insert below", "Insert as many rows below as are selected.", "Rows", "insert_rows(True)"),
+    Command("duplicate", "ctrl+b", "Duplicate", "Copy the selected rows to below them.", "Rows", verb=Sheet.duplicate_rows),
+    Command("delete-rows", "ctrl+delete,ctrl+k", "Delete rows", "Delete the selected rows.", "Rows", verb=Sheet.delete_rows),
+    Command("row-up", "alt+shift+up", "Move up", "Move the selected rows up.", "Rows", verb=_move_up),
+    Command("row-down", "alt+shift+down", "Move down", "Move the selected rows down.", "Rows", verb=_move_down),
+    Command("enable", "ctrl+e", "Enable / disable", "Disable the rows, or enable them again.", "Rows", verb=Sheet.enable_rows),
+    Command("delete-columns", "alt+delete", "Delete columns", "Delete the selected columns.", "Columns", verb=Sheet.delete_columns),
+    Command("column-left", "alt+shift+left", "Move left", "Move the column left.", "Columns", verb=lambda s: s.move_column(-1)),
+    Command("column-right", "alt+shift+right", "Move right", "Move the column right.", "Columns", verb=lambda s: s.move_column(1)),
+    Command("sort", "alt+s", "Sort", "Show the rows sorted by this column: up, down, as in the file.", "View", "sort"),
+    Command("test-row", "f6", "Test row", "Go to the test row, or back to the table.", "Test row", "test_row", in_footer=True),
+    Command("leave", "escape", "Back", "Leave the test row; end a selection.", "Move", "leave", is_listed=False),
+)
+
+_OF_ASSETS = (
+    Command("find", "ctrl+f", "Find", "Find texts, and replace them.", "Edit", "find", in_footer=True),
+    Command("find-next", "f3", "Find next", "Go to the next cell found.", "Edit", "find_next(False)"),
+    Command("find-previous", "shift+f3", "Find previous", "Go to the cell found before.", "Edit", "find_next(True)"),
+    Command("go-to", "ctrl+g", "Go to", "Go to a row by its number or its asset.", "Move", "go_to"),
+    Command("filter", "ctrl+l", "Filter", "Show only some rows.", "View", "filter"),
+    Command("filter-same", "alt+f", "Filter same", "Show only rows with the text of this cell.", "View", "filter_same"),
+    Command("show-all", "alt+g", "Show all rows", "Take the filter off.", "View", "show_all"),
+    Command("sort-file", "", "Sort the file", "Put the rows of the file itself in the order shown.", "Rows", "sort_file"),
+    Command("autofit", "alt+w", "Autofit", "Make each column as wide as its texts.", "View", "autofit"),
+    Command("rename-column", "", "Rename column", "Give the column another name.", "Columns", "rename_column"),
+    Command("clear-context", "alt+x", "Clear test row", "Ask for nothing.", "Test row", "clear_context"),
+)
+
+_OF_SCREEN = (
+    Command("help", "f1", "Help", "Every key, and how cells are written.", "Help", "help", in_footer=True),
+    Command("save", "ctrl+s", "Save", "Write the table to its file.", "File", "save", in_footer=True),
+    Command("open", "ctrl+o", "Tables", "Go to another table of the folder.", "File", "tables"),
+    Command("refresh", "f5", "Refresh", "Take in what changed on the disk, sort and filter anew.", "File", "refresh"),
+    Command("import", "", "Import", "Bring rows in from Excel, CSV, Parquet or JSON.", "File", "import"),
+    Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
+    Command("history", "alt+z", "Undo history", "Every step; go back to any of them.", "Edit", "history"),
+    Command("add-column", "alt+c", "Add column", "Add a condition or another column.", "Columns", "add_column"),
+    Command("blueprints", "", "Blueprints", "Sets of columns that are used again.", "Columns", "blueprints"),
+    Command("contexts", "f9", "Contexts", "Load a saved or recorded context.", "Test row", "contexts", in_footer=True),
+    Command("next-context", "f8", "Next context", "Load the next context of the file.", "Test row", "step(1)"),
+    Command("previous-context", "f7", "Previous context", "Load the context before.", "Test row", "step(-1)"),
+    Command("why", "f12", "Why", "Why this row is not valid, and which are nearest.", "Test row", "why", in_footer=True),
+    Command("next-tab", "ctrl+pagedown,alt+right", "Next tab", "Go to the next tab.", "Tabs", "next_tab(1)"),
+    Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the tab before.", "Tabs", "next_tab(-1)"),
+    Command("assets", "alt+1", "Assets", "The table.", "Tabs", "tab('assets')"),
+    Command("options", "alt+2", "Options", "The settings of the table.", "Tabs", "tab('options')"),
+    Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
+    Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
+    Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
+    Command(
+        "palette",
+        "ctrl+p",
+        "Commands",
+        "Find a command by its name.",
+        "Help",
+        "app.command_palette",
+        scope="screen",
+        in_footer=True,
+    ),
+    Command("quit", "ctrl+q", "Quit", "Leave; unsaved edits are asked about.", "File", "quit"),
+)
+
+SCREEN: tuple[Command, ...] = tuple(replace(command, scope="screen") for command in _OF_SCREEN)
+ASSETS: tuple[Command, ...] = tuple(replace(command, scope="assets") for command in _OF_ASSETS)
+COMMANDS: tuple[Command, ...] = (*GRID, *ASSETS, *SCREEN)
+BY_ID = {command.id: command for command in COMMANDS}
+
+
+def bindings(commands: Iterable[Command]) -> list[BindingType]:
+    """The commands that have keys as Textual bindings."""
+    return [binding for command in commands if (binding := command.binding()) is not None]
+
+
+JUMPS = {"home": Selection.home, "end": Selection.end, "first": Selection.first, "last": Selection.last}
+
+NAMES = {"pageup": "PgUp", "pagedown": "PgDn", "escape": "Esc", "delete": "Del", "insert": "Ins", "backspace": "Backspace"}
+
+
+def key_name(key: str) -> str:
+    """A key as people write it: "ctrl+shift+left" is "Ctrl+Shift+Left"."""
+    return "+".join(NAMES.get(part, part.upper() if len(part) == 1 else part.capitalize()) for part in key.split("+"))

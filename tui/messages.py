@@ -1,0 +1,54 @@
+"""What panes and widgets tell the screen they stand on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from textual.message import Message
+
+from tui.model.sheet import Done
+
+
+@dataclass
+class GoToCell(Message):
+    """Show a cell in the grid."""
+
+    row: int
+    """The row of the file, from 0."""
+    column: str | None = None
+    """The column's name; None: whichever the cursor is in."""
+
+
+@dataclass
+class FillGap(Message):
+    """Make a new row of these cells, and show it in the grid."""
+
+    cells: Mapping[str, str]
+    """Condition to cell; a condition that is not named accepts everything."""
+
+
+@dataclass
+class SetContext(Message):
+    """Make these the facts of the test row."""
+
+    facts: Mapping[str, str]
+    """Condition to fact, as written in `contextdb query`; a condition that is not named is left out of the question."""
+    name: str = ""
+    """Where the context comes from: shown beside the test row."""
+
+
+@dataclass
+class Edited(Message):
+    """The sheet was edited: show it anew and say what was done."""
+
+    done: Done
+
+
+@dataclass
+class Told(Message):
+    """Say something in the line over the footer."""
+
+    text: str
+    level: Literal["information", "warning", "error"] = "information"

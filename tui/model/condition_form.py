@@ -1,0 +1,99 @@
+"""A condition as a form of texts: what a person typed, what it declares, and what is wrong with which field."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from contextdb.cell_words import quoted
+from contextdb.cells import format_number
+from contextdb.conditions import Condition
+from contextdb.domains import KINDS
+from contextdb.errors import Fault, SchemaError
+from contextdb.schema import conditions_from_dict
+from contextdb.sections import has_place
+
+KIND_WORDS = {
+    "bool": "True or False",
+    "int": "whole numbers",
+    "number": "any number",
+    "angle": "degrees, on the circle",
+    "enum": "one of the names below",
+    "text": "any name",
+    "tags": "a set of tags",
+}
+"""What a fact of each type is, in a few words."""
+assert tuple(KIND_WORDS) == KINDS
+
+_NAME = re.compile(r'"((?:[^"]|"")*)"|([^\s,;"]+)')
+
+
+@dataclass(frozen=True)
+class ConditionForm:
+    """The fields of a condition, as texts; an empty one says nothing."""
+
+    kind: str = "bool"
+    minimum: str = ""
+    maximum: str = ""
+    unit: str = ""
+    values: str = ""
+    """Names, with spaces or commas between them; one with a space in it stands in quotes."""
+    description: str = ""
+
+    @classmethod
+    def of(cls, condition: Condition) -> ConditionForm:
+        """The form that says what a condition is."""
+        domain = condition.domain
+        low, high = (format_number(x) if math.isfinite(x) else "" for x in (domain.minimum, domain.maximum))
+        values = " ".join(quoted(value) for value in domain.values or ())
+        return cls(domain.kind, low, high, condition.unit, values, condition.description)
+
+    def declared(self) -> tuple[dict[str, object], dict[str, str]]:
+        """What `[conditions.NAME]` would say, and for each field that cannot be read why; fields without a place are left out."""
+        said: dict[str, object] = {"type": self.kind, "unit": self.unit.strip(), "description": self.description.strip()}
+        wrong: dict[str, str] = {}
+        for key, text in (("min", self.minimum), ("max", self.maximum)):
+            if has_place(key, self.kind) and text.strip():
+                number = _number(text)
+                said[key] = number
+                if number is None:
+                    wrong[key] = f'"{text.strip()}" is no number.'
+        if has_place("values", self.kind) and self.values.strip():
+            said["values"] = list(dict.fromkeys(names_in(self.values)))
+        said = {key: value for key, value in said.items() if value not in ("", None)}
+        return said, wrong or _faults(said)
+
+
+def names_in(text: str) -> Iterable[str]:
+    """The names that a person typed: with spaces, commas or semicolons between them, those in quotes as they are."""
+    return (match[1].replace('""', '"') if match[1] is not None else match[2] for match in _NAME.finditer(text))
+
+
+def _number(text: str) -> float | int | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return int(value) if value.is_integer() and abs(value) < 2.0**53 else value
+
+
+def _faults(said: dict[str, object]) -> dict[str, str]:
+    """What is wrong with each field of what is declared."""
+    try:
+        conditions_from_dict({"x": said})
+    except SchemaError as error:
+        return {_field_of(fault): plain(fault) for fault in reversed(error.faults)}
+    return {}
+
+
+def _field_of(fault: Fault) -> str:
+    key = re.match(r"\[conditions\.x\] (min|max|values|unit|description)\b", fault.found)
+    return key[1] if key else "values" if "values" in fault.found + fault.accepted else "type"
+
+
+def plain(fault: Fault) -> str:
+    """A fault as a form shows it, without the section in which contextdb.toml would have it."""
+    text = re.sub(r"^\[conditions\.[^\]]*\] ", "", fault.message)
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,152 @@
+"""A table held open by one editor, so that a second one is told.
+
+The lock is a file in the folder of journals that says who holds it. The system lets go of it when the process ends, however it
+ends, so on one machine none is stale. On a network drive locks may not reach another machine: there a name of another host in the
+file counts as a holder of whom nobody can say whether it still runs, and a person decides.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import secrets
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from contextdb.disk import make_folder, write_atomic
+from contextdb.errors import ContextDBError
+
+FOLDER = ".contextdb-journal"
+MOST_BYTES = 1000
+
+
+def own_folder(folder: Path) -> None:
+    """Make the folder of journals and locks, which git passes over."""
+    make_folder(folder)
+    ignore = folder / ".gitignore"
+    if not ignore.exists():
+        write_atomic(ignore, b"*\n")
+
+
+@dataclass(frozen=True)
+class Holder:
+    """The editor that has a table open."""
+
+    pid: int
+    id: str
+    host: str = ""
+    """Its machine; empty for this one."""
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the editor surely runs; of one on another machine nobody can tell."""
+        return not self.host
+
+    def __str__(self) -> str:
+        who = f"process {self.pid}" if self.pid else "another process"
+        return f"{who} on {self.host}" if self.host else who
+
+
+class Lock:
+    """A table held open by this editor."""
+
+    def __init__(self, table: Path, host: str | None = None) -> None:
+        self.path = table.parent / FOLDER / f"{table.name}.lock"
+        self.id = secrets.token_hex(8)
+        self._host = platform.node() if host is None else host
+        self._descriptor = -1
+
+    def acquire(self, takes_over: bool = False) -> Holder | None:
+        """Take the lock; gives who has it when somebody else does. Where the disk cannot lock, nobody is told.
+
+        `takes_over`: take it from an editor on another machine, which a person says has ended.
+        """
+        try:
+            own_folder(self.path.parent)
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+        except (OSError, ContextDBError):
+            return None
+        try:
+            _lock(descriptor)
+        except BlockingIOError:
+            holder = self._holder(os.read(descriptor, MOST_BYTES))
+            os.close(descriptor)
+            return holder or Holder(0, "")
+        except OSError:
+            os.close(descriptor)
+            return None
+        last = self._holder(os.read(descriptor, MOST_BYTES))
+        if last is not None and last.host and not takes_over:
+            os.close(descriptor)
+            return last
+        self._write(descriptor, {"pid": os.getpid(), "id": self.id, "host": self._host})
+        self._descriptor = descriptor
+        return None
+
+    @property
+    def is_held(self) -> bool:
+        """Whether this editor has the lock."""
+        return self._descriptor >= 0
+
+    def taken_by(self) -> Holder | None:
+        """Who has taken the lock over from this editor; None when nobody has."""
+        if not self.is_held:
+            return None
+        with suppress(OSError):
+            holder = self._holder(self.path.read_bytes()[:MOST_BYTES])
+            return holder if holder is not None and holder.id not in ("", self.id) else None
+        return None
+
+    def release(self) -> None:
+        """Let go of the table."""
+        if self.is_held:
+            with suppress(OSError):
+                if self.taken_by() is None:
+                    os.truncate(self._descriptor, 0)
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    def __enter__(self) -> Lock:
+        self.acquire()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+    def _write(self, descriptor: int, said: Mapping[str, object]) -> None:
+        os.truncate(descriptor, 0)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        os.write(descriptor, json.dumps(said).encode())
+
+    def _holder(self, raw: bytes) -> Holder | None:
+        """Who the file names; None when it names nobody: the last holder let go."""
+        if not raw.strip():
+            return None
+        try:
+            said: Any = json.loads(raw)
+            host = str(said.get("host", ""))
+            return Holder(int(said["pid"]), str(said["id"]), "" if host == self._host else host)
+        except (ValueError, KeyError, TypeError, AttributeError):  # it is just writing who it is
+            return Holder(0, "")
+
+
+def _lock(descriptor: int) -> None:
+    """Lock an open file or raise BlockingIOError."""
+    try:
+        import fcntl
+    except ImportError:  # Windows: there the lock is on a byte far behind the text, which others may then still read
+        import msvcrt
+
+        os.lseek(descriptor, 1 << 30, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
+        except PermissionError as error:
+            raise BlockingIOError from error
+        finally:
+            os.lseek(descriptor, 0, os.SEEK_SET)
+    else:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,0 +1,98 @@
+"""Change the text of a cell of numbers: move the number under the caret, or write the same set in the other form.
+
+Texts are changed as texts, so that what is not touched stays as it is written; what comes out always reads.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from decimal import Decimal
+
+from contextdb.cell_words import NUMBER_TEXT
+from contextdb.cells import Cell, NumberSet, format_cell, format_number, parse_cell, reads
+from contextdb.domains import Domain
+from tui.model.interval_picture import Piece, pieces
+
+_NUMBER = re.compile(rf"(?:(?<=\+)-)?({NUMBER_TEXT})")
+"""The "-" of "20 +-5" is no sign."""
+_CENTRE_MARK = re.compile(r",|±|\+-")
+
+
+def step_of(domain: Domain, value: float) -> Decimal:
+    """By how much a number is moved: 1 for whole numbers and degrees, else a power of ten near a hundredth of the domain."""
+    if domain.kind in ("int", "angle"):
+        return Decimal(1)
+    width = domain.maximum - domain.minimum
+    if math.isfinite(width) and width > 0.0:
+        return Decimal(10) ** math.floor(math.log10(width / 50.0))
+    return Decimal(1) if abs(value) >= 10.0 else Decimal("0.1")
+
+
+def nudged(text: str, caret: int, domain: Domain, steps: int) -> tuple[str, int] | None:
+    """The text with the number at the caret moved by so many steps, and where the caret is then.
+
+    The number is the one under the caret, or the last one before it. A number within the bounds of the domain stays within them, an
+    angle goes on through half a turn. None where there is no number, or the text would not read or hold nothing.
+    """
+    found = [m for m in _NUMBER.finditer(text) if math.isfinite(float(m[1]))]
+    if not found or not reads(text, domain):
+        return None
+    number = next((m for m in found if m.start(1) <= caret <= m.end(1)), None)
+    number = number or next((m for m in reversed(found) if m.end(1) < caret), found[0])
+    moved = _moved(number[1], domain, steps)
+    changed = text[: number.start(1)] + moved + text[number.end(1) :]
+    if not reads(changed, domain) or parse_cell(changed, domain).is_empty > parse_cell(text, domain).is_empty:
+        return None
+    return changed, number.start(1) + len(moved)
+
+
+def _moved(text: str, domain: Domain, steps: int) -> str:
+    old, value = Decimal(text), float(text)
+    new = old + step_of(domain, value) * steps
+    low, high = (Decimal(-180), Decimal(180)) if domain.kind == "angle" else (_bound(domain.minimum), _bound(domain.maximum))
+    if low <= old <= high and not low <= new <= high:
+        new = new + (360 if new < low else -360) if domain.kind == "angle" else max(low, min(new, high))
+    return f"{new:f}" if -30 < new.adjusted() < 30 else str(new)
+
+
+def _bound(value: float) -> Decimal:
+    return Decimal(format_number(value))
+
+
+def other_form(text: str, domain: Domain) -> str | None:
+    """The same set with bounds where the text has centre and tolerance, and the other way round.
+
+    None where the two are not equal to the last bit, or the set cannot be written so.
+    """
+    if not reads(text, domain):
+        return None
+    cell = parse_cell(text, domain)
+    if not isinstance(cell.accepts, NumberSet) or cell.is_empty or text.casefold().lstrip().startswith("not"):
+        return None
+    written = format_cell(cell, domain) if _CENTRE_MARK.search(text) else _centred(cell, domain)
+    return written if written and written != text and reads(written, domain) and parse_cell(written, domain) == cell else None
+
+
+def _centred(cell: Cell, domain: Domain) -> str | None:
+    parts = [_centre_of(piece, domain) for piece in pieces(cell, domain)]
+    if None in parts:
+        return None
+    tail = format_cell(replace(cell, accepts=None), domain).removeprefix("Any")
+    return " | ".join(part for part in parts if part) + tail
+
+
+def _centre_of(piece: Piece, domain: Domain) -> str | None:
+    """Centre and tolerance in decimal arithmetic; in double arithmetic the sum may differ by a bit, and then there is none."""
+    if not (piece.is_low_in and piece.is_high_in and math.isfinite(piece.low) and math.isfinite(piece.high)):
+        return None
+    low, high = Decimal(f"{piece.low:.15g}"), Decimal(f"{piece.high:.15g}")
+    if domain.kind == "angle" and high < low:
+        high += 360
+    centre, tolerance = (low + high) / 2, (high - low) / 2
+    if domain.kind == "angle" and centre > 180:
+        centre -= 360
+    if domain.kind == "int" and not float(centre).is_integer():
+        return None
+    return f"{format_number(float(centre))}, {format_number(float(tolerance))}"

@@ -1,0 +1,81 @@
+"""The part of a sheet that stands on the screen, read once and then painted line by line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from contextdb.cells import Cell
+from contextdb.columns import TextColumn
+from contextdb.table import ConditionColumn
+from tui.model.shown import ShownTable
+
+Kind = Literal["text", "any", "failing", "fault"]
+"""How a cell is meant: it accepts everything; it does not accept its fact; it cannot be read."""
+
+MARKS: dict[Kind, str] = {"text": " ", "any": " ", "failing": "×", "fault": "!"}
+"""What stands before the text of a cell, so that no colour is needed to tell them apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class WindowRow:
+    """A row on the screen: what the gutter says of it."""
+
+    number: int
+    """Its place in the file, from 1."""
+    is_enabled: bool
+    is_valid: bool
+    """For a test row that asks for something."""
+
+
+class Window:
+    """Rows `top` up to `top + n_rows` of a sheet's view."""
+
+    def __init__(self, sheet: ShownTable, top: int, n_rows: int) -> None:
+        self.top = top
+        rows = sheet.view.rows[top : top + n_rows]
+        self.n_rows = len(rows)
+        self._sheet = sheet
+        self._rows = rows
+        is_asked = not sheet.query.is_empty
+        valid = sheet.query.valid[rows] if is_asked else np.zeros(len(rows), np.bool_)
+        self._failing = sheet.failing(top, top + n_rows) if is_asked else None
+        enabled = sheet.table.enabled[rows]
+        self.rows = [WindowRow(r + 1, e, v) for r, e, v in zip(rows.tolist(), enabled.tolist(), valid.tolist(), strict=True)]
+        self._columns: dict[int, list[tuple[str, Kind]]] = {}
+
+    def holds(self, row: int) -> bool:
+        """Whether a row of the view is in it."""
+        return self.top <= row < self.top + self.n_rows
+
+    def row(self, row: int) -> WindowRow:
+        """A row of the view."""
+        return self.rows[row - self.top]
+
+    def cell(self, row: int, column: int) -> tuple[str, Kind]:
+        """The text of a cell, and how it is meant."""
+        if column not in self._columns:
+            self._columns[column] = self._read(column)
+        return self._columns[column][row - self.top]
+
+    def _read(self, column: int) -> list[tuple[str, Kind]]:
+        texts = self._sheet.table.columns[column]
+        condition = self._sheet.condition(column)
+        codes = texts.codes[self._rows].tolist()
+        kinds = {code: _kind(texts, condition, code) for code in set(codes)}
+        found = [(texts.texts[code], kinds[code]) for code in codes]
+        if self._failing is None or condition is None:
+            return found
+        fails = self._failing[:, column].tolist()
+        return [(text, "failing") if f and kind != "fault" else (text, kind) for (text, kind), f in zip(found, fails, strict=True)]
+
+
+def _kind(texts: TextColumn, condition: ConditionColumn | None, code: int) -> Kind:
+    if condition is None:
+        return "text"
+    if code in condition.faults:
+        return "fault"
+    cell: Cell = condition.cells[code]
+    return "any" if cell.is_any else "text"

@@ -1,0 +1,85 @@
+"""The tables of a folder, and which of them are open. An edge: it reads the disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from contextdb.disk import TABLE_SUFFIXES
+from contextdb.errors import Fault, FileError, Place
+from contextdb.places import table_path
+from contextdb.project import read_folder_schema, schema_for, table_files
+from tui.model.session import Session
+
+FOLDERS = (Path("tables"), Path())
+
+
+class Workspace:
+    """A folder of tables. A table is read when it is first asked for, and then stays open with its edits."""
+
+    def __init__(self, path: str | Path | None = None) -> None:
+        """Look at a folder, or at the folder of a table; without a path in tables/ or here.
+
+        Raises
+        ------
+        FileError, TableError, SchemaError
+            There is no such table or folder, it holds no table, or its contextdb.toml cannot be read.
+        """
+        where = _found(path)
+        self.folder = where if where.is_dir() else schema_for(where)[0]
+        self.files = _tables(self.folder)
+        self.sessions: dict[str, Session] = {}
+        if where.is_dir():
+            self.first = next(iter(self.files), "")
+        else:
+            self.first = self._name_of(where)
+        if not self.files:
+            mend = "to write one: its first line names the columns"
+            raise FileError(Fault("the folder holds no table.", " or ".join(TABLE_SUFFIXES), mend, Place(str(self.folder))))
+
+    def session(self, name: str) -> Session:
+        """A table, opened when it is not yet; errors as of `Session`."""
+        if name not in self.sessions:
+            self.sessions[name] = Session(self.files[name])
+        return self.sessions[name]
+
+    def reopen(self, name: str, takes_over: bool = False) -> Session:
+        """Let go of a table and open it anew; errors as of `Session`."""
+        if (session := self.sessions.pop(name, None)) is not None:
+            session.close()
+        self.sessions[name] = Session(self.files[name], takes_over)
+        return self.sessions[name]
+
+    @property
+    def unsaved(self) -> list[str]:
+        """The tables with unsaved edits."""
+        return [name for name, session in self.sessions.items() if session.sheet.is_modified]
+
+    def look_again(self) -> None:
+        """Take in tables that came to the folder; those that are open stay."""
+        open_files = {name: self.files[name] for name in self.sessions if name in self.files}
+        self.files = open_files | {n: p for n, p in _tables(self.folder).items() if p not in open_files.values()}
+
+    def close(self, keep_journals: bool = False) -> None:
+        """Let go of every table."""
+        for session in self.sessions.values():
+            session.close(keep_journals)
+
+    def _name_of(self, file: Path) -> str:
+        for name, path in self.files.items():
+            if path.exists() and path.samefile(file):
+                return name
+        self.files = {file.stem: file, **self.files}
+        return file.stem
+
+
+def _found(path: str | Path | None) -> Path:
+    if path is None:
+        return next((folder for folder in FOLDERS if folder.is_dir() and _tables(folder)), Path())
+    return Path(path) if Path(path).is_dir() else table_path(str(path))
+
+
+def _tables(folder: Path) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for name, file in table_files(folder, read_folder_schema(folder)):
+        found.setdefault(name, file)
+    return found

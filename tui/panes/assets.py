@@ -1,0 +1,416 @@
+"""The tab of the assets: the line of the cell, the grid, find and filter. It opens the cell editors and answers the grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.geometry import Size
+
+from contextdb.check import check
+from contextdb.columns import TextColumn
+from contextdb.edits import check_cell
+from contextdb.errors import ContextDBError, ContextError, Fault, TableError, plural
+from contextdb.facts import read_fact_text
+from tui.clipboard import Clipboard
+from tui.messages import Edited, Told
+from tui.model.find import PatternError, Search
+from tui.model.sheet import Done, Sheet
+from tui.model.views import Filter, Sort
+from tui.panes.pane import Pane
+from tui.screens.ask import AskDialog
+from tui.widgets.bar import CellLine
+from tui.widgets.cell_editor import CellEditor
+from tui.widgets.find_bar import FilterBar, FindBar, SheetBar
+from tui.widgets.grid import Grid
+
+MOST_KNOWN = 10_000
+"""So many of a column's texts are offered to complete from."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """The cell, or the fact, that an editor was opened for."""
+
+    row: int = 0
+    column: int = 0
+    is_fact: bool = False
+
+
+class AssetsPane(Pane):
+    """A table as a spreadsheet, with the test row at its foot."""
+
+    DEFAULT_CSS = "AssetsPane { layout: vertical; & Grid { height: 1fr; } }"
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("f6", "back", "Back to the table", show=False)]
+
+    def __init__(self, sheet: Sheet, clipboard: Clipboard) -> None:
+        super().__init__(id="assets")
+        self.sheet = sheet
+        self.clipboard = clipboard
+        self._search = Search("")
+        self._edited = _Place()
+
+    def compose(self) -> ComposeResult:
+        yield CellLine()
+        yield Grid(self.sheet)
+        yield FilterBar()
+        yield FindBar()
+
+    def on_mount(self) -> None:
+        self._show_cell()
+
+    @property
+    def grid(self) -> Grid:
+        """The grid."""
+        return self.query_one(Grid)
+
+    @property
+    def editor(self) -> CellEditor | None:
+        """The editor that is open over a cell."""
+        return next(iter(self.screen.query(CellEditor)), None)
+
+    def show(self) -> None:
+        """Show the sheet as it is now."""
+        self.grid.changed()
+        self._show_cell()
+
+    def take_focus(self) -> None:
+        """Give the keys to the grid, or to an editor that is open."""
+        (self.editor or self.grid).focus()
+
+    def go_to(self, row: int, column: str | None) -> None:
+        """Show a cell of the file."""
+        self.grid.is_in_test_row = False
+        self.sheet.go_to(row, column)
+        self.show()
+        self.grid.post_message(Grid.Moved())
+        self.take_focus()
+
+    def summary(self) -> str:
+        """What the line at the foot says at its right: valid rows, filter, sort, selection."""
+        sheet, block = self.sheet, self.sheet.block
+        parts = []
+        if not sheet.query.is_empty:
+            where = f" for {self.grid.test_name}" if self.grid.test_name else ""
+            parts.append(f"{sheet.query.n_valid:,} valid{where}")
+        if len(sheet.view) < sheet.table.n_rows:
+            parts.append(f"{len(sheet.view):,} of {plural(sheet.table.n_rows, 'row')} shown")
+        if sheet.sort is not None:
+            parts.append(f"sorted by {sheet.sort.column} {'▼' if sheet.sort.is_descending else '▲'}")
+        if block.n_cells > 1:
+            parts.append(f"{block.shape[0]:,} × {block.shape[1]:,} selected")
+        return " · ".join(parts)
+
+    # ---- the line of the cell
+
+    @on(Grid.Moved)
+    def _show_cell(self) -> None:
+        sheet = self.sheet
+        row, column = sheet.cursor
+        name = sheet.table.columns[column].name
+        condition = sheet.condition(column)
+        about = condition.condition.description if condition is not None else ""
+        if self.grid.is_in_test_row:
+            fault = sheet.query.faults.get(name)
+            self.query_one(CellLine).show(f"test row · {name}", self.grid.cell_text(), _short(fault), about)
+        elif len(sheet.view):
+            place = f"row {sheet.row_number(row)} · {name}"
+            self.query_one(CellLine).show(place, sheet.text(row, column), _short(sheet.fault(row, column)), about)
+        else:
+            self.query_one(CellLine).show(name, "", "", about)
+
+    # ---- the cell editor
+
+    @on(Grid.EditWanted)
+    def _open_editor(self, event: Grid.EditWanted) -> None:
+        event.stop()
+        if self.editor is not None:
+            return
+        row, column = self.sheet.cursor
+        self._edited = _Place(row, column, self.grid.is_in_test_row)
+        found, texts = self.sheet.condition(column), self.sheet.table.columns[column]
+        editor = CellEditor(
+            found.condition if found is not None else None,
+            self.sheet.header(column).kind,
+            event.text,
+            check=self._check_fact if self._edited.is_fact else lambda text: check_cell(self.sheet.table, texts.name, text),
+            known=_by_frequency(texts),
+            is_fact=self._edited.is_fact,
+            is_typing=event.is_typing,
+            open_list=event.opens_list,
+        )
+        self.mount(editor)
+        self._place_editor()
+        editor.focus()
+
+    def _check_fact(self, text: str) -> Fault | None:
+        found = self.sheet.condition(self._edited.column)
+        if found is None or not text.strip():
+            return None
+        try:
+            read_fact_text(text, found.condition)
+        except ContextError as error:
+            return error.faults[0]
+        return None
+
+    @on(CellEditor.Committed)
+    def _commit(self, event: CellEditor.Committed) -> None:
+        """Take the text for the cell that was edited, wherever a click has put the cursor meanwhile."""
+        event.stop()
+        place, clicked = self._edited, self.sheet.selection
+        is_elsewhere = self.sheet.cursor != (place.row, place.column) or self.grid.is_in_test_row != place.is_fact
+        if place.is_fact:
+            self.sheet.set_fact(self.sheet.table.columns[place.column].name, event.text)
+            self._close_editor()
+            self._fact_changed()
+            if not is_elsewhere and event.right:
+                self.grid.action_move(0, event.right, False)
+            return
+        if is_elsewhere:
+            self.sheet.go(place.row, place.column)
+        if not self._enter(event.text, event.is_fill):
+            return
+        if is_elsewhere:
+            self.sheet.select(lambda _, shape: clicked.within(shape))
+        elif not event.is_fill:
+            self.sheet.select(lambda s, shape: s.next_cell(event.down, event.right, shape))
+        self.grid.show_cursor()
+
+    def _enter(self, text: str, is_fill: bool) -> bool:
+        """Put a text into the cell, or into all that are selected; one that is refused stays in the editor."""
+        if is_fill:
+            done = self.sheet.fill(text)
+        elif fault := self.sheet.type_text(text):
+            if self.editor is not None:
+                self.editor.refuse(fault)
+            return False
+        else:
+            done = Done(self.sheet.history.undo_name or "")
+        self._close_editor()
+        self.post_message(Edited(done))
+        return True
+
+    @on(CellEditor.Cancelled)
+    def _cancel(self, event: CellEditor.Cancelled) -> None:
+        event.stop()
+        self._close_editor()
+
+    def _close_editor(self) -> None:
+        if self.editor is not None:
+            self.editor.remove()
+        self.grid.focus()
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._place_editor)
+
+    def _place_editor(self) -> None:
+        if self.editor is not None:
+            self.editor.place(self.grid.cell_region(), Size(self.screen.size.width, self.region.bottom))
+
+    # ---- the test row
+
+    @on(Grid.FactChanged)
+    def _fact_changed(self) -> None:
+        self.grid.test_name = ""
+        self.show()
+
+    def action_clear_context(self) -> None:
+        """Ask for nothing."""
+        self.set_context({}, "")
+
+    def set_context(self, facts: dict[str, str], name: str) -> None:
+        """Make these the facts of the test row."""
+        self.sheet.query.load(facts)
+        self.sheet.version += 1
+        if self.sheet.filter.is_valid:
+            self.sheet.refresh()
+        self.grid.test_name = name
+        self.show()
+        self.grid.post_message(Grid.Moved())
+
+    # ---- clipboard
+
+    @on(Grid.CopyWanted)
+    def _copy(self, event: Grid.CopyWanted) -> None:
+        event.stop()
+        problem = self.clipboard.copy(event.text)
+        n_rows = event.text.count("\n") or 1
+        self.post_message(Told(problem or f"Copied {plural(n_rows, 'row')}.", "warning" if problem else "information"))
+
+    @on(Grid.PasteWanted)
+    def _paste(self, event: Grid.PasteWanted) -> None:
+        event.stop()
+        self.grid.paste(self.clipboard.paste())
+
+    # ---- find
+
+    def action_find(self) -> None:
+        """Open the bar, with the text of the cell where it was opened from nothing."""
+        self.query_one(FilterBar).remove_class("-open")
+        self.query_one(FindBar).open()
+
+    def action_find_next(self, is_backwards: bool) -> None:
+        """Go to the next cell found."""
+        if not self._search.text:
+            self.action_find()
+        else:
+            self._seek(FindBar.Sought(self._search, is_backwards))
+
+    @on(FindBar.Sought)
+    def _seek(self, event: FindBar.Sought) -> None:
+        event.stop()
+        self._search = event.search
+        bar = self.query_one(FindBar)
+        if not event.search.text:
+            bar.say("")
+            return
+        try:
+            if event.only_counts:
+                n_found = self.sheet.count(event.search)
+            else:
+                n_found = self.sheet.find(event.search, event.is_backwards)
+                self.grid.is_in_test_row = False
+                self.show()
+                self.grid.post_message(Grid.Moved())
+        except PatternError as error:
+            bar.say(error.faults[0].message)
+            return
+        bar.say(f"{n_found:,} found" if n_found else "not found")
+
+    @on(FindBar.Replaced)
+    def _replace(self, event: FindBar.Replaced) -> None:
+        event.stop()
+        sheet = self.sheet
+        if event.is_all:
+            self._try(lambda: sheet.replace_all(event.search, event.replacement, event.in_selection))
+        else:
+            self._try(lambda: sheet.replace_here(event.search, event.replacement))
+        self._seek(FindBar.Sought(event.search, only_counts=True))
+
+    # ---- filter and sort
+
+    def action_filter(self) -> None:
+        """Open the bar."""
+        self.query_one(FindBar).remove_class("-open")
+        self.query_one(FilterBar).open()
+
+    def action_filter_same(self) -> None:
+        """Only rows whose cell in this column has the text under the cursor."""
+        row, column = self.sheet.cursor
+        if len(self.sheet.view):
+            name, text = self.sheet.table.columns[column].name, self.sheet.text(row, column)
+            others = tuple(pair for pair in self.sheet.filter.cells if pair[0] != name)
+            self._show_filtered(replace(self.sheet.filter, cells=(*others, (name, frozenset([text])))))
+
+    def action_show_all(self) -> None:
+        """Take the filter off."""
+        self.query_one(FilterBar).clear()
+        self._show_filtered(Filter())
+
+    @on(FilterBar.Wanted)
+    def _filter(self, event: FilterBar.Wanted) -> None:
+        event.stop()
+        if event.has_findings:
+            self.sheet.set_findings(check(self.sheet.table))
+        name = self.sheet.table.columns[self.sheet.selection.column].name
+        columns = ((name, event.text),) if event.in_column and event.text else ()
+        text = "" if event.in_column else event.text
+        self._show_filtered(Filter(text, columns, self.sheet.filter.cells, event.is_valid, event.has_findings))
+
+    def _show_filtered(self, wanted: Filter) -> None:
+        self.sheet.set_filter(wanted)
+        self.show()
+        self.grid.post_message(Grid.Moved())
+
+    @on(SheetBar.Closed)
+    def _bar_closed(self) -> None:
+        self.grid.focus()
+
+    def action_sort_file(self) -> None:
+        """Put the file's rows in the order that is shown."""
+        sort = self.sheet.sort
+        if sort is None:
+            name = self.sheet.table.columns[self.sheet.selection.column].name
+            sort = Sort(name)
+
+        def sorted_file() -> Done:
+            done = self.sheet.sort_file(sort)
+            self.sheet.set_sort(None)
+            return done
+
+        self._try(sorted_file)
+
+    def action_go_to(self) -> None:
+        """Ask for a row, by its number or its asset."""
+        dialog = AskDialog("Go to", "A row's number, or the beginning of an asset's name", "", self._check_place)
+        self.app.push_screen(dialog, self._went)
+
+    def _check_place(self, text: str) -> str:
+        if text.strip().isdigit():
+            n_rows = self.sheet.table.n_rows
+            return "" if 1 <= int(text) <= n_rows else f"The table has {plural(n_rows, 'row')}."
+        return "" if self._row_named(text) is not None else "No asset has such a name."
+
+    def _row_named(self, text: str) -> int | None:
+        word = text.strip().casefold()
+        names = [(name.casefold(), row) for row, name in enumerate(self.sheet.table.assets)]
+        beginning = (row for name, row in names if word and name.startswith(word))
+        return next(beginning, next((row for name, row in names if word and word in name), None))
+
+    def _went(self, text: str | None) -> None:
+        if text is not None:
+            row = int(text) - 1 if text.strip().isdigit() else self._row_named(text)
+            self.go_to(row or 0, None)
+
+    def action_rename_column(self) -> None:
+        """Ask for another name of the cursor's column."""
+        name = self.sheet.table.columns[self.sheet.selection.column].name
+
+        def renamed(text: str | None) -> None:
+            if text is not None and text != name:
+                self._try(lambda: self.sheet.rename_column(text))
+
+        self.app.push_screen(AskDialog("Rename the column", f"Another name for {name}", name, self._check_name), renamed)
+
+    def _check_name(self, text: str) -> str:
+        others = {c.name for c in self.sheet.table.columns} - {self.sheet.table.columns[self.sheet.selection.column].name}
+        if not text.strip():
+            return "A column needs a name."
+        return "Another column has this name." if text in others else ""
+
+    def action_autofit(self) -> None:
+        """Make each column as wide as its texts."""
+        self.grid.autofit()
+
+    def refresh_view(self) -> None:
+        """Sort and filter anew."""
+        self.sheet.refresh()
+        self.show()
+
+    # ---- parts
+
+    def _try(self, verb: Callable[[], Done]) -> None:
+        try:
+            done = verb()
+        except (TableError, ContextDBError) as error:
+            self.post_message(Told(str(error), "error"))
+            return
+        self.post_message(Edited(done))
+
+
+def _short(fault: Fault | None) -> str:
+    if fault is None:
+        return ""
+    return f"{fault.message} Did you mean {fault.mend}?" if fault.mend else fault.message
+
+
+def _by_frequency(column: TextColumn) -> list[str]:
+    """The distinct texts of a column, most frequent first."""
+    counts = np.bincount(column.codes, minlength=len(column.texts))
+    order = np.argsort(-counts, kind="stable")[:MOST_KNOWN]
+    return [column.texts[code] for code in order.tolist() if counts[code]]

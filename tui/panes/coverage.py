@@ -1,0 +1,336 @@
+"""The Coverage tab: which contexts have no valid row, which conditions together are open, where rows crowd, which are too many."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import VerticalScroll
+from textual.content import Content
+from textual.message import Message
+from textual.widget import Widget
+from textual.widgets import ContentSwitcher, Static
+
+from contextdb.covering import CoverageReport, format_percent
+from contextdb.covering.inside import facts_inside
+from contextdb.errors import ContextDBError, in_quotes
+from tui.messages import FillGap, GoToCell, SetContext, Told
+from tui.model import coverage_lines as lines
+from tui.model.coverage_run import CoverageRun, Result, is_quick
+from tui.model.sheet import Sheet
+from tui.panes.pair_map import PairMap
+from tui.panes.pane import Pane
+from tui.widgets.choice_line import ChoiceLine
+from tui.widgets.fitted import bar
+from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+SECTIONS = ("gaps", "pairs", "crowded", "rows", "about")
+NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About")
+
+
+class GapList(LineList):
+    """The gaps, largest first."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "choose", "New row for the gap")]
+
+
+class RowList(LineList):
+    """Rows with something about them."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "choose", "Go to the row")]
+
+
+class CoveragePane(Pane):
+    """What a table leaves open."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        *(Binding(str(at + 1), f"section({at})", name, show=False) for at, name in enumerate(NAMES)),
+        Binding("left_square_bracket", "turn(-1)", "Section before", show=False),
+        Binding("right_square_bracket", "turn(1)", "Next section", show=False),
+        Binding("t", "try_context", "To the test row"),
+        Binding("r", "measure", "Work out anew"),
+        Binding("escape", "back", "Stop, or back", show=False),
+    ]
+    DEFAULT_CSS = """
+    CoveragePane {
+        layout: vertical; height: 1fr; background: $surface;
+        & > #coverage-state { height: auto; max-height: 3; padding: 0 2; text-style: bold; }
+        &.-stale > #coverage-state { color: $text-warning; }
+        & > #coverage-bar { height: 1; padding: 0 2; color: $text-muted; }
+        & > #coverage-sections { margin: 1 0 0 0; }
+        & > ContentSwitcher { height: 1fr; }
+        & LineList, & HeatMap { height: 1fr; }
+        & HeatMap { padding: 0 2; }
+        & #about { padding: 1 2; }
+        & > #coverage-detail { height: auto; max-height: 45%; border-top: solid $panel; }
+        & #coverage-detail-text { padding: 0 2; min-height: 3; height: auto; }
+    }
+    """
+
+    class Changed(Message):
+        """The run has got somewhere; sent from its thread."""
+
+    def __init__(self, sheet: Sheet, run: CoverageRun, *, id: str | None = None) -> None:  # noqa: A002
+        super().__init__(id=id)
+        self.sheet, self.run = sheet, run
+        self.section = 0
+        self._shown: Result | None = None
+        self._details = dict.fromkeys(SECTIONS, "")
+        self._detail = ""
+
+    def compose(self) -> ComposeResult:
+        """The parts."""
+        yield Static(id="coverage-state", markup=False)
+        yield Static(id="coverage-bar", markup=False)
+        yield ChoiceLine(self._labels(), id="coverage-sections")
+        with ContentSwitcher(initial="gaps"):
+            columns = [ListColumn("Share", 8, 0, True), ListColumn("New", 8, 0, True)]
+            yield GapList(
+                [*columns, ListColumn("Contexts without a valid row", 27, 3), ListColumn("Nearest row", 13, 2)],
+                empty="No gap is known.",
+                id="gaps",
+            )
+            yield PairMap(id="pairs")
+            yield RowList(
+                [ListColumn("Rows", 5, 0, True), ListColumn("Share", 8, 0, True), ListColumn("Contexts", 30, 1)],
+                empty="Nowhere are two rows valid at once, as far as is known.",
+                id="crowded",
+            )
+            yield RowList(
+                [ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2), ListColumn("What is said of it", 22, 2)],
+                empty="No row is said to be too many.",
+                id="rows",
+            )
+            with VerticalScroll(id="about"):
+                yield Static(id="about-text", markup=False)
+        with VerticalScroll(id="coverage-detail"):
+            yield Static(id="coverage-detail-text", markup=False)
+
+    def on_mount(self) -> None:
+        """Begin to listen."""
+        self.run.listen(self._tell)
+        self.show()
+
+    def on_unmount(self) -> None:
+        """Listen no more; nobody waits for what runs."""
+        self.run.unlisten(self._tell)
+        self.run.cancel()
+
+    def _tell(self) -> None:
+        self.post_message(self.Changed())
+
+    # ---- what is shown
+
+    def show(self) -> None:
+        """Bring everything up to date; a small table is measured at once."""
+        self.run.follow(self.sheet.table)
+        if self.run.state in ("none", "stale") and self.is_on_screen_now and is_quick(self.sheet.table):
+            self.run.start(self.sheet.table)
+        self._show_state()
+
+    @property
+    def is_on_screen_now(self) -> bool:
+        """Whether the tab is the one that is seen."""
+        return self.is_attached and all(node.display for node in self.ancestors_with_self if isinstance(node, Widget))
+
+    @on(Changed)
+    def _show_state(self) -> None:
+        run = self.run
+        self.query_one("#coverage-state", Static).update(lines.state_text(run, self.sheet.table))
+        self._show_bar()
+        if run.result is not self._shown:
+            self._shown = run.result
+            if run.result is not None:
+                self._fill(run.result)
+        self.set_class(run.state == "stale", "-stale")
+        self._show_section()
+
+    def _show_bar(self) -> None:
+        result, width = self.run.result, max(10, min(40, self.size.width - 50))
+        if self.run.state == "running":
+            share = self.run.progress[1]
+            text = bar(share, share, width)
+        elif result is None:
+            text = ""
+        else:
+            text = f"{bar(result.report.lower, result.report.upper, width)}  {lines.summary_text(result.report)}"
+        self.query_one("#coverage-bar", Static).update(text)
+
+    def _fill(self, result: Result) -> None:
+        report = result.report
+        self.query_one("#gaps", LineList).show(len(report.gaps), lambda at: _gap_line(report, at))
+        self.query_one(PairMap).show_pairs(result.pairs)
+        self.query_one("#crowded", LineList).show(len(report.crowded), lambda at: _crowd_line(report, at))
+        self.query_one("#rows", LineList).show(len(report.findings), lambda at: _finding_line(report, at))
+        self.query_one("#about-text", Static).update(lines.about_text(result))
+
+    def _show_section(self) -> None:
+        name = SECTIONS[self.section]
+        self.query_one(ContentSwitcher).current = name
+        self.query_one(ChoiceLine).show(self._labels(), self.section)
+        detail = self.query_one("#coverage-detail")
+        detail.display = name != "about"
+        if self._details[name] != self._detail:
+            self._detail = self._details[name]
+            self.query_one("#coverage-detail-text", Static).update(Content(self._detail))
+            detail.scroll_home(animate=False)
+
+    def _labels(self) -> Sequence[str]:
+        result = self.run.result
+        counts = ["", "", "", "", ""]
+        if result is not None:
+            report = result.report
+            more = "" if report.gaps_complete else "+"
+            counts = [f" {len(report.gaps)}{more}", "", f" {len(report.crowded)}", f" {len(report.findings)}", ""]
+        return [f"{at + 1} {name}{counts[at]}" for at, name in enumerate(NAMES)]
+
+    def on_resize(self) -> None:
+        """Draw the bar anew."""
+        self._show_bar()
+
+    def take_focus(self) -> None:
+        """Give the keys to the section that is seen."""
+        self._current.focus()
+
+    @property
+    def _current(self) -> Widget:
+        return self.query_one(f"#{SECTIONS[self.section]}", Widget)
+
+    # ---- details
+
+    @on(LineList.Moved)
+    def _moved(self, event: LineList.Moved) -> None:
+        event.stop()
+        result, table = self.run.result, self.sheet.table
+        if result is None or event.list.id not in self._details:
+            return
+        text, report = "", result.report
+        if event.index >= 0 and event.list.id == "gaps":
+            text = lines.gap_text(report.gaps[event.index], event.index, report, self.run.table or table)
+        elif event.index >= 0 and event.list.id == "crowded":
+            text = lines.crowd_text(report.crowded[event.index], self.run.table or table)
+        elif event.index >= 0:
+            text = lines.finding_text(report.findings[event.index])
+        self._details[event.list.id] = text
+        self._show_section()
+
+    @on(PairMap.Said)
+    def _said(self, event: PairMap.Said) -> None:
+        event.stop()
+        self._details["pairs"] = event.text
+        self._show_section()
+
+    # ---- what can be done
+
+    def action_section(self, at: int) -> None:
+        """Show another section."""
+        had_focus = self.has_focus_within
+        self.section = at
+        self._show_section()
+        self.refresh_bindings()
+        if had_focus:
+            self.take_focus()
+
+    def action_turn(self, step: int) -> None:
+        """Show the section beside."""
+        self.action_section((self.section + step) % len(SECTIONS))
+
+    @on(ChoiceLine.Picked)
+    def _picked(self, event: ChoiceLine.Picked) -> None:
+        event.stop()
+        self.action_section(event.index)
+        self.take_focus()
+
+    def action_measure(self) -> None:
+        """Work the coverage out anew."""
+        self.run.start(self.sheet.table)
+
+    def action_back(self) -> None:
+        """Stop what runs; else leave the pair that is shown."""
+        if self.run.state == "running":
+            self.run.cancel()
+            self._show_state()
+        elif SECTIONS[self.section] == "pairs":
+            self.query_one(PairMap).back()
+
+    @on(LineList.Chosen)
+    def _chosen(self, event: LineList.Chosen) -> None:
+        event.stop()
+        result = self.run.result
+        if result is None:
+            return
+        report = result.report
+        if event.list.id == "gaps":
+            self._fill_gap(report.gaps[event.index].cells)
+        elif event.list.id == "crowded":
+            self._go_to(report.crowded[event.index].rows[0])
+        elif event.list.id == "rows":
+            row = report.findings[event.index].row
+            if row is not None:
+                self._go_to(row, report.findings[event.index].column)
+
+    def _fill_gap(self, cells: Mapping[str, str]) -> None:
+        gone = cells.keys() - {c.condition.name for c in self.sheet.table.conditions}
+        if gone:
+            self.post_message(Told(f"{in_quotes(min(gone))} is no condition any more. R works the coverage out anew.", "warning"))
+        else:
+            self.post_message(FillGap(dict(cells)))
+
+    def _go_to(self, row: int, column: str | None = None) -> None:
+        if self.run.state == "stale" and row >= self.sheet.table.n_rows:
+            self.post_message(Told("That row is gone. R works the coverage out anew.", "warning"))
+        else:
+            self.post_message(GoToCell(row, column))
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only where there are contexts, one can be tried."""
+        return action != "try_context" or SECTIONS[self.section] in ("gaps", "pairs", "crowded")
+
+    def action_try_context(self) -> None:
+        """Put a context of what the cursor is on into the test row."""
+        found = self._cells_here()
+        if found is None:
+            self.post_message(Told("There is nothing here to try.", "warning"))
+            return
+        name, cells = found
+        try:
+            facts = facts_inside(cells, [c.condition for c in self.sheet.table.conditions])
+        except ContextDBError as error:
+            self.post_message(Told(str(error.faults[0]), "error"))
+            return
+        self.post_message(SetContext(facts, name))
+
+    def _cells_here(self) -> tuple[str, dict[str, str]] | None:
+        result, section = self.run.result, SECTIONS[self.section]
+        if result is None:
+            return None
+        if section == "pairs":
+            cells = self.query_one(PairMap).cells_here()
+            return None if cells is None else ("slice", cells)
+        if section not in ("gaps", "crowded"):
+            return None
+        places = result.report.gaps if section == "gaps" else result.report.crowded
+        at = self.query_one(f"#{section}", LineList).index
+        return (f"gap {at + 1}" if section == "gaps" else f"crowd {at + 1}", dict(places[at].cells)) if places else None
+
+
+def _gap_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
+    gap = report.gaps[at]
+    share = (f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}", "strong") if gap.share else ("points", "muted")
+    new: ListCell = ("same", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
+    return [share, new, partial(lines.cells_within, gap.cells), lines.nearest_text(gap.nearest)]
+
+
+def _crowd_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
+    crowd = report.crowded[at]
+    return [(str(crowd.n_rows), "strong"), format_percent(crowd.share), partial(lines.cells_within, crowd.cells)]
+
+
+def _finding_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
+    finding = report.findings[at]
+    row = "" if finding.row is None else str(finding.row + 1)
+    return [row, finding.asset or "", (lines.TITLES.get(finding.rule, finding.rule), finding.level)]

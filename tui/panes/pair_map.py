@@ -1,0 +1,125 @@
+"""Pairs of conditions as a heat map: all pairs, and on Enter the values of one pair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from textual.binding import Binding, BindingType
+from textual.message import Message
+
+from contextdb.covering import PairTable, Slice
+from tui.model import coverage_lines as lines
+from tui.widgets.heat_map import HeatMap, Square
+
+WIDEST = 14
+
+
+class PairMap(HeatMap):
+    """The overview has a square for each two conditions, of their least covered combination; on the diagonal stand single ones."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("enter", "choose", "Open the pair"),
+        Binding("backspace", "back", "All pairs"),
+    ]
+
+    @dataclass
+    class Said(Message):
+        """What the square under the cursor means, in words."""
+
+        text: str
+
+    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
+        super().__init__(id=id)
+        self.pairs: PairTable | None = None
+        self.pair: tuple[int, int] | None = None
+        """The pair that is shown, that with more parts first; None: all of them."""
+        self._opened_at = (0, 1)
+        self._worst: dict[tuple[int, int], Slice | None] = {}
+
+    def show_pairs(self, pairs: PairTable) -> None:
+        """Show these; the pair that is open stays so where it is still there."""
+        before, self.pairs, self._worst = self.pairs, pairs, {}
+        if self.pair and (before is None or before.conditions != pairs.conditions):
+            self.pair = None
+        self._show(self.place if before is not None else (0, 1))
+
+    def back(self) -> None:
+        """From one pair to all of them."""
+        if self.pair is not None:
+            self.pair = None
+            self._show(self._opened_at)
+
+    def action_back(self) -> None:
+        """From one pair to all of them."""
+        self.back()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """A pair is opened from all of them, and left from within."""
+        if action in ("choose", "back"):
+            return (self.pair is None) == (action == "choose")
+        return True
+
+    def cells_here(self) -> dict[str, str] | None:
+        """The slice under the cursor as cells; in the overview the least covered one of the pair."""
+        found = self._slice(*self.place) if self.pair else self._worst_of(*self.place)
+        return None if found is None else found.cells
+
+    def action_choose(self) -> None:
+        """Open the pair of the square."""
+        if self.pairs is not None and self.pair is None and self.pairs.conditions:
+            self._opened_at = self.place
+            one, other = self.place
+            has_more = len(self.pairs.parts[one]) >= len(self.pairs.parts[other])
+            self.pair = (one, other) if has_more else (other, one)
+            self._show((0, 0))
+
+    def go(self, row: int, column: int) -> None:
+        """Choose a square, and say what it means."""
+        super().go(row, column)
+        if self.pairs is None or not self.rows:
+            self.post_message(self.Said(""))
+        elif self.pair is None:
+            self.post_message(self.Said(lines.pair_text(self.pairs, *self.place)))
+        else:
+            found = self._slice(*self.place)
+            self.post_message(self.Said("" if found is None else lines.slice_text(found)))
+
+    def _show(self, place: tuple[int, int]) -> None:
+        assert self.pairs is not None
+        self.refresh_bindings()
+        if self.pair is None:
+            names = self.pairs.conditions
+            rows = [f"{at + 1} {name}" for at, name in enumerate(names)]
+            self.show(rows, [str(at + 1) for at in range(len(names))], self._overview_square, place, corner="least covered, %")
+            return
+        one, other = self.pair
+        rows = [f"{part}" for part in self.pairs.parts[one]]
+        columns = [self.pairs.conditions[one]] if one == other else list(self.pairs.parts[other])
+        names = self.pairs.conditions
+        corner = names[one] if one == other else f"{names[one]} \\ {names[other]}"
+        self.show(rows, columns, self._slice_square, place, WIDEST, corner)
+
+    def _overview_square(self, row: int, column: int) -> Square:
+        return _square(self._worst_of(row, column))
+
+    def _slice_square(self, row: int, column: int) -> Square:
+        return _square(self._slice(row, column))
+
+    def _worst_of(self, row: int, column: int) -> Slice | None:
+        if self.pairs is None or not self.pairs.conditions:
+            return None
+        key = min(row, column), max(row, column)
+        if key not in self._worst:
+            self._worst[key] = self.pairs.worst(*key)
+        return self._worst[key]
+
+    def _slice(self, row: int, column: int) -> Slice | None:
+        if self.pairs is None or self.pair is None:
+            return None
+        one, other = self.pair
+        return self.pairs.slice(one, other, row, row if one == other else column)
+
+
+def _square(found: Slice | None) -> Square:
+    return Square(None) if found is None else Square(found.covered, found.lower, found.upper)

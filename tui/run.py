@@ -1,0 +1,48 @@
+"""Run the editor in this terminal: what `contextdb edit` calls. An edge."""
+
+from __future__ import annotations
+
+import os
+
+from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
+from tui.app import EditorApp
+from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
+from tui.model.conflicted import conflicts_in
+from tui.model.workspace import Workspace
+
+FEW_COLOURS = ("ansi", "linux", "vt100", "vt220", "xterm", "xterm-color", "screen", "tmux", "rxvt", "cygwin")
+"""Terminals of 16 colours or fewer, by TERM, unless COLORTERM says that they can do more."""
+
+
+def edit(path: str | None, theme: str | None = None) -> None:
+    """Open a table or a folder of tables, and stay until the editor is left.
+
+    Raises
+    ------
+    ContextDBError
+        There is no such table, it cannot be read, or the settings cannot be taken.
+    """
+    workspace = Workspace(path)
+    themes = EditorApp.theme_names()
+    settings = read_settings(settings_path(), themes)
+    if theme is not None and theme not in themes:
+        near = nearest(theme, themes)
+        found = f"there is no theme {in_quotes(theme)}."
+        raise SettingsError(Fault(found, ", ".join(themes), in_quotes(near) if near else ""))
+    _require_readable(workspace)
+    EditorApp(workspace, settings, theme or _theme_for(settings)).run()
+
+
+def _require_readable(workspace: Workspace) -> None:
+    """Say what cannot be read before the screen is taken; a file with a conflict between marks is asked about there."""
+    try:
+        workspace.session(workspace.first)
+    except ContextDBError:
+        if conflicts_in(workspace.files[workspace.first]) is None:
+            raise
+
+
+def _theme_for(settings: EditorSettings) -> str:
+    """The theme of the settings; without one, in a terminal of few colours, the terminal's own colours."""
+    has_few = os.environ.get("TERM", "") in FEW_COLOURS and not os.environ.get("COLORTERM")
+    return settings.theme or ("ansi-dark" if has_few else "")

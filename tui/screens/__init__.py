@@ -1,0 +1,1 @@
+"""The screens: that of the sheet, and the dialogs that open over it."""

@@ -1,0 +1,108 @@
+"""Small dialogs: ask for a line of text, or let one choose from a list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.widgets import Input, OptionList, Static
+from textual.widgets.option_list import Option
+
+from tui.screens.dialog import Dialog
+
+
+class AskDialog(Dialog[str]):
+    """Ask for one line of text. `check` says what is wrong with it, or nothing."""
+
+    DEFAULT_CSS = """
+    AskDialog > #dialog > #dialog-body > Input { margin: 1 0; }
+    AskDialog #ask-fault { color: $text-error; height: auto; }
+    """
+    keys_text = "Enter take · Esc cancel"
+
+    def __init__(self, title: str, question: str, text: str, check: Callable[[str], str]) -> None:
+        super().__init__()
+        self.title_text = title
+        self._question, self._text, self._check = question, text, check
+
+    def compose_body(self) -> ComposeResult:
+        yield Static(Text(self._question))
+        yield Input(self._text, compact=True)
+        yield Static(id="ask-fault")
+
+    def on_mount(self) -> None:
+        self.query_one(Input).focus()
+
+    def on_input_changed(self) -> None:
+        self.query_one("#ask-fault", Static).update("")
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        event.stop()
+        fault = self._check(event.value)
+        if fault:
+            self.query_one("#ask-fault", Static).update(Text(f"! {fault}"))
+        else:
+            self.dismiss(event.value)
+
+
+class ChooseDialog(Dialog[int]):
+    """Choose one of some lines; what is typed filters them. Gives the number of the line."""
+
+    DEFAULT_CSS = """
+    ChooseDialog OptionList { height: auto; max-height: 60vh; border: none; background: $surface; margin-top: 1; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up", "move(-1)", show=False),
+        Binding("down", "move(1)", show=False),
+        Binding("pageup", "move(-10)", show=False),
+        Binding("pagedown", "move(10)", show=False),
+    ]
+    keys_text = "↑↓ choose · Enter take · Esc cancel"
+
+    def __init__(self, title: str, lines: Sequence[str], chosen: int = 0) -> None:
+        super().__init__()
+        self.title_text = title
+        self._lines = list(lines)
+        self._chosen = chosen
+
+    def compose_body(self) -> ComposeResult:
+        yield Input(compact=True, placeholder="type to filter")
+        yield OptionList()
+
+    def on_mount(self) -> None:
+        self._show("", self._chosen)
+        self.query_one(Input).focus()
+
+    def _show(self, word: str, chosen: int | None = None) -> None:
+        options = self.query_one(OptionList)
+        options.clear_options()
+        found = [i for i, line in enumerate(self._lines) if word.casefold() in line.casefold()]
+        options.add_options([Option(Text(self._lines[i]), id=str(i)) for i in found])
+        if found:
+            options.highlighted = found.index(chosen) if chosen in found else 0
+
+    def action_move(self, by: int) -> None:
+        """Up and down, while one types."""
+        options = self.query_one(OptionList)
+        if options.option_count:
+            options.highlighted = max(0, min((options.highlighted or 0) + by, options.option_count - 1))
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        event.stop()
+        self._show(event.value)
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        event.stop()
+        options = self.query_one(OptionList)
+        if options.highlighted is not None:
+            self._take(options.get_option_at_index(options.highlighted))
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        event.stop()
+        self._take(event.option)
+
+    def _take(self, option: Option) -> None:
+        self.dismiss(int(option.id or 0))

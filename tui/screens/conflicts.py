@@ -1,0 +1,196 @@
+"""What others wrote and edits here disagree about: decide it place by place, or all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from textual import events, on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.content import Content
+from textual.message import Message
+from textual.widgets import Static
+
+from contextdb.diff import Conflict, Side
+from contextdb.errors import plural, shown
+from tui.screens.dialog import Dialog
+from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+CHOSEN, OPEN = "●", "○"
+WHERE_WIDTH = 10
+TEXT_WIDTH = 11
+N_OTHER_LINES = 15
+"""What the dialog has beside its list: the border, the texts of the chosen place, the choices, and the lines between."""
+
+
+class ConflictLines(LineList):
+    """The places in question. A click on a text takes it."""
+
+    class Taken(Message):
+        """A side was clicked."""
+
+        def __init__(self, index: int, side: Side) -> None:
+            super().__init__()
+            self.index, self.side = index, side
+
+    def on_click(self, event: events.Click) -> None:
+        """Go to the line; take the side that was clicked."""
+        event.prevent_default()  # else the list would choose the line
+        index = event.y - 1 + self.scroll_offset.y
+        if event.y < 1 or index >= self.n_lines:
+            return
+        self.go(index)
+        *_, mine, theirs = self._widths(self.scrollable_content_region.width)
+        start = self.scrollable_content_region.width - theirs - 2
+        if event.x >= start:
+            self.post_message(self.Taken(index, "theirs"))
+        elif event.x >= start - mine - 2:
+            self.post_message(self.Taken(index, "ours"))
+
+
+class ConflictsDialog(Dialog[Mapping[int, Side]]):
+    """Decide conflicts. Gives a side for each of them, by its place in the list; None to leave all as it is."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("left", "take('ours')", "Mine", priority=True),
+        Binding("right", "take('theirs')", "On disk", priority=True),
+        Binding("space", "turn", "Other side", priority=True),
+        Binding("m", "take_all('ours')", "All mine"),
+        Binding("d", "take_all('theirs')", "All on disk"),
+    ]
+    DEFAULT_CSS = """
+    ConflictsDialog {
+        & > #dialog { width: 90%; }
+        & #dialog-body > Static { height: auto; }
+        & ConflictLines { margin: 1 0; }
+        & #conflict-texts { height: 4; }
+        & #conflict-choices { margin-top: 1; }
+    }
+    """
+    title_text = "The file was changed on disk"
+    keys_text = "← mine · → on disk · M D all · Enter merge · Esc cancel"
+
+    def __init__(self, conflicts: Sequence[Conflict], file: str = "") -> None:
+        super().__init__()
+        self.conflicts = tuple(conflicts)
+        self.sides: dict[int, Side] = {}
+        self._file = file
+
+    def compose_body(self) -> ComposeResult:
+        """How many there are, the list, the texts of the chosen one in full, and what can be clicked."""
+        where = f" in {shown(self._file)}" if self._file else ""
+        yield Static(
+            Content(f"{plural(len(self.conflicts), 'place')}{where} changed both here and on disk. All else goes together.")
+        )
+        columns = [ListColumn("Asset", WHERE_WIDTH, 2), ListColumn("Column", WHERE_WIDTH, 1)]
+        texts = [ListColumn(title, TEXT_WIDTH, 2) for title in ("Before", "Mine", "On disk")]
+        yield ConflictLines([*columns, *texts])
+        yield Static(id="conflict-texts")
+        yield Static(id="conflict-choices")
+
+    def on_mount(self) -> None:
+        """Show the list from its start."""
+        self._lines.show(len(self.conflicts), self._line)
+        self._lines.focus()
+        self._show()
+
+    def on_resize(self, event: events.Resize) -> None:
+        """Give the list the lines that it needs, or all that are left."""
+        left = event.size.height * 92 // 100 - N_OTHER_LINES
+        self._lines.styles.height = max(3, min(len(self.conflicts) + 1, left))
+
+    @property
+    def _lines(self) -> ConflictLines:
+        return self.query_one(ConflictLines)
+
+    @property
+    def n_open(self) -> int:
+        """How many are not decided yet."""
+        return len(self.conflicts) - len(self.sides)
+
+    # ---- keys and mouse
+
+    def action_take(self, side: Side) -> None:
+        """Decide the one of the cursor, and go to the next that is open when it was."""
+        self._take(self._lines.index, side)
+
+    def action_turn(self) -> None:
+        """Decide the one of the cursor the other way."""
+        at = self._lines.index
+        self.sides[at] = "theirs" if self.sides.get(at) == "ours" else "ours"
+        self._show()
+
+    def action_take_all(self, side: Side) -> None:
+        """Decide all of them."""
+        self.sides = dict.fromkeys(range(len(self.conflicts)), side)
+        self._show()
+
+    def action_merge(self) -> None:
+        """Give back what was decided, or go to the first that is not."""
+        if not self.n_open:
+            self.dismiss(dict(self.sides))
+            return
+        self._lines.go(next(at for at in range(len(self.conflicts)) if at not in self.sides))
+        self._show(is_asked=True)
+
+    @on(LineList.Chosen)
+    def _chosen(self, event: LineList.Chosen) -> None:
+        event.stop()
+        self.action_merge()
+
+    @on(LineList.Moved)
+    def _moved(self, event: LineList.Moved) -> None:
+        event.stop()
+        self._show_texts()
+
+    @on(ConflictLines.Taken)
+    def _taken(self, event: ConflictLines.Taken) -> None:
+        event.stop()
+        self.sides[event.index] = event.side
+        self._show()
+
+    def _take(self, at: int, side: Side) -> None:
+        was_open = at not in self.sides
+        self.sides[at] = side
+        following = (i for i in range(at + 1, len(self.conflicts)) if i not in self.sides)
+        if was_open and (place := next(following, None)) is not None:
+            self._lines.go(place)
+        self._show()
+
+    # ---- what is seen
+
+    def _line(self, at: int) -> Sequence[ListCell]:
+        one, side = self.conflicts[at], self.sides.get(at)
+        what = one.column or "(row)"
+        asset = {"column": "(column)", "name": "(name)"}.get(one.kind, one.asset)
+        texts = [("ours", told(one.ours)), ("theirs", told(one.theirs))]
+        cells = [(f"{CHOSEN if side == name else OPEN} {text}", _tone(side, name)) for name, text in texts]
+        return [shown(asset), shown(what), (told(one.base, "(new)"), "muted"), *cells]
+
+    def _show(self, is_asked: bool = False) -> None:
+        self._lines.refresh()
+        self._show_texts()
+        status = f"{self.n_open:,} of {len(self.conflicts):,} to decide" if self.n_open else "All decided"
+        status = f"Decide {self.n_open:,} first" if is_asked else status
+        parts = [("merge", "Merge"), ("take_all('ours')", "All mine"), ("take_all('theirs')", "All on disk"), ("cancel", "Cancel")]
+        links = "   ".join(f"[@click=screen.{action}]{text}[/]" for action, text in parts)
+        self.query_one("#conflict-choices", Static).update(Content.from_markup(f"{links}     $status", status=status))
+
+    def _show_texts(self) -> None:
+        if not self.conflicts:
+            return
+        one = self.conflicts[max(self._lines.index, 0)]
+        lines = [("Before ", told(one.base, "(new)")), ("Mine   ", told(one.ours)), ("On disk", told(one.theirs))]
+        place = Content.styled(shown(one.place, 200), "bold")
+        texts = [Content(f"{name}  {text}") for name, text in lines]
+        self.query_one("#conflict-texts", Static).update(Content("\n").join([place, *texts]))
+
+
+def told(text: str | None, gone: str = "(deleted)") -> str:
+    """A text on one line; one that is not there, or empty, in words."""
+    return gone if text is None else shown(text, 400) if text.strip() else "(empty)"
+
+
+def _tone(side: Side | None, name: str) -> str:
+    return "" if side is None else "strong" if side == name else "muted"

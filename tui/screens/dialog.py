@@ -1,0 +1,56 @@
+"""What all dialogs share: a titled box in the middle, its keys at the foot, Escape to leave.
+
+A dialog is given what it shows, and gives back what was decided, or None. It changes nothing itself.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Generic, TypeVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+Answer = TypeVar("Answer")
+
+
+class Dialog(ModalScreen[Answer | None], Generic[Answer]):
+    """A box over the sheet. Children say `title_text`, `keys_text` and `compose_body`."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "cancel", "Cancel", show=False)]
+
+    DEFAULT_CSS = """
+    Dialog {
+        align: center middle;
+        background: $background 60%;
+        & > #dialog {
+            width: 76; max-width: 96%; height: auto; max-height: 92%;
+            background: $surface; border: round $primary; border-title-color: $text; border-title-style: bold;
+            border-subtitle-color: $text-muted; padding: 1 2;
+        }
+        &.-wide > #dialog { width: 90%; height: 90%; }
+        & > #dialog > #dialog-body { height: auto; max-height: 100%; }
+        &.-wide > #dialog > #dialog-body { height: 1fr; }
+    }
+    """
+
+    title_text = ""
+    """Stands in the upper border."""
+    keys_text = "Esc cancel"
+    """Which keys do what, in the lower border."""
+
+    def compose(self) -> ComposeResult:
+        with Vertical(id="dialog") as box, Vertical(id="dialog-body"):
+            yield from self.compose_body()
+        box.border_title = self.title_text
+        box.border_subtitle = self.keys_text
+
+    def compose_body(self) -> ComposeResult:
+        """What stands in the box."""
+        yield Static()
+
+    def action_cancel(self) -> None:
+        """Leave without an answer."""
+        self.dismiss(None)

@@ -1,0 +1,135 @@
+"""What a screen does about files that others write while it shows them: look once a second, merge, ask, save.
+
+A screen makes one `DiskCare` for its session, has a timer call `look`, and saves through `save`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from textual.screen import Screen
+
+from contextdb.diff import Merge, Side, diff
+from contextdb.errors import ContextDBError, FileError
+from tui.model.session import Session
+from tui.screens.conflicts import ConflictsDialog
+
+LOOK_EVERY_S = 1.0
+
+Level = Literal["information", "warning", "error"]
+
+
+class Say(Protocol):
+    """Show a line to the person."""
+
+    def __call__(self, text: str, level: Level = ...) -> None: ...
+
+
+class DiskCare:
+    """Keeps a session and the files on the disk together."""
+
+    def __init__(self, screen: Screen[Any], session: Session, say: Say, changed: Callable[[], None]) -> None:
+        """`changed` shows the sheet anew; it is called after every merge and reload."""
+        self._screen, self._session, self._say, self._changed = screen, session, say, changed
+        self._told = ""
+        """What was said last of the disk, so that a timer does not say it again."""
+        self._left: object = None
+        """The stamp of a version of the file that is not merged, as the person said or because it cannot be: until a save."""
+
+    def look(self) -> None:
+        """Take in what others did since the last look. Not while a dialog is open."""
+        if self._screen.app.screen is not self._screen:
+            return
+        found = self._session.poll()
+        if not found:
+            self._told = ""
+            return
+        if found.schema != "same":
+            self._reload()
+        if found.taken_by is not None:
+            self._say_once(f"{found.taken_by} has taken this table over: it can only be saved under another name.", "warning")
+        elif found.is_free:
+            self._say_once("The other editor has closed this table: open it again to edit it here.")
+        if found.table == "gone":
+            self._say_once(f"{self._session.path.name} is gone from the disk. Saving makes it anew.", "warning")
+        elif found.table == "changed" and self._session.disk_stamp != self._left:
+            self._merge_unasked()
+
+    def save(self, path: Path | None = None, overwrite: bool = False, then: Callable[[], None] = lambda: None) -> None:
+        """Save; conflicts with what others wrote are asked about first. `then` is called when the table is saved.
+
+        Raises
+        ------
+        FileError, TableError
+            As of `Session.save`, but for conflicts that can be decided.
+        """
+        try:
+            self._session.save(path, overwrite)
+        except FileError as error:
+            if error.faults[0].rule != "merge-conflict":
+                raise
+            try:
+                self.merge(then=lambda: self.save(path, overwrite, then))
+            except ContextDBError:
+                raise error from None  # what stands on the disk is no table
+            return
+        then()
+
+    def merge(self, then: Callable[[], None] = lambda: None) -> None:
+        """Merge what stands on the disk, and ask about conflicts. `then` is called when it is merged.
+
+        Raises
+        ------
+        FileError, SchemaError, TableError
+            What stands on the disk is gone, no table, or another one.
+        """
+        merged = self._session.merge_from_disk()
+        if merged.conflicts:
+            self._ask(merged, then)
+        else:
+            self._merged(merged, then)
+
+    # ---- parts
+
+    def _merge_unasked(self) -> None:
+        try:
+            self.merge()
+        except ContextDBError as error:
+            self._left = self._session.disk_stamp
+            self._say_once(str(error), "error")
+
+    def _ask(self, merged: Merge, then: Callable[[], None]) -> None:
+        def decided(sides: Mapping[int, Side] | None) -> None:
+            if sides is None:
+                self._left = self._session.disk_stamp
+                self._say("Nothing is merged. The next save asks again.", "warning")
+                return
+            resolved = merged.resolved(sides)
+            if resolved.conflicts:  # a row that comes back can bring new ones
+                self._ask(resolved, then)
+                return
+            self._session.take(resolved)
+            self._merged(resolved, then)
+
+        self._screen.app.push_screen(ConflictsDialog(merged.conflicts, self._session.path.name), decided)
+
+    def _merged(self, merged: Merge, then: Callable[[], None]) -> None:
+        self._changed()
+        self._say(f"Merged from disk: {diff(merged.base, merged.theirs).summary}. Ctrl+Z takes it back.")
+        then()
+
+    def _reload(self) -> None:
+        try:
+            self._session.reload_schema()
+        except ContextDBError as error:
+            self._say_once(str(error), "error")
+            return
+        self._changed()
+        self._say("contextdb.toml was changed on disk and is read anew.")
+
+    def _say_once(self, text: str, level: Level = "information") -> None:
+        if text != self._told:
+            self._told = text
+            self._say(text, level)

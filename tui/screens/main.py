@@ -1,0 +1,399 @@
+"""The screen of a table: tabs, tools, what the tab shows, a line that says what was done, and the keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+
+from rich.text import Text
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import BindingType
+from textual.screen import Screen
+from textual.widgets import ContentSwitcher, Static
+
+from contextdb.disk import write_atomic
+from contextdb.edits import Edit, set_cells
+from contextdb.errors import ContextDBError, plural
+from contextdb.table import Table
+from tui.clipboard import Clipboard
+from tui.commands import ASSETS, BY_ID, SCREEN, bindings
+from tui.messages import Edited, FillGap, GoToCell, SetContext, Told
+from tui.model.context_list import ContextList
+from tui.model.coverage_run import CoverageRun
+from tui.model.session import Session
+from tui.model.workspace import Workspace
+from tui.panes.assets import AssetsPane
+from tui.panes.coverage import CoveragePane
+from tui.panes.options import OptionsPane
+from tui.panes.pane import Pane
+from tui.panes.priorities import PrioritiesPane
+from tui.panes.problems import ProblemsPane
+from tui.screens.ask import ChooseDialog
+from tui.screens.dialog import Dialog
+from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
+from tui.screens.steps import StepsDialog
+from tui.widgets.bar import Bar, Item, StatusLine
+from tui.widgets.grid import Grid
+from tui.widgets.key_line import KeyLine
+
+if TYPE_CHECKING:
+    from tui.app import EditorApp
+    from tui.model.importing import Import
+    from tui.screens.contexts import Loaded
+    from tui.screens.export_table import Export
+    from tui.screens.nearest import CellAnswer
+
+Chosen = TypeVar("Chosen")
+
+
+class Answer(Protocol):
+    """What a dialog about columns gives back."""
+
+    def edit(self, table: Table) -> Edit:
+        """The edit that was decided."""
+
+
+TABS = ("assets", "options", "priorities", "coverage", "problems")
+TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
+
+
+class MainScreen(Screen[None]):
+    """One table of the workspace, with its tabs."""
+
+    BINDINGS: ClassVar[list[BindingType]] = bindings([*SCREEN, *ASSETS])
+
+    DEFAULT_CSS = """
+    MainScreen {
+        layout: vertical;
+        & > ContentSwitcher { height: 1fr; & > * { height: 1fr; } }
+        & > #said { height: auto; max-height: 4; padding: 0 1; background: $surface; display: none; }
+        & > #said.-warning { display: block; color: $text-warning; }
+        & > #said.-error { display: block; color: $text-error; text-style: bold; }
+    }
+    """
+
+    app: EditorApp
+
+    def __init__(self, workspace: Workspace, name: str) -> None:
+        super().__init__()
+        self.workspace = workspace
+        self.table_name = name
+        self.session: Session = workspace.session(name)
+        self.coverage = CoverageRun()
+        self.contexts: ContextList | None = None
+        """The contexts that F7 and F8 step through."""
+        self._said = ("", "information")
+        self.care = DiskCare(self, self.session, self.say, self.show)
+        self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
+
+    @property
+    def tab(self) -> str:
+        """The tab that is seen."""
+        return self.query_one("#panes", ContentSwitcher).current or "assets"
+
+    @property
+    def assets(self) -> AssetsPane:
+        """The tab of the grid."""
+        return self.query_one(AssetsPane)
+
+    def compose(self) -> ComposeResult:
+        yield Bar(id="tabs")
+        yield Bar([Item(name, BY_ID[name].label) for name in TOOLS], id="tools")
+        with ContentSwitcher(initial="assets", id="panes"):
+            yield AssetsPane(self.session.sheet, self.clipboard)
+        yield Static(id="said")
+        yield StatusLine()
+        yield KeyLine()
+
+    def on_mount(self) -> None:
+        self.assets.take_focus()
+        self.set_interval(LOOK_EVERY_S, self.care.look)
+        self._opened()
+
+    def on_unmount(self) -> None:
+        self.coverage.cancel()
+
+    # ---- what is shown
+
+    def show(self) -> None:
+        """Show the table, and everything said of it, as it is now."""
+        table = self.session.sheet.table
+        self.coverage.follow(table)
+        if self.contexts is not None:
+            self.contexts.show(table)
+        self.assets.show()
+        self._show_bars()
+        if self.tab != "assets":
+            self._pane(self.tab).show()
+
+    def _show_bars(self) -> None:
+        mark = " *" if self.session.sheet.is_modified else ""
+        items = [Item("open", f"{self.table_name}{mark}", is_strong=True)]
+        items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in TABS]
+        table = self.session.sheet.table
+        about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
+        self.query_one("#tabs", Bar).show(items, about)
+        self.query_one(StatusLine).show(right=self.assets.summary())
+
+    def say(self, text: str, level: str = "information") -> None:
+        """Say something in the line over the footer; nothing takes away what was said."""
+        is_quiet = level == "information"
+        self.query_one(StatusLine).show(text if is_quiet else "")
+        if (text, level) != self._said:
+            self._said = (text, level)
+            said = self.query_one("#said", Static)
+            said.set_classes("" if is_quiet else f"-{level}")
+            said.update(Text("" if is_quiet else f"! {text}"))
+
+    @on(Told)
+    def _told(self, event: Told) -> None:
+        self.say(event.text, event.level)
+
+    @on(Edited)
+    def _edited(self, event: Edited) -> None:
+        done = event.done
+        self.say(" ".join([f"{done.name}." if done.name else "", *done.notes]).strip(), "warning" if done.notes else "information")
+        self.show()
+
+    @on(Grid.Moved)
+    @on(Grid.FactChanged)
+    def _moved(self) -> None:
+        self._show_bars()
+
+    @on(Bar.Pressed)
+    async def _pressed(self, event: Bar.Pressed) -> None:
+        await self.run_command(event.command)
+
+    # ---- commands
+
+    async def run_command(self, name: str) -> None:
+        """Run a command of the palette or a bar, wherever its keys are."""
+        command = BY_ID[name]
+        if command.scope == "screen":
+            await self.run_action(command.run)
+            return
+        self._switch_to("assets")
+        await (self.assets.grid if command.scope == "grid" else self.assets).run_action(command.run)
+
+    async def action_command(self, name: str) -> None:
+        """A command of the assets' pane, from any tab."""
+        await self.run_command(name)
+
+    async def action_tab(self, name: str) -> None:
+        """Go to a tab, which is made when it is first gone to."""
+        if not self.query(f"#{name}"):
+            await self.query_one("#panes", ContentSwitcher).mount(self._new_pane(name))
+        self._switch_to(name)
+
+    def _switch_to(self, name: str) -> None:
+        self.query_one("#panes", ContentSwitcher).current = name
+        self._show_bars()
+        if name != "assets":
+            self._pane(name).show()
+        self._pane(name).take_focus()
+
+    def _new_pane(self, name: str) -> Pane:
+        sheet = self.session.sheet
+        if name == "options":
+            return OptionsPane(sheet, id=name)
+        if name == "priorities":
+            return PrioritiesPane(sheet, id=name)
+        return CoveragePane(sheet, self.coverage, id=name) if name == "coverage" else ProblemsPane(sheet, id=name)
+
+    async def action_next_tab(self, by: int) -> None:
+        """Go to the tab beside."""
+        await self.action_tab(TABS[(TABS.index(self.tab) + by) % len(TABS)])
+
+    def action_help(self) -> None:
+        from tui.screens.help import HelpDialog
+
+        self.app.push_screen(HelpDialog(self.app.settings.keys))
+
+    def action_history(self) -> None:
+        """Choose a step to go to."""
+        history = self.session.sheet.history
+
+        def chosen(position: int | None) -> None:
+            if position is not None:
+                self._edited(Edited(self.session.sheet.go_to_step(position)))
+
+        self.app.push_screen(StepsDialog(history.names, history.position), chosen)
+
+    # ---- tables and files
+
+    def action_tables(self) -> None:
+        """Choose a table of the folder."""
+        self.workspace.look_again()
+        names = list(self.workspace.files)
+        lines = [f"{name}{' *' if name in self.workspace.unsaved else ''}" for name in names]
+
+        def chosen(at: int | None) -> None:
+            if at is not None and names[at] != self.table_name:
+                self.app.open_table(names[at])
+
+        self.app.push_screen(ChooseDialog("Tables", lines, names.index(self.table_name)), chosen)
+
+    def action_save(self) -> None:
+        """Write the table to its file, and what is said anew to contextdb.toml."""
+        editor = self.assets.editor
+        if editor is not None and editor.fault is not None:
+            self.say("Finish the cell first: Enter takes it, Esc leaves it as it was.", "warning")
+            return
+        self._try(lambda: self.care.save(then=self._saved))
+
+    def _saved(self) -> None:
+        n_unreadable = len(self.session.sheet.table.faults)
+        note = f" {plural(n_unreadable, 'cell')} cannot be read: see Problems." if n_unreadable else ""
+        self.show()
+        self.say(f"Saved {self.session.path.name}.{note}", "warning" if note else "information")
+
+    def action_import(self) -> None:
+        """Bring rows in from another file."""
+        from tui.screens.import_table import ImportDialog
+
+        def chosen(answer: Import | None) -> None:
+            if answer is not None:
+                self.apply(answer.edit, answer.notes)
+
+        self.app.push_screen(ImportDialog(self.session.sheet.table, self.workspace.folder), chosen)
+
+    def action_export(self) -> None:
+        """Write the table for another program."""
+        from tui.screens.export_table import ExportDialog
+
+        def chosen(answer: Export | None) -> None:
+            if answer is not None:
+                self._try(lambda: self._export(answer))
+
+        self.app.push_screen(ExportDialog(self.session.sheet.table, self.workspace.folder), chosen)
+
+    def _export(self, answer: Export) -> None:
+        write_atomic(answer.path, answer.raw)
+        self.say(" ".join([f"Wrote {answer.path.name}.", *answer.notes]), "warning" if answer.notes else "information")
+
+    # ---- columns
+
+    def action_add_column(self) -> None:
+        """Add a declared condition, those of a blueprint, or a new column."""
+        from tui.screens.add_column import AddColumn
+
+        sheet = self.session.sheet
+        self.app.push_screen(AddColumn(sheet.table, sheet.selection.column), self._answered)
+
+    def action_blueprints(self) -> None:
+        """Insert the conditions of a blueprint, or keep the selected ones as one."""
+        from tui.screens.blueprints import Blueprints
+
+        sheet = self.session.sheet
+        self.app.push_screen(Blueprints(sheet.table, sheet.selected_columns, sheet.selection.column), self._answered)
+
+    def _answered(self, answer: Answer | None) -> None:
+        if answer is not None:
+            self._try(lambda: self.apply(answer.edit(self.session.sheet.table)))
+
+    def apply(self, edit: Edit, notes: Sequence[str] = ()) -> None:
+        """Make an edit, show it and say what was done; what cannot be done is said."""
+
+        def made() -> None:
+            done = self.session.sheet.apply(edit)
+            self._edited(Edited(replace(done, notes=(*done.notes, *notes))))
+
+        self._try(made)
+
+    # ---- the test row
+
+    def action_contexts(self) -> None:
+        """Look through saved or recorded contexts."""
+        from tui.screens.contexts import ContextsDialog
+
+        def loaded(answer: Loaded | None) -> None:
+            if answer is not None:
+                self.contexts = answer.contexts
+                self._load_context()
+
+        sheet = self.session.sheet
+        self._try(lambda: self._push(ContextsDialog(sheet.table, sheet.query.texts, self.contexts), loaded))
+
+    def action_step(self, by: int) -> None:
+        """Load the next context, or the one before; of the saved ones where none were looked at yet."""
+        self._try(lambda: self._step(by))
+
+    def _step(self, by: int) -> None:
+        if self.contexts is None:
+            self.contexts = ContextList.beside(self.session.sheet.table)
+        if self.contexts.next() if by > 0 else self.contexts.previous():
+            self._load_context()
+        else:
+            self.say("There is no other context. F9 opens a file of them, and saves the test row as one.")
+
+    def _load_context(self) -> None:
+        if self.contexts is not None:
+            self._set_context(SetContext(self.contexts.texts, self.contexts.title))
+
+    def action_why(self) -> None:
+        """Why the row of the cursor is not valid, and which rows are nearest."""
+        from tui.screens.nearest import NearestDialog
+
+        sheet = self.session.sheet
+        if sheet.query.is_empty:
+            self.say("The test row asks for nothing yet: F6 goes there, F9 loads a context.")
+            return
+        row = int(sheet.view.rows[sheet.cursor[0]]) if len(sheet.view) else None
+        self._push(NearestDialog(sheet.query, sheet.table, row), self._why_answered)
+
+    def _why_answered(self, answer: CellAnswer | None) -> None:
+        if answer is None:
+            return
+        self._go_to_cell(GoToCell(answer.row, answer.column))
+        if answer.text is not None:
+            self.apply(set_cells(self.session.sheet.table, [(answer.row, answer.column, answer.text)]))
+
+    def _push(self, dialog: Dialog[Chosen], then: Callable[[Chosen | None], None]) -> None:
+        self.app.push_screen(dialog, then)
+
+    def action_refresh(self) -> None:
+        """Take in what changed on the disk; sort and filter anew."""
+        self.workspace.look_again()
+        self.assets.refresh_view()
+        self.show()
+        self.say("Refreshed.")
+
+    def _opened(self) -> None:
+        session = self.session
+        if session.n_recovered:
+            self.say(f"{plural(session.n_recovered, 'unsaved edit')} brought back from the last time.", "warning")
+        elif session.problem is not None:
+            self.say(str(session.problem), "warning")
+        elif why := session.why_read_only:
+            self.say(f"This table can be read, not saved: {why}.", "warning")
+        self._show_bars()
+
+    def _try(self, verb: Callable[[], None]) -> None:
+        try:
+            verb()
+        except ContextDBError as error:
+            self.say(str(error), "error")
+
+    # ---- what panes ask for
+
+    @on(GoToCell)
+    def _go_to_cell(self, event: GoToCell) -> None:
+        self._switch_to("assets")
+        self.assets.go_to(event.row, event.column)
+
+    @on(FillGap)
+    def _fill_gap(self, event: FillGap) -> None:
+        done = self.session.sheet.insert_rows(below=True, texts=[dict(event.cells)])
+        self._switch_to("assets")
+        self._edited(Edited(done))
+        self.say("A new row fills the gap: name its asset.")
+
+    @on(SetContext)
+    def _set_context(self, event: SetContext) -> None:
+        self._switch_to("assets")
+        self.assets.set_context(dict(event.facts), event.name)
+
+    def _pane(self, name: str) -> Pane:
+        return self.query_one(f"#{name}", Pane)

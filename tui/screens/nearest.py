@@ -1,0 +1,201 @@
+"""Why not this row, and which rows are nearest to valid in the test row's context: go to a cell, or mend it with one key."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.content import Content
+from textual.widgets import Static
+
+from contextdb.errors import plural
+from contextdb.table import Table
+from tui.model.query_row import QueryRow
+from tui.model.why import CellWhy, RowWhy, State, nearest_rows, why_row
+from tui.screens.dialog import Dialog
+from tui.widgets.choice_line import ChoiceLine
+from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+MOST_ROWS = 20
+NARROW = 110
+"""With fewer columns of the screen, fact and cell of the nearest rows stand below the list only."""
+
+STATES: dict[State, tuple[str, str]] = {
+    "fails": ("✗ fails", "error"),
+    "unreadable": ("! unread", "error"),
+    "disabled": ("✗ disabled", "error"),
+    "holds": ("✓ holds", ""),
+    "not asked": ("· not asked", "muted"),
+}
+
+
+@dataclass(frozen=True)
+class CellAnswer:
+    """What the dialog gives back: a cell to go to, and, when it is to be mended, its new text."""
+
+    row: int
+    """The row of the file, from 0."""
+    column: str
+    text: str | None = None
+
+
+class NearestDialog(Dialog[CellAnswer]):
+    """One row cell by cell, or the rows nearest to valid."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("tab,left,right", "turn", "This row / nearest rows"),
+        Binding("m,f4", "mend", "Mend the cell"),
+    ]
+    DEFAULT_CSS = """
+    NearestDialog {
+        & > #dialog { width: 96%; max-width: 140; height: 92%; padding: 0 1; }
+        & > #dialog > #dialog-body { height: 1fr; }
+        & #nearest-choice { padding: 0 1; margin: 0 0 1 0; }
+        & #nearest-state { height: auto; max-height: 3; padding: 0 1; text-style: bold; }
+        & #nearest-lines { height: 1fr; margin: 1 0; }
+        & #nearest-detail { height: auto; min-height: 2; max-height: 6; padding: 0 1; }
+        & #nearest-keys { height: 1; margin: 1 0 0 0; padding: 0 1; }
+    }
+    """
+    title_text = "Why not"
+    keys_text = "Tab turns the page · Esc close"
+
+    def __init__(self, query: QueryRow, table: Table, row: int | None = None) -> None:
+        """`row` is the row of the file that the cursor is in; None: there is none."""
+        super().__init__()
+        self.why = why_row(query, table, row) if row is not None and 0 <= row < table.n_rows else None
+        self.nearest = nearest_rows(query, table, MOST_ROWS)
+        self.n_valid, self.n_rows, self.asks_nothing = query.n_valid, table.n_rows, query.is_empty
+        self.faults = dict(query.faults)
+        self.is_nearest = self.why is None or (self.why.is_valid and bool(self.nearest))
+        self.cells: list[CellWhy] = []
+        self.names: dict[int, str] = {}
+        self.firsts: set[int] = set()
+        self.is_narrow = False
+
+    def compose_body(self) -> ComposeResult:
+        """Which page, what it says, its cells, the chosen cell in full."""
+        yield ChoiceLine((), id="nearest-choice")
+        yield Static(id="nearest-state")
+        yield LineList([ListColumn("Condition", 12, 1)], empty="No row.", id="nearest-lines")
+        yield Static(id="nearest-detail")
+        yield Static(id="nearest-keys")
+
+    def on_mount(self) -> None:
+        """Show the page that says most."""
+        self.lines.focus()
+        self._show()
+
+    @property
+    def lines(self) -> LineList:
+        """The list of cells."""
+        return self.query_one(LineList)
+
+    @property
+    def chosen(self) -> CellWhy | None:
+        """The cell that the cursor is on."""
+        return self.cells[self.lines.index] if self.cells else None
+
+    def _show(self) -> None:
+        pages = ["This row"] * (self.why is not None) + [f"Nearest rows {len(self.nearest)}"]
+        self.query_one(ChoiceLine).show(pages, len(pages) - 1 if self.is_nearest else 0)
+        self.query_one("#nearest-state", Static).update(Content(self._state()))
+        shown = self.nearest if self.is_nearest else [self.why] if self.why else []
+        self.cells = [cell for why in shown for cell in why.cells]
+        self.names = {why.row: why.asset for why in shown}
+        self.firsts = {id(why.cells[0]) for why in shown if why.cells}
+        self._lay_out()
+        self.lines.empty = "Every row is valid." if self.n_valid == self.n_rows else "No row is there."
+        self.lines.show(len(self.cells), lambda at: self._line(self.cells[at]))
+
+    def _lay_out(self) -> None:
+        """Columns for the page and the room that there is."""
+        self.is_narrow = self.size.width < NARROW
+        told = [ListColumn(name, 10, 1) for name in ("Fact", "Cell", "Change to")]
+        if not self.is_nearest:
+            self.lines.columns = (ListColumn("", 11), ListColumn("Condition", 14, 2), *told)
+        else:
+            told = [ListColumn("Change to", 14)] if self.is_narrow else told
+            self.lines.columns = (ListColumn("Row", 5, 0, True), ListColumn("Asset", 16, 2), ListColumn("Condition", 12, 1), *told)
+        self.lines.refresh()
+
+    def on_resize(self) -> None:
+        """More columns, or fewer."""
+        self._lay_out()
+
+    def _line(self, cell: CellWhy) -> Sequence[ListCell]:
+        tone = "muted" if cell.state in ("holds", "not asked") else ""
+        told: list[ListCell] = [(cell.fact or "–", tone), (cell.cell or "Any", tone), (cell.mend or "", "info")]
+        if not self.is_nearest:
+            return [STATES[cell.state], (cell.column, tone), *told]
+        head: list[ListCell] = [str(cell.row + 1), (self.names[cell.row], "strong")] if id(cell) in self.firsts else ["", ""]
+        return [*head, cell.column, *(told[-1:] if self.is_narrow else told)]
+
+    def _state(self) -> str:
+        unread = "".join(f"\n! The fact {name} cannot be read and is left out." for name in list(self.faults)[:2])
+        if self.asks_nothing:
+            return f"The test row asks for nothing: every row that is enabled is valid.{unread}"
+        if self.is_nearest or self.why is None:
+            return f"{self.n_valid:,} of {plural(self.n_rows, 'row')} valid{unread}"
+        return row_state(self.why) + unread
+
+    @on(LineList.Moved)
+    def _moved(self) -> None:
+        cell = self.chosen
+        row = f"Row {cell.row + 1:,}, {self.names[cell.row]}: " if cell and self.is_nearest else ""
+        self.query_one("#nearest-detail", Static).update(Content(row + cell_state(cell) if cell else ""))
+        named = [("go", "Enter Go to the cell")] * (cell is not None)
+        named += [("mend", "M Mend the cell")] * (cell is not None and cell.mend is not None)
+        self.query_one("#nearest-keys", Static).update(
+            Content.from_markup("   ".join(f"[@click=screen.{action}]{label}[/]" for action, label in named))
+        )
+
+    @on(LineList.Chosen)
+    def action_go(self) -> None:
+        """Give back the cell."""
+        if (cell := self.chosen) is not None:
+            self.dismiss(CellAnswer(cell.row, cell.column))
+
+    def action_mend(self) -> None:
+        """Give back the cell with its mend."""
+        cell = self.chosen
+        if cell is not None and cell.mend is not None:
+            self.dismiss(CellAnswer(cell.row, cell.column, cell.mend))
+
+    def action_turn(self) -> None:
+        """The other page."""
+        if self.why is not None:
+            self.is_nearest = not self.is_nearest
+            self._show()
+
+    @on(ChoiceLine.Picked)
+    def _picked(self, event: ChoiceLine.Picked) -> None:
+        if self.why is not None and self.is_nearest != (event.index == 1):
+            self.action_turn()
+
+
+def row_state(why: RowWhy) -> str:
+    """A row in a sentence."""
+    row = f"Row {why.row + 1:,}, {why.asset}"
+    if why.is_valid:
+        return f"✓ {row}: valid"
+    return f"✗ {row}: not valid, {plural(why.n_wrong, 'cell')} {'keeps' if why.n_wrong == 1 else 'keep'} it from that"
+
+
+def cell_state(cell: CellWhy) -> str:
+    """A cell in a sentence."""
+    text = f'"{cell.cell}"' if cell.cell else "Any"
+    match cell.state:
+        case "fails":
+            return f'{cell.column} is {cell.fact}; the cell says {text}.\n"{cell.mend}" would accept it too.'
+        case "unreadable":
+            return f"{cell.column}: the cell {text} cannot be read, so the row is never valid."
+        case "disabled":
+            return f"The row is disabled: {cell.column} says {text}."
+        case "holds":
+            return f"{cell.column} is {cell.fact}; the cell says {text} and accepts it."
+    return f"{cell.column} is not asked for; the cell says {text}."

@@ -1,0 +1,189 @@
+"""A line of things to click: the tabs, the tools. Each is also a command with a key or a place in the palette."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rich.cells import cell_len
+from rich.segment import Segment
+from rich.style import Style
+from textual import events
+from textual.message import Message
+from textual.strip import Strip
+from textual.widget import Widget
+
+from tui.model.layout import cut
+
+
+@dataclass(frozen=True)
+class Item:
+    """One thing to click."""
+
+    command: str
+    """The id of a command, told in `Pressed`; empty: only a text."""
+    label: str
+    is_on: bool = False
+    """It is the one that is chosen."""
+    is_strong: bool = False
+
+
+class Bar(Widget):
+    """Items from the left, one text at the right. What does not fit is left out, the text first."""
+
+    ALLOW_SELECT = False
+    COMPONENT_CLASSES: ClassVar[set[str]] = {"bar--item", "bar--on", "bar--strong", "bar--text", "bar--hover"}
+
+    DEFAULT_CSS = """
+    Bar {
+        height: 1; background: $panel;
+        .bar--item { color: $foreground 75%; }
+        .bar--on { color: $foreground; background: $surface; text-style: bold underline; }
+        .bar--strong { color: $text-primary; text-style: bold; }
+        .bar--text { color: $foreground 55%; }
+        .bar--hover { color: $foreground; text-style: underline; }
+    }
+    """
+
+    @dataclass
+    class Pressed(Message):
+        """An item was clicked."""
+
+        command: str
+
+    def __init__(self, items: Sequence[Item] = (), text: str = "", id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self._items = tuple(items)
+        self._text = text
+        self._hovered: str | None = None
+
+    def show(self, items: Sequence[Item], text: str = "") -> None:
+        """Show other items."""
+        if (tuple(items), text) != (self._items, self._text):
+            self._items, self._text = tuple(items), text
+            self.refresh()
+
+    def render_line(self, y: int) -> Strip:
+        segments = [Segment(f" {item.label} ", self._style(item)) for item in self._fitting()]
+        used = sum(s.cell_length for s in segments)
+        room = self.size.width - used - 2
+        plain = self._of("bar--text")
+        if room >= cell_len(self._text):
+            segments += [Segment(" " * (room - cell_len(self._text)), plain), Segment(f" {self._text} ", plain)]
+        return Strip(segments).adjust_cell_length(self.size.width, plain)
+
+    def _fitting(self) -> list[Item]:
+        fitting: list[Item] = []
+        used = 0
+        for item in self._items:
+            used += cell_len(item.label) + 2
+            if used > self.size.width and fitting:
+                break
+            fitting.append(item)
+        return fitting
+
+    def _style(self, item: Item) -> Style:
+        if item.is_on or item.is_strong:
+            return self._of("bar--on" if item.is_on else "bar--strong")
+        return self._of("bar--hover" if item.command and item.command == self._hovered else "bar--item")
+
+    def _of(self, name: str) -> Style:
+        return self.get_component_rich_style(name)
+
+    def _item_at(self, x: int) -> Item | None:
+        end = 0
+        for item in self._fitting():
+            end += cell_len(item.label) + 2
+            if x < end:
+                return item
+        return None
+
+    def on_click(self, event: events.Click) -> None:
+        item = self._item_at(event.x)
+        if item is not None and item.command:
+            self.post_message(self.Pressed(item.command))
+
+    def on_mouse_move(self, event: events.MouseMove) -> None:
+        item = self._item_at(event.x)
+        self._hover(item.command if item else None)
+
+    def on_leave(self) -> None:
+        self._hover(None)
+
+    def _hover(self, command: str | None) -> None:
+        if command != self._hovered:
+            self._hovered = command
+            self.refresh()
+
+
+class StatusLine(Widget):
+    """One line with a text at its left and one at its right; showing others is cheap, for no widget changes its size."""
+
+    ALLOW_SELECT = False
+    DEFAULT_CSS = "StatusLine { height: 1; background: $surface; color: $foreground 75%; }"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._texts = ("", "")
+
+    def show(self, left: str | None = None, right: str | None = None) -> None:
+        """Show other texts; None: the one that stands there."""
+        texts = (self._texts[0] if left is None else left, self._texts[1] if right is None else right)
+        if texts != self._texts:
+            self._texts = texts
+            self.refresh()
+
+    def render_line(self, y: int) -> Strip:
+        left, right = self._texts
+        width, style = self.size.width, self.rich_style
+        if not right:
+            return Strip([Segment(cut(f" {left}", width), style)])
+        room = max(width - cell_len(right) - 2, 0)
+        return Strip([Segment(cut(f" {left}", room), style), Segment(f" {right} ", style)]).adjust_cell_length(width, style)
+
+
+class CellLine(Widget):
+    """The line over the grid: which cell the cursor is in, all of its text, and what is wrong with it."""
+
+    ALLOW_SELECT = False
+    COMPONENT_CLASSES: ClassVar[set[str]] = {"cell-line--place", "cell-line--text", "cell-line--fault", "cell-line--about"}
+
+    DEFAULT_CSS = """
+    CellLine {
+        height: 1; background: $surface;
+        .cell-line--place { color: $text-primary; text-style: bold; }
+        .cell-line--text { color: $foreground; }
+        .cell-line--fault { color: $text-error; text-style: bold; }
+        .cell-line--about { color: $foreground 55%; }
+    }
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._parts = ("", "", "", "")
+
+    def show(self, place: str, text: str, fault: str = "", about: str = "") -> None:
+        """Show a cell: where it stands, its text, what is wrong with it, and what its column is about."""
+        if (place, text, fault, about) != self._parts:
+            self._parts = (place, text, fault, about)
+            self.refresh()
+
+    def render_line(self, y: int) -> Strip:
+        place, text, fault, about = self._parts
+        plain = self.get_component_rich_style("cell-line--about")
+        segments = [
+            Segment(f" {cut(place, min(cell_len(place), self.size.width // 2))}  ", self._of("place")),
+            Segment(cut(text, min(cell_len(text), self.size.width)) if text else "", self._of("text")),
+        ]
+        if fault:
+            segments.append(Segment(f"  ! {fault}", self._of("fault")))
+        elif about:
+            segments.append(Segment(f"   {about}", plain))
+        strip = Strip(segments)
+        if strip.cell_length > self.size.width:
+            strip = Strip.join([strip.crop(0, self.size.width - 1), Strip([Segment("…", plain)])])
+        return strip.adjust_cell_length(self.size.width, plain)
+
+    def _of(self, part: str) -> Style:
+        return self.get_component_rich_style(f"cell-line--{part}")

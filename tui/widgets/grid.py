@@ -1,0 +1,503 @@
+"""The grid: a sheet in a terminal, with the keys and the mouse of a spreadsheet.
+
+It shows a `Sheet` and calls its verbs; what a key does is said in `tui.commands`. Cells are not edited here: `EditWanted` asks the
+screen to open an editor over a cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rich.style import Style
+from textual import events
+from textual.binding import BindingType
+from textual.geometry import Region, Size
+from textual.message import Message
+from textual.reactive import reactive
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
+
+from contextdb.errors import ContextDBError
+from tui.commands import BY_ID, GRID, JUMPS, bindings
+from tui.messages import Edited, Told
+from tui.model.layout import COMPACT, NARROWEST, WIDEST, Layout, fitted_width, layout
+from tui.model.selection import Selection
+from tui.model.sheet import Done, Sheet
+from tui.model.views import Sort
+from tui.widgets.grid_paint import N_HEADERS, Look, Painter
+
+GROUNDS = (
+    "row", "row-valid", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test", "selected", "cursor",
+    "cursor-away",
+)  # fmt: skip
+MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
+
+
+class Grid(ScrollView, can_focus=True):
+    """A spreadsheet."""
+
+    ALLOW_SELECT = False
+    BINDINGS: ClassVar[list[BindingType]] = bindings(GRID)
+    COMPONENT_CLASSES: ClassVar[set[str]] = {f"grid--{name}" for name in (*GROUNDS, *MEANT)}
+
+    DEFAULT_CSS = """
+    Grid {
+        background: $surface; color: $foreground; scrollbar-size-vertical: 1; scrollbar-size-horizontal: 1;
+        scrollbar-background: $panel; scrollbar-color: $foreground 25%; scrollbar-corner-color: $panel;
+        scrollbar-background-hover: $panel; scrollbar-background-active: $panel;
+        .grid--row { background: $surface; }
+        .grid--row-valid { background: $success 18%; }
+        .grid--frozen { background: $surface; }
+        .grid--header { background: $panel; }
+        .grid--header-kind { background: $panel; }
+        .grid--header-leaves { background: $panel; text-style: underline; }
+        .grid--header-chosen { background: $primary 40%; }
+        .grid--gutter { background: $panel; }
+        .grid--test { background: $boost; text-style: bold; }
+        .grid--selected { background: $primary 35%; }
+        .grid--cursor { background: $block-cursor-background; color: $block-cursor-foreground; text-style: bold; }
+        .grid--cursor-away { background: $primary 50%; text-style: bold; }
+        .grid--text { color: $foreground; }
+        .grid--any { color: $foreground 45%; }
+        .grid--muted { color: $foreground 55%; }
+        .grid--name { color: $foreground; text-style: bold; }
+        .grid--failing { color: $text-warning; }
+        .grid--fault { color: $text-error; text-style: bold underline; }
+        .grid--disabled { color: $foreground 40%; text-style: strike; }
+        .grid--valid { color: $text-success; text-style: bold; }
+        .grid--line { color: $foreground 18%; }
+        .grid--on-cursor { color: $block-cursor-foreground; text-style: bold; }
+    }
+    """
+
+    is_in_test_row = reactive(False)
+    """Whether the cursor is in the test row."""
+
+    @dataclass
+    class EditWanted(Message):
+        """Open an editor over the cell of the cursor."""
+
+        text: str
+        """What stands in it at first."""
+        is_typing: bool = False
+        """It was begun by typing: the text is what was typed."""
+        opens_list: bool = False
+
+    @dataclass
+    class Moved(Message):
+        """The cursor or the selection is elsewhere."""
+
+    @dataclass
+    class FactChanged(Message):
+        """A fact of the test row was changed."""
+
+    @dataclass
+    class CopyWanted(Message):
+        """Put a text on the clipboard."""
+
+        text: str
+
+    @dataclass
+    class PasteWanted(Message):
+        """Paste what the clipboard holds."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        super().__init__()
+        self.sheet = sheet
+        self.test_name = ""
+        """Where the context of the test row comes from."""
+        self._painter = Painter(sheet, self._style)
+        self._styles: dict[tuple[str, str], Style] = {}
+        self._widths: dict[str, int] = {}
+        self._drag: tuple[str, int] | None = None
+        """What the mouse drags: ("cells" | "rows" | "columns", -) or ("width", column)."""
+        self._layout: Layout | None = None
+        self._said_shape = (-1, -1)
+
+    # ---- what is shown
+
+    def open(self, sheet: Sheet) -> None:
+        """Show another table."""
+        self.sheet = sheet
+        self._painter = Painter(sheet, self._style)
+        self._widths.clear()
+        self.is_in_test_row = False
+        self.changed()
+
+    def changed(self) -> None:
+        """Show the sheet as it is now, after an edit, a filter or another fact."""
+        self._painter.changed()
+        self._layout = None
+        self._fit()
+        self.show_cursor()
+        self.refresh()
+
+    def autofit(self) -> None:
+        """Make each column as wide as its texts and its name."""
+        for at, column in enumerate(self.sheet.table.columns):
+            self._widths[column.name] = self._fitted(at, WIDEST)
+        self.changed()
+
+    @property
+    def window(self) -> Size:
+        """The cells there are to paint on."""
+        return self.scrollable_content_region.size
+
+    @property
+    def grid_layout(self) -> Layout:
+        """Where the columns stand."""
+        if self._layout is None or self._layout.width != self.window.width:
+            names = [c.name for c in self.sheet.table.columns]
+            widths = [self._width(at, name) for at, name in enumerate(names)]
+            n_frozen = names.index(self.sheet.table.asset_column) + 1
+            self._layout = layout(widths, n_frozen if n_frozen <= 3 else 0, self.sheet.table.n_rows, self.window.width)
+        return self._layout
+
+    @property
+    def look(self) -> Look:
+        """Where the grid stands at present."""
+        x, y = self.scroll_offset
+        return Look(self.grid_layout, self.window.height, x, y, self.is_in_test_row, self.has_focus)
+
+    def cell_region(self) -> Region:
+        """Where the cell of the cursor stands on the screen, without its mark."""
+        look, (row, column) = self.look, self.sheet.cursor
+        y = look.height - 1 if self.is_in_test_row else N_HEADERS + row - look.top
+        x = look.layout.place(column, look.left)
+        return Region(self.content_region.x + x + 1, self.content_region.y + y, look.layout.widths[column] - 1, 1)
+
+    def render_line(self, y: int) -> Strip:
+        return self._painter.line(y, self.look)
+
+    def notify_style_update(self) -> None:
+        self._styles.clear()
+        super().notify_style_update()
+
+    def _width(self, at: int, name: str) -> int:
+        if name not in self._widths:
+            self._widths[name] = self._fitted(at, WIDEST if name == self.sheet.table.asset_column else COMPACT)
+        return self._widths[name]
+
+    def _fitted(self, at: int, widest: int) -> int:
+        header = self.sheet.header(at)
+        kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
+        return fitted_width(self.sheet.table.columns[at], [header.name + " ↕", kind], widest)
+
+    def _style(self, ground: str, meant: str) -> Style:
+        if (ground, meant) not in self._styles:
+            under = self.get_component_rich_style(f"grid--{ground}")
+            over = self.get_component_rich_style(f"grid--{meant}")
+            plain = Style(bgcolor=under.bgcolor, bold=under.bold, underline=under.underline)
+            said = Style(color=over.color, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
+            self._styles[ground, meant] = plain + said
+        return self._styles[ground, meant]
+
+    def _fit(self) -> None:
+        rows, total = len(self.sheet.view), self.grid_layout.extent
+        if self._said_shape != (rows, total):
+            self._said_shape = (rows, total)
+            self.virtual_size = Size(total, rows + N_HEADERS + 1)
+
+    def on_resize(self) -> None:
+        self._layout = None
+        self._fit()
+        self.show_cursor()
+
+    def on_focus(self) -> None:
+        self.refresh()
+
+    def on_blur(self) -> None:
+        self.refresh()
+
+    # ---- moving
+
+    def show_cursor(self) -> None:
+        """Scroll so that the cursor, or the corner that Shift moves, is seen."""
+        look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else self.sheet.cursor
+        top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
+        left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
+        if (top, left) != (look.top, look.left):
+            self.scroll_to(left, top, animate=False, force=True, immediate=True)
+
+    def _moving(self, move: Callable[[], None]) -> None:
+        """Make a move and paint the lines that it touches."""
+        before = self.sheet.block
+        move()
+        self.show_cursor()
+        after, look = self.sheet.block, self.look
+        if before.left != after.left or before.right != after.right:
+            self.refresh()
+        else:
+            top, bottom = min(before.top, after.top), max(before.bottom, after.bottom)
+            self.refresh(Region(0, N_HEADERS + top - look.top, look.layout.width, bottom - top + 1))
+        self.post_message(self.Moved())
+
+    def _select(self, change: Callable[[Selection], Selection]) -> None:
+        self._moving(lambda: self.sheet.select(lambda selection, _: change(selection)))
+
+    def action_move(self, down: int, right: int, extend: bool) -> None:
+        """An arrow."""
+        if self.is_in_test_row and down:
+            if down < 0:
+                self.is_in_test_row = False
+            return
+        is_last = self.sheet.selection.row >= len(self.sheet.view) - 1
+        if down > 0 and is_last and not extend:
+            self.is_in_test_row = True
+            return
+        self._moving(lambda: self.sheet.move(down, right, extend and not self.is_in_test_row))
+
+    def action_edge(self, down: int, right: int, extend: bool) -> None:
+        """Ctrl and an arrow."""
+        if not self.is_in_test_row:
+            self._moving(lambda: self.sheet.move_to_edge(down, right, extend))
+        elif right:
+            self.action_jump("home" if right < 0 else "end", False)
+
+    def action_jump(self, jump: str, extend: bool) -> None:
+        """Home, End, with Ctrl too."""
+        self._moving(lambda: self.sheet.select(lambda s, shape: JUMPS[jump](s, shape, extend)))
+        if jump in ("home", "first"):  # the frozen columns are seen wherever one is: the others come back too
+            self.scroll_to(0, self.look.top, animate=False, force=True, immediate=True)
+
+    def action_page(self, pages: int, extend: bool) -> None:
+        """Page Up and Page Down: what is seen moves on by a page, and the cursor with it."""
+        if self.is_in_test_row:
+            return
+        look = self.look
+        by = pages * max(look.n_body - 1, 1)
+
+        def move() -> None:
+            self.scroll_to(look.left, max(0, min(look.top + by, self.max_scroll_y)), animate=False, force=True, immediate=True)
+            self.sheet.move(by, 0, extend)
+
+        self._moving(move)
+
+    def action_select_rows(self) -> None:
+        self._select(lambda s: s.rows(self.sheet.shape))
+
+    def action_select_columns(self) -> None:
+        self._select(lambda s: s.columns(self.sheet.shape))
+
+    def action_select_all(self) -> None:
+        self._select(Selection.everything)
+
+    def action_test_row(self) -> None:
+        """To the test row and back."""
+        self.is_in_test_row = not self.is_in_test_row
+
+    def action_leave(self) -> None:
+        """Out of the test row, or back to one cell."""
+        if self.is_in_test_row:
+            self.is_in_test_row = False
+        else:
+            self._moving(lambda: self.sheet.go(*self.sheet.cursor))
+
+    def watch_is_in_test_row(self) -> None:
+        if self.is_mounted:
+            if self.is_in_test_row and not self._is_condition():
+                self._first_condition()
+            self.show_cursor()
+            self.refresh()
+            self.post_message(self.Moved())
+
+    def _is_condition(self) -> bool:
+        return self.sheet.condition(self.sheet.cursor[1]) is not None
+
+    def _first_condition(self) -> None:
+        columns = [at for at in range(self.sheet.shape[1]) if self.sheet.condition(at) is not None]
+        if columns:
+            self.sheet.go(self.sheet.cursor[0], columns[0])
+
+    # ---- editing
+
+    def action_verb(self, name: str) -> None:
+        """Call the verb of a command; what cannot be done is said."""
+        verb = BY_ID[name].verb
+        assert verb is not None
+        self._do(lambda: verb(self.sheet))
+
+    def _do(self, verb: Callable[[], Done]) -> None:
+        try:
+            done = verb()
+        except ContextDBError as error:
+            self.post_message(Told(str(error), "error"))
+            return
+        self.post_message(Edited(done))
+
+    def action_insert_rows(self, below: bool) -> None:
+        """As many rows as are selected."""
+        n_rows = max(self.sheet.block.shape[0], 1) if len(self.sheet.view) else 1
+        self._do(lambda: self.sheet.insert_rows(n_rows, below))
+
+    def action_edit(self) -> None:
+        self._want_edit(self.cell_text())
+
+    def action_choose(self) -> None:
+        self._want_edit(self.cell_text(), opens_list=True)
+
+    def cell_text(self) -> str:
+        """The text under the cursor: of a cell, or of a fact of the test row."""
+        row, column = self.sheet.cursor
+        if self.is_in_test_row:
+            return self.sheet.query.texts.get(self.sheet.table.columns[column].name, "")
+        return self.sheet.text(row, column) if len(self.sheet.view) else ""
+
+    def _want_edit(self, text: str, is_typing: bool = False, opens_list: bool = False) -> None:
+        if self.is_in_test_row and not self._is_condition():
+            self.post_message(Told("Only conditions have a fact to test with.", "warning"))
+        elif not self.is_in_test_row and not len(self.sheet.view):
+            self.post_message(Told("There is no row here. Ctrl+N makes one.", "warning"))
+        else:
+            self.show_cursor()
+            self.post_message(self.EditWanted(text, is_typing, opens_list))
+
+    def action_clear(self) -> None:
+        if self.is_in_test_row:
+            self.set_fact("")
+        else:
+            self._do(self.sheet.clear)
+
+    def set_fact(self, text: str) -> None:
+        """Write the fact under the cursor."""
+        name = self.sheet.table.columns[self.sheet.cursor[1]].name
+        if self._is_condition():
+            self.sheet.set_fact(name, text)
+            self.post_message(self.FactChanged())
+
+    def action_copy(self) -> None:
+        self.post_message(self.CopyWanted(self.cell_text() if self.is_in_test_row else self.sheet.copy()))
+
+    def action_cut(self) -> None:
+        if self.is_in_test_row:
+            self.action_copy()
+            self.set_fact("")
+            return
+
+        def cut() -> Done:
+            text, done = self.sheet.cut()
+            self.post_message(self.CopyWanted(text))
+            return done
+
+        self._do(cut)
+
+    def action_paste(self) -> None:
+        self.post_message(self.PasteWanted())
+
+    def paste(self, text: str) -> None:
+        """Put a text of the clipboard over the selection, or into the fact of the test row."""
+        if self.is_in_test_row:
+            self.set_fact(text.splitlines()[0].split("\t")[0] if text.strip() else "")
+        else:
+            self._do(lambda: self.sheet.paste(text))
+
+    def on_paste(self, event: events.Paste) -> None:
+        event.stop()
+        self.paste(event.text)
+
+    def on_key(self, event: events.Key) -> None:
+        """A character begins a cell anew."""
+        if event.is_printable and event.character:
+            event.stop()
+            event.prevent_default()
+            self._want_edit(event.character, is_typing=True)
+
+    def action_sort(self) -> None:
+        """By the cursor's column: ascending, descending, as in the file."""
+        self.sort_by(self.sheet.selection.column)
+
+    def sort_by(self, column: int) -> None:
+        """The next of the three ways of sorting by a column."""
+        name, sort = self.sheet.table.columns[column].name, self.sheet.sort
+        if sort is None or sort.column != name:
+            self.sheet.set_sort(Sort(name))
+        else:
+            self.sheet.set_sort(None if sort.is_descending else Sort(name, True))
+        self.changed()
+        self.post_message(self.Moved())
+
+    # ---- mouse
+
+    def _place_at(self, x: int, y: int) -> tuple[int, int]:
+        look = self.look
+        row = look.top + y - N_HEADERS
+        return max(0, min(row, len(self.sheet.view) - 1)), look.layout.column_at(x, look.left)
+
+    def on_mouse_down(self, event: events.MouseDown) -> None:
+        if event.button != 1:
+            return
+        event.stop()
+        self.focus()
+        look = self.look
+        row, column = self._place_at(event.x, event.y)
+        if event.y < N_HEADERS:
+            self._press_header(event, column, look)
+        elif event.y == look.height - 1:
+            self._moving(lambda: self.sheet.go(self.sheet.cursor[0], column))
+            self.is_in_test_row = True
+        elif look.top + event.y - N_HEADERS < len(self.sheet.view):
+            self.is_in_test_row = False
+            self._moving(lambda: self.sheet.go(row, column, event.shift))
+            if event.x < look.layout.gutter:
+                self.action_select_rows()
+            self._begin_drag("rows" if event.x < look.layout.gutter else "cells", 0)
+
+    def _press_header(self, event: events.MouseDown, column: int, look: Look) -> None:
+        separator = look.layout.separator_at(event.x, look.left)
+        if separator is not None:
+            self._begin_drag("width", separator)
+            return
+        right = look.layout.place(column, look.left) + look.layout.widths[column]
+        if event.y == 0 and event.x >= right - 2:
+            self.sort_by(column)
+            return
+        self.is_in_test_row = False
+        self._moving(lambda: self.sheet.go(self.sheet.cursor[0], column, event.shift))
+        self.action_select_columns()
+        self._begin_drag("columns", 0)
+
+    def _begin_drag(self, what: str, column: int) -> None:
+        self._drag = (what, column)
+        self.capture_mouse()
+
+    def on_mouse_move(self, event: events.MouseMove) -> None:
+        if self._drag is None:
+            return
+        event.stop()
+        what, column = self._drag
+        if what == "width":
+            left = self.look.layout.place(column, self.look.left)
+            self._widths[self.sheet.table.columns[column].name] = max(NARROWEST, event.x - left)
+            self.changed()
+            return
+        row, column = self._place_at(event.x, event.y)
+        if event.y >= self.look.height - 1:  # past the foot or the head: the rows come after the mouse
+            row = min(row + 1, len(self.sheet.view) - 1)
+        elif event.y < N_HEADERS:
+            row = max(self.look.top - 1, 0)
+        kind = self.sheet.selection.kind
+        self._moving(lambda: self._drag_to(row, column, kind))
+
+    def _drag_to(self, row: int, column: int, kind: str) -> None:
+        self.sheet.go(row, column, True)
+        if kind == "rows":
+            self.sheet.select(Selection.rows)
+        elif kind == "columns":
+            self.sheet.select(Selection.columns)
+
+    def on_mouse_up(self, event: events.MouseUp) -> None:
+        self._drag = None
+        self.release_mouse()
+
+    def on_click(self, event: events.Click) -> None:
+        if event.chain != 2:
+            return
+        look = self.look
+        separator = look.layout.separator_at(event.x, look.left)
+        if event.y < N_HEADERS and separator is not None:
+            self._widths[self.sheet.table.columns[separator].name] = self._fitted(separator, WIDEST)
+            self.changed()
+        elif event.y >= N_HEADERS and event.x >= look.layout.gutter:
+            self.action_edit()

@@ -1,0 +1,209 @@
+"""Paint the lines of a grid: three lines of headers, the rows on the screen, and the test row at the foot.
+
+Only what is seen is read and painted, so that a line costs the same in a table of ten rows and of a hundred thousand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from rich.segment import Segment
+from rich.style import Style
+from textual.strip import Strip
+
+from contextdb.errors import plural
+from tui.model.layout import Layout, cut
+from tui.model.selection import Block
+from tui.model.shown import Header, ShownTable
+from tui.model.window import MARKS, Window
+
+N_HEADERS = 3
+UP, DOWN, UNSORTED = "▲", "▼", "↕"
+
+StyleOf = Callable[[str, str], Style]
+"""The style of a ground and of what stands on it: `style("cursor", "text")`."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Where a grid stands at present."""
+
+    layout: Layout
+    height: int
+    left: int
+    """How many cells it is scrolled to the right."""
+    top: int
+    """The first row of the view that is seen."""
+    is_in_test_row: bool
+    has_focus: bool
+
+    @property
+    def n_body(self) -> int:
+        """How many lines there are for rows."""
+        return max(self.height - N_HEADERS - 1, 0)
+
+
+class Painter:
+    """Paints a sheet. `changed` must be called when anything but the cursor has changed."""
+
+    def __init__(self, sheet: ShownTable, style: StyleOf) -> None:
+        self.sheet = sheet
+        self.style = style
+        self._window: Window | None = None
+        self._headers: dict[int, Header] = {}
+
+    def changed(self) -> None:
+        """Read the sheet anew."""
+        self._window = None
+        self._headers.clear()
+
+    def line(self, y: int, look: Look) -> Strip:
+        """Line `y` of the window."""
+        if y < N_HEADERS:
+            return self._header_line(y, look)
+        if y == look.height - 1:
+            return self._test_line(look)
+        row = look.top + y - N_HEADERS
+        if row >= len(self.sheet.view):
+            return self._empty_line(row, look)
+        return self._body_line(row, look)
+
+    # ---- headers
+
+    def _header_line(self, y: int, look: Look) -> Strip:
+        ground = ("header", "header-kind", "header-leaves")[y]
+        texts = (self._name, self._kind, self._leaves)[y]
+        block = self.sheet.block
+        gutter = ("#".rjust(look.layout.gutter - 3) + "   ") if y == 0 else " " * look.layout.gutter
+
+        def cell(column: int) -> Iterator[Segment]:
+            chosen = "header-chosen" if block.left <= column < block.right else ground
+            yield from texts(column, look.layout.widths[column], chosen)
+
+        return self._joined(Segment(gutter, self.style(ground, "muted")), cell, look, ground)
+
+    def _name(self, column: int, width: int, ground: str) -> Iterator[Segment]:
+        header, sort = self._header(column), self.sheet.sort
+        sign = UNSORTED
+        if sort is not None and sort.column == header.name:
+            sign = DOWN if sort.is_descending else UP
+        yield Segment(" " + cut(header.name, width - 3), self.style(ground, "name"))
+        yield Segment(" " + sign, self.style(ground, "muted" if sign == UNSORTED else "name"))
+
+    def _kind(self, column: int, width: int, ground: str) -> Iterator[Segment]:
+        header = self._header(column)
+        kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
+        yield Segment(" " + cut(kind, width - 1), self.style(ground, "muted"))
+
+    def _leaves(self, column: int, width: int, ground: str) -> Iterator[Segment]:
+        header = self._header(column)
+        if header.fault is not None:
+            yield Segment("!" + cut("cannot be read", width - 1), self.style(ground, "fault"))
+            return
+        text = "" if header.leaves is None else f"leaves {header.leaves:,}"
+        yield Segment(" " + cut(text, width - 1), self.style(ground, "muted"))
+
+    def _header(self, column: int) -> Header:
+        if column not in self._headers:
+            self._headers[column] = self.sheet.header(column)
+        return self._headers[column]
+
+    # ---- rows
+
+    def _body_line(self, row: int, look: Look) -> Strip:
+        window = self._window_at(row, look)
+        seen, block, ground = window.row(row), self._block(look), self._ground(row, window)
+        cursor = None if look.is_in_test_row or self.sheet.cursor[0] != row else self.sheet.cursor[1]
+
+        def cell(column: int) -> Iterator[Segment]:
+            text, kind = window.cell(row, column)
+            meant: str = kind if seen.is_enabled or kind == "fault" else "disabled"
+            under = ground if column >= look.layout.n_frozen or ground != "row" else "frozen"
+            if column == cursor:
+                under, meant = ("cursor", "on-cursor") if look.has_focus else ("cursor-away", "name")
+            elif block is not None and block.holds(row, column):
+                under = "selected"
+            yield Segment(MARKS[kind] + cut(text, look.layout.widths[column] - 1), self.style(under, meant))
+
+        mark = "●" if seen.is_valid else " " if seen.is_enabled else "–"
+        number = f"{seen.number:>{look.layout.gutter - 3}} {mark} "
+        style = self.style("gutter", "valid" if seen.is_valid else "name" if cursor is not None else "muted")
+        return self._joined(Segment(number, style), cell, look, ground)
+
+    def _window_at(self, row: int, look: Look) -> Window:
+        if self._window is None or not self._window.holds(row):
+            self._window = Window(self.sheet, look.top, max(look.n_body, 1))
+            if not self._window.holds(row):
+                self._window = Window(self.sheet, row, 1)
+        return self._window
+
+    def _ground(self, row: int, window: Window) -> str:
+        return "row-valid" if window.row(row).is_valid else "row"
+
+    def _block(self, look: Look) -> Block | None:
+        block = self.sheet.block
+        return None if block.n_cells <= 1 or look.is_in_test_row else block
+
+    def _empty_line(self, row: int, look: Look) -> Strip:
+        text = ""
+        if row == look.top and not len(self.sheet.view):
+            text = "no row passes the filter" if self.sheet.table.n_rows else "the table has no rows: Ctrl+N makes one"
+        space = " " * look.layout.gutter
+        return Strip([Segment(space + cut(text, max(look.layout.width - len(space), 0)), self.style("row", "muted"))])
+
+    # ---- the test row
+
+    def _test_line(self, look: Look) -> Strip:
+        query, names = self.sheet.query, [c.name for c in self.sheet.table.columns]
+        has_fact = {c.condition.name for c in self.sheet.table.conditions}
+        asset = names.index(self.sheet.table.asset_column)
+
+        def cell(column: int) -> Iterator[Segment]:
+            width, name = look.layout.widths[column], names[column]
+            is_cursor = look.is_in_test_row and column == self.sheet.cursor[1]
+            ground = ("cursor" if look.has_focus else "cursor-away") if is_cursor else "test"
+            is_lit = is_cursor and look.has_focus
+            if column == asset:
+                yield Segment(" " + cut(self._said(), width - 1), self.style(ground, "on-cursor" if is_lit else "name"))
+                return
+            text = query.texts.get(name, "") if name in has_fact else ""
+            meant = "fault" if name in query.faults else "text"
+            mark = "!" if name in query.faults else " "
+            yield Segment(mark + cut(text, width - 1), self.style(ground, "on-cursor" if is_lit else meant))
+
+        gutter = "?".rjust(look.layout.gutter - 3) + "   "
+        return self._joined(Segment(gutter, self.style("test", "name")), cell, look, "test")
+
+    def _said(self) -> str:
+        query = self.sheet.query
+        if query.is_empty:
+            return "test row"
+        return f"{query.n_valid:,} of {plural(self.sheet.table.n_rows, 'row')} valid"
+
+    # ---- parts
+
+    def _joined(self, gutter: Segment, cell: Callable[[int], Iterator[Segment]], look: Look, ground: str) -> Strip:
+        """The gutter, the frozen columns and those that are scrolled, each followed by its separator."""
+        layout = look.layout
+        bar = Segment("│", self.style(ground, "line"))
+        line = [gutter]
+        for column in range(layout.n_frozen):
+            line += [*cell(column), bar]
+        moving: list[Segment] = []
+        columns = layout.visible(look.left)
+        for column in columns:
+            moving += [*cell(column), bar]
+        start = look.left - (layout.starts[columns.start] - layout.frozen) if len(columns) else 0
+        line += _from(moving, start)
+        return Strip(line).adjust_cell_length(layout.width, self.style(ground, "text"))
+
+
+def _from(segments: list[Segment], start: int) -> list[Segment]:
+    """The segments without their first `start` cells."""
+    while start > 0 and segments:
+        first, *rest = segments
+        if first.cell_length > start:
+            return [first.split_cells(start)[1], *rest]
+        segments, start = rest, start - first.cell_length
+    return segments

@@ -7,6 +7,7 @@ edits again. Nothing here touches the disk; whoever saves says so with `saved`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -121,6 +122,17 @@ class History:
         for p in later:  # they were made of the source before
             del self._kept[p]
         self._pinned -= set(later)
+
+    def based_on(self, table: Table, is_saved: bool) -> None:
+        """The present texts stand on another source now, that somebody else wrote; `is_saved` when the file holds just them."""
+        self.saved(table)
+        if not is_saved:
+            self._saved = None
+
+    def renewed(self, change: Callable[[Table], Table]) -> None:
+        """Put every table that is kept, past ones too, under another schema."""
+        self._kept = {position: change(table) for position, table in self._kept.items()}
+        self.table = self._kept[self.position]
 
     def _step(self, start: int, stop: int) -> Step:
         forwards = range(start, stop) if stop > start else range(stop, start)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "tomlkit"}
+HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "tomlkit", "python_calamine", "openpyxl"}
 
 
 def modules_after(statement: str) -> set[str]:

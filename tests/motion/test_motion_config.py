@@ -100,6 +100,13 @@ def test_nothing_is_a_config_too():
     assert MotionConfig().build("nowhere") == {}
 
 
+def test_a_pattern_that_is_none_is_told(folder):
+    databases = SECTIONS["databases"] | {"jog": {**SECTIONS["databases"]["jog"], "clips": "clips/**x.bvh"}}
+    config = MotionConfig.from_dict({**SECTIONS, "databases": databases})
+    with pytest.raises(MotionError, match=r"\[databases.jog\] (clips = .* is no pattern|no file fits)"):  # newer Pythons read it
+        config.load_clips("jog", folder)
+
+
 def test_no_clips_and_broken_clips_are_told(folder):
     config = MotionConfig.from_dict(SECTIONS, file="contextdb.toml")
     with pytest.raises(MotionError, match=r'contextdb.toml: \[databases.jog_tired\] no file fits clips = "clips/\*_tired.bvh"'):

@@ -38,7 +38,6 @@ from contextdb.parquet import read_parquet
 from contextdb.schema_file import SchemaChange
 from contextdb.source import read_csv
 from contextdb.table import Table, build_table
-from tui.model.file_history import FileHistory
 from tui.model.lock import FOLDER, own_folder
 from tui.model.watched import digest_of
 
@@ -191,7 +190,7 @@ def _append(path: Path, line: bytes) -> None:
 class Recovery:
     """What a journal brings back."""
 
-    history: FileHistory
+    history: History
     """The table with the unsaved edits made, and undo for them."""
     n_edits: int
     problem: Fault | None = None
@@ -234,11 +233,11 @@ def recover(table: Table) -> Recovery | None:
     if records[0].get("format") != FORMAT or base is None:
         n_edits = sum("do" in r for r in records)
         found = f"the file has changed since {plural(n_edits, 'unsaved edit')} of it were kept, so they cannot be made again."
-        return Recovery(FileHistory(table), 0, Fault(found, "the file as it was then", place=Place(str(path))))
+        return Recovery(History(table), 0, Fault(found, "the file as it was then", place=Place(str(path))))
     if n_bytes < len(raw):
         with suppress(OSError):
             os.truncate(path, n_bytes)
-    found_again = _replayed(FileHistory(base), records[1:], path)
+    found_again = _replayed(History(base), records[1:], path)
     return found_again if base is table else replace(found_again, base=base)
 
 
@@ -271,7 +270,7 @@ def _base_of(table: Table, digest: object) -> Table | None:
         return None
 
 
-def _replayed(history: FileHistory, records: list[Record], path: Path) -> Recovery:
+def _replayed(history: History, records: list[Record], path: Path) -> Recovery:
     for record in records:
         try:
             if "do" in record:

@@ -87,13 +87,15 @@ class Layout:
             return left
         if right <= scroll:
             return scroll
-        return min(self.starts[bisect_left(self.starts, self.frozen + right)] - self.frozen, left)
+        return self.starts[min(bisect_left(self.starts, self.frozen + right), column)] - self.frozen
 
 
 def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int) -> Layout:
-    """The layout of columns of these widths. Frozen ones that would take more than half of the window are narrowed."""
+    """The layout of columns of these widths. Frozen ones take at most half of the window: they are narrowed, or scroll too."""
     gutter = len(str(n_rows)) + 3
-    room = max((width - gutter) // 2, NARROWEST * n_frozen)
+    room = (width - gutter) // 2
+    if room < (NARROWEST + 1) * n_frozen:
+        n_frozen = 0
     frozen = list(widths[:n_frozen])
     excess = sum(frozen) + n_frozen - room
     for column in sorted(range(len(frozen)), key=lambda c: -frozen[c]):

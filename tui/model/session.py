@@ -18,13 +18,13 @@ from contextdb.diff import Merge, diff, merge
 from contextdb.diffing.alignment import align
 from contextdb.disk import path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, plural
+from contextdb.history import History
 from contextdb.parquet import ParquetSource, rewritten_parquet
 from contextdb.project import SCHEMA_FILE, load_table, schema_for
 from contextdb.rewrite import rewritten
 from contextdb.schema_file import schema_change
 from contextdb.source import Source
 from contextdb.table import Table
-from tui.model.file_history import FileHistory
 from tui.model.journal import Journal, finish_save, recover, set_aside
 from tui.model.leftovers import clear_leftovers
 from tui.model.lock import Holder, Lock
@@ -82,7 +82,7 @@ class Session:
         """Why unsaved edits could not be brought back, or not all of them."""
         self.saved_table = found.base if found and found.base else table
         """The table as it stands in the file: what edits are compared with when they are saved."""
-        self._history = found.history if found and found.n_edits else FileHistory(self.saved_table)
+        self._history = found.history if found and found.n_edits else History(self.saved_table)
         self._watch_files()
         self.journal = Journal(self.path, self._digest, self._history if self.n_recovered else None)
         if self.holder is None:

@@ -72,7 +72,7 @@ def clip_files(
     MotionError
         No file fits the pattern, or two of the files have one name; `file` is that of the settings in messages.
     """
-    paths = sorted(folder.glob(settings.clips))
+    paths = _paths(settings, folder, file)
     if not paths:
         found = f"[databases.{settings.name}] no file fits clips = {as_toml(settings.clips)}."
         raise MotionError(Fault(found, place=Place(file), rule="file"))
@@ -82,6 +82,14 @@ def clip_files(
         raise MotionError(*faults)
     loops = {path.stem for path in wanted if markup is not None and markup.is_looping(path.stem)}
     return [ClipFile(path, settings, schema, path.stem in loops) for path in wanted]
+
+
+def _paths(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[Path]:
+    try:
+        return sorted(folder.glob(settings.clips))
+    except (ValueError, NotImplementedError):
+        found = f"[databases.{settings.name}] clips = {as_toml(settings.clips)} is no pattern."
+        raise MotionError(Fault(found, '"clips/*.bvh", "clips/**/*.bvh"', place=Place(file), rule="file")) from None
 
 
 def unmatched(
@@ -95,7 +103,7 @@ def unmatched(
     found: set[str] = set()
     held: set[str] = set()
     for settings in databases:
-        names = {path.stem for path in folder.glob(settings.clips)}
+        names = {path.stem for path in _paths(settings, folder)}
         found |= names
         if settings.table is not None:
             clips.setdefault(settings.table, set()).update(names)

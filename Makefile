@@ -36,7 +36,7 @@ demo: $(VENV)/.runtime
 	@$(PY) -m contextdb demo
 
 test: $(VENV)/.dev
-	$(PY) -m pytest
+	$(PY) -m pytest --numprocesses auto --dist worksteal
 
 check: $(VENV)/.dev
 	$(PY) -m ruff format --check .
@@ -50,11 +50,13 @@ format: $(VENV)/.dev
 
 docs: $(VENV)/.dev
 	$(PY) tests/test_docs.py --update
+	$(PY) docs/keys.py
 	$(PY) docs/pictures.py
 
 bench: $(VENV)/.bench
 	$(PY) benchmarks/query.py
 	$(PY) benchmarks/search.py
+	$(PY) benchmarks/editor.py
 
 clean:
 	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in '$(VENV) build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache'.split()]"

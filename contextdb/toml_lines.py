@@ -1,28 +1,23 @@
 """TOML with the lines kept: which line a key stands on, and which line cannot be read.
 
 `tomllib` gives the values of a document but not where they stand. So a document that reads is walked once more, statement by
-statement, when a fault in it has to be placed. Keys of inline tables are not followed: they stand on the line of their statement.
+statement (`contextdb.toml_edit`), when a fault in it has to be placed. Keys of inline tables are not followed: they stand on the
+line of their statement.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, shown
-
-Path = tuple[str, ...]
+from contextdb.toml_edit import statements
+from contextdb.toml_values import Path as Path
 
 MOST_KEYS = 8
 """Deeper keys are placed on the line of their first ones; no section of ours goes as deep."""
 
-_TOKEN = re.compile(
-    r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+'  # strings over several lines
-    r'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\''
-    r"|#[^\n]*|[\[\]{}=\n]|[^\s\[\]{}=#\"']+|[^\S\n]+",
-    re.DOTALL,
-)
 _PLACE = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
 
 _ACCEPTED = '[section.name], key = "text", key = 1.5, key = ["A", "B"]'
@@ -61,45 +56,18 @@ def read_toml(text: str, file: str) -> dict[str, object]:
 def key_lines(text: str) -> dict[Path, int]:
     """The line (from 1) on which each key, and each section, of a document that reads first stands."""
     lines: dict[Path, int] = {}
-    section: Path = ()
-    for line, tokens in _statements(text):
-        if tokens[0] == "[":
-            section = _keys("".join(tokens).strip("[] \t\r"))
-            path = section
-        else:
-            path = section + _keys("".join(tokens[: tokens.index("=")]))
-        for depth in range(1, len(path[:MOST_KEYS]) + 1):
-            lines.setdefault(path[:depth], line)
+    line, at = 1, 0
+    for one in statements(text):
+        line += text.count("\n", at, one.span[0])
+        at = one.span[0]
+        for depth in range(1, len(one.path[:MOST_KEYS]) + 1):
+            lines.setdefault(one.path[:depth], line)
     return lines
 
 
 def line_of(path: Path, lines: Mapping[Path, int]) -> int | None:
     """The line of a key, else of the nearest section that holds it."""
     return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), None)
-
-
-def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Each section header and each `key = value`: the line it starts on and its tokens, without space and comments around them."""
-    line, depth, start = 1, 0, 1
-    tokens: list[str] = []
-    for token in _TOKEN.findall(text + "\n"):
-        depth += (token in ("[", "{")) - (token in ("]", "}"))
-        if token == "\n" and depth == 0 and tokens:
-            yield start, tokens
-            tokens = []
-        elif not token.isspace() and token[0] != "#":
-            start = start if tokens else line
-            tokens.append(token)
-        line += token.count("\n")
-
-
-def _keys(dotted: str) -> Path:
-    value: object = tomllib.loads(f"{dotted} = 0")
-    path: list[str] = []
-    while isinstance(value, dict):
-        key, value = next(iter(value.items()))
-        path.append(key)
-    return tuple(path)
 
 
 def _syntax_fault(error: str, text: str, file: str) -> Fault:

@@ -128,7 +128,7 @@ def test_a_quote_that_never_closes_is_named_where_it_opens(here: Path):
 
 
 def test_mixed_line_ends_are_read_and_told(here: Path):
-    (here / "t.csv").write_bytes(b"Asset,speed\r\nrun,1\njump,1..2\r\n")
+    (here / "t.csv").write_bytes(b"Asset,speed\r\nrun,1\njump,2..3\r\n")
     assert run("query", "t.csv", "speed=1").code == 0
     assert [f["rule"] for f in run("check", "t.csv", "--json").json["findings"]] == ["mixed-line-ends"]
 

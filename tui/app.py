@@ -26,7 +26,6 @@ from tui.screens.leaving import HeldDialog, LeavingDialog
 from tui.screens.main import MainScreen
 from tui.themes import DARK, THEMES
 
-
 WAIT_FOR_PART_S = 2.0
 """So long a key waits for a part of the screen that is still at work on the key before."""
 
@@ -37,6 +36,7 @@ class EditorApp(App[None]):
     TITLE = "contextdb"
     ENABLE_COMMAND_PALETTE = True
     COMMAND_PALETTE_BINDING: ClassVar[str] = "ctrl+p"
+    CSS: ClassVar[str] = "CommandPalette SearchIcon { display: none; }"
 
     def __init__(self, workspace: Workspace, settings: EditorSettings | None = None, theme: str = "") -> None:
         super().__init__()

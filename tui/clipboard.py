@@ -26,11 +26,12 @@ class Clipboard:
     def copy(self, text: str) -> str:
         """Keep a text, and hand it to the system; gives what a person should know of it, or nothing."""
         self.text = text
-        in_system = _to_system(text)
-        self._of_system = _from_system() if in_system else None
-        in_tmux = "TMUX" in os.environ and _to_tmux(text)
-        if len(text.encode()) <= MOST_OSC_BYTES:
-            self._to_terminal(text)
+        raw = text.encode(errors="replace")  # half of a surrogate pair is no text for other programs
+        in_system = _to_system(raw.decode())
+        self._of_system = _from_system()
+        in_tmux = "TMUX" in os.environ and _to_tmux(raw)
+        if len(raw) <= MOST_OSC_BYTES:
+            self._to_terminal(raw.decode())
             return ""
         return "" if in_system or in_tmux else "too long for the terminal's clipboard; it can be pasted here."
 
@@ -59,9 +60,9 @@ def _from_system() -> str | None:
         return None
 
 
-def _to_tmux(text: str) -> bool:
+def _to_tmux(raw: bytes) -> bool:
     try:
-        done = subprocess.run(["tmux", "load-buffer", "-w", "-"], input=text.encode(), capture_output=True, timeout=2, check=False)
+        done = subprocess.run(["tmux", "load-buffer", "-w", "-"], input=raw, capture_output=True, timeout=2, check=False)
     except (OSError, subprocess.SubprocessError):
         return False
     return done.returncode == 0

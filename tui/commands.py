@@ -5,6 +5,7 @@ Key bindings, the footer, the command palette, the help on F1, the keymap file a
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -141,6 +142,7 @@ _OF_SCREEN = (
     Command("help", "f1", "Help", "Every key, and how cells are written.", "Help", "help", in_footer=True),
     Command("save", "ctrl+s", "Save", "Write the table to its file.", "File", "save", in_footer=True),
     Command("open", "ctrl+o", "Tables", "Go to another table of the folder.", "File", "tables"),
+    Command("new-table", "", "New table", "Make a table, with the columns of a blueprint.", "File", "new_table"),
     Command("refresh", "f5", "Refresh", "Take in what changed on the disk, sort and filter anew.", "File", "refresh"),
     Command("import", "", "Import", "Bring rows in from Excel, CSV, Parquet or JSON.", "File", "import"),
     Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
@@ -188,5 +190,15 @@ NAMES = {"pageup": "PgUp", "pagedown": "PgDn", "escape": "Esc", "delete": "Del",
 
 
 def key_name(key: str) -> str:
-    """A key as people write it: "ctrl+shift+left" is "Ctrl+Shift+Left"."""
-    return "+".join(NAMES.get(part, part.upper() if len(part) == 1 else part.capitalize()) for part in key.split("+"))
+    """A key as people write it: "ctrl+shift+left" is "Ctrl+Shift+Left", "left_square_bracket" is "["."""
+    return "+".join(
+        NAMES.get(part) or _sign(part) or (part.upper() if len(part) == 1 else part.capitalize()) for part in key.split("+")
+    )
+
+
+def _sign(part: str) -> str:
+    """The character that Textual calls by its Unicode name; empty for other keys."""
+    try:
+        return unicodedata.lookup(part.replace("_", " ")) if "_" in part else ""
+    except KeyError:
+        return ""

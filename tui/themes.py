@@ -28,6 +28,10 @@ THEMES = (
             "footer-key-foreground": "#8fc1ea",
             "footer-background": "#242a33",
             "input-selection-background": "#6aa7d8 35%",
+            "scrollbar": "#50565f",
+            "scrollbar-hover": "#7a828d",
+            "scrollbar-active": "#7a828d",
+            "scrollbar-background": "#242a33",
         },
     ),
     Theme(
@@ -51,6 +55,10 @@ THEMES = (
             "footer-key-foreground": "#1f6fb2",
             "footer-background": "#e8ecf1",
             "input-selection-background": "#1f6fb2 30%",
+            "scrollbar": "#b4b9c0",
+            "scrollbar-hover": "#8a919b",
+            "scrollbar-active": "#8a919b",
+            "scrollbar-background": "#e8ecf1",
         },
     ),
 )

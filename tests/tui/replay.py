@@ -24,7 +24,6 @@ begin with `|` are what a command shows, and a test compares them:
 
 from __future__ import annotations
 
-import contextlib
 import difflib
 import shutil
 import sys
@@ -33,16 +32,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from unittest.mock import patch
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 sys.path[:0] = [str(HERE), str(ROOT)]
 
-from terminal import drive, screen_text, settled  # noqa: E402
+from terminal import alone, drive, screen_text, settled  # noqa: E402
 from textual.events import Paste  # noqa: E402
 from textual.pilot import Pilot  # noqa: E402
-from textual.widgets import Static  # noqa: E402
 
 from tui.app import EditorApp  # noqa: E402
 from tui.model.workspace import Workspace  # noqa: E402
@@ -114,6 +111,7 @@ class Replay:
     """Holds tables/, and is the folder for the settings and journals of the system too."""
     app: EditorApp | None = None
     at_first: dict[str, str] = field(default_factory=dict)
+    last_file: str = ""
 
     def shown(self, steps: list[Step]) -> list[Step]:
         """The steps with what is shown now."""
@@ -126,9 +124,13 @@ class Replay:
         if opening is None:
             raise ReplayError("there is no line `table NAME`")
         name, *size = opening.rest.split()
-        self.app = EditorApp(Workspace(self._path(f"{name}.csv") if name != "." else self.folder / "tables"))
+        self.last_file = f"{name}.csv"
+        self.app = EditorApp(Workspace(self._path(self.last_file)))
         columns, rows = map(int, size or (80, 24))
-        return drive(self.app, lambda pilot: self._all(pilot, steps), (columns, rows))
+        try:
+            return drive(self.app, lambda pilot: self._all(pilot, steps), (columns, rows))
+        finally:
+            self.app.workspace.close()
 
     async def _all(self, pilot: Pilot[Any], steps: list[Step]) -> list[Step]:
         done = []
@@ -139,8 +141,6 @@ class Replay:
                 await self._do(pilot, step)
                 await settled(pilot)
             done.append(step)
-        if self.app is not None and self.app._exit is False:
-            self.app.workspace.close()
         return done
 
     # ---- what is done
@@ -200,7 +200,8 @@ class Replay:
         if step.command == "column":
             return iter(next(c for c in self.app.main.session.sheet.table.columns if c.name == step.rest).to_list())
         if step.command == "said":
-            return iter(str(self.app.main.query_one("#said", Static).content).splitlines())
+            text, level = self.app.main._said
+            return iter([text if level == "information" else f"! {text}"])
         lines = screen_text(self.app).splitlines()
         if step.command == "place":
             return iter([lines[self.app.main.query_one(CellLine).region.y].strip()])
@@ -209,10 +210,11 @@ class Replay:
 
     @property
     def _file(self) -> str:
+        """The file of the table that is seen, or was last."""
         assert self.app is not None
         screens = [screen for screen in self.app.screen_stack if isinstance(screen, MainScreen)]
-        self._last_file = screens[-1].session.path.name if screens else getattr(self, "_last_file", "")
-        return self._last_file
+        self.last_file = screens[-1].session.path.name if screens else self.last_file
+        return self.last_file
 
     def _path(self, name: str) -> Path:
         return self.folder / "tables" / name
@@ -236,22 +238,8 @@ def replayed(path: Path) -> tuple[str, str]:
     """The text of a replay file, and what it would be if all that it shows is as it is now."""
     text = path.read_text("utf-8")
     steps, ending = read_steps(text)
-    with TemporaryDirectory() as folder, _alone(Path(folder)):
+    with TemporaryDirectory() as folder, alone(Path(folder)):
         return text, written(Replay(Path(folder)).shown(steps), ending)
-
-
-@contextlib.contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """No system clipboard, no settings of whoever runs this, no looks at the disk but those that are asked for."""
-    environment = {"XDG_STATE_HOME": str(folder), "XDG_CONFIG_HOME": str(folder), "TEXTUAL_ANIMATIONS": "none"}
-    with (
-        patch.dict("os.environ", environment),
-        patch("tui.clipboard._to_system", lambda text: False),
-        patch("tui.clipboard._from_system", lambda: None),
-        patch("tui.clipboard._to_tmux", lambda text: False),
-        patch("tui.screens.main.LOOK_EVERY_S", 1e6),
-    ):
-        yield
 
 
 def main(arguments: list[str]) -> int:

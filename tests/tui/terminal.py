@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import contextlib
+from collections.abc import Awaitable, Callable, Iterator
+from pathlib import Path
 from typing import Any, TypeVar
+from unittest.mock import patch
 
 from textual.app import App
 from textual.pilot import Pilot
+
+from tui.app import EditorApp
+from tui.editor_settings import EditorSettings
+from tui.model.workspace import Workspace
 
 T = TypeVar("T")
 
@@ -34,3 +41,43 @@ async def settled(pilot: Pilot[Any], n_rounds: int = 4) -> None:
     """Wait until what was pressed has gone its way: a message goes on from part to part, and each may tell another."""
     for _ in range(n_rounds):
         await pilot.pause()
+
+
+@contextlib.contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """No clipboard of the system, no settings of whoever runs this, no looks at the disk but those that are asked for."""
+    environment = {"XDG_STATE_HOME": str(folder), "XDG_CONFIG_HOME": str(folder), "TEXTUAL_ANIMATIONS": "none"}
+    with (
+        patch.dict("os.environ", environment),
+        patch("tui.clipboard._to_system", lambda text: False),
+        patch("tui.clipboard._from_system", lambda: None),
+        patch("tui.clipboard._to_tmux", lambda raw: False),
+        patch("tui.screens.main.LOOK_EVERY_S", 1e6),
+    ):
+        yield
+
+
+def with_editor(
+    path: Path,
+    script: Callable[[EditorApp, Pilot[Any]], Awaitable[T]],
+    size: tuple[int, int] = (80, 24),
+    settings: EditorSettings | None = None,
+) -> T:
+    """Open a table in the whole editor, as `contextdb edit` does, while `script` presses keys; gives what the script gives."""
+    with alone(path.parent):
+        app = EditorApp(Workspace(path), settings)
+        try:
+            return drive(app, lambda pilot: script(app, pilot), size)
+        finally:
+            app.workspace.close()
+
+
+async def press(pilot: Pilot[Any], *keys: str) -> None:
+    """Press keys, and wait until all is done that they set off."""
+    await pilot.press(*keys)
+    await settled(pilot)
+
+
+def said(app: EditorApp) -> str:
+    """What the line over the footer says."""
+    return app.main._said[0]

@@ -103,6 +103,14 @@ class Priorities:
         schema = self.sheet.table.schema
         return Path(schema.file).parent if schema.file else None
 
+    def clips_without_row(self) -> list[str]:
+        """The clips of this table's databases that no row of it names yet; none where contextdb.toml has faults."""
+        if self.faults():
+            return []
+        own = [one for one in self.config.databases.values() if one.table == self.sheet.table.settings.name]
+        named = set(self.sheet.table.assets)
+        return [clip for clip in dict.fromkeys(clip for one in own for clip in self._clips_of(one)) if clip not in named]
+
     def faults(self) -> tuple[Fault, ...]:
         """Why the selectors cannot be shown."""
         try:

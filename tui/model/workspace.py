@@ -68,8 +68,9 @@ class Workspace:
         for name, path in self.files.items():
             if path.exists() and path.samefile(file):
                 return name
-        self.files = {file.stem: file, **self.files}
-        return file.stem
+        name = file.stem if file.stem not in self.files else file.name
+        self.files = {name: file, **self.files}
+        return name
 
 
 def _found(path: str | Path | None) -> Path:

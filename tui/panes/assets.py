@@ -139,7 +139,7 @@ class AssetsPane(Pane):
             self.sheet.header(column).kind,
             event.text,
             check=self._check_fact if self._edited.is_fact else lambda text: check_cell(self.sheet.table, texts.name, text),
-            known=_by_frequency(texts),
+            known=self._known(texts),
             is_fact=self._edited.is_fact,
             is_typing=event.is_typing,
             open_list=event.opens_list,
@@ -147,6 +147,15 @@ class AssetsPane(Pane):
         self.mount(editor)
         self._place_editor()
         editor.focus()
+
+    def _known(self, texts: TextColumn) -> list[str]:
+        """What a cell may be completed to: an asset first to the clips that no row names yet."""
+        known = _by_frequency(texts)
+        if texts.name != self.sheet.table.asset_column or not self.sheet.table.schema.motion.get("databases"):
+            return known
+        from tui.model.priorities import Priorities
+
+        return [*Priorities(self.sheet).clips_without_row(), *known]
 
     def _check_fact(self, text: str) -> Fault | None:
         found = self.sheet.condition(self._edited.column)

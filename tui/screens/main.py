@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 from rich.text import Text
@@ -22,6 +23,7 @@ from tui.commands import ASSETS, BY_ID, SCREEN, bindings
 from tui.messages import Edited, FillGap, GoToCell, SetContext, Told
 from tui.model.context_list import ContextList
 from tui.model.coverage_run import CoverageRun
+from tui.model.new_table import make_table, name_fault
 from tui.model.session import Session
 from tui.model.workspace import Workspace
 from tui.panes.assets import AssetsPane
@@ -30,7 +32,7 @@ from tui.panes.options import OptionsPane
 from tui.panes.pane import Pane
 from tui.panes.priorities import PrioritiesPane
 from tui.panes.problems import ProblemsPane
-from tui.screens.ask import ChooseDialog
+from tui.screens.ask import AskDialog, ChooseDialog
 from tui.screens.dialog import Dialog
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
 from tui.screens.steps import StepsDialog
@@ -235,6 +237,34 @@ class MainScreen(Screen[None]):
 
         self.app.push_screen(ChooseDialog("Tables", lines, names.index(self.table_name)), chosen)
 
+    def action_new_table(self) -> None:
+        """Ask for a name and a blueprint, and make a table."""
+        workspace = self.workspace
+
+        def named(name: str | None) -> None:
+            if name is not None:
+                self._choose_blueprint(name)
+
+        question = "The name of the table and its file"
+        check = partial(name_fault, workspace.folder, taken=workspace.files)
+        self.app.push_screen(AskDialog("New table", question, "", check), named)
+
+    def _choose_blueprint(self, name: str) -> None:
+        blueprints = self.session.sheet.table.schema.blueprints
+        lines = ["only the assets", *(f"{one}: {', '.join(names)}" for one, names in blueprints.items())]
+
+        def chosen(at: int | None) -> None:
+            if at is not None:
+                conditions = [(), *blueprints.values()][at]
+                self._try(lambda: self._make_table(name.strip(), conditions))
+
+        self.app.push_screen(ChooseDialog("With the columns of a blueprint", lines), chosen)
+
+    def _make_table(self, name: str, conditions: Sequence[str]) -> None:
+        make_table(self.workspace.folder, name, conditions)
+        self.workspace.look_again()
+        self.app.open_table(name)
+
     def action_save(self) -> None:
         """Write the table to its file, and what is said anew to contextdb.toml."""
         editor = self.assets.editor
@@ -355,10 +385,11 @@ class MainScreen(Screen[None]):
 
     def action_refresh(self) -> None:
         """Take in what changed on the disk; sort and filter anew."""
-        self.workspace.look_again()
+        self.say("Refreshed.")
+        self._try(self.workspace.look_again)
+        self.care.look()
         self.assets.refresh_view()
         self.show()
-        self.say("Refreshed.")
 
     def _opened(self) -> None:
         session = self.session

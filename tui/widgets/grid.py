@@ -116,6 +116,10 @@ class Grid(ScrollView, can_focus=True):
         self._layout: Layout | None = None
         self._said_shape = (-1, -1)
 
+    def post_message(self, message: Message) -> bool:
+        """Post a message as the grid's own, also when the pane has it do so: Textual ends a message at the parent that made it."""
+        return super().post_message(message.set_sender(self) if isinstance(message, TOLD) else message)
+
     # ---- what is shown
 
     def open(self, sheet: Sheet) -> None:
@@ -214,7 +218,9 @@ class Grid(ScrollView, can_focus=True):
     # ---- moving
 
     def show_cursor(self) -> None:
-        """Scroll so that the cursor, or the corner that Shift moves, is seen."""
+        """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again."""
+        if not self.size:
+            return
         look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else self.sheet.cursor
         top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
         left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
@@ -227,11 +233,10 @@ class Grid(ScrollView, can_focus=True):
         move()
         self.show_cursor()
         after, look = self.sheet.block, self.look
-        if before.left != after.left or before.right != after.right:
-            self.refresh()
-        else:
-            top, bottom = min(before.top, after.top), max(before.bottom, after.bottom)
-            self.refresh(Region(0, N_HEADERS + top - look.top, look.layout.width, bottom - top + 1))
+        if (before.left, before.right) != (after.left, after.right):
+            self.refresh(Region(0, 0, look.layout.width, N_HEADERS))
+        top, bottom = min(before.top, after.top), max(before.bottom, after.bottom)
+        self.refresh(Region(0, N_HEADERS + top - look.top, look.layout.width, bottom - top + 1))
         self.post_message(self.Moved())
 
     def _select(self, change: Callable[[Selection], Selection]) -> None:
@@ -437,7 +442,7 @@ class Grid(ScrollView, can_focus=True):
         elif event.y == look.height - 1:
             self._moving(lambda: self.sheet.go(self.sheet.cursor[0], column))
             self.is_in_test_row = True
-        elif look.top + event.y - N_HEADERS < len(self.sheet.view):
+        elif self._is_cell_line(event.y, look):
             self.is_in_test_row = False
             self._moving(lambda: self.sheet.go(row, column, event.shift))
             if event.x < look.layout.gutter:
@@ -499,5 +504,13 @@ class Grid(ScrollView, can_focus=True):
         if event.y < N_HEADERS and separator is not None:
             self._widths[self.sheet.table.columns[separator].name] = self._fitted(separator, WIDEST)
             self.changed()
-        elif event.y >= N_HEADERS and event.x >= look.layout.gutter:
+        elif event.x >= look.layout.gutter and self._is_cell_line(event.y, look):
             self.action_edit()
+
+    def _is_cell_line(self, y: int, look: Look) -> bool:
+        """Whether cells stand on a line of the window: those of a row, or of the test row."""
+        return y == look.height - 1 or (y >= N_HEADERS and look.top + y - N_HEADERS < len(self.sheet.view))
+
+
+TOLD = (Edited, Told, Grid.Moved, Grid.FactChanged)
+"""What the grid tells the screen."""

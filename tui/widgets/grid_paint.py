@@ -150,7 +150,8 @@ class Painter:
         if row == look.top and not len(self.sheet.view):
             text = "no row passes the filter" if self.sheet.table.n_rows else "the table has no rows: Ctrl+N makes one"
         space = " " * look.layout.gutter
-        return Strip([Segment(space + cut(text, max(look.layout.width - len(space), 0)), self.style("row", "muted"))])
+        line = Strip([Segment(space + cut(text, max(look.layout.width - len(space), 0)), self.style("row", "muted"))])
+        return line.adjust_cell_length(look.layout.width)
 
     # ---- the test row
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from contextdb.batch import ManyMatches
     from contextdb.compiled import CompiledTable
+    from contextdb.covering import CoverageReport, Gap, coverage
     from contextdb.errors import (
         ArtefactError,
         CellError,
@@ -39,12 +40,14 @@ if TYPE_CHECKING:
     from contextdb.matches import Matches
     from contextdb.project import Project
     from contextdb.table import Table, load
+    from contextdb.watching import watch
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "batch": ("ManyMatches",),
     "compiled": ("CompiledTable",),
+    "covering": ("CoverageReport", "Gap", "coverage"),
     "errors": (
         "ArtefactError",
         "CellError",
@@ -67,18 +70,23 @@ _HOMES = {
     "matches": ("Matches",),
     "project": ("Project",),
     "table": ("Table", "load"),
+    "watching": ("watch",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [  # noqa: RUF022
     "load",
     "Project",
+    "watch",
     "Table",
     "CompiledTable",
     "Matches",
     "ManyMatches",
     "LiveContext",
     "cell",
+    "coverage",
+    "CoverageReport",
+    "Gap",
     "Explanation",
     "RowExplanation",
     "Failure",

@@ -23,6 +23,7 @@ COMMANDS = {
     "query": "which assets are valid for one context",
     "evaluate": "every context of a file: how many assets are valid in each",
     "check": "what is wrong with the tables",
+    "coverage": "which contexts have no asset, and whether that is enough",
     "diff": "what changed between two versions of a table",
     "merge": "join what two sides made of one table",
     "import": "bring in a table from another program: CSV, Excel, JSON, DMN, Unreal",

@@ -13,6 +13,7 @@ from textual.app import App, SystemCommand
 from textual.dom import DOMNode
 from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES
+from textual.widget import Widget
 
 from contextdb.diff import Merge, Side
 from contextdb.errors import ContextDBError
@@ -85,7 +86,7 @@ class EditorApp(App[None]):
     def _parts_at_work(self) -> list[DOMNode]:
         if not self.screen_stack:
             return []
-        new = [part for part in self.screen.walk_children(with_self=True) if not part.is_mounted]
+        new = [part for part in self.screen.walk_children(Widget, with_self=True) if not part.is_mounted]
         return [*(self.focused or self.screen).ancestors_with_self, *new, self]
 
     async def _take_next(self) -> None:

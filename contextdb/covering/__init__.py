@@ -3,7 +3,21 @@
 from __future__ import annotations
 
 from contextdb.covering.engine import coverage
-from contextdb.covering.report import CoverageReport, Gap, Nearest, Overlap
+from contextdb.covering.pairs import PairTable, Slice, pairs
+from contextdb.covering.progress import Cancelled
+from contextdb.covering.report import CoverageReport, Crowd, Gap, Nearest, Overlap
 from contextdb.covering.shares import format_percent
 
-__all__ = ["CoverageReport", "Gap", "Nearest", "Overlap", "coverage", "format_percent"]
+__all__ = [
+    "Cancelled",
+    "CoverageReport",
+    "Crowd",
+    "Gap",
+    "Nearest",
+    "Overlap",
+    "PairTable",
+    "Slice",
+    "coverage",
+    "format_percent",
+    "pairs",
+]

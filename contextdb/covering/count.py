@@ -7,11 +7,14 @@ numbers.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from threading import Thread
+from typing import Any
 
 import numpy as np
 
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, Space, used_factors
 
 SLACKS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
@@ -20,6 +23,8 @@ ROUNDING = 1e-12
 """Bounds that are not equal are moved apart by so much, which is more than all roundings."""
 LOG2_KNOWN = 20
 """How many parts are remembered, as a power of two; 32 bytes each."""
+POLL_S = 0.02
+"""How often a long count is looked at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +41,9 @@ class Bounds:
         return self.lower == self.upper
 
 
-def uncovered_share(space: Space, boxes: Sequence[Box], work: int, within: Box | None = None) -> Bounds:
+def uncovered_share(
+    space: Space, boxes: Sequence[Box], work: int, within: Box | None = None, progress: Progress = SILENT
+) -> Bounds:
     """The share of the space, or of the box `within`, that none of the boxes holds."""
     weights = [_within(f.weights, None if within is None else within[i]) for i, f in enumerate(space.factors)]
     if within is not None:
@@ -49,7 +56,8 @@ def uncovered_share(space: Space, boxes: Sequence[Box], work: int, within: Box |
         return Bounds(1.0, 1.0)
     if full in boxes:
         return Bounds(0.0, 0.0)
-    return _count([[box[f] for f in used] for box in boxes], [full[f] for f in used], [weights[f] for f in used], work)
+    sides = [[box[f] for f in used] for box in boxes]
+    return _count(sides, [full[f] for f in used], [weights[f] for f in used], work, progress)
 
 
 def _within(
@@ -77,7 +85,11 @@ def runs_of(side: int) -> list[tuple[int, int]]:
 
 
 def _count(
-    boxes: list[list[int]], full: list[int], weights: list[np.ndarray[tuple[int], np.dtype[np.float64]]], work: int
+    boxes: list[list[int]],
+    full: list[int],
+    weights: list[np.ndarray[tuple[int], np.dtype[np.float64]]],
+    work: int,
+    progress: Progress,
 ) -> Bounds:
     from contextdb.covering.kernels import CUT, WORK, uncovered
 
@@ -110,9 +122,8 @@ def _count(
     for slack in SLACKS if len(cells) > 200 else SLACKS[-1:]:
         state = np.array([done, work, 0, 0], np.int64)
         with np.errstate(over="ignore"):
-            low, high = uncovered(
-                np.arange(len(cells), dtype=np.int32), box_hashes, masks, volumes, 1.0, slack, tables, known, state
-            )
+            arguments = (np.arange(len(cells), dtype=np.int32), box_hashes, masks, volumes, 1.0, slack, tables, known, state)
+            low, high = uncovered(*arguments) if progress.is_silent else _watched(uncovered, arguments, state, progress)
         done = int(state[WORK])
         if state[CUT] == 0 or low == high:
             return Bounds(float(high), float(high), done)
@@ -120,3 +131,24 @@ def _count(
         if done >= work:
             break
     return Bounds(max(0.0, lower), min(1.0, upper), done)
+
+
+def _watched(
+    loop: Callable[..., Any], arguments: tuple[Any, ...], state: np.ndarray[tuple[int], np.dtype[np.int64]], progress: Progress
+) -> Any:
+    """Run the loop on a thread of its own, so that it can be told of and stopped: a limit below 0 ends it."""
+    from contextdb.covering.kernels import LIMIT, WORK
+
+    answer: list[Any] = []
+    limit = max(1, int(state[LIMIT]))
+    thread = Thread(target=lambda: answer.append(loop(*arguments)), daemon=True)
+    thread.start()
+    try:
+        while thread.is_alive():
+            thread.join(POLL_S)
+            progress.at(int(state[WORK]) / limit)
+    finally:
+        if thread.is_alive():
+            state[LIMIT] = -1
+            thread.join()
+    return answer[0]

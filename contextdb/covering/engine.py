@@ -13,19 +13,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from contextdb.compiled import CompiledTable
+from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.count import Bounds, uncovered_share
-from contextdb.covering.gaps import SHARE_WORK, described, find_gaps
+from contextdb.covering.crowded import find_crowds
+from contextdb.covering.gaps import SHARE_WORK, Measure, described, find_gaps, share_of
 from contextdb.covering.judge import Judge
-from contextdb.covering.report import CoverageReport, Method, Overlap
+from contextdb.covering.progress import Progress, Stops, Tell
+from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
 from contextdb.covering.sample import LITTLE, Counts, Sampler
+from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
-from contextdb.covering.space import CellBox, Space, WeightsOf
-from contextdb.errors import ContextError, Fault
+from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
 from contextdb.table import Table
 
 WORK = 40_000_000
 SAMPLES = 200_000
 MOST_GAPS = 200
+COUNT_AT, SAMPLES_AT, GAPS_AT, SHARES_AT, FINDINGS_AT, CROWDS_AT = 0.02, 0.4, 0.48, 0.6, 0.75, 0.97
+"""Where the parts of the work begin, for a bar of progress."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +52,16 @@ def coverage(
     max_gaps: int = MOST_GAPS,
     impossible: Sequence[CellBox] = (),
     weights: WeightsOf | None = None,
+    assume: bool = True,
+    progress: Tell | None = None,
+    should_stop: Stops | None = None,
 ) -> CoverageReport:
     """Work out which contexts have a valid row.
 
     Parameters
     ----------
     table : Table or CompiledTable
-        Findings of a Table carry lines, and tell rows that are written alike.
+        Findings of a Table carry lines, and tell rows that are written alike; a CompiledTable has no assumptions.
     seed : int
         Where samples start; the same input and seed give the same report.
     work : int
@@ -63,45 +71,69 @@ def coverage(
     max_gaps : int
         The report names at most so many gaps, the largest.
     impossible : sequence of mapping of str to Cell or cell text
-        Contexts that cannot happen, as boxes: they belong to no share.
+        Contexts that cannot happen, as boxes, besides those that the table's own `assume` rules out: they belong to no share.
     weights : mapping of str to mapping of value or cell text to float, optional
         For some conditions how often their values come up, in any unit; a cell's weight is spread over it. Default: all values
         alike, numbers by length.
+    assume : bool
+        False leaves aside what contextdb.toml says of contexts: `assume` of the table, and that derived facts are computed.
+    progress : callable of (str, float), optional
+        Is told what is being worked out and which share of the whole is done; the report is the same without it.
+    should_stop : callable that gives bool, optional
+        Asked often, from the thread of the call; True ends the call with Cancelled.
 
     Raises
     ------
+    ExpressionError
+        An assumption of the table cannot be read.
     TableError
         The table has cells that cannot be read, or a condition whose domain is empty.
     ContextError, CellError
         `impossible` or `weights` name what is not there.
+    Cancelled
+        `should_stop` said so.
+
+    Notes
+    -----
+    Assumptions that boxes can tell are exact. One that computes with facts or compares them, and derived facts that are not bools
+    of other conditions of the table, are known to samples only: the share is then an estimate, a gap's share is that of the samples
+    in it, and gaps without a sample that can happen are left out.
     """
-    for name, number in (("work", work), ("samples", samples), ("max_gaps", max_gaps), ("seed", seed)):
-        if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
-            raise ContextError(Fault(f"{name} is {number!r}.", "a whole number from 0 up"))
-    compiled = table.compile() if isinstance(table, Table) else table
-    space = Space.of(compiled, impossible, weights)
-    return _report(space, compiled, table if isinstance(table, Table) else None, seed, work, samples, max_gaps)
+    require_counts(work=work, samples=samples, max_gaps=max_gaps, seed=seed)
+    watcher = Progress(progress, should_stop)
+    found = opened(table, impossible, weights, assume, watcher.within("Reading the cells", 0.0, COUNT_AT))
+    return _report(found, seed, work, samples, max_gaps, watcher)
 
 
-def _report(
-    space: Space, compiled: CompiledTable, table: Table | None, seed: int, work: int, samples: int, max_gaps: int
-) -> CoverageReport:
-    possible = uncovered_share(space, space.impossible, work)
-    left = uncovered_share(space, space.boxes + space.impossible, work)
-    sampler = Sampler(space)
+def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, watcher: Progress) -> CoverageReport:
+    space, compiled, drawer = opened.space, opened.compiled, opened.drawer
+    possible = uncovered_share(space, space.impossible, work, None, watcher.within("Counting contexts", COUNT_AT, COUNT_AT))
+    counting = watcher.within("Counting contexts", COUNT_AT, SAMPLES_AT)
+    left = uncovered_share(space, space.boxes + space.impossible, work, None, counting)
+    sampler = Sampler(space, watcher.within("Trying random contexts", SAMPLES_AT, GAPS_AT), drawer)
     rng = np.random.default_rng(seed)
     whole = sampler.all_contexts()
     counts = whole or sampler.sampled(samples, rng)
-    certain = _certain(space, possible, left)
+    certain = _certain(space, possible, left, drawer is not None)
     covered = _covered(certain, counts, whole is None, sampler, possible, rng, samples)
     steps = search_steps(work, len(space.boxes))
-    found = find_gaps(space, () if whole else counts.uncovered, 4 * max_gaps + 1, steps)
-    judge = Judge(space, compiled, table, finding_steps(work, len(space.boxes)))
+    searching = watcher.within("Looking for gaps", GAPS_AT, SHARES_AT)
+    found = find_gaps(space, () if whole else counts.uncovered, 4 * max_gaps + 1, steps, searching)
+    sizing = watcher.within("Measuring gaps", SHARES_AT, FINDINGS_AT)
+    measure = _measure(opened, possible, work, samples, seed)
+    gaps = described(space, compiled, found.boxes, measure, max_gaps, sizing)
+    n_open = len(found.boxes)
+    if drawer is not None:
+        gaps = [gap for gap in gaps if gap.share > 0.0]
+    judging = watcher.within("Comparing rows", FINDINGS_AT, CROWDS_AT)
+    judge = Judge(space, compiled, opened.table, finding_steps(work, len(space.boxes)), judging, drawer)
     findings = judge.findings()
     middle = (possible.lower + possible.upper) / 2.0
-    if middle == 0.0:
+    if middle == 0.0 and drawer is None:
         covered = _of_nothing(found.is_complete and not found.boxes)
-    hits = _hits(space, counts)
+    hits = _hits(space, counts, drawer is not None)
+    crowding = watcher.within("Looking for crowded contexts", CROWDS_AT, 1.0)
+    crowded = _crowded(space, counts, measure, crowding)
     return CoverageReport(
         table=compiled.name,
         n_rows=compiled.n_rows,
@@ -110,8 +142,8 @@ def _report(
         lower=covered.lower,
         upper=covered.upper,
         method=covered.method,
-        gaps=tuple(described(space, compiled, found.boxes, possible, max_gaps, min(work, SHARE_WORK))),
-        gaps_complete=found.is_complete and len(found.boxes) <= max_gaps,
+        gaps=tuple(gaps),
+        gaps_complete=found.is_complete and n_open <= max_gaps and len(gaps) == n_open,
         findings=tuple(findings),
         findings_complete=judge.is_complete,
         overlap=_overlap(counts, hits, whole is not None),
@@ -122,6 +154,9 @@ def _report(
         hits=_of_all_rows(hits, space, compiled.n_rows),
         assumed=space.assumed,
         weighted=space.weighted,
+        crowded=crowded,
+        assumptions=opened.assumptions,
+        sampled=opened.sampled,
     )
 
 
@@ -135,8 +170,18 @@ def finding_steps(work: int, n_boxes: int) -> int:
     return search_steps(work, n_boxes) + min(n_boxes * (work // 1_000_000), 16 * work // max(1, n_boxes))
 
 
-def _certain(space: Space, possible: Bounds, left: Bounds) -> Bounds:
+def _measure(opened: Opened, possible: Bounds, work: int, samples: int, seed: int) -> Measure:
+    """What tells the share of a box: the counter, or samples where only they know what can happen."""
+    if opened.drawer is not None:
+        return SampledShares.of(Sampler(opened.space, drawer=opened.drawer), samples, np.random.default_rng(seed))
+    space, most = opened.space, min(work, SHARE_WORK)
+    return lambda box, without: share_of(space, box, [*space.impossible, *without], possible, most)
+
+
+def _certain(space: Space, possible: Bounds, left: Bounds, is_sampled: bool) -> Bounds:
     """The covered share of the possible contexts, for certain; never 0 or 1 by rounding."""
+    if is_sampled:  # what can happen may lie within the rows, or outside of them all
+        return Bounds(1.0, 1.0) if left.upper == 0.0 else Bounds(0.0, 0.0 if not space.boxes else 1.0)
     if possible.upper == 0.0:
         return Bounds(0.0, 1.0)
     lower = 1.0 - min(1.0, left.upper / possible.lower) if possible.lower > 0.0 else 0.0
@@ -160,7 +205,7 @@ def _covered(
     n = counts.n_contexts
     n_covered = n - round(float(counts.histogram[0]))
     value, (lower, upper) = n_covered / n, wilson(n_covered, n)
-    if value < LITTLE and possible.is_exact:
+    if value < LITTLE and possible.is_exact and sampler.drawer is None:
         value, lower, upper = (share / possible.lower for share in sampler.out_of_rows(samples, rng))
     lower, upper = max(lower, certain.lower), min(upper, certain.upper)
     if upper - lower >= certain.upper - certain.lower or lower > upper:
@@ -174,8 +219,16 @@ def _of_nothing(is_all_covered: bool) -> Covered:
     return Covered(share, share, share, "exact")
 
 
-def _hits(space: Space, counts: Counts) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    if not space.impossible:
+def _crowded(space: Space, counts: Counts, measure: Measure, progress: Progress) -> tuple[Crowd, ...]:
+    crowds = []
+    for found in find_crowds(space, counts.fullest, progress=progress):
+        rows = tuple(row for i, row in enumerate(space.rows) if found.held_by >> i & 1)
+        crowds.append(Crowd(rows, measure(found.box, ())[0], space.cells(found.box)))
+    return tuple(crowd for crowd in crowds if crowd.share > 0.0 or not isinstance(measure, SampledShares))
+
+
+def _hits(space: Space, counts: Counts, is_sampled: bool) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    if not space.impossible and not is_sampled:
         return np.array([space.volume(box) for box in space.boxes])
     total = counts.histogram.sum()
     return counts.hits / total if total else np.zeros(len(space.boxes))

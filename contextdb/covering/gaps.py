@@ -9,18 +9,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from contextdb import bitmask
 from contextdb.cells import Cell, NumberSet, TagSet, ValueSet, format_cell
 from contextdb.compiled import CompiledTable
 from contextdb.covering.count import Bounds, uncovered_share
 from contextdb.covering.factors import TagFactor
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.report import Gap, Nearest
 from contextdb.covering.space import Box, Space
-from contextdb.covering.witness import BoxSet, OutOfSteps, Point
+from contextdb.covering.witness import BoxSet, OutOfSteps, Point, Steps
 from contextdb.intervals import union
 
+Measure = Callable[[Box, Sequence[Box]], tuple[float, bool]]
+"""Tells which share of the possible contexts is in a box and in none of some others, and whether it is exact."""
 SHARE_WORK = 200_000
 """Row visits for the share of one gap; one that needs more is the middle of its bounds, and not `is_exact`."""
 
@@ -33,20 +39,22 @@ class FoundGaps:
     is_complete: bool
 
 
-def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int) -> FoundGaps:
+def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progress: Progress = SILENT) -> FoundGaps:
     """Gaps round the seeds, then by search, until there are no more, `most` are found, or the steps are used up."""
-    rows = BoxSet.of(space.full, space.boxes)
-    seen = BoxSet.of(space.full, space.boxes + space.impossible)
+    rows = BoxSet.of(space.full, space.boxes, progress)
+    seen = BoxSet.of(space.full, space.boxes + space.impossible, progress)
     order = _rarest_first(rows)
     found: list[Box] = []
     for point in seeds:
         if len(found) >= most // 2:
             break
+        progress.at(len(found) / most)
         if not any(all(side >> k & 1 for side, k in zip(box, point, strict=True)) for box in found):
             found.append(_add(seen, widened(space, rows, point, order)))
-    left = [steps]
+    left = Steps(steps, progress)
     try:
         while len(found) < most:
+            progress.at(len(found) / most)
             point_left = seen.outside(seen.all, space.full, left)
             if point_left is None:
                 return FoundGaps(tuple(found), True)
@@ -82,21 +90,33 @@ def _add(seen: BoxSet, box: Box) -> Box:
     return box
 
 
-def described(space: Space, compiled: CompiledTable, found: Sequence[Box], possible: Bounds, most: int, work: int) -> list[Gap]:
+def described(
+    space: Space,
+    compiled: CompiledTable,
+    found: Sequence[Box],
+    measure: Measure,
+    most: int,
+    progress: Progress = SILENT,
+) -> list[Gap]:
     """The gaps with their shares of the possible contexts, largest first."""
-    sized = [(_share(space, box, space.impossible, possible, work), space.cells(box), box) for box in found]
+    sized = []
+    for box in found:
+        progress.check()
+        sized.append((measure(box, ()), space.cells(box), box))
     sized.sort(key=lambda item: (-item[0][0], json.dumps(item[1], ensure_ascii=False)))
     gaps: list[Gap] = []
     earlier: list[Box] = []
+    rows = BoxSet.of(space.full, space.boxes, progress)
     for (share, is_exact), cells, box in sized[:most]:
-        new_share, is_new_exact = _share(space, box, [*space.impossible, *earlier], possible, work)
-        nearest = nearest_row(space, compiled, box)
+        progress.at(len(gaps) / min(len(sized), most))
+        new_share, is_new_exact = measure(box, earlier)
+        nearest = nearest_row(space, compiled, rows, box)
         gaps.append(Gap(gap_id(cells), share, min(share, new_share), cells, nearest, is_exact and is_new_exact))
         earlier.append(box)
     return gaps
 
 
-def _share(space: Space, box: Box, without: Sequence[Box], possible: Bounds, work: int) -> tuple[float, bool]:
+def share_of(space: Space, box: Box, without: Sequence[Box], possible: Bounds, work: int) -> tuple[float, bool]:
     """The share of the possible contexts that a box holds and others do not, and whether it is exact or a middle of bounds."""
     volume, whole = space.volume(box), (possible.lower + possible.upper) / 2.0
     if volume == 0.0 or whole == 0.0:
@@ -111,17 +131,21 @@ def gap_id(cells: dict[str, str]) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:12]
 
 
-def nearest_row(space: Space, compiled: CompiledTable, gap: Box) -> Nearest | None:
+def nearest_row(space: Space, compiled: CompiledTable, rows: BoxSet, gap: Box) -> Nearest | None:
     """The row with fewest cells to change so that it holds the gap, the first of these, and the first cell to change."""
-    best: tuple[int, int, int] | None = None
-    for i, box in enumerate(space.boxes):
-        failing = [at for at, own in enumerate(space.of_condition) if any(gap[f] & ~box[f] for f in own)]
-        if best is None or len(failing) < best[0]:
-            best = len(failing), i, failing[0]
-    if best is None:
+    if not space.boxes:
         return None
-    n_changes, i, at = best
-    row, condition = space.rows[i], space.conditions[at]
+    n_failing = np.zeros(len(space.boxes), np.int64)
+    failing: list[int] = []
+    for own in space.of_condition:
+        held = rows.all
+        for f in own:
+            held &= rows.holding(f, gap[f])
+        failing.append(rows.all & ~held)
+        n_failing += bitmask.unpack(bitmask.from_int(failing[-1], rows.n_boxes), rows.n_boxes)
+    i = int(n_failing.argmin())
+    at = next(at for at, bits in enumerate(failing) if bits >> i & 1)
+    n_changes, row, condition = int(n_failing[i]), space.rows[i], space.conditions[at]
     now = compiled.cells(at)[int(compiled.texts[at].codes[row])]
     return Nearest(row, compiled.assets[row], n_changes, condition.name, _joined(now, space, at, gap))
 

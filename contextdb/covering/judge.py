@@ -17,10 +17,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from contextdb.check import check
 from contextdb.compiled import CompiledTable
+from contextdb.covering.draw import Drawer
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, Space
-from contextdb.covering.witness import BoxSet, OutOfSteps
+from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural
 from contextdb.findings import Finding, Level
 from contextdb.table import Table
@@ -39,6 +43,9 @@ class Judge:
     compiled: CompiledTable
     table: Table | None
     steps: int
+    progress: Progress = SILENT
+    drawer: Drawer | None = None
+    """Tells which contexts can happen, where boxes cannot."""
     is_complete: bool = True
     """False when the steps ended before an answer."""
     _held: dict[tuple[int, int], int] = field(default_factory=dict)
@@ -56,7 +63,7 @@ class Judge:
     @cached_property
     def boxes(self) -> BoxSet:
         """The rows, then the impossible contexts, as bits."""
-        return BoxSet.of(self.space.full, self.space.boxes + self.space.impossible)
+        return BoxSet.of(self.space.full, self.space.boxes + self.space.impossible, self.progress)
 
     @cached_property
     def _impossible(self) -> int:
@@ -77,6 +84,7 @@ class Judge:
     def _rows(self) -> Iterator[Finding]:
         told = {f.row for f in self._identical}
         for i, box in enumerate(self.space.boxes):
+            self.progress.at(i / len(self.space.boxes))
             equal = self._equal[box]
             if self.space.impossible and not self._is_possible(box):
                 yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions rule out.")
@@ -105,6 +113,7 @@ class Judge:
             yield from self._overlapping()
         if self.compiled.policy in ("first", "priority"):
             for i, box in enumerate(self.space.boxes):
+                self.progress.check()
                 before = self._before(i) & self._meeting(box)
                 if before and self._covered(box, before | self._impossible) and self._is_possible(box):
                     why = "stands above it" if self.compiled.policy == "first" else "has a higher priority"
@@ -132,10 +141,11 @@ class Judge:
 
     def _overlapping(self) -> Iterator[Finding]:
         for i, box in enumerate(self.space.boxes):
+            self.progress.check()
             others, joint = 0, None
             for j in _bits(self._meeting(box) & ((1 << i) - 1)):
                 shared = tuple(a & b for a, b in zip(box, self.space.boxes[j], strict=True))
-                if self._is_possible(shared):
+                if self._is_possible(shared) and self._was_seen(shared):
                     others |= 1 << j
                     joint = joint or (j, shared)
             if joint:
@@ -146,15 +156,19 @@ class Judge:
     def _is_possible(self, box: Box) -> bool:
         return not (self.space.impossible and self._covered(box, self._impossible))
 
+    def _was_seen(self, box: Box) -> bool:
+        """Whether draws, where they are needed, give a context of the box that can happen."""
+        return self.drawer is None or self.drawer.may_happen(box, np.random.default_rng(0))
+
     def _covered(self, box: Box, by: int) -> bool:
         """Whether some boxes hold all of a box; "no" where that cannot be told within the steps."""
         allowed = min(self.steps, max(200, self.steps // QUESTIONS))
-        left = [allowed]
+        steps = Steps(allowed, self.progress)
         try:
-            answer = self.boxes.outside(by, box, left) is None
+            answer = self.boxes.outside(by, box, steps) is None
         except OutOfSteps:
             self.is_complete, answer = False, False
-        self.steps -= allowed - left[0]
+        self.steps -= allowed - steps.left
         return answer
 
     def _thinned(self, box: Box, by: int) -> int:

@@ -31,7 +31,7 @@ except ImportError:  # pragma: no cover - the same loops, slower
 
 _options: dict[str, Any] = {"cache": True, "nogil": True, "boundscheck": False, "error_model": "numpy"}
 WORK, LIMIT, CUT, NODES = 0, 1, 2, 3
-"""What stands in `state`: row visits done, row visits allowed, nodes that were cut short, nodes opened."""
+"""What stands in `state`: row visits done and allowed (below 0, set meanwhile: stop), nodes that were cut short, nodes opened."""
 SMALL = 64
 """Boxes within others are looked for among so many."""
 PROBES = 16
@@ -245,6 +245,9 @@ def uncovered(boxes, hashes, masks, volumes, mass, slack, tables, known, state):
     `tables` are (cells, runs, first, sizes, hashes of cells, weights, edges, marks), `known` what was worked out before.
     """
     cells, runs, first, sizes, cell_hashes, weights, edges, marks = tables
+    if state[LIMIT] < 0:
+        state[CUT] += 1
+        return 0.0, 1.0
     if boxes.shape[0] == 0:
         return 1.0, 1.0
     for i in range(boxes.shape[0]):
@@ -315,7 +318,7 @@ def uncovered(boxes, hashes, masks, volumes, mass, slack, tables, known, state):
         chosen, masses = _groups(boxes, factor, cells, runs, first, weights[edges[factor] : edges[factor + 1]], marks)
         found_low, found_high = 0.0, 0.0
         for g in range(chosen.shape[0]):
-            if masses[g] == 0.0:
+            if masses[g] == 0.0 or state[LIMIT] < 0:
                 continue
             state[WORK] += m
             b2, n = np.empty(m, np.int32), 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from contextdb.covering.shares import format_percent
+from contextdb.covering.shares import format_percent, told_apart
 from contextdb.findings import Finding
 
 Method = Literal["exact", "bounds", "estimate"]
@@ -72,6 +72,25 @@ class Overlap:
 
 
 @dataclass(frozen=True, slots=True)
+class Crowd:
+    """A box of contexts in which all of these rows, and no fewer, are valid. `cells` as in a gap."""
+
+    rows: tuple[int, ...]
+    share: float
+    """Of the possible contexts."""
+    cells: dict[str, str]
+
+    @property
+    def n_rows(self) -> int:
+        """How many rows are valid at once."""
+        return len(self.rows)
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {"rows": list(self.rows), "share": self.share, "cells": self.cells}
+
+
+@dataclass(frozen=True, slots=True)
 class CoverageReport:
     """The context coverage of one table.
 
@@ -104,13 +123,19 @@ class CoverageReport:
     """What had to be assumed of conditions without bounds or declared values."""
     weighted: tuple[str, ...]
     """The conditions whose values do not all count the same."""
+    crowded: tuple[Crowd, ...] = ()
+    """Where most rows are valid at once, the fullest first; the first is the fullest of all when `overlap` is exact."""
+    assumptions: tuple[str, ...] = ()
+    """The table's assumptions, as contextdb.toml has them."""
+    sampled: tuple[str, ...] = ()
+    """Of these, and of the derived facts, what only samples know: with any of them the share is an estimate."""
 
     @property
     def headline(self) -> str:
         """The covered share in one sentence that says how it is known."""
         if self.method == "exact":
             return f"{format_percent(self.covered)} of the contexts have a valid row (exact)."
-        ends = f"{format_percent(self.lower)} and {format_percent(self.upper)}"
+        ends = " and ".join(told_apart(self.lower, self.upper))
         how = "certain bounds" if self.method == "bounds" else f"99 % interval, {self.n_samples:,} samples, seed {self.seed}"
         return f"Between {ends} of the contexts have a valid row ({how})."
 
@@ -131,9 +156,12 @@ class CoverageReport:
                 "work": self.work,
                 "assumed": self.assumed,
                 "weighted": list(self.weighted),
+                "assumptions": list(self.assumptions),
+                "sampled": list(self.sampled),
             },
             "gaps": {"complete": self.gaps_complete, "items": [gap.to_json() for gap in self.gaps]},
             "findings": [finding.to_json() for finding in self.findings],
             "findings_complete": self.findings_complete,
             "overlap": self.overlap.to_json(),
+            "crowded": [crowd.to_json() for crowd in self.crowded],
         }

@@ -8,6 +8,7 @@ Source: Karp, Luby and Madras, "Monte-Carlo approximation algorithms for enumera
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,13 +19,18 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Words
 from contextdb.covering.count import runs_of
+from contextdb.covering.draw import Drawer
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import Point
 
 Codes = NDArray[np.int32]
+Chunks = Iterator[tuple[Codes, NDArray[np.float64] | None]]
+"""Contexts, int32 [N, factors] of classes, and the weight of each; None: all alike."""
 CHUNK = 4096
 MOST_SEEDS = 2000
+MOST_FULL = 200
 LITTLE = 0.1
 """Below this covered share contexts are drawn out of the rows."""
 MOST_CONTEXTS = 100_000
@@ -39,6 +45,8 @@ class Counts:
     histogram: NDArray[np.float64]
     hits: NDArray[np.float64]
     uncovered: tuple[Point, ...]
+    fullest: tuple[Point, ...]
+    """Contexts of some measure with most valid rows, the fullest first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +54,9 @@ class Sampler:
     """Masks of the rows of a space for each class, to look contexts up in."""
 
     space: Space
+    progress: Progress = SILENT
+    drawer: Drawer | None = None
+    """Draws the contexts where boxes cannot tell which can happen."""
 
     @cached_property
     def _sides(self) -> list[tuple[NDArray[np.int64], list[int]]]:
@@ -55,29 +66,39 @@ class Sampler:
     @cached_property
     def masks(self) -> tuple[Words, NDArray[np.int64]]:
         """uint64 [classes of all factors, words], and where each factor's begin."""
-        return _masks(self.space, self.space.boxes)
+        return _masks(self.space, self.space.boxes, self.progress)
 
     @cached_property
     def _impossible(self) -> tuple[Words, NDArray[np.int64]]:
-        return _masks(self.space, self.space.impossible)
+        return _masks(self.space, self.space.impossible, self.progress)
 
     def sampled(self, n_samples: int, rng: np.random.Generator) -> Counts:
         """Look random possible contexts up; those drawn that are impossible do not count."""
-        sums = [np.cumsum(f.weights) for f in self.space.factors]
-        chunks = ((self._draw(sums, min(CHUNK, n_samples - at), rng), None) for at in range(0, n_samples, CHUNK))
-        return self._counted(chunks)
+        return self._counted(self.random_contexts(n_samples, rng))
 
     def all_contexts(self) -> Counts | None:
         """Look every class of the space up, by its weight; None where there are too many."""
-        sizes = [len(f.weights) for f in self.space.factors]
-        total = 1
-        for size in sizes:
-            total *= size
-            if total > MOST_CONTEXTS:
-                return None
-        return self._counted(self._grid(sizes, total))
+        every = self.every_context()
+        return None if every is None else self._counted(every)
 
-    def _grid(self, sizes: list[int], total: int) -> Iterator[tuple[Codes, NDArray[np.float64]]]:
+    def random_contexts(self, n_samples: int, rng: np.random.Generator) -> Chunks:
+        """Random contexts, a few thousand at a time, all of one weight; those in impossible boxes are among them."""
+        if self.drawer is not None:
+            drawer = self.drawer
+            return ((drawer.draw(min(CHUNK, n_samples - at), rng), None) for at in range(0, n_samples, CHUNK))
+        sums = [np.cumsum(f.weights) for f in self.space.factors]
+        return ((self._draw(sums, min(CHUNK, n_samples - at), rng), None) for at in range(0, n_samples, CHUNK))
+
+    def every_context(self) -> Chunks | None:
+        """One context of each class of the space with its weight, a few thousand at a time; None where there are too many,
+        or where only draws tell what can happen."""
+        if self.drawer is not None:
+            return None
+        sizes = [len(f.weights) for f in self.space.factors]
+        total = math.prod(sizes)
+        return self._grid(sizes, total) if total <= MOST_CONTEXTS else None
+
+    def _grid(self, sizes: list[int], total: int) -> Chunks:
         for at in range(0, total, CHUNK):
             numbers = np.arange(at, min(at + CHUNK, total))
             codes, shares = np.zeros((len(numbers), len(sizes)), np.int32), np.ones(len(numbers))
@@ -94,12 +115,14 @@ class Sampler:
                 codes[:, f] = _drawn(cumulative, rng.random(n))
         return codes
 
-    def _counted(self, chunks: Iterator[tuple[Codes, NDArray[np.float64] | None]]) -> Counts:
+    def _counted(self, chunks: Chunks) -> Counts:
         histogram, hits = np.zeros(1), np.zeros(len(self.space.boxes))
         uncovered: dict[Point, None] = {}
+        fullest: dict[Point, int] = {}
         n_contexts = 0
         for codes, shares in chunks:
-            possible = self._is_possible(codes)
+            self.progress.check()
+            possible = self.is_possible(codes)
             codes = codes[possible]
             weights = np.ones(len(codes)) if shares is None else shares[possible]
             counts, found = lookup(codes, self.masks, len(self.space.boxes), shares is None)
@@ -111,9 +134,11 @@ class Sampler:
                 hits += weights @ found
             for i in np.flatnonzero(counts == 0).tolist() if len(uncovered) < MOST_SEEDS else ():
                 uncovered[tuple(codes[i].tolist())] = None
-        return Counts(n_contexts, histogram, hits, tuple(uncovered))
+            fullest = _fullest(fullest, codes, np.where(weights > 0.0, counts, 0))
+        return Counts(n_contexts, histogram, hits, tuple(uncovered), tuple(fullest))
 
-    def _is_possible(self, codes: Codes) -> NDArray[np.bool_]:
+    def is_possible(self, codes: Codes) -> NDArray[np.bool_]:
+        """Which contexts are in no impossible box."""
         if not self.space.impossible:
             return np.ones(len(codes), np.bool_)
         return np.equal(lookup(codes, self._impossible, len(self.space.impossible), True)[0], 0)
@@ -130,13 +155,14 @@ class Sampler:
             drawn = _drawn(np.cumsum(volumes), rng.random(n))
             codes = self._draw_inside(drawn, rng)
             words = intersected(codes, self.masks)
-            n_first += int((_first_box(words) == drawn)[self._is_possible(codes)].sum())
+            n_first += int((_first_box(words) == drawn)[self.is_possible(codes)].sum())
         low, high = wilson(n_first, n_samples)
         return min(1.0, total * n_first / n_samples), min(1.0, total * low), min(1.0, total * high)
 
     def _draw_inside(self, drawn: NDArray[np.int64], rng: np.random.Generator) -> Codes:
         codes = np.zeros((len(drawn), len(self.space.factors)), np.int32)
         for f, factor in enumerate(self.space.factors):
+            self.progress.check()
             if len(factor.weights) == 1:
                 continue
             uniform = rng.random(len(drawn))
@@ -178,10 +204,18 @@ def intersected(codes: Codes, masks: tuple[Words, NDArray[np.int64]]) -> Words:
     return found
 
 
-def _masks(space: Space, boxes: tuple[Box, ...]) -> tuple[Words, NDArray[np.int64]]:
+def _fullest(known: dict[Point, int], codes: Codes, counts: NDArray[np.int64]) -> dict[Point, int]:
+    """The contexts with most valid rows, those known and more, the fullest first; of equals the earlier."""
+    best = np.argsort(-counts, kind="stable")[:MOST_FULL]
+    found = known | {tuple(codes[i].tolist()): int(counts[i]) for i in best.tolist() if counts[i] > 1}
+    return dict(sorted(found.items(), key=lambda item: -item[1])[:MOST_FULL])
+
+
+def _masks(space: Space, boxes: tuple[Box, ...], progress: Progress) -> tuple[Words, NDArray[np.int64]]:
     starts = np.cumsum([0, *(len(f.weights) for f in space.factors)])
     parts = []
     for f, factor in enumerate(space.factors):
+        progress.check()
         of_box, sides = _numbered([box[f] for box in boxes])
         turns = np.zeros((len(factor.weights) + 1, bitmask.n_words(len(boxes))), np.uint64)
         for number, side in enumerate(sides):

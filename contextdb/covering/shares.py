@@ -16,13 +16,19 @@ def format_percent(share: float, digits: int = 2) -> str:
         return "0 %" if share <= 0.0 else "100 %"
     if share < 0.5:
         percent = 100.0 * share
-        text = f"{percent:.{digits}f}"
-        return f"{text} %" if float(text) > 0.0 else f"{percent:.1g} %"
+        texts = (f"{percent:.{places}f}" for places in range(digits, 11))
+        return f"{next((text for text in texts if float(text) > 0.0), f'{percent:.1g}')} %"
     for places in range(digits, 13):
         text = f"{100.0 * share:.{places}f}"
         if float(text) < 100.0:
             return f"{text} %"
     return "> 99.9999999999 %"
+
+
+def told_apart(one: float, other: float) -> tuple[str, str]:
+    """Two shares as percentages, with as many digits as it takes to tell them apart."""
+    texts = [(format_percent(one, digits), format_percent(other, digits)) for digits in range(2, 9)]
+    return next((pair for pair in texts if pair[0] != pair[1]), texts[0])
 
 
 def wilson(n_hits: int, n_samples: int, z: float = Z_99) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from contextdb.cells import Accepted, Cell, TagSet, format_cell, parse_cell
 from contextdb.compiled import CompiledTable
 from contextdb.conditions import Condition
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, some
 
 Box = tuple[int, ...]
@@ -44,30 +45,39 @@ class Space:
     """The conditions whose weights were given."""
 
     @classmethod
-    def of(cls, compiled: CompiledTable, impossible: Sequence[CellBox] = (), weights: WeightsOf | None = None) -> Space:
+    def of(
+        cls,
+        compiled: CompiledTable,
+        impossible: Sequence[CellBox] = (),
+        weights: WeightsOf | None = None,
+        progress: Progress = SILENT,
+    ) -> Space:
         """The space of a compiled table; see `contextdb.covering.coverage` for the arguments."""
         excluded = [_read_box(box, compiled.conditions) for box in impossible]
         given = {name: _read_weights(name, parts, compiled.conditions) for name, parts in (weights or {}).items()}
         factors: list[Factor] = []
         of_condition: list[tuple[int, ...]] = []
         for at, condition in enumerate(compiled.conditions):
+            progress.check()
             is_text = condition.domain.kind == "text"  # its values are those that cells name, soft ones too
             accepted = [c.accepts for c in compiled.cells(at) if c.accepts is not None and (is_text or not c.is_soft)]
             accepted += [cell.accepts for box in excluded for name, cell in box.items() if name == condition.name and cell.accepts]
             accepted += [cell.accepts for cell in given.get(condition.name, {}) if cell.accepts]
-            new = _factors(accepted, condition, given.get(condition.name))
+            new = factors_of(accepted, condition, given.get(condition.name))
             of_condition.append(tuple(range(len(factors), len(factors) + len(new))))
             factors += new
         space = cls(compiled.conditions, tuple(factors), tuple(of_condition), (), (), (), tuple(given))
-        return space._with_boxes(compiled, excluded)
+        return space._with_boxes(compiled, excluded, progress)
 
-    def _with_boxes(self, compiled: CompiledTable, excluded: Sequence[Mapping[str, Cell]]) -> Space:
-        columns = [
-            [self.sides(at, None if c.is_soft else c.accepts) for c in compiled.cells(at)] for at in range(len(self.conditions))
-        ]
+    def _with_boxes(self, compiled: CompiledTable, excluded: Sequence[Mapping[str, Cell]], progress: Progress) -> Space:
+        columns = []
+        for at in range(len(self.conditions)):
+            progress.check()
+            columns.append([self.sides(at, None if c.is_soft else c.accepts) for c in compiled.cells(at)])
         codes = [compiled.texts[at].codes.tolist() for at in range(len(self.conditions))]
         found: list[tuple[int, Box]] = []
         for row in np.flatnonzero(bitmask.unpack(compiled.enabled, compiled.n_rows)).tolist():
+            progress.check()
             box = tuple(side for at in range(len(columns)) for side in columns[at][codes[at][row]])
             if 0 not in box and not any(self._is_void(columns[at][codes[at][row]], at) for at in range(len(columns))):
                 found.append((row, box))
@@ -79,7 +89,7 @@ class Space:
             self.of_condition,
             rows,
             boxes,
-            tuple(b for b in impossible if b is not None),
+            tuple(dict.fromkeys(b for b in impossible if b is not None)),
             self.weighted,
         )
 
@@ -156,12 +166,20 @@ class Space:
         }
 
 
+def require_counts(**numbers: object) -> None:
+    """Raise ContextError unless every argument is a whole number from 0 up."""
+    for name, number in numbers.items():
+        if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
+            raise ContextError(Fault(f"{name} is {number!r}.", "a whole number from 0 up"))
+
+
 def weight_of(factor: Factor, side: int) -> float:
     """The share of a factor that some classes make up."""
     return float(sum(w for k, w in enumerate(factor.weights.tolist()) if side >> k & 1))
 
 
-def _factors(accepted: Sequence[Accepted], condition: Condition, parts: Mapping[Cell, float] | None) -> list[Factor]:
+def factors_of(accepted: Sequence[Accepted], condition: Condition, parts: Mapping[Cell, float] | None = None) -> list[Factor]:
+    """The factors of a condition, cut so that the sets are sets of classes; weighed by parts where they are given."""
     domain = condition.domain
     if domain.kind == "tags":
         return list(tag_factors(accepted, domain))

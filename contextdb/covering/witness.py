@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from contextdb.covering.count import runs_of
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box
 
 Point = tuple[int, ...]
@@ -18,6 +19,21 @@ Point = tuple[int, ...]
 
 class OutOfSteps(Exception):
     """The search was not finished within its budget."""
+
+
+@dataclass
+class Steps:
+    """How many steps a search has left, and who may stop it between two of them."""
+
+    left: int
+    progress: Progress = SILENT
+
+    def take(self) -> None:
+        """One step. Raises OutOfSteps when there is none left, Cancelled when the search was stopped."""
+        if self.left <= 0:
+            raise OutOfSteps
+        self.left -= 1
+        self.progress.check()
 
 
 @dataclass(eq=False)
@@ -32,11 +48,12 @@ class BoxSet:
     n_boxes: int = 0
 
     @classmethod
-    def of(cls, full: Box, boxes: Sequence[Box]) -> BoxSet:
+    def of(cls, full: Box, boxes: Sequence[Box], progress: Progress = SILENT) -> BoxSet:
         """The boxes in their order: bit i is box i."""
         everything = (1 << len(boxes)) - 1
         accepts, restricts = [], []
         for f, side_full in enumerate(full):
+            progress.check()
             sides: dict[int, int] = {}
             for i, box in enumerate(boxes):
                 if box[f] != side_full:
@@ -92,10 +109,10 @@ class BoxSet:
                 found &= bits
         return found
 
-    def outside(self, open_boxes: int, within: Box, steps: list[int]) -> Point | None:
+    def outside(self, open_boxes: int, within: Box, steps: Steps) -> Point | None:
         """A context of `within` that is in none of the open boxes, or None when there is none.
 
-        Raises OutOfSteps when `steps[0]`, which counts down, is used up.
+        Raises OutOfSteps when the steps, which count down, are used up.
         """
         for f, side in enumerate(within):
             if open_boxes and side != self.full[f]:
@@ -103,12 +120,10 @@ class BoxSet:
         point = self._search(open_boxes, within, list(range(len(within))), steps)
         return None if point is None else tuple(point.get(f, _first(side)) for f, side in enumerate(within))
 
-    def _search(self, open_boxes: int, within: Box, free: list[int], steps: list[int]) -> dict[int, int] | None:
+    def _search(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> dict[int, int] | None:
         if not open_boxes:
             return {}
-        if steps[0] <= 0:
-            raise OutOfSteps
-        steps[0] -= 1
+        steps.take()
         factor = self._next_factor(open_boxes, within, free)
         if factor is None:
             return None

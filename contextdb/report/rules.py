@@ -92,8 +92,98 @@ RULES: dict[str, Rule] = {
         "The folder holds no table.",
         "Name the folder that holds contextdb.toml and the tables.",
     ),
+    "case-failed": Rule(
+        "error",
+        "A saved context expects other assets to be valid than are valid.",
+        "Look at the context in the editor or with `contextdb query --explain`; correct the table, or what is expected.",
+    ),
+    "unreadable-case": Rule(
+        "error",
+        "A saved context cannot be asked",
+        "Write facts as in `contextdb query`, and what is expected as asset names, +name, -name or (none).",
+    ),
+    "subsumed-row": Rule(
+        "warning",
+        "Wherever a row is valid, one other row is valid too, and elsewhere besides.",
+        "Narrow the other row, widen this one, or keep both where the game should have a choice.",
+    ),
+    "equal-row": Rule(
+        "warning",
+        "A row is valid in just the contexts of another row, though its cells are written otherwise.",
+        "Tell the rows apart by a condition, or keep both where the game should have a choice.",
+    ),
+    "redundant-row": Rule(
+        "info",
+        "Several rows together are valid wherever a row is.",
+        "Nothing need be done; where the table should be shorter, the row can go without opening a gap.",
+    ),
+    "dead-row": Rule(
+        "warning",
+        "A row is valid only in contexts that the table's assumptions rule out.",
+        "Correct the row, or the assumption; or delete the row.",
+    ),
+    "never-chosen": Rule(
+        "warning",
+        "By the table's policy another valid row always comes before this one.",
+        "Move the row up, give it a higher priority, or narrow the rows that come before it.",
+    ),
+    "policy-overlap": Rule(
+        "error",
+        'Two rows can be valid at once in a table whose policy is "unique".',
+        "Change a cell so that the rows exclude each other, rule the overlap out by `assume`, or set another policy.",
+    ),
+    "no-context": Rule(
+        "error",
+        "The table's assumptions leave no context that can happen.",
+        "Correct the assumption that the message names; `and` may have been meant as `or`.",
+    ),
+    "bad-assumption": Rule(
+        "error",
+        "An assumption of a table cannot be read.",
+        "Correct it in contextdb.toml; it may name conditions that are declared, and columns of its table.",
+    ),
+    "always-any": Rule(
+        "info",
+        "Every cell of a condition is Any, so it excludes no row.",
+        "Nothing need be done; delete the column where nobody is going to fill it.",
+    ),
+    "unused-condition": Rule(
+        "info",
+        "A condition is declared, and no table of the folder uses it.",
+        "Nothing need be done; delete its section where no table is going to use it.",
+    ),
+    "gap": Rule(
+        "info",
+        "Some contexts have no valid row.",
+        "Add a row, or widen the nearest one, where the contexts can happen; where they cannot, say so by `assume`.",
+    ),
+    "new-gap": Rule(
+        "warning",
+        "Contexts that had a valid row in the baseline have none now, or are new.",
+        "Look at what changed since the baseline; mend it, or make a new baseline where it is meant.",
+    ),
+    "coverage-below": Rule(
+        "error",
+        "A smaller share of the contexts is covered than `--fail-under` demands.",
+        "Fill the largest gaps, rule out what cannot happen by `assume`, or lower the bar.",
+    ),
+    "coverage-dropped": Rule(
+        "error",
+        "The covered share fell by more than `--max-drop` allows since the baseline.",
+        "Look at the new gaps; mend them, or make a new baseline where they are meant.",
+    ),
+    "telemetry-below": Rule(
+        "error",
+        "A smaller share of the recorded moments is covered than `--fail-under-telemetry` demands.",
+        "Fill the gaps that come up most often in the recordings, or lower the bar.",
+    ),
 }
-"""Every rule that a check may break, by name."""
+"""Every rule that a check, or coverage, may break, by name."""
 
-TABLE_RULES: tuple[str, ...] = tuple(name for name in RULES if name not in ("unreadable", "no-such-path", "more"))
-"""The rules that every table which can be read is held to."""
+OF_COVERAGE = ("gap", "new-gap", "coverage-below", "coverage-dropped", "telemetry-below")
+"""The rules that only `contextdb coverage` tells of."""
+
+TABLE_RULES: tuple[str, ...] = tuple(
+    name for name in RULES if name not in ("unreadable", "no-such-path", "no-tables", "unused-condition", *OF_COVERAGE)
+)
+"""The rules that every table which can be read is held to by a check."""

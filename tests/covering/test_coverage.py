@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
+from contextdb.cells import parse_cell
 from contextdb.covering import coverage
 from contextdb.covering.space import Space
 
@@ -158,6 +159,21 @@ def test_changing_the_cells_of_the_nearest_row_closes_the_gap(seed):
         if gap.nearest and gap.nearest.n_changes == 1:
             closed = Brute(brute.table.with_cell(gap.nearest.row, gap.nearest.condition, gap.nearest.cell), brute.impossible)
             assert all(rows for rows, flag in zip(closed.valid, closed.inside(gap.cells), strict=True) if flag)
+
+
+@examples(2)
+@given(SEEDS)
+def test_no_row_needs_fewer_changes_than_the_nearest_and_no_earlier_one_as_few(seed):
+    table = random_table(random.Random(seed), most_rows=12)
+    space = Space.of(table.compile())
+    for gap in coverage(table, samples=0).gaps:
+        if not space.boxes:
+            assert gap.nearest is None
+            continue
+        box = space.box({c.name: parse_cell(gap.cells[c.name], c.domain) for c in space.conditions if c.name in gap.cells})
+        changes = [sum(any(box[f] & ~row[f] for f in own) for own in space.of_condition) for row in space.boxes]
+        assert gap.nearest.n_changes == min(changes) > 0
+        assert gap.nearest.row == space.rows[changes.index(min(changes))]
 
 
 @examples(1)

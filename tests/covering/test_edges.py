@@ -11,7 +11,7 @@ import pytest
 
 import contextdb as cdb
 from contextdb.covering import coverage, format_percent
-from contextdb.covering.shares import wilson
+from contextdb.covering.shares import told_apart, wilson
 from contextdb.schema import TableSettings
 
 SPEED = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}
@@ -209,12 +209,25 @@ def test_more_than_64_conditions_are_counted():
         (0.999999, "99.9999 %"),
         (0.99999, "99.999 %"),
         (1.0 - 2.0**-53, "> 99.9999999999 %"),
-        (1e-9, "1e-07 %"),
+        (1e-9, "0.0000001 %"),
         (0.00004, "0.004 %"),
     ],
 )
 def test_a_percentage_never_rounds_to_0_or_100(share, text):
     assert format_percent(share) == text
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "texts"),
+    [
+        (0.41, 0.43, ("41.00 %", "43.00 %")),
+        (0.037901, 0.037914, ("3.790 %", "3.791 %")),
+        (0.5, 0.5, ("50.00 %", "50.00 %")),
+        (0.0, 1e-9, ("0 %", "0.0000001 %")),
+    ],
+)
+def test_two_ends_are_written_so_that_they_can_be_told_apart(one, other, texts):
+    assert told_apart(one, other) == texts
 
 
 def test_an_interval_of_samples_holds_the_share_that_was_seen():

@@ -20,12 +20,14 @@ PAGE = (ROOT / "docs" / "messages.md").read_text(encoding="utf-8")
 SECTIONS = {
     part.partition("\n")[0].strip(): part for part in re.split(r"^### ", re.sub(r"^## .*", "", PAGE, flags=re.M), flags=re.M)[1:]
 }
-RULE_ARGUMENT = {"Finding": 0, "_at": 2, "Fault": 4}
+RULE_ARGUMENT = {"Finding": 0, "_at": 2, "Fault": 4, "_of_schema": 1}
 """Where calls that make a finding or a fault take the name of a rule."""
+METHODS = ("_at", "_whole")
+"""Methods that make a finding, and take the rule before its level."""
 
 
-def rules_in(tree: ast.AST) -> Iterator[str]:
-    """Every rule that a module names: as an argument, as a default, or before a level in a tuple."""
+def rules_in(tree: ast.AST, in_tuples: bool) -> Iterator[str]:
+    """Every rule that a module names: as an argument, as a default, or before a level, in a tuple only where that is asked."""
     for node in ast.walk(tree):
         found: list[ast.expr | None] = []
         if isinstance(node, ast.keyword):
@@ -35,15 +37,17 @@ def rules_in(tree: ast.AST) -> Iterator[str]:
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             at = RULE_ARGUMENT.get(node.func.id, len(node.args))
             found = [*node.args[at : at + 1]]
-        elif isinstance(node, ast.Tuple):
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in METHODS:
+            found = [a for a, b in pairwise(node.args) if isinstance(b, ast.Constant) and b.value in LEVELS]
+        elif in_tuples and isinstance(node, ast.Tuple):
             found = [a for a, b in pairwise(node.elts) if isinstance(b, ast.Constant) and b.value in LEVELS]
         yield from (f.value for f in found if isinstance(f, ast.Constant) and isinstance(f.value, str) and f.value not in LEVELS)
 
 
-def rules_of(*patterns: str) -> set[str]:
-    """Every rule that the modules of contextdb/ name."""
-    paths = [path for pattern in patterns for path in (ROOT / "contextdb").glob(pattern)]
-    return {rule for path in paths for rule in rules_in(ast.parse(path.read_text(encoding="utf-8")))}
+def rules_of(*patterns: str, package: str = "contextdb") -> set[str]:
+    """Every rule that the modules of a package name."""
+    paths = [path for pattern in patterns for path in (ROOT / package).glob(pattern)]
+    return {rule for path in paths for rule in rules_in(ast.parse(path.read_text(encoding="utf-8")), package == "contextdb")}
 
 
 def fenced(section: str, language: str) -> str | None:
@@ -63,7 +67,7 @@ def printed(section: str, folder: Path) -> str:
 
 
 def test_every_rule_that_the_code_names_has_its_section_and_the_other_way_round():
-    assert rules_of("**/*.py") == set(SECTIONS)
+    assert rules_of("**/*.py") | rules_of("**/*.py", package="tui") == set(SECTIONS)
 
 
 def test_every_rule_of_a_check_carries_its_own_help():

@@ -40,7 +40,8 @@ def drive(app: App[Any], script: Callable[[Pilot[Any]], Awaitable[T]], size: tup
 async def settled(pilot: Pilot[Any], n_rounds: int = 4) -> None:
     """Wait until what was pressed has gone its way: a message goes on from part to part, and each may tell another."""
     for _ in range(n_rounds):
-        await pilot.pause()
+        await pilot.pause(0.0)
+    await pilot.pause()
 
 
 @contextlib.contextmanager

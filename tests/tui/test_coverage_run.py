@@ -142,10 +142,10 @@ def test_contexts_that_the_assumptions_rule_out_belong_to_no_share():
     run = CoverageRun()
     run.start(cdb.Table.from_columns(columns, schema, settings))
     result = done(run).result
+    assert result.report.assumptions == ("not (up and down)", "a < b")
     assert result.report.covered == pytest.approx(1 / 3)
-    assert (result.assumed, result.left_aside) == (("not (up and down)",), ("a < b",))
     assert result.pairs.slice(0, 1, 1, 1).covered is None
-    assert "Left aside, as it compares or computes facts: a < b" in about_text(result)
+    assert "Assumed of every context: a < b" in about_text(result)
 
 
 def test_an_assumption_that_cannot_be_read_is_told():

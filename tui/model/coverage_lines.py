@@ -179,8 +179,8 @@ def about_text(result: Result) -> str:
     given = f"Weights were given for {', '.join(report.weighted)}."
     lines.append(given if report.weighted else "Every value of a condition counts the same, numbers by length.")
     lines += [f"{name} is not fully declared: {what}." for name, what in report.assumed.items()]
-    lines += [f"Assumed of every context: {text}" for text in result.assumed]
-    lines += [f"Left aside, as it compares or computes facts: {text}" for text in result.left_aside]
+    lines += [f"Assumed of every context: {text}" for text in report.assumptions]
+    lines += [f"Known to samples only, so that the share is an estimate: {text}" for text in report.sampled]
     lines.append("")
     lines.append(f"Rows valid at once: {report.overlap.mean:.3g} on average ({report.overlap.method}).")
     lines += [f"  {n:>3}   {format_percent(share)}" for n, share in enumerate(report.overlap.histogram) if share > 0.0]

@@ -19,7 +19,6 @@ from typing import Literal
 from contextdb.covering import Cancelled, CoverageReport, PairTable, coverage, pairs
 from contextdb.covering.progress import Stops, Tell
 from contextdb.errors import ContextDBError, plural, shown
-from contextdb.expressions import assumptions_of
 from contextdb.table import Table
 
 State = Literal["none", "running", "done", "stale", "failed"]
@@ -36,10 +35,6 @@ class Result:
 
     report: CoverageReport
     pairs: PairTable
-    assumed: tuple[str, ...] = ()
-    """The assumptions that were taken into account."""
-    left_aside: tuple[str, ...] = ()
-    """Assumptions that compute with facts: what they rule out is no box, so it was counted as possible."""
 
 
 Measure = Callable[[Table, Tell, Stops], Result]
@@ -47,24 +42,9 @@ Measure = Callable[[Table, Tell, Stops], Result]
 
 def measured(table: Table, tell: Tell, should_stop: Stops) -> Result:
     """The coverage of a table and of its pairs of conditions, in the contexts that its assumptions leave."""
-    assumptions = assumptions_of(table)
-    boxes = assumptions.boxes
-    report = coverage(
-        table,
-        max_gaps=MOST_GAPS,
-        impossible=boxes,
-        progress=lambda part, share: tell(part, share * PAIRS_AT),
-        should_stop=should_stop,
-    )
-    compared = pairs(
-        table,
-        impossible=boxes,
-        progress=lambda part, share: tell(part, PAIRS_AT + share * (1.0 - PAIRS_AT)),
-        should_stop=should_stop,
-    )
-    aside = [e.text for e in assumptions.unboxed]
-    told = [e.text for e in assumptions.expressions if e.text not in aside]
-    return Result(report, compared, tuple(told), tuple(aside))
+    report = coverage(table, max_gaps=MOST_GAPS, progress=lambda part, share: tell(part, share * PAIRS_AT), should_stop=should_stop)
+    compared = pairs(table, progress=lambda part, share: tell(part, PAIRS_AT + share * (1.0 - PAIRS_AT)), should_stop=should_stop)
+    return Result(report, compared)
 
 
 @dataclass(eq=False)

@@ -54,7 +54,7 @@ class OptionsPane(Pane):
 
     DEFAULT_CSS = """
     OptionsPane {
-        layout: vertical; overflow-y: auto; height: 1fr;
+        layout: vertical; overflow-y: auto; height: 1fr; background: $surface;
         & > .options--part { height: auto; padding: 0 1; width: 1fr; }
         &.-wide { layout: horizontal; }
         & .options--title { color: $text; margin: 0 0 1 0; height: auto; }

@@ -55,7 +55,7 @@ class PrioritiesPane(Pane):
 
     DEFAULT_CSS = """
     PrioritiesPane {
-        layout: vertical; height: 1fr; overflow-y: auto;
+        layout: vertical; height: 1fr; overflow-y: auto; background: $surface;
         & #priorities-context { height: auto; padding: 0 1; color: $text-muted; }
         & #priorities-list { height: auto; max-height: 1fr; border: none; padding: 0 1; background: transparent; margin: 1 0 0 0; }
         & #priorities-list > .option-list--option-disabled { color: $text; }
@@ -63,9 +63,9 @@ class PrioritiesPane(Pane):
         & #priorities-list:focus > .option-list--option-highlighted { text-style: bold; }
         & #priorities-detail { height: auto; max-height: 8; padding: 0 1; color: $text-muted; overflow-y: auto; }
         & #priorities-empty { height: auto; padding: 0 1; }
-        & #priorities-foot { height: auto; dock: bottom; padding: 0 1; background: $background; }
+        & #priorities-foot { height: auto; dock: bottom; padding: 0 1; background: $surface; }
         & #priorities-tools { height: 1; }
-        & #priorities-tools Button { margin: 0 1 0 0; min-width: 0; width: auto; padding: 0 1; }
+        & #priorities-tools Button { margin: 0 1 0 0; min-width: 0; width: auto; padding: 0 1; background: $panel; }
         & #priorities-entry { height: auto; display: none; }
         & #priorities-entry.-open { display: block; }
         & #priorities-entry Horizontal { height: 1; }

@@ -114,6 +114,8 @@ class Grid(ScrollView, can_focus=True):
         self._drag: tuple[str, int] | None = None
         """What the mouse drags: ("cells" | "rows" | "columns", -) or ("width", column)."""
         self._layout: Layout | None = None
+        self._laid_out = sheet.table
+        """The table that the layout is of: a step may have made another one before the screen is told."""
         self._said_shape = (-1, -1)
 
     def post_message(self, message: Message) -> bool:
@@ -152,7 +154,8 @@ class Grid(ScrollView, can_focus=True):
     @property
     def grid_layout(self) -> Layout:
         """Where the columns stand."""
-        if self._layout is None or self._layout.width != self.window.width:
+        if self._layout is None or self._layout.width != self.window.width or self._laid_out is not self.sheet.table:
+            self._laid_out = self.sheet.table
             names = [c.name for c in self.sheet.table.columns]
             widths = [self._width(at, name) for at, name in enumerate(names)]
             n_frozen = names.index(self.sheet.table.asset_column) + 1
@@ -256,7 +259,7 @@ class Grid(ScrollView, can_focus=True):
 
     def action_edge(self, down: int, right: int, extend: bool) -> None:
         """Ctrl and an arrow."""
-        if not self.is_in_test_row:
+        if not self.is_in_test_row and len(self.sheet.view):
             self._moving(lambda: self.sheet.move_to_edge(down, right, extend))
         elif right:
             self.action_jump("home" if right < 0 else "end", False)

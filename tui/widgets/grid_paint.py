@@ -52,14 +52,18 @@ class Painter:
         self.style = style
         self._window: Window | None = None
         self._headers: dict[int, Header] = {}
+        self._read = sheet.table, sheet.view
 
     def changed(self) -> None:
         """Read the sheet anew."""
         self._window = None
         self._headers.clear()
+        self._read = self.sheet.table, self.sheet.view
 
     def line(self, y: int, look: Look) -> Strip:
         """Line `y` of the window."""
+        if self._read[0] is not self.sheet.table or self._read[1] is not self.sheet.view:
+            self.changed()  # painted between a step and word of it
         if y < N_HEADERS:
             return self._header_line(y, look)
         if y == look.height - 1:

@@ -1,0 +1,244 @@
+"""Which contexts have a valid row, which have none, and whether that is enough.
+
+Exits with 1 when a bar is missed: --fail-under, --fail-under-telemetry, --max-drop (0 unless given, when there is a --baseline).
+Bars are held against the lower bound of the covered share, so that no lucky sample passes.
+
+  contextdb coverage tables/
+  contextdb coverage locomotion --gap 1
+  contextdb coverage tables/ --format json -o coverage.json
+  contextdb coverage tables/ --baseline coverage.json --max-drop 0.5
+  contextdb coverage tables/ --format html -o coverage.html
+  contextdb coverage locomotion --telemetry "recorded/*.parquet" --fail-under-telemetry 99.5
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contextdb.commands import coverage_telemetry
+from contextdb.console import output, printable, terminal_width, wants_colour
+from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
+from contextdb.disk import read_bytes, write_atomic
+from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
+from contextdb.exit_codes import ExitCode
+from contextdb.places import table_path
+from contextdb.project import SCHEMA_FILE, Project, load_table
+from contextdb.report import coverage_formats
+
+if TYPE_CHECKING:
+    from contextdb.covering.baseline import Earlier
+    from contextdb.report.coverage_results import CoverageResults, Measured
+    from contextdb.table import Table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or the name of a table")
+    formats = coverage_formats.FORMATS
+    told = f"{', '.join(formats)} (default: text)"
+    parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=told)
+    parser.add_argument("--json", action="store_const", const="json", dest="format", help="the same as --format json")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
+    parser.add_argument("--fail-under", type=_percent, metavar="PCT", help="fail when less is covered in any table")
+    parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run")
+    parser.add_argument("--max-drop", type=_percent, metavar="PCT", help="how many points a table may fall below the baseline")
+    parser.add_argument("--gap", metavar="N", help="tell all of one gap, by its number or id")
+    parser.add_argument("--explain", metavar="ROW", help="tell all of one row, by its number (from 0) or asset")
+    parser.add_argument("--all", action="store_true", help="list every gap and finding")
+    parser.add_argument("--seed", type=_count, default=0, metavar="N", help="where samples start (default: 0)")
+    parser.add_argument("--work", type=_count, default=WORK, metavar="N", help=f"steps of the exact count (default: {WORK:,})")
+    parser.add_argument("--samples", type=_count, default=SAMPLES, metavar="N", help=f"contexts to try (default: {SAMPLES:,})")
+    coverage_telemetry.add_arguments(parser, _percent)
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Measure one table or a folder of them."""
+    _require_sense(arguments)
+    tables = tables_at(arguments.path)
+    baseline = _read_baseline(arguments.baseline) if arguments.baseline else None
+    if arguments.gap is not None or arguments.explain is not None:
+        text, code = _details(arguments, _only(tables)), ExitCode.OK
+    else:
+        results = _results(arguments, tables, baseline)
+        code = _code(results)
+        colour = wants_colour(sys.stdout) and not arguments.output
+        text = coverage_formats.render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
+    if arguments.output:
+        write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
+    else:
+        with output():
+            print(text, end="")
+    return code
+
+
+def _code(results: CoverageResults) -> ExitCode:
+    """Whether every bar is kept; telemetry that could not be read whole is no answer."""
+    if any(m.telemetry is not None and not m.telemetry.is_complete for m in results.tables):
+        return ExitCode.BAD_USE
+    return ExitCode.OK if results.passed else ExitCode.FOUND
+
+
+def tables_at(text: str) -> list[Table]:
+    """The tables under a path: a folder of them, one file, or a table by its name.
+
+    Raises
+    ------
+    ContextDBError
+        With every fault of every file; a folder without a table is one.
+    """
+    if not os.path.isdir(text) and Path(text).name != SCHEMA_FILE:
+        return [load_table(table_path(text))]
+    found = list(Project.load(text).tables.values())
+    if not found:
+        accepted = f"a folder with {SCHEMA_FILE} and a .csv or .parquet file for each table"
+        raise FileError(Fault("the folder holds no table.", accepted, place=Place(text), rule="no-tables"))
+    return found
+
+
+def _require_sense(arguments: argparse.Namespace) -> None:
+    if arguments.max_drop is not None and not arguments.baseline:
+        raise ContextError(Fault("--max-drop compares with a baseline.", "--baseline FILE beside it"))
+    coverage_telemetry.require_telemetry(arguments)
+    is_detail = arguments.gap is not None or arguments.explain is not None
+    names = ("fail_under", "fail_under_telemetry", "max_drop", "baseline")
+    bars = [f"--{name.replace('_', '-')}" for name in names if getattr(arguments, name) is not None]
+    if is_detail and (arguments.format != "text" or bars):
+        other = f"--format {arguments.format}" if arguments.format != "text" else bars[0]
+        raise ContextError(Fault(f"--gap and --explain are text about one thing; {other} does not go with them."))
+    if arguments.gap is not None and arguments.explain is not None:
+        raise ContextError(Fault("--gap and --explain do not go together.", "one of them"))
+
+
+def _results(arguments: argparse.Namespace, tables: Sequence[Table], baseline: dict[str, Earlier] | None) -> CoverageResults:
+    from contextdb.report.coverage_results import CoverageResults
+
+    measured = tuple(_measured(arguments, table, baseline) for table in tables)
+    names = {table.name for table in tables}
+    is_folder = os.path.isdir(arguments.path) or Path(arguments.path).name == SCHEMA_FILE
+    gone = tuple(name for name in baseline or () if name not in names) if is_folder else ()
+    return CoverageResults(measured, gone)
+
+
+def _measured(arguments: argparse.Namespace, table: Table, baseline: dict[str, Earlier] | None) -> Measured:
+    from dataclasses import replace
+
+    from contextdb.covering.assumed import opened
+    from contextdb.covering.baseline import compared
+    from contextdb.report.coverage_results import fail_under, fail_under_telemetry, max_drop
+
+    found = measure(arguments, table)
+    gates = [] if arguments.fail_under is None else [fail_under(found.report, arguments.fail_under)]
+    if found.telemetry is not None and arguments.fail_under_telemetry is not None:
+        gates.append(fail_under_telemetry(found.telemetry, arguments.fail_under_telemetry))
+    change = None
+    if baseline is not None and table.name in baseline:
+        change = compared(opened(table), found.report, baseline[table.name])
+        gates.append(max_drop(change, arguments.max_drop or 0.0))
+    return replace(found, change=change, gates=tuple(gates))
+
+
+def measure(arguments: argparse.Namespace, table: Table) -> Measured:
+    """The coverage of one table and of its pairs of conditions, by the budgets of the arguments."""
+    from contextdb.covering import coverage, pairs
+    from contextdb.covering.pairs import SAMPLES as PAIR_SAMPLES
+    from contextdb.report.coverage_results import Measured
+
+    with _placed(table):
+        with coverage_telemetry.bar(f"measuring {printable(table.name)}") as told:
+            report = coverage(
+                table,
+                seed=arguments.seed,
+                work=arguments.work,
+                samples=arguments.samples,
+                max_gaps=MOST_GAPS,
+                progress=None if told is None else lambda _, share: told(int(1000 * share), 1000),
+            )
+        seen = coverage_telemetry.observed(arguments, table)
+        compared = pairs(table, seed=arguments.seed, samples=min(arguments.samples, PAIR_SAMPLES))
+    lines = tuple(table.place(row).line for row in range(table.n_rows))
+    return Measured(report, str(table.path) if table.path else None, tuple(table.assets), lines, compared, telemetry=seen)
+
+
+@contextmanager
+def _placed(table: Table) -> Iterator[None]:
+    """Say of a fault which table it is in."""
+    try:
+        yield
+    except ContextDBError as error:
+        file = str(table.path) if table.path else table.name
+        raise type(error)(*(f if f.place.file else f.at(Place(file, column=f.place.column)) for f in error.faults)) from None
+
+
+def _details(arguments: argparse.Namespace, table: Table) -> str:
+    from contextdb.report.coverage_details import gap_details, row_details
+
+    width = terminal_width()
+    if arguments.explain is not None:
+        row = _row(arguments.explain, table)
+        return row_details(measure(arguments, table), row, width)
+    measured = measure(arguments, table)
+    gaps = measured.report.gaps
+    text = arguments.gap
+    found = [g for i, g in enumerate(gaps, 1) if text in (str(i), g.id)]
+    if not found:
+        accepted = f"1 to {len(gaps)}, or an id of the JSON report" if gaps else "none: no gap was found"
+        raise ContextError(Fault(f"there is no gap {in_quotes(text)}.", accepted))
+    return gap_details(measured, found[0], table, width)
+
+
+def _row(text: str, table: Table) -> int:
+    """The row that --explain means: a number from 0, else an asset that stands in one row."""
+    rows = [row for row, asset in enumerate(table.assets) if asset == text]
+    if len(rows) == 1:
+        return rows[0]
+    if text.isdecimal() and int(text) < table.n_rows:
+        return int(text)
+    if rows:
+        numbers = ", ".join(map(str, rows[:6]))
+        found = f"the asset {in_quotes(text)} stands in {plural(len(rows), 'row')}."
+        raise ContextError(Fault(found, f"one of the rows {numbers}"))
+    near = nearest(text, table.assets)
+    accepted = f"a row from 0 to {table.n_rows - 1:,}, or an asset" if table.n_rows else "none: the table has no rows"
+    raise ContextError(Fault(f"there is no row {in_quotes(text)}.", accepted, in_quotes(near) if near else ""))
+
+
+def _only(tables: Sequence[Table]) -> Table:
+    if len(tables) != 1:
+        names = ", ".join(in_quotes(table.name) for table in tables[:6])
+        raise TableError(Fault(f"--gap and --explain are about one table, and there are {len(tables)}.", f"one of {names}"))
+    return tables[0]
+
+
+def _read_baseline(file: str) -> dict[str, Earlier]:
+    from contextdb.covering.baseline import ACCEPTED, read_baseline
+
+    try:
+        text = read_bytes(Path(file)).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ContextError(Fault("the baseline is no text.", ACCEPTED, place=Place(file))) from None
+    return read_baseline(text, file)
+
+
+def _percent(text: str) -> float:
+    """A percentage as a share."""
+    try:
+        percent = float(text.removesuffix("%"))
+    except ValueError:
+        percent = -1.0
+    if not 0.0 <= percent <= 100.0:
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no percentage. Accepted: a number from 0 to 100.")
+    return percent / 100.0
+
+
+def _count(text: str) -> int:
+    """A whole number from 0 up."""
+    plain = text.replace("_", "").replace(",", "")
+    if not (plain.isascii() and plain.isdecimal()) or len(plain) > 15:
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no whole number from 0 up.")
+    return int(plain)

@@ -1,0 +1,93 @@
+"""The part of `contextdb coverage` that holds recorded contexts against the tables."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from contextdb.console import printable
+from contextdb.errors import ContextError, Fault
+
+if TYPE_CHECKING:
+    from contextdb.table import Table
+    from contextdb.telemetry import Observed
+
+ENGINES = ("local", "dask")
+
+
+def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], float]) -> None:
+    """The arguments about telemetry."""
+    told = parser.add_argument_group("recorded contexts")
+    told.add_argument(
+        "--telemetry", action="append", metavar="GLOB", help="CSV or Parquet files with a column for each fact; may be given again"
+    )
+    told.add_argument(
+        "--fail-under-telemetry", type=percent, metavar="PCT", help="fail when fewer of the recorded moments have a valid row"
+    )
+    told.add_argument("--count", metavar="COLUMN", help="the column that says how often each row's moment was seen")
+    told.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
+    told.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
+    told.add_argument("--resume", metavar="FOLDER", help="keep the sums of finished files, and go on there after an interruption")
+
+
+def require_telemetry(arguments: argparse.Namespace) -> None:
+    """Refuse options about telemetry where there is none.
+
+    Raises
+    ------
+    ContextError
+        The first of them is named.
+    """
+    if arguments.telemetry:
+        if arguments.scheduler is not None and arguments.engine != "dask":
+            raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask beside it"))
+        return
+    given = {
+        "--fail-under-telemetry": arguments.fail_under_telemetry is not None,
+        "--count": arguments.count is not None,
+        "--engine": arguments.engine != "local",
+        "--scheduler": arguments.scheduler is not None,
+        "--resume": arguments.resume is not None,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise ContextError(Fault(f"{option} is about recorded contexts.", "--telemetry GLOB beside it"))
+
+
+def observed(arguments: argparse.Namespace, table: Table) -> Observed | None:
+    """What the recorded contexts say of a table; None where no files were named. Files that cannot be read are told."""
+    if not arguments.telemetry:
+        return None
+    from contextdb.telemetry import observe
+
+    with bar(f"reading telemetry for {printable(table.name)}") as tell:
+        found = observe(
+            table,
+            arguments.telemetry,
+            count=arguments.count,
+            engine=arguments.engine,
+            scheduler=arguments.scheduler,
+            progress=tell,
+            resume=arguments.resume,
+        )
+    for file in found.unread:
+        for fault in file.faults:
+            print(printable(f"contextdb: {fault}"), file=sys.stderr)
+    return found
+
+
+@contextmanager
+def bar(label: str) -> Iterator[Callable[[int, int], None] | None]:
+    """A bar, told how much is done of how much; on standard error where that is a terminal, else None."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as shown:
+        task = shown.add_task(label, total=None)
+        yield lambda done, total: shown.update(task, completed=done, total=total)

@@ -1,0 +1,94 @@
+"""What a table assumes of its contexts, read for coverage: its `assume`, and that derived facts are what they are computed as.
+
+What boxes can tell is left out of the space, exactly. The rest is left to a `Drawer`: it draws contexts that can happen, so that
+shares are estimates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from contextdb.compiled import CompiledTable
+from contextdb.conditions import Condition
+from contextdb.covering.draw import Drawer
+from contextdb.covering.progress import SILENT, Progress
+from contextdb.covering.space import CellBox, Space, WeightsOf, used_factors
+from contextdb.expressions import Assumptions, Derivation, Expression, assumptions_of
+from contextdb.expressions.tokens import written_name
+from contextdb.table import Table
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A table ready to be measured."""
+
+    compiled: CompiledTable
+    table: Table | None
+    """None where a compiled table was given: it has no lines and no assumptions."""
+    space: Space
+    drawer: Drawer | None
+    assumptions: tuple[str, ...] = ()
+    """What was taken into account, as contextdb.toml has it."""
+    sampled: tuple[str, ...] = ()
+    """What of it only samples know."""
+
+
+def opened(
+    table: Table | CompiledTable,
+    impossible: Sequence[CellBox] = (),
+    weights: WeightsOf | None = None,
+    assume: bool = True,
+    progress: Progress = SILENT,
+) -> Opened:
+    """A table with its space; see `contextdb.covering.coverage` for the arguments and what is raised."""
+    if isinstance(table, CompiledTable):
+        return Opened(table, None, Space.of(table, impossible, weights, progress), None)
+    compiled = table.compile()
+    if not assume:
+        return Opened(compiled, table, Space.of(compiled, impossible, weights, progress), None)
+    assumed = assumptions_of(table)
+    space = Space.of(compiled, [*impossible, *assumed.boxes], weights, progress)
+    texts = tuple(expression.text for expression in assumed.expressions)
+    restricted = _restricted(space)
+    drawn = [c for c in _drawn(table, assumed) if c.name in restricted]
+    named = [c.name for expression in assumed.unboxed for c in expression.conditions]
+    derivation = table.schema.derivation_of([*(c.name for c in compiled.conditions), *named])
+    unboxed = _that_matter(assumed.unboxed, derivation, restricted)
+    if not drawn and not unboxed:
+        return Opened(compiled, table, space, None, texts)
+    sampled = (*(f"{c.name} = {c.expr}" for c in drawn), *(expression.text for expression in unboxed))
+    return Opened(compiled, table, space, Drawer(space, derivation, unboxed), texts, sampled)
+
+
+def _restricted(space: Space) -> set[str]:
+    """The conditions that some row, or some context that cannot happen, restricts."""
+    used = set(used_factors(space.boxes + space.impossible, space.full))
+    return {c.name for c, factors in zip(space.conditions, space.of_condition, strict=True) if used.intersection(factors)}
+
+
+def _that_matter(unboxed: Sequence[Expression], derivation: Derivation | None, restricted: Iterable[str]) -> tuple[Expression, ...]:
+    """The assumptions that have to do with what rows restrict, if only by way of others; the rest changes no share."""
+    linked = _with_inputs(restricted, derivation)
+    left, found = list(unboxed), set[str]()
+    while near := [e for e in left if not linked.isdisjoint(_with_inputs(e.names, derivation))]:
+        left = [e for e in left if e not in near]
+        found |= {e.text for e in near}
+        linked |= _with_inputs((name for e in near for name in e.names), derivation)
+    return tuple(e for e in unboxed if e.text in found)
+
+
+def _with_inputs(names: Iterable[str], derivation: Derivation | None) -> set[str]:
+    """Some facts, and those that they are computed from."""
+    own = set(names)
+    return own if derivation is None else own | {n for step in derivation.only(own).steps for n in step.expression.names}
+
+
+def _drawn(table: Table, assumed: Assumptions) -> Iterator[Condition]:
+    """The derived conditions of a table that no boxes over its conditions tell."""
+    names = {column.condition.name for column in table.conditions}
+    told = {e.text for e in assumed.derived if all(box.keys() <= names for box in e.as_boxes(False) or ())}
+    for column in table.conditions:
+        condition = column.condition
+        if condition.expr and f"{written_name(condition.name)} == ({condition.expr})" not in told:
+            yield condition

@@ -1,0 +1,189 @@
+"""A coverage report against an earlier one: gaps that opened and closed, rows that died, how much the covered share fell.
+
+The earlier report is the JSON of `contextdb coverage --format json`. Gaps are compared by what they hold, not by how they are cut:
+a gap is new when it holds a context that no earlier gap held, and an earlier one is closed when every context of it has a valid row
+now. Where that cannot be told (the search is too long, a condition is gone) gaps of one id are the same.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from contextdb.cells import Cell, parse_cell
+from contextdb.covering.assumed import Opened
+from contextdb.covering.report import CoverageReport, Gap
+from contextdb.covering.space import Box, Space
+from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
+from contextdb.domains import Domain
+from contextdb.errors import ContextDBError, ContextError, Fault, Place
+from contextdb.findings import Finding
+
+FORMAT = 1
+DEAD_RULES = ("dead-row", "never-chosen")
+STEPS = 20_000
+"""Search steps for one comparison."""
+ACCEPTED = 'the document that "contextdb coverage --format json" writes'
+
+
+@dataclass(frozen=True)
+class EarlierGap:
+    """A gap of an earlier report."""
+
+    id: str
+    cells: dict[str, str]
+    share: float
+
+    @property
+    def text(self) -> str:
+        """The cells on one line."""
+        return ", ".join(f"{name}: {cell}" for name, cell in self.cells.items()) or "every context"
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {"id": self.id, "share": self.share, "cells": self.cells}
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """What an earlier report says of one table."""
+
+    lower: float
+    gaps: tuple[EarlierGap, ...]
+    is_complete: bool
+    dead: Counter[tuple[str, str]]
+    """Rule and asset of each dead row."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What became of a table since an earlier report."""
+
+    before: float
+    """The lower bound of the covered share then."""
+    drop: float
+    """How much the lower bound fell; below 0 where it rose."""
+    opened: tuple[Gap, ...]
+    closed: tuple[EarlierGap, ...]
+    dead: tuple[Finding, ...]
+    """Rows that became dead, or are never chosen any more."""
+    is_complete: bool
+    """Whether both reports list all their gaps; else a gap that was too small for the earlier list may seem new."""
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {
+            "before": self.before,
+            "drop": self.drop,
+            "complete": self.is_complete,
+            "opened": [gap.id for gap in self.opened],
+            "closed": [gap.to_json() for gap in self.closed],
+            "dead": [finding.to_json() for finding in self.dead],
+        }
+
+
+def read_baseline(text: str, file: str) -> dict[str, Earlier]:
+    """What an earlier report says, by table.
+
+    Raises
+    ------
+    ContextError
+        It is no such report; the place names the file.
+    """
+    try:
+        document = json.loads(text)
+        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            raise ValueError('it has no "format": 1')
+        return {_text(entry["table"]): _earlier(entry) for entry in document["tables"]}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        why = f"{error} is missing" if isinstance(error, KeyError) else str(error) or "lists stand in lists too deep"
+        fault = Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))
+        raise ContextError(fault) from None
+
+
+def _earlier(entry: Mapping[str, Any]) -> Earlier:
+    gaps = entry["gaps"]
+    items = [
+        EarlierGap(_text(g["id"]), {_text(n): _text(c) for n, c in g["cells"].items()}, _share(g["share"])) for g in gaps["items"]
+    ]
+    found = entry.get("findings", [])
+    dead = Counter((_text(f["rule"]), str(f.get("asset"))) for f in found if f["rule"] in DEAD_RULES)
+    return Earlier(_share(entry["covered"]["lower"]), tuple(items), gaps["complete"] is True, dead)
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r:.60} is no text")
+    return value
+
+
+def _share(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (math.isfinite(value) and 0 <= value <= 1):
+        raise ValueError(f"{value!r:.60} is no share from 0 to 1")
+    return float(value)
+
+
+def compared(ready: Opened, report: CoverageReport, earlier: Earlier) -> Change:
+    """What became of a table; `report` is that of the table that `ready` holds."""
+    now, before = [gap.cells for gap in report.gaps], [gap.cells for gap in earlier.gaps]
+    excluded = [ready.space.cells(box) for box in ready.space.impossible]
+    space, boxes = _boxes(ready, [*excluded, *now, *before])
+    impossible = [box for box in boxes[: len(excluded)] if box is not None]
+    now_boxes, before_boxes = boxes[len(excluded) :][: len(now)], boxes[len(excluded) + len(now) :]
+    held_before = BoxSet.of(space.full, [*impossible, *(box for box in before_boxes if box is not None)])
+    rows = BoxSet.of(space.full, [*impossible, *space.boxes])
+    ids_now, ids_before = {gap.id for gap in report.gaps}, {gap.id for gap in earlier.gaps}
+    opened = (g for g, box in zip(report.gaps, now_boxes, strict=True) if g.id not in ids_before and not _is_in(box, held_before))
+    closed = (g for g, box in zip(earlier.gaps, before_boxes, strict=True) if g.id not in ids_now and _is_closed(box, rows))
+    is_complete = report.gaps_complete and earlier.is_complete
+    dead = tuple(_newly_dead(report.findings, earlier.dead))
+    return Change(earlier.lower, earlier.lower - report.lower, tuple(opened), tuple(closed), dead, is_complete)
+
+
+def _boxes(ready: Opened, boxes: Sequence[Mapping[str, str]]) -> tuple[Space, list[Box | None]]:
+    """Boxes of cells in a space that tells them apart; None for those that the table cannot say any more."""
+    domains = {condition.name: condition.domain for condition in ready.space.conditions}
+    readable = [cells if _reads(cells, domains) else None for cells in boxes]
+    space = Space.of(ready.compiled, [cells for cells in readable if cells is not None])
+    return space, [None if cells is None else space.box(_parsed(cells, domains)) for cells in readable]
+
+
+def _parsed(cells: Mapping[str, str], domains: Mapping[str, Domain]) -> dict[str, Cell]:
+    return {name: parse_cell(text, domains[name], wants_mend=False) for name, text in cells.items()}
+
+
+def _reads(cells: Mapping[str, str], domains: Mapping[str, Domain]) -> bool:
+    try:
+        return bool(_parsed(cells, domains)) or not cells
+    except (KeyError, ContextDBError):
+        return False
+
+
+def _is_in(box: Box | None, others: BoxSet) -> bool:
+    """Whether some boxes hold a whole box; "no" where that cannot be told."""
+    try:
+        return box is not None and others.outside(others.all, box, Steps(STEPS)) is None
+    except OutOfSteps:
+        return False
+
+
+def _is_closed(box: Box | None, rows: BoxSet) -> bool:
+    """Whether every context of an earlier gap has a valid row now, or can happen no more; one that the table cannot say is gone."""
+    try:
+        return box is None or rows.outside(rows.all, box, Steps(STEPS)) is None
+    except OutOfSteps:
+        return True
+
+
+def _newly_dead(findings: Iterable[Finding], before: Counter[tuple[str, str]]) -> Iterable[Finding]:
+    left = before.copy()
+    for finding in findings:
+        if finding.rule in DEAD_RULES:
+            key = (finding.rule, str(finding.asset))
+            left[key] -= 1
+            if left[key] < 0:
+                yield finding

@@ -1,0 +1,85 @@
+"""Crowded contexts: where most rows are valid at once, as boxes that all of those rows hold.
+
+A context with many valid rows is moved, one factor at a time, to the class that keeps most rows, until no class keeps more. The
+rows that are valid there meet in one box. Where the space was gone through whole, the first is the fullest there is; else the best
+that samples led to. Single points of a domain do not count: two ends that touch are no crowd.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from contextdb.covering.progress import SILENT, Progress
+from contextdb.covering.space import Box, Space
+from contextdb.covering.witness import BoxSet, Point
+
+MOST_CROWDS = 10
+SWEEPS = 20
+"""So many times each factor may be moved; it takes two or three."""
+
+
+@dataclass(frozen=True)
+class CrowdBox:
+    """Boxes of the space (by number, as bits) and what they share."""
+
+    held_by: int
+    box: Box
+
+
+def find_crowds(space: Space, seeds: Iterable[Point], most: int = MOST_CROWDS, progress: Progress = SILENT) -> list[CrowdBox]:
+    """The fullest boxes that climbing from the seeds leads to, most rows first; none lies within the rows of another."""
+    rows = BoxSet.of(space.full, space.boxes, progress)
+    impossible = BoxSet.of(space.full, space.impossible, progress)
+    found: dict[int, None] = {}
+    for point in seeds:
+        progress.check()
+        found[_climbed(space, rows, impossible, point)] = None
+    kept: list[int] = []
+    for bits in sorted(found, key=lambda b: (-b.bit_count(), b)):
+        if bits.bit_count() > 1 and not any(bits & ~other == 0 for other in kept):
+            kept.append(bits)
+    return [CrowdBox(bits, _shared(space, bits)) for bits in kept[:most]]
+
+
+def _climbed(space: Space, rows: BoxSet, impossible: BoxSet, start: Point) -> int:
+    """The boxes that hold the fullest possible context which changes of one factor at a time lead to."""
+    point = list(start)
+    n_valid = _holding(rows, point).bit_count()
+    for _ in range(SWEEPS):
+        before = n_valid
+        for f in range(len(point)):
+            point[f], n_valid = _best_class(space, rows, impossible, point, f, n_valid)
+        if n_valid == before:
+            break
+    return _holding(rows, point)
+
+
+def _best_class(space: Space, rows: BoxSet, impossible: BoxSet, point: list[int], f: int, n_valid: int) -> tuple[int, int]:
+    """The class of one factor with most rows, and how many; the present one unless another has more."""
+    if not rows.restricts[f]:
+        return point[f], n_valid
+    others, ruled_out = _holding(rows, point, f), _holding(impossible, point, f)
+    best = point[f]
+    for k, weight in enumerate(space.factors[f].weights.tolist()):
+        n = (others & rows.accepts[f][k]).bit_count()
+        if n > n_valid and weight > 0.0 and not ruled_out & impossible.accepts[f][k]:
+            best, n_valid = k, n
+    return best, n_valid
+
+
+def _holding(boxes: BoxSet, point: list[int], without: int = -1) -> int:
+    found = boxes.all
+    for f, k in enumerate(point):
+        if f != without:
+            found &= boxes.accepts[f][k]
+    return found
+
+
+def _shared(space: Space, bits: int) -> Box:
+    box = space.full
+    while bits:
+        lowest = bits & -bits
+        box = tuple(a & b for a, b in zip(box, space.boxes[lowest.bit_length() - 1], strict=True))
+        bits ^= lowest
+    return box

@@ -1,0 +1,233 @@
+"""Pairs of conditions: which share of the contexts with two given values has a valid row, and whether any row names the two.
+
+Each condition's domain is cut into a few parts: a value, a span of numbers, a tag that is there or not. A slice is a part of one
+condition with a part of another. Its *conditional* coverage is the share of its possible contexts that have a valid row; it is
+*named* when some row restricts both conditions and accepts some of both parts. (That some row accepts both is worth little: rows
+that say Any accept everything.)
+
+G is the number of parts of all conditions; part p belongs to one condition. A condition with itself has slices too: those of one
+part with itself are that part's own coverage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.compiled import CompiledTable
+from contextdb.covering.assumed import opened
+from contextdb.covering.parts import Sides, flags_of, parts_of
+from contextdb.covering.progress import Progress, Stops, Tell
+from contextdb.covering.sample import Codes, Sampler, lookup
+from contextdb.covering.shares import wilson
+from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
+from contextdb.table import Table
+
+SAMPLES = 50_000
+
+
+@dataclass(frozen=True, slots=True)
+class Slice:
+    """Two parts, and what is known of the contexts that lie in both."""
+
+    cells: dict[str, str]
+    share: float
+    """Of the possible contexts; 0 where none is possible, or single points only."""
+    covered: float | None
+    """The share of them that has a valid row; None where nothing could be measured."""
+    lower: float
+    upper: float
+    """Both equal `covered` where it is exact; else its 99 % interval (Wilson)."""
+    n_samples: int
+    """Contexts that the estimate rests on; 0 where it is exact."""
+    n_rows: int
+    """Rows that are valid in some of them, or would be if they were possible."""
+    is_named: bool
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether `covered` is no estimate."""
+        return self.covered is not None and self.lower == self.upper
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {
+            "cells": self.cells,
+            "share": self.share,
+            "covered": self.covered,
+            "lower": self.lower,
+            "upper": self.upper,
+            "samples": self.n_samples,
+            "rows": self.n_rows,
+            "named": self.is_named,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class PairTable:
+    """Conditional and explicit coverage of all pairs of conditions."""
+
+    table: str
+    method: Literal["exact", "estimate"]
+    seed: int
+    n_samples: int
+    """Contexts tried; 0 where all were gone through."""
+    conditions: tuple[str, ...]
+    parts: tuple[tuple[str, ...], ...]
+    """For each condition its parts as cells."""
+    shares: NDArray[np.float64]
+    """float64 [G, G]: the share of the possible contexts in both parts, as measured."""
+    covered: NDArray[np.float64]
+    """float64 [G, G]: the share of the possible contexts that is in both parts and has a valid row."""
+    counts: NDArray[np.int64]
+    """int64 [G, G]: samples in both parts; 0 where all contexts were gone through."""
+    meeting: NDArray[np.int64]
+    """int64 [G, G]: rows that accept some of both parts."""
+    naming: NDArray[np.int64]
+    """int64 [G, G]: rows that restrict both conditions too."""
+
+    def first(self, condition: int) -> int:
+        """The number of a condition's first part."""
+        return sum(len(parts) for parts in self.parts[:condition])
+
+    def slice(self, one: int, other: int, i: int, j: int) -> Slice:
+        """Part `i` of condition number `one` with part `j` of condition number `other`; the same part where they are the same."""
+        p, q = self.first(one) + i, self.first(other) + j
+        cells = {self.conditions[one]: self.parts[one][i]} | {self.conditions[other]: self.parts[other][j]}
+        covered, lower, upper = self._measured(p, q)
+        n_samples = int(self.counts[p, q])
+        share = float(self.shares[p, q])
+        return Slice(cells, share, covered, lower, upper, n_samples, int(self.meeting[p, q]), bool(self.naming[p, q]))
+
+    def slices(self, one: int, other: int) -> list[Slice]:
+        """All slices of two conditions, by the parts of the first, then of the second; of a condition with itself, one a part."""
+        if one == other:
+            return [self.slice(one, one, i, i) for i in range(len(self.parts[one]))]
+        return [self.slice(one, other, i, j) for i in range(len(self.parts[one])) for j in range(len(self.parts[other]))]
+
+    def worst(self, one: int, other: int) -> Slice | None:
+        """The slice of two conditions that is covered least, the largest of equals; None where none has a measure."""
+        measured = [s for s in self.slices(one, other) if s.covered is not None]
+        return min(measured, key=lambda s: (s.covered, -s.share)) if measured else None
+
+    def explicit(self, one: int, other: int) -> float:
+        """The share of the slices of two conditions that some row names."""
+        slices = self.slices(one, other)
+        return sum(s.is_named for s in slices) / len(slices) if slices else 1.0
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        """Every pair of two conditions, by number."""
+        return ((i, j) for i in range(len(self.conditions)) for j in range(i + 1, len(self.conditions)))
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        items = [
+            {
+                "conditions": [self.conditions[i], self.conditions[j]],
+                "explicit": self.explicit(i, j),
+                "slices": [s.to_json() for s in self.slices(i, j)],
+            }
+            for i, j in self.pairs()
+        ]
+        parts = dict(zip(self.conditions, map(list, self.parts), strict=True))
+        how: dict[str, object] = {"method": self.method, "seed": self.seed, "samples": self.n_samples}
+        return {**how, "parts": parts, "items": items}
+
+    def _measured(self, p: int, q: int) -> tuple[float | None, float, float]:
+        if self.method == "estimate" and not self.meeting[p, q]:
+            return 0.0, 0.0, 0.0  # no row accepts both, whatever the samples say
+        if self.method == "exact":
+            share = float(self.shares[p, q])
+            ratio = min(1.0, float(self.covered[p, q]) / share) if share > 0.0 else None
+            return ratio, ratio or 0.0, 1.0 if ratio is None else ratio
+        n = int(self.counts[p, q])
+        n_covered = round(float(self.covered[p, q]) * self.n_samples)
+        return (None, 0.0, 1.0) if not n else (n_covered / n, *wilson(n_covered, n))
+
+
+def pairs(
+    table: Table | CompiledTable,
+    *,
+    seed: int = 0,
+    samples: int = SAMPLES,
+    impossible: Sequence[CellBox] = (),
+    weights: WeightsOf | None = None,
+    assume: bool = True,
+    progress: Tell | None = None,
+    should_stop: Stops | None = None,
+) -> PairTable:
+    """Work out the coverage of pairs of conditions.
+
+    Exact where the contexts that cells tell apart are few enough to go through; else out of random contexts. That no row accepts
+    two parts is certain in either case. The arguments, and what is raised, are those of `coverage`.
+    """
+    require_counts(samples=samples, seed=seed)
+    watcher = Progress(progress, should_stop).within("Comparing conditions", 0.0, 1.0)
+    found = opened(table, impossible, weights, assume, watcher)
+    space = found.space
+    parts = [parts_of(space, at) for at in range(len(space.conditions))]
+    sides = [sides for own in parts for _, sides in own]
+    sampler = Sampler(space, watcher, found.drawer)
+    every = sampler.every_context()
+    is_exact = every is not None
+    tally = _Tally(space, sides)
+    for codes, weights_of in every or sampler.random_contexts(samples, np.random.default_rng(seed)):
+        watcher.at(tally.n_contexts / max(1, samples))
+        is_possible = sampler.is_possible(codes)
+        counts, _ = lookup(codes[is_possible], sampler.masks, len(space.boxes), True)
+        tally.add(codes[is_possible], None if weights_of is None else weights_of[is_possible], counts)
+    return PairTable(
+        table=found.compiled.name,
+        method="exact" if is_exact else "estimate",
+        seed=int(seed),
+        n_samples=0 if is_exact else tally.n_contexts,
+        conditions=tuple(c.name for c in space.conditions),
+        parts=tuple(tuple(text for text, _ in own) for own in parts),
+        shares=tally.inside / tally.total if tally.total else tally.inside,
+        covered=tally.valid / tally.total if tally.total else tally.valid,
+        counts=np.zeros_like(tally.inside, np.int64) if is_exact else np.rint(tally.inside).astype(np.int64),
+        meeting=_rows_in_both(space, sides, None, watcher),
+        naming=_rows_in_both(space, sides, [at for at, own in enumerate(parts) for _ in own], watcher),
+    )
+
+
+class _Tally:
+    """Sums over contexts: for each two parts the weight of the contexts in both, and of those with a valid row."""
+
+    def __init__(self, space: Space, sides: Sequence[Sides]) -> None:
+        self.inside, self.valid = np.zeros((len(sides), len(sides))), np.zeros((len(sides), len(sides)))
+        self.total, self.n_contexts = 0.0, 0
+        self._members = [[(f, flags_of(side, len(space.factors[f].weights))) for f, side in part.items()] for part in sides]
+
+    def add(self, codes: Codes, weights: NDArray[np.float64] | None, counts: NDArray[np.int64]) -> None:
+        """More contexts: the classes of each, its weight, and how many rows are valid in it."""
+        weights = np.ones(len(codes)) if weights is None else weights
+        flags = np.ones((len(codes), len(self._members)))
+        for p, part in enumerate(self._members):
+            for f, members in part:
+                flags[:, p] *= members[codes[:, f]]
+        self.total += float(weights.sum())
+        self.n_contexts += len(codes)
+        weighted = flags * weights[:, None]
+        self.inside += weighted.T @ flags
+        has_row = counts > 0
+        self.valid += weighted[has_row].T @ flags[has_row]
+
+
+def _rows_in_both(
+    space: Space, sides: Sequence[Sides], of_condition: Sequence[int] | None, progress: Progress
+) -> NDArray[np.int64]:
+    """How many rows accept some of both parts; given the condition of each part, only rows that restrict both conditions."""
+    flags = np.ones((len(space.boxes), len(sides)))
+    for p, part in enumerate(sides):
+        progress.check()
+        meets = [all(box[f] & side for f, side in part.items()) for box in space.boxes]
+        flags[:, p] = meets
+        if of_condition is not None:
+            own = space.of_condition[of_condition[p]]
+            flags[:, p] *= [any(box[f] != space.full[f] for f in own) for box in space.boxes]
+    return np.rint(flags.T @ flags).astype(np.int64)

@@ -1,0 +1,85 @@
+"""The parts of conditions: each condition's domain cut into a few sets of values, to compare conditions with each other.
+
+A value of a bool, enum or text is a part, of many values those that most rows name, then all others; numbers are cut into eighths
+by weight; a tag is there or not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells import Cell, TagSet, format_cell
+from contextdb.covering.count import runs_of
+from contextdb.covering.factors import TagFactor, ValueFactor
+from contextdb.covering.space import Space
+
+MOST_PARTS = 8
+"""A condition has so many parts at most."""
+
+Sides = dict[int, int]
+"""For some factors the classes of a part; it holds every class of the others."""
+
+
+def parts_of(space: Space, at: int) -> list[tuple[str, Sides]]:
+    """The parts of a condition: each as a cell, and as classes of its factors."""
+    numbers = space.of_condition[at]
+    if space.conditions[at].domain.kind == "tags":
+        return _tag_parts(space, at)
+    f = numbers[0]
+    factor = space.factors[f]
+    sides = _value_sides(space, f) if isinstance(factor, ValueFactor) else _span_sides(factor.weights)
+    return [(format_cell(Cell(factor.accepts(side)), space.conditions[at].domain), {f: side}) for side in sides]
+
+
+def _value_sides(space: Space, f: int) -> list[int]:
+    """Each value; of many those that most rows name, then all others."""
+    n = len(space.factors[f].weights)
+    if n <= MOST_PARTS:
+        return [1 << k for k in range(n)]
+    named = np.zeros(n, np.int64)
+    for box in space.boxes:
+        if box[f] != space.full[f]:
+            named += flags_of(box[f], n)
+    chosen = sorted(np.argsort(-named, kind="stable")[: MOST_PARTS - 1].tolist())
+    sides = [1 << k for k in chosen]
+    return [*sides, space.full[f] & ~sum(sides)]
+
+
+def _span_sides(weights: NDArray[np.float64]) -> list[int]:
+    """Neighbouring spans of numbers; single points go to the span below them, or to the first."""
+    wide = np.flatnonzero(weights > 0.0)
+    starts = [0, *wide[1:].tolist()]
+    if len(wide) > MOST_PARTS:
+        middle = np.cumsum(weights)[wide] - weights[wide] / 2.0
+        eighth = np.minimum((middle * MOST_PARTS).astype(np.int64), MOST_PARTS - 1)
+        starts = [0, *wide[1:][eighth[1:] != eighth[:-1]].tolist()]
+    stops = [*starts[1:], len(weights)]
+    return [(1 << stop) - (1 << start) for start, stop in zip(starts, stops, strict=True)]
+
+
+def _tag_parts(space: Space, at: int) -> list[tuple[str, Sides]]:
+    """With and without each tag that cells name; of many those that most rows restrict."""
+    found: list[tuple[int, str, Sides, Sides]] = []
+    for f in space.of_condition[at]:
+        factor = space.factors[f]
+        assert isinstance(factor, TagFactor)
+        for tag in factor.tags:
+            side = factor.classes(TagSet(frozenset((tag,)), frozenset()))
+            n_rows = sum(not (box[f] & side and box[f] & ~side) for box in space.boxes)
+            found.append((n_rows, tag, {f: side}, {f: space.full[f] & ~side}))
+    found.sort(key=lambda item: -item[0])
+    domain = space.conditions[at].domain
+    parts: list[tuple[str, Sides]] = []
+    for _, tag, with_it, without in found[: MOST_PARTS // 2]:
+        parts.append((format_cell(Cell(TagSet(frozenset((tag,)), frozenset())), domain), with_it))
+        parts.append((format_cell(Cell(TagSet(frozenset(), frozenset((tag,)))), domain), without))
+    return [(text, sides) for text, sides in parts if all(sides.values())]
+
+
+def flags_of(side: int, n: int) -> NDArray[np.bool_]:
+    """Which of `n` classes a set of classes holds."""
+    flags = np.zeros(n, np.bool_)
+    for first, stop in runs_of(side):
+        flags[first:stop] = True
+    return flags

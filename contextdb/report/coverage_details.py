@@ -1,0 +1,74 @@
+"""One gap or one row in full, for `contextdb coverage --gap` and `--explain`."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+
+from contextdb.console import aligned, printable
+from contextdb.covering import Gap, format_percent
+from contextdb.covering.inside import facts_inside
+from contextdb.errors import plural
+from contextdb.report.coverage_results import Measured
+from contextdb.report.coverage_words import nearest_sentence
+from contextdb.report.render_text import wrapped
+from contextdb.table import Table
+
+
+def gap_details(measured: Measured, gap: Gap, table: Table, width: int) -> str:
+    """Everything about a gap: its cells, a context of it to try, and how each cell of the nearest row stands to it."""
+    return "".join(f"{line}\n" for line in _gap_lines(measured, gap, table, width))
+
+
+def _gap_lines(measured: Measured, gap: Gap, table: Table, width: int) -> Iterator[str]:
+    report = measured.report
+    size = f"{'' if gap.is_exact else 'about '}{format_percent(gap.share)} of the contexts" if gap.share else "single points"
+    yield f"Gap {report.gaps.index(gap) + 1} of {len(report.gaps)} in {printable(report.table)} ({gap.id}): {size}"
+    if gap.share and gap.new_share != gap.share:
+        yield f"{format_percent(gap.new_share)} of the contexts are in no gap before it"
+    yield ""
+    yield from aligned(list(gap.cells.items()) or [("every context", "")], indent="  ")
+    if gap.nearest is not None:
+        yield ""
+        yield from wrapped(printable(nearest_sentence(measured, gap)), width)
+        names = [c.condition.name for c in table.conditions if c.condition.name in gap.cells]
+        row = gap.nearest.row
+        rows = [(name, table.text(row, name) or "Any", gap.cells[name]) for name in names]
+        yield ""
+        yield from aligned([("condition", "its cell", "the gap"), *rows], indent="  ")
+    facts = facts_inside(gap.cells, [c.condition for c in table.conditions])
+    given = " ".join(shlex.quote(f"{name}={fact}") for name, fact in facts.items())
+    yield ""
+    yield "To see which rows are nearest in one context of it:"
+    yield printable(f"  contextdb query {shlex.quote(measured.file or report.table)} {given} --unknown any --explain")
+
+
+def row_details(measured: Measured, row: int, width: int) -> str:
+    """Everything about a row: how often it is valid, and what is wrong with it, with the rows that cause that."""
+    return "".join(f"{line}\n" for line in _row_lines(measured, row, width))
+
+
+def _row_lines(measured: Measured, row: int, width: int) -> Iterator[str]:
+    report = measured.report
+    yield printable(f"{measured.named(row)} of {report.table} (row {row})")
+    share = report.hits[row]
+    yield f"valid in {format_percent(share)} of the contexts" if share else "valid in no context, or in single points only"
+    if measured.telemetry is not None:
+        yield f"valid in {measured.telemetry.hits[row]:,} of {measured.telemetry.moments:,} recorded moments"
+    found = [finding for finding in report.findings if finding.row == row]
+    for finding in found:
+        yield ""
+        yield from wrapped(printable(f"{finding.level} {finding.rule}: {finding.message}"), width)
+        for cause in finding.by:
+            share_text = format_percent(report.hits[cause]) if report.hits[cause] else "points"
+            yield printable(f"  {measured.named(cause)}, valid in {share_text}")
+    if not found:
+        yield ""
+        sure = "" if report.findings_complete else ", as far as the work allowed to tell"
+        yield f"Nothing is wrong with it: no other rows are valid wherever it is{sure}."
+    needed_by = [f for f in report.findings if row in f.by]
+    if needed_by:
+        yield ""
+        yield f"It is among what makes {plural(len(needed_by), 'row')} needless:"
+        for finding in needed_by[:10]:
+            yield printable(f"  {measured.named(finding.row or 0)}: {finding.rule}")

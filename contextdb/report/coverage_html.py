@@ -1,0 +1,226 @@
+"""Coverage as one HTML page that needs no network: every text of a table is escaped, and nothing of it can become markup or script.
+
+What stands in the page is complete without its script, which only sorts tables and opens the squares of the map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from importlib.resources import files
+
+from contextdb import __version__
+from contextdb.console import printable
+from contextdb.covering import format_percent
+from contextdb.report.coverage_heat import heat_map
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_size
+from contextdb.report.coverage_text import by_rule
+from contextdb.report.coverage_words import (
+    assumed_sentences,
+    cells_text,
+    change_sentence,
+    facts_sentences,
+    gaps_sentence,
+    nearest_sentence,
+    overlap_sentence,
+)
+from contextdb.report.results import as_path
+
+MOST_ROWS = 5_000
+"""Rows that are listed, those with findings before others."""
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+
+
+def render(results: CoverageResults) -> str:
+    """The page."""
+    sections = "".join(_section(measured, number) for number, measured in enumerate(results.tables))
+    names = [printable(m.report.table) for m in results.tables]
+    title = f"Coverage of {names[0]}" if len(names) == 1 else f"Coverage of {len(names)} tables"
+    anchors = "".join(f'<a href="#t{i}">{escape(name)}</a>' for i, name in enumerate(names))
+    links = f"<nav>{anchors}</nav>" if len(names) > 1 else ""
+    verdict = f'<p class="{"passed" if results.passed else "failed"}">{escape(results.verdict)}</p>' if results.verdict else ""
+    gone = f"<p>No longer there: {escape(printable(', '.join(results.gone)))}.</p>" if results.gone else ""
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>\n{_part('coverage.css')}</style>\n</head>\n<body>\n"
+        f"<h1>{escape(title)}</h1>\n{verdict}{gone}{links}\n<main>\n{sections}</main>\n"
+        f'<p class="muted">contextdb {__version__}</p>\n<script>\n{_part("coverage.js")}</script>\n</body>\n</html>\n'
+    )
+
+
+def _part(name: str) -> str:
+    return files("contextdb.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _section(measured: Measured, number: int) -> str:
+    report = measured.report
+    parts = [f'<h2 id="t{number}">{_text(report.table)}</h2>\n', _paragraph(_size(measured), "muted"), *_head(measured)]
+    parts += [*_change(measured), *_telemetry(measured), *_gaps(measured)]
+    if measured.pairs is not None:
+        parts.append(heat_map(measured.pairs, number))
+    parts += [*_overlap(measured), *_findings(measured), *_rows(measured)]
+    return f"<article>\n{''.join(parts)}</article>\n"
+
+
+def _size(measured: Measured) -> str:
+    return measured.summary.size + (f", in {as_path(measured.file)}" if measured.file else "")
+
+
+def _head(measured: Measured) -> Iterator[str]:
+    report = measured.report
+    yield _paragraph(report.headline, "headline")
+    ends = [(report.upper, "open"), (report.lower, "")] if report.lower < report.upper else [(report.lower, "")]
+    inner = "".join(f'<i class="{name}" style="width:{_width(share)}"></i>' for share, name in ends)
+    yield f'<div class="bar" role="img" aria-label="{escape(report.headline)}">{inner}</div>\n'
+    yield from (_paragraph(sentence, "muted") for sentence in assumed_sentences(report))
+    if measured.gates:
+        items = (
+            f'<li><span class="{"passed" if g.passed else "failed"}">{"Passed" if g.passed else "Failed"}</span> '
+            f"{escape(g.name)}: {_text(g.message)}</li>"
+            for g in measured.gates
+        )
+        yield f'<ul class="gates">{"".join(items)}</ul>\n'
+
+
+def _change(measured: Measured) -> Iterator[str]:
+    change = measured.change
+    if change is None:
+        return
+    yield "<h3>Since the baseline</h3>\n"
+    yield _paragraph(f"{change_sentence(measured, change)}.")
+    rows = [("new gap", gap.text, gap.share) for gap in change.opened] + [
+        ("closed gap", gap.text, gap.share) for gap in change.closed
+    ]
+    lines = [[_cell(kind), _cell(text), _cell(format_percent(share), share)] for kind, text, share in rows]
+    lines += [[_cell("newly dead"), _cell(measured.named(f.row or 0)), _cell("", 0.0)] for f in change.dead]
+    if lines:
+        yield _table("What changed", [("", False), ("contexts, or row", False), ("share", True)], lines)
+
+
+def _telemetry(measured: Measured) -> Iterator[str]:
+    seen = measured.telemetry
+    if seen is None:
+        return
+    yield "<h3>Recorded moments</h3>\n"
+    yield _paragraph(seen.headline)
+    lines = [[_cell(format_percent(gap.share), gap.share), _cell(gap.text)] for gap in seen.gaps]
+    if lines:
+        yield _table("Moments without a valid row", [("share of the moments", True), ("contexts", False)], lines)
+    yield from (_paragraph(f"{sentence}.", "muted") for sentence in facts_sentences(seen))
+
+
+def _gaps(measured: Measured) -> Iterator[str]:
+    report = measured.report
+    yield "<h3>Gaps</h3>\n"
+    yield _paragraph(f"{gaps_sentence(report)}.")
+    if not report.gaps:
+        return
+    columns = [("", True), ("share", True), ("in no gap above", True), ("contexts without a valid row", False), ("nearest", False)]
+    lines = [
+        [
+            _cell(str(i), i),
+            _cell(gap_size(gap), gap.share),
+            _cell(format_percent(gap.new_share), gap.new_share),
+            _cell(gap.text),
+            _cell(nearest_sentence(measured, gap).removeprefix("nearest: ")),
+        ]
+        for i, gap in enumerate(report.gaps, 1)
+    ]
+    yield _table("Gaps", columns, lines)
+
+
+def _overlap(measured: Measured) -> Iterator[str]:
+    report = measured.report
+    yield "<h3>Rows valid at once</h3>\n"
+    yield _paragraph(f"{overlap_sentence(report)}.")
+    most = max(report.overlap.histogram, default=0.0)
+    bars = "".join(
+        f'<tr><td class="n">{n}</td><td class="n">{escape(format_percent(share))}</td>'
+        f'<td><i style="width:{_width(share / most)}"></i></td></tr>'
+        for n, share in enumerate(report.overlap.histogram)
+        if share > 0.0
+    )
+    if bars:
+        head = '<thead><tr><th class="n">valid rows</th><th class="n">contexts</th><th></th></tr></thead>'
+        table = f'<table class="hist">{head}<tbody>{bars}</tbody></table>'
+        yield f'<div class="scroll" tabindex="0" role="region" aria-label="Overlap">{table}</div>\n'
+    for crowd in report.crowded[:5]:
+        yield _paragraph(f"{crowd.n_rows} rows where {cells_text(crowd.cells, len(crowd.cells))}", "muted")
+
+
+def _findings(measured: Measured) -> Iterator[str]:
+    report = measured.report
+    blocks = by_rule(report.findings)
+    if not blocks:
+        return
+    yield "<h3>Findings</h3>\n"
+    if not report.findings_complete:
+        yield _paragraph("The work ended before every row was decided.", "muted")
+    lines = [
+        [_word(f.level), _word(rule), _cell("" if f.row is None else measured.named(f.row)), _cell(f.message)]
+        for rule, found in blocks.items()
+        for f in found[:MOST_ROWS]
+    ]
+    yield _table("Findings", [("level", False), ("rule", False), ("row", False), ("finding", False)], lines)
+
+
+def _rows(measured: Measured) -> Iterator[str]:
+    report = measured.report
+    if not measured.assets:
+        return
+    rules: dict[int, list[str]] = {}
+    for finding in report.findings:
+        if finding.row is not None:
+            rules.setdefault(finding.row, []).append(finding.rule)
+    order = sorted(range(len(measured.assets)), key=lambda row: (row not in rules, row))[:MOST_ROWS]
+    seen = measured.telemetry
+    columns = [
+        ("line" if measured.lines[0] is not None else "row", True),
+        ("asset", False),
+        ("valid in", True),
+        ("findings", False),
+    ]
+    columns[3:3] = [("recorded moments", True)] if seen else []
+    lines = []
+    for row in sorted(order):
+        place = measured.lines[row] if measured.lines[row] is not None else row
+        hits = [_cell(f"{seen.hits[row]:,}", seen.hits[row])] if seen else []
+        share = _cell(format_percent(report.hits[row]), report.hits[row])
+        lines.append([_cell(str(place), place), _cell(measured.assets[row]), share, *hits, _cell(", ".join(rules.get(row, [])))])
+    yield "<h3>Rows</h3>\n"
+    if len(order) < len(measured.assets):
+        yield _paragraph(f"{len(order):,} of {len(measured.assets):,} rows are listed, those with findings before others.", "muted")
+    yield _table("Rows", columns, lines)
+
+
+def _table(label: str, columns: Sequence[tuple[str, bool]], lines: Iterable[Sequence[str]]) -> str:
+    head = "".join(f'<th{" class=n" if is_number else ""} scope="col">{escape(name)}</th>' for name, is_number in columns)
+    body = "".join(f"<tr>{''.join(line)}</tr>\n" for line in lines)
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(label)}"><table class="sortable">'
+        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>\n"
+    )
+
+
+def _cell(text: str, value: float | None = None) -> str:
+    return f"<td>{_text(text)}</td>" if value is None else f'<td class="n" data-v="{value!r}">{_text(text)}</td>'
+
+
+def _word(text: str) -> str:
+    return f'<td class="k">{_text(text)}</td>'
+
+
+def _paragraph(text: str, kind: str = "") -> str:
+    return f"<p{f' class={kind}' if kind else ''}>{_text(text)}</p>\n"
+
+
+def _text(text: str) -> str:
+    return escape(printable(text))
+
+
+def _width(share: float) -> str:
+    """A width that is full, or nothing, only where the share is."""
+    percent = 100.0 * share
+    return f"{percent if percent in (0.0, 100.0) else min(max(percent, 0.3), 99.7):.2f}%"

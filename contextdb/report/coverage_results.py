@@ -1,0 +1,186 @@
+"""What `contextdb coverage` hands to its renderers: measured tables, the bars they are held to, what changed. Data only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
+from contextdb.covering.baseline import Change
+from contextdb.covering.shares import told_apart
+from contextdb.errors import plural
+from contextdb.findings import Finding
+from contextdb.report.results import CheckReport, TableSummary
+
+if TYPE_CHECKING:
+    from contextdb.telemetry.observed import Observed
+
+ROUNDING = 1e-12
+"""Shares are as exact as this; a bar of 100 % takes nothing less all the same."""
+MOST_GAP_FINDINGS = 10
+
+
+@dataclass(frozen=True)
+class Gate:
+    """A bar that a table is held to."""
+
+    name: str
+    """The option: fail-under, max-drop, fail-under-telemetry."""
+    limit: float
+    value: float
+    passed: bool
+    message: str
+    rule: str
+    """The rule that a table breaks which misses the bar."""
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One table with its coverage."""
+
+    report: CoverageReport
+    file: str | None
+    assets: tuple[str, ...]
+    lines: tuple[int | None, ...]
+    """For each row its line in the file."""
+    pairs: PairTable | None = None
+    change: Change | None = None
+    telemetry: Observed | None = None
+    gates: tuple[Gate, ...] = ()
+
+    @property
+    def summary(self) -> TableSummary:
+        """The table as a check names it."""
+        return TableSummary(self.report.table, self.file, self.report.n_rows, self.report.n_conditions)
+
+    def named(self, row: int) -> str:
+        """A row as people find it: its line, else its number, and its asset."""
+        line = self.lines[row]
+        return f"{f'row {row}' if line is None else f'line {line}'} {self.assets[row]}".rstrip()
+
+    def worst_pairs(self, most: int) -> list[Slice]:
+        """Of each pair of conditions the combination that is covered least; the worst of these, the largest of equals first."""
+        if self.pairs is None:
+            return []
+        worst = [self.pairs.worst(i, j) for i, j in self.pairs.pairs()]
+        measured = [s for s in worst if s is not None and s.covered is not None and s.covered < 1.0 and s.share > 0.0]
+        return sorted(measured, key=lambda s: (s.covered, -s.share, *s.cells.items()))[:most]
+
+    def to_json(self) -> dict[str, object]:
+        """One entry of `tables` in the JSON document."""
+        report = self.report.to_json()
+        shown = [s.to_json() for s in self.worst_pairs(20)]
+        return report | {
+            "file": self.file,
+            "hits": list(self.report.hits),
+            "pairs": shown,
+            "telemetry": None if self.telemetry is None else self.telemetry.to_json(),
+            "baseline": None if self.change is None else self.change.to_json(),
+            "gates": [gate.to_json() for gate in self.gates],
+        }
+
+
+@dataclass(frozen=True)
+class CoverageResults:
+    """All measured tables."""
+
+    tables: tuple[Measured, ...]
+    gone: tuple[str, ...] = ()
+    """Tables of the baseline that are not there any more."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether every table keeps every bar."""
+        return all(gate.passed for measured in self.tables for gate in measured.gates)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the bars are kept, in one sentence; "" where there are none."""
+        gates = [gate for measured in self.tables for gate in measured.gates]
+        n_failed = sum(not gate.passed for gate in gates)
+        if n_failed:
+            return f"{n_failed} of {plural(len(gates), 'bar')} missed."
+        return f"{plural(len(gates), 'bar')} kept." if gates else ""
+
+    def to_json(self) -> dict[str, object]:
+        """The JSON document."""
+        tables = [measured.to_json() for measured in self.tables]
+        return {"format": 1, "passed": self.passed, "tables": tables, "gone": list(self.gone)}
+
+    def as_check(self) -> CheckReport:
+        """Missed bars, findings and the largest gaps as findings, for formats that know nothing else."""
+        return CheckReport(tuple(m.summary for m in self.tables), tuple(f for m in self.tables for f in _findings(m)))
+
+
+def reaches(value: float, limit: float) -> bool:
+    """Whether a share reaches a bar; 100 % is reached by 100 % alone."""
+    return value >= limit or (limit < 1.0 and value >= limit - ROUNDING)
+
+
+def fail_under(report: CoverageReport, limit: float) -> Gate:
+    """Hold the lower bound of the covered share to a bar."""
+    at_least = "" if report.method == "exact" else "at least "
+    return _bar("fail-under", report.lower, limit, f"{at_least}{{}} of the contexts are covered", rule="coverage-below")
+
+
+def max_drop(change: Change, limit: float) -> Gate:
+    """Hold the fall of the covered share since the baseline to a bar."""
+    passed = change.drop <= limit + ROUNDING
+    if change.drop <= ROUNDING:
+        return Gate("max-drop", limit, change.drop, passed, "the covered share did not fall.", rule="coverage-dropped")
+    points = format_percent(change.drop).replace(" %", " points").replace("%", "points")
+    allowed = format_percent(limit).replace(" %", " points")
+    verb = "within" if passed else "more than"
+    return Gate(
+        "max-drop",
+        limit,
+        change.drop,
+        passed,
+        f"the covered share fell by {points}, {verb} the {allowed} allowed.",
+        rule="coverage-dropped",
+    )
+
+
+def fail_under_telemetry(telemetry: Observed, limit: float) -> Gate:
+    """Hold the covered share of recorded moments to a bar."""
+    return _bar("fail-under-telemetry", telemetry.covered, limit, "{} of the recorded moments are covered", rule="telemetry-below")
+
+
+def _bar(name: str, value: float, limit: float, said: str, rule: str) -> Gate:
+    passed = reaches(value, limit)
+    found, bar = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
+    message = f"{said.format(found)}, which {'reaches' if passed else 'is below'} the bar of {bar}."
+    return Gate(name, limit, value, passed, message, rule)
+
+
+def gap_size(gap: Gap) -> str:
+    """The share of a gap as people read it."""
+    return f"{'' if gap.is_exact else '≈ '}{format_percent(gap.share)}" if gap.share else "point"
+
+
+def _findings(measured: Measured) -> Iterator[Finding]:
+    report = measured.report
+    for gate in measured.gates:
+        if not gate.passed:
+            yield Finding(gate.rule, "error", gate.message, report.table, measured.file)
+    yield from report.findings
+    if measured.change is not None:
+        for gap in measured.change.opened[:MOST_GAP_FINDINGS]:
+            yield _gap_finding(measured, gap, True)
+    opened = {gap.id for gap in measured.change.opened[:MOST_GAP_FINDINGS]} if measured.change else set()
+    for gap in report.gaps[:MOST_GAP_FINDINGS]:
+        if gap.id not in opened:
+            yield _gap_finding(measured, gap, False)
+
+
+def _gap_finding(measured: Measured, gap: Gap, is_new: bool) -> Finding:
+    size = "single points" if not gap.share else f"{gap_size(gap)} of the contexts"
+    message = f"no row is valid for {gap.text} ({size}; gap {gap.id})."
+    if is_new:
+        return Finding("new-gap", "warning", message, measured.report.table, measured.file)
+    return Finding("gap", "info", message, measured.report.table, measured.file)

@@ -1,0 +1,205 @@
+"""Coverage for people in a terminal: the covered share and how it is known, then what to look at; about 40 lines a table."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+
+from contextdb.console import printable, styled, width_of
+from contextdb.covering import Gap, format_percent
+from contextdb.errors import plural
+from contextdb.findings import LEVELS, Finding
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_size
+from contextdb.report.coverage_words import (
+    assumed_sentences,
+    cells_text,
+    change_sentence,
+    facts_sentences,
+    gaps_sentence,
+    nearest_sentence,
+    overlap_sentence,
+    slice_sentence,
+)
+from contextdb.report.render_text import STYLES, wrapped
+
+BAR_CELLS = 50
+MOST_LINES = 42
+SIZES = ((6, 4, 4), (5, 3, 3), (4, 3, 3), (3, 2, 2))
+"""So many gaps, pairs of conditions and rows of a rule are listed of one table: the first that fits."""
+FEW = (2, 0, 4)
+"""The same for each of several tables."""
+MOST_ITEMS = 4
+INDENT = "   "
+
+
+def render(results: CoverageResults, colour: bool = False, width: int = 100, shows_all: bool = False) -> str:
+    """The coverage of one table in about 40 lines; of several, a few lines each, unless all is asked for."""
+    is_one = len(results.tables) == 1
+    sections = [_fitted(m, colour, width, shows_all, is_one) for m in results.tables]
+    tail = [styled(results.verdict, "green" if results.passed else "red", colour)] if results.verdict else []
+    tail += [f"No longer there: {printable(', '.join(results.gone))}."] if results.gone else []
+    if not is_one and not shows_all:
+        tail.append("contextdb coverage TABLE tells more of one; --all tells all.")
+    return "\n".join([*sections, *("".join(f"{line}\n" for line in [part]) for part in tail)])
+
+
+def _fitted(measured: Measured, colour: bool, width: int, shows_all: bool, is_one: bool) -> str:
+    if shows_all:
+        return _section(measured, colour, width, (sys.maxsize, 20, sys.maxsize))
+    if not is_one:
+        return _section(measured, colour, width, FEW)
+    texts = [_section(measured, colour, width, sizes) for sizes in SIZES]
+    return next((text for text in texts if text.count("\n") <= MOST_LINES), texts[-1])
+
+
+def _section(measured: Measured, colour: bool, width: int, sizes: tuple[int, int, int]) -> str:
+    most_gaps, most_pairs, most_rows = sizes
+    parts = [_head(measured, colour, width), _gaps(measured, colour, width, most_gaps)]
+    if sizes == FEW:
+        parts.append(_counts(measured.report.findings, width))
+    else:
+        parts += [
+            _overlap(measured, colour, width),
+            _pairs(measured, colour, width, most_pairs),
+            _findings(measured.report.findings, measured, colour, width, most_rows),
+        ]
+    parts += [_telemetry(measured, colour, width), _change(measured, colour, width), _gates(measured, colour, width)]
+    blocks = ["".join(f"{line}\n" for line in lines) for lines in map(list, parts) if lines]
+    return ("" if sizes == FEW else "\n").join(blocks)
+
+
+def _head(measured: Measured, colour: bool, width: int) -> Iterator[str]:
+    report = measured.report
+    for line in wrapped(printable(f"{report.table}: {measured.summary.size}"), width):
+        yield styled(line, "bold", colour)
+    yield from wrapped(report.headline, width)
+    yield bar(report.lower, report.upper, min(BAR_CELLS, width))
+    for sentence in assumed_sentences(report):
+        yield from wrapped(printable(sentence), width)
+
+
+def bar(lower: float, upper: float, n_cells: int) -> str:
+    """A bar: full up to the lower bound, dotted up to the upper one. It is full, or empty, only where the share is."""
+    full = min(int(lower * n_cells), n_cells)
+    full = 1 if full == 0 and lower > 0.0 else full
+    dotted = 0 if lower == upper else max(1, round(upper * n_cells) - full)
+    dotted = min(dotted, n_cells - full)
+    return "█" * full + "▒" * dotted + "░" * (n_cells - full - dotted)
+
+
+def _gaps(measured: Measured, colour: bool, width: int, most: int) -> Iterator[str]:
+    report = measured.report
+    yield from (styled(line, "bold", colour) for line in wrapped(gaps_sentence(report), width))
+    shown = report.gaps[:most]
+    number, share = len(str(len(shown))), max((width_of(gap_size(g)) for g in shown), default=0)
+    for i, gap in enumerate(shown, 1):
+        head = f"{INDENT}{i:>{number}}  {gap_size(gap):>{share}}  "
+        yield from hanging(head, cells_text(gap.cells), width)
+        if gap.nearest is not None:
+            yield from hanging(" " * width_of(head), nearest_sentence(measured, gap), width)
+    if len(shown) < len(report.gaps):
+        yield from hanging(
+            INDENT, f"… and {len(report.gaps) - len(shown):,} more; --gap N tells all of one, --all lists them", width
+        )
+
+
+def hanging(head: str, text: str, width: int) -> Iterator[str]:
+    """A text beside a head, wrapped in its own column; where that would be narrow, under it."""
+    text, indent = printable(text), width_of(head)
+    if width - indent < 30:
+        yield head.rstrip()
+        yield from (f"{INDENT}{INDENT}{line}" for line in wrapped(text, max(20, width - 2 * len(INDENT))))
+        return
+    for i, line in enumerate(wrapped(text, width - indent)):
+        yield (head if i == 0 else " " * indent) + line
+
+
+def _overlap(measured: Measured, colour: bool, width: int) -> Iterator[str]:
+    report = measured.report
+    yield styled("Rows valid at once", "bold", colour)
+    yield from hanging(INDENT, overlap_sentence(report), width)
+    for crowd in report.crowded[:1]:
+        yield from hanging(INDENT, f"most, {crowd.n_rows}, where {cells_text(crowd.cells)}", width)
+
+
+def _pairs(measured: Measured, colour: bool, width: int, most: int) -> Iterator[str]:
+    worst = measured.worst_pairs(most)
+    if not worst:
+        return
+    yield styled("Pairs of conditions covered least", "bold", colour)
+    for found in worst:
+        yield from hanging(INDENT, slice_sentence(found), width)
+
+
+def _findings(findings: Sequence[Finding], measured: Measured, colour: bool, width: int, most: int) -> Iterator[str]:
+    blocks = by_rule(findings)
+    if not blocks:
+        return
+    sure = "" if measured.report.findings_complete else " (the work ended before every row was decided)"
+    yield from (styled(line, "bold", colour) for line in wrapped(f"Findings{sure}", width))
+    widest = max(map(len, blocks)) + 1 + max(len(f"{len(found):,}") for found in blocks.values())
+    for rule, found in blocks.items():
+        room = f"{rule} {len(found):>{max(1, widest - len(rule) - 1)},}"
+        head = f"{INDENT}{styled(room, STYLES[found[0].level], colour)}  "
+        shown = found[:most]
+        named = ", ".join(measured.named(f.row) if f.row is not None else f.message for f in shown)
+        more = f" and {len(found) - len(shown):,} more" if len(shown) < len(found) else ""
+        lines = list(hanging(" " * (len(INDENT) + widest + 2), named + more, width))
+        yield head + lines[0].lstrip() if lines[0].strip() else head.rstrip()
+        yield from lines[1:]
+
+
+def by_rule(findings: Sequence[Finding]) -> Mapping[str, list[Finding]]:
+    """The findings of each rule, those of the worst level first."""
+    blocks: dict[str, list[Finding]] = {}
+    for finding in sorted(findings, key=lambda f: LEVELS.index(f.level)):
+        blocks.setdefault(finding.rule, []).append(finding)
+    return blocks
+
+
+def _counts(findings: Sequence[Finding], width: int) -> Iterator[str]:
+    said = ", ".join(f"{len(found)} {rule}" for rule, found in by_rule(findings).items())
+    if said:
+        yield from hanging(INDENT, f"findings: {said}", width)
+
+
+def _telemetry(measured: Measured, colour: bool, width: int) -> Iterator[str]:
+    seen = measured.telemetry
+    if seen is None:
+        return
+    yield styled("Recorded moments", "bold", colour)
+    yield from hanging(INDENT, seen.headline, width)
+    for gap in seen.gaps[:MOST_ITEMS]:
+        yield from hanging(f"{INDENT}{'' if gap.is_exact else '≈ '}{format_percent(gap.share)}  ", cells_text(gap.cells), width)
+    never = seen.never_used
+    if never:
+        named = ", ".join(measured.named(row) for row in never[:MOST_ITEMS])
+        more = f" and {len(never) - MOST_ITEMS:,} more" if len(never) > MOST_ITEMS else ""
+        yield from hanging(INDENT, f"{plural(len(never), 'row')} never valid in them: {named}{more}", width)
+    for sentence in facts_sentences(seen):
+        yield from hanging(INDENT, sentence, width)
+
+
+def _change(measured: Measured, colour: bool, width: int) -> Iterator[str]:
+    change = measured.change
+    if change is None:
+        return
+    yield styled("Since the baseline", "bold", colour)
+    yield from hanging(INDENT, change_sentence(measured, change), width)
+    for sign, gaps in (("+", change.opened), ("-", change.closed)):
+        for gap in gaps[:MOST_ITEMS]:
+            size = gap_size(gap) if isinstance(gap, Gap) else format_percent(gap.share)
+            yield from hanging(f"{INDENT}{sign} {size}  ", cells_text(gap.cells), width)
+        if len(gaps) > MOST_ITEMS:
+            yield f"{INDENT}{sign} … and {len(gaps) - MOST_ITEMS:,} more"
+    if change.dead:
+        dead = ", ".join(measured.named(f.row) for f in change.dead[:MOST_ITEMS] if f.row is not None)
+        yield from hanging(f"{INDENT}! newly dead: ", dead, width)
+
+
+def _gates(measured: Measured, colour: bool, width: int) -> Iterator[str]:
+    for gate in measured.gates:
+        word, style = ("passed", "green") if gate.passed else ("FAILED", "red")
+        first, *rest = hanging(f"{word}  {gate.name}  ", gate.message, width)
+        yield styled(word, style, colour) + first.removeprefix(word)
+        yield from rest

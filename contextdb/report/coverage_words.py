@@ -1,0 +1,118 @@
+"""Sentences about coverage, for every format that people read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from contextdb.covering import CoverageReport, Gap, Slice, format_percent
+from contextdb.covering.baseline import Change
+from contextdb.covering.shares import told_apart
+from contextdb.errors import plural
+from contextdb.report.coverage_results import Measured
+
+if TYPE_CHECKING:
+    from contextdb.telemetry.observed import FactNote, Observed
+
+MOST_TOLD = 8
+"""Conditions and assumptions that are told one by one."""
+MOST_COUNTS = 6
+"""Numbers of rows that the histogram tells one by one."""
+
+
+def assumed_sentences(report: CoverageReport) -> Iterator[str]:
+    """What the share rests on."""
+    if report.method == "bounds":
+        yield "The count was not finished and nothing was sampled, or samples told no more; --work and --samples allow more."
+    if report.weighted:
+        yield f"Weighed by the values of {', '.join(report.weighted)}; those of the others count the same."
+    if report.assumptions:
+        yield f"Left out is what breaks {_some(report.assumptions, ' or ')}."
+    if report.sampled:
+        yield f"Known to samples only: {_some(report.sampled, '; ')}."
+    if report.assumed:
+        yield f"Without bounds: {_some([f'{name} ({text})' for name, text in report.assumed.items()], '; ')}."
+
+
+def _some(texts: tuple[str, ...] | list[str], between: str) -> str:
+    more = f" and {len(texts) - MOST_TOLD:,} more" if len(texts) > MOST_TOLD else ""
+    return between.join(texts[:MOST_TOLD]) + more
+
+
+def gaps_sentence(report: CoverageReport) -> str:
+    """How many gaps there are, and whether these are all."""
+    if not report.gaps:
+        if report.gaps_complete:
+            return "No gap: every context has a valid row"
+        return "No gap was found; that there is none is not proved"
+    listed = "all of them" if report.gaps_complete else "there are more"
+    return f"Contexts without a valid row: {plural(len(report.gaps), 'gap')}, {listed}; the largest first"
+
+
+def nearest_sentence(measured: Measured, gap: Gap) -> str:
+    """The row nearest to a gap, and the one cell to change."""
+    nearest = gap.nearest
+    if nearest is None:
+        return "there is no row to start from"
+    change = f"{nearest.condition}: {nearest.cell}"
+    if nearest.n_changes == 1:
+        return f"nearest: {measured.named(nearest.row)}, which would cover it with {change}"
+    return f"nearest: {measured.named(nearest.row)}, {nearest.n_changes} cells to change, first {change}"
+
+
+def overlap_sentence(report: CoverageReport) -> str:
+    """How many rows are valid at once."""
+    histogram = report.overlap.histogram
+    told = [f"{n or 'none'}: {format_percent(share)}" for n, share in enumerate(histogram[:MOST_COUNTS]) if share > 0.0]
+    rest = sum(histogram[MOST_COUNTS:])
+    told += [f"{MOST_COUNTS} or more: {format_percent(rest)}"] if rest > 0.0 else []
+    about = "" if report.overlap.method == "exact" else f" (estimated from {report.n_samples:,} samples)"
+    return f"on average {report.overlap.mean:.3g}{about}; " + ", ".join(told) if told else "nothing was measured"
+
+
+def slice_sentence(found: Slice) -> str:
+    """A pair of values with how much of it is covered."""
+    cells = ", ".join(f"{name}: {cell}" for name, cell in found.cells.items())
+    named = "" if found.is_named else "; no row names both"
+    return f"{covered_text(found)} of {cells} (which is {format_percent(found.share)} of the contexts{named})"
+
+
+def cells_text(cells: Mapping[str, str], most: int = MOST_TOLD) -> str:
+    """Some cells on one line; of many conditions the first few, and how many there are more."""
+    told = [f"{name}: {cell}" for name, cell in list(cells.items())[:most]]
+    more = f" and {plural(len(cells) - most, 'more condition')}" if len(cells) > most else ""
+    return ", ".join(told) + more or "every context"
+
+
+def covered_text(found: Slice) -> str:
+    """The covered share of a slice, with its bounds where it is an estimate."""
+    if found.covered is None:
+        return "unknown"
+    if found.is_exact:
+        return format_percent(found.covered)
+    return " to ".join(told_apart(found.lower, found.upper))
+
+
+def change_sentence(measured: Measured, change: Change) -> str:
+    """What became of the covered share and of the gaps since the baseline."""
+    at_least = "" if measured.report.method == "exact" else "at least "
+    now, before = told_apart(measured.report.lower, change.before)
+    share = f"covered {at_least}{now}, before {before}" if change.drop else f"covered {at_least}{now}, as before"
+    sure = "" if change.is_complete else "; the lists are not complete, so some may have been there"
+    return f"{share}; {plural(len(change.opened), 'new gap')}, {len(change.closed):,} closed{sure}"
+
+
+def facts_sentences(seen: Observed) -> Iterator[str]:
+    """What is wrong with recorded facts."""
+    for word, notes in (("missing", seen.missing), ("outside the domain", seen.outside)):
+        told = [f"{note.condition} in {plural(note.moments, 'moment')}{_examples(note)}" for note in notes]
+        if told:
+            yield f"{word}: {_some(told, ', ')}"
+    if seen.unknown_columns:
+        yield f"columns that the table does not ask for: {_some(seen.unknown_columns, ', ')}"
+    if seen.unread:
+        yield f"not read: {_some([file.file for file in seen.unread], ', ')}"
+
+
+def _examples(note: FactNote) -> str:
+    return f" ({', '.join(note.examples)})" if note.examples else ""

@@ -1,0 +1,99 @@
+"""A coverage report against an earlier one: gaps are compared by the contexts that they hold."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from contextdb.covering import coverage
+from contextdb.covering.assumed import opened
+from contextdb.covering.baseline import Change, compared, read_baseline
+from contextdb.errors import ContextError
+from contextdb.schema import TableSettings
+from contextdb.table import Table
+
+SCHEMA = {"speed": {"type": "number", "min": 0, "max": 10}, "gait": {"type": "enum", "values": ["Walk", "Run"]}}
+
+
+def table_of(*rows: tuple[str, str, str], policy: str = "collect") -> Table:
+    columns = dict(zip(("Asset", "speed", "gait"), map(list, zip(*rows, strict=True)), strict=True))
+    return Table.from_columns(columns, SCHEMA, TableSettings("t", policy=policy))
+
+
+def change(before: Table, after: Table) -> Change:
+    document = json.dumps({"format": 1, "tables": [coverage(before).to_json()]})
+    return compared(opened(after), coverage(after), read_baseline(document, "b.json")["table"])
+
+
+WALK, RUN = ("walk", "0..4", "Walk"), ("run", "4..10", "Run")
+
+
+def test_the_same_table_changed_in_nothing():
+    found = change(table_of(WALK, RUN), table_of(RUN, WALK))
+    assert (found.drop, found.opened, found.closed, found.dead, found.is_complete) == (0.0, (), (), (), True)
+
+
+def test_a_row_taken_away_opens_a_gap_and_lowers_the_share():
+    found = change(table_of(WALK, RUN), table_of(WALK))
+    assert found.drop == pytest.approx(0.3)
+    assert [gap.cells for gap in found.opened] == [{"speed": "(4..10]"}, {"gait": "Run"}]
+    assert found.closed == ()
+
+
+def test_a_gap_that_became_narrower_is_neither_new_nor_closed():
+    found = change(table_of(WALK), table_of(WALK, ("run", "4..6", "Run")))
+    assert found.drop < 0
+    assert (found.opened, found.closed) == ((), ())
+
+
+def test_a_gap_that_is_cut_otherwise_is_not_new():
+    found = change(table_of(("walk", "0..4", "Any")), table_of(("walk", "0..4", "Any"), ("run", "6..8", "Run")))
+    assert (found.opened, found.closed) == ((), ())
+
+
+def test_a_gap_is_closed_when_every_context_of_it_has_a_row():
+    found = change(table_of(WALK), table_of(WALK, ("run", "Any", "Run")))
+    assert [gap.cells for gap in found.closed] == [{"gait": "Run"}]
+    assert found.opened == ()
+
+
+def test_single_points_count():
+    found = change(table_of(("a", "..5", "Any"), ("b", "5..", "Any")), table_of(("a", "..5)", "Any"), ("b", "(5..", "Any")))
+    assert [(gap.cells, gap.share) for gap in found.opened] == [({"speed": "5"}, 0.0)]
+    assert found.drop == 0.0
+
+
+def test_rows_that_died_since_are_told_and_those_dead_before_are_not():
+    before = table_of(("all", "0..4", "Any"), ("slow", "0..3", "Any"), ("fast", "4..9", "Any"), policy="first")
+    after = table_of(("all", "0..9", "Any"), ("slow", "0..3", "Any"), ("fast", "4..9", "Any"), policy="first")
+    assert [f.asset for f in change(before, after).dead] == ["fast"]
+
+
+def test_gaps_over_a_condition_that_is_gone_are_closed():
+    document = coverage(table_of(WALK)).to_json()
+    plain = Table.from_columns({"Asset": ["walk"], "speed": ["0..4"]}, SCHEMA, TableSettings("t"))
+    earlier = read_baseline(json.dumps({"format": 1, "tables": [document]}), "b.json")["table"]
+    found = compared(opened(plain), coverage(plain), earlier)
+    assert [gap.cells for gap in found.closed] == [{"gait": "Run"}]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "no json",
+        "[]",
+        '{"format": 2, "tables": []}',
+        '{"format": 1}',
+        '{"format": 1, "tables": [{}]}',
+        '{"format": 1, "tables": [{"table": "t", "covered": {"lower": 2}, "gaps": {"complete": true, "items": []}}]}',
+        '{"format": 1, "tables": [{"table": "t", "covered": {"lower": NaN}, "gaps": {"complete": true, "items": []}}]}',
+        '{"format": 1, "tables": [{"table": "t", "covered": {"lower": 0}, "gaps": {"complete": true, "items": [1]}}]}',
+        '{"format": 1, "tables": [{"table": "t", "covered": {"lower": 0}, "gaps": null}]}',
+        "[" * 100_000,
+    ],
+)
+def test_what_is_no_report_is_refused_with_its_file(text: str):
+    with pytest.raises(ContextError, match=r"^b\.json: the baseline cannot be read: .*coverage --format json"):
+        read_baseline(text, "b.json")

@@ -1,0 +1,83 @@
+"""What `contextdb check` finds of rows, assumptions and declarations."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from brute import random_table
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import examples
+
+from contextdb.commands.check_command import check_path
+from contextdb.covering import coverage
+from contextdb.covering.check_rows import check_rows
+
+TOML = """
+[conditions.speed]
+type = "number"
+min = 0
+max = 10
+
+[conditions.tired]
+type = "bool"
+
+[conditions.angle]
+type = "angle"
+
+[conditions.twice]
+type = "number"
+expr = "speed * 2"
+"""
+
+
+@pytest.fixture
+def rules_of(tmp_path: Path):
+    def found(rows: str, settings: str = "", path: str = "") -> list[tuple[str, str | None, int | None]]:
+        (tmp_path / "contextdb.toml").write_text(f"{TOML}\n[tables.jog]\n{settings}\n", encoding="utf-8")
+        (tmp_path / "jog.csv").write_text(rows, encoding="utf-8")
+        return [(f.rule, f.column, f.line) for f in check_path(str(tmp_path / path)).findings]
+
+    return found
+
+
+def test_conditions_that_no_table_uses_are_told_with_their_line_when_the_folder_is_checked(rules_of):
+    rows = "Asset,speed\nslow,0..5\nfast,5..10\n"
+    assert rules_of(rows) == [
+        ("unused-condition", "tired", 7),
+        ("unused-condition", "angle", 10),
+        ("unused-condition", "twice", 13),
+    ]
+    assert rules_of(rows, path="jog.csv") == []
+
+
+def test_a_condition_is_used_by_assumptions_and_by_what_is_computed_from_it(rules_of):
+    assert rules_of("Asset,twice\nslow,0..5\n", 'assume = ["not tired or twice < 3"]') == [("unused-condition", "angle", 10)]
+
+
+def test_nothing_is_called_unused_where_a_table_cannot_be_read(rules_of):
+    assert {rule for rule, _, _ in rules_of("Asset,speed\nslow,0..5,1\n")} == {"unreadable"}
+
+
+def test_a_condition_that_is_always_any_is_told_and_disabled_rows_do_not_count(rules_of):
+    rows = "Asset,speed,tired,On\na,0..5,Any,True\nb,5..10,,True\nc,5..10,True,False\n"
+    assert rules_of(rows, 'enabled = "On"', "jog.csv") == [("always-any", "tired", None)]
+
+
+def test_contradicting_assumptions_are_named(rules_of):
+    assert rules_of("Asset,speed\na,0..5\n", 'assume = ["speed > 5", "speed < 4"]', "jog.csv") == [("no-context", None, None)]
+
+
+def test_rows_are_not_judged_where_cells_cannot_be_read(rules_of):
+    assert [rule for rule, _, _ in rules_of("Asset,speed\na,0..5\nb,1..2\nc,x\n", path="jog.csv")] == ["unreadable-cell"]
+
+
+@examples(10)
+@given(st.integers(0, 2**32))
+def test_a_check_finds_of_small_tables_what_coverage_finds(seed):
+    rng = random.Random(seed)
+    table = random_table(rng, rng.choice(["collect", "first", "priority", "unique"]))
+    found = [f for f in check_rows(table) if f.rule != "always-any"]
+    assert found == [f for f in coverage(table, samples=0).findings if f.rule != "identical-rows"]

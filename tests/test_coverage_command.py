@@ -1,0 +1,277 @@
+"""`contextdb coverage`: its JSON contract, its exit codes for every bar, its baseline, and what it says of bad use."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from running import ROOT, Result, run
+
+from contextdb import cli
+
+TOML = """
+[conditions.speed]
+type = "number"
+min = 0
+max = 10
+
+[conditions.gait]
+type = "enum"
+values = ["Walk", "Run"]
+"""
+JOG = "Asset,speed,gait\nwalk,0..4,Walk\nrun,4..10,Run\n"
+"""Covers 0.2 + 0.3 of the contexts."""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setitem(cli.COMMANDS, "coverage", "which contexts have no asset")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tables").mkdir()
+    write(JOG)
+    (tmp_path / "tables/contextdb.toml").write_text(TOML, encoding="utf-8")
+    return tmp_path
+
+
+def write(rows: str, name: str = "jog") -> None:
+    Path(f"tables/{name}.csv").write_text(rows, encoding="utf-8")
+
+
+def baseline(file: str = "before.json") -> None:
+    assert run("coverage", "tables", "--format", "json", "-o", file).code == 0
+
+
+def test_the_json_document_keeps_its_contract():
+    result = run("coverage", "tables", "--format", "json")
+    assert (result.code, result.err) == (0, "")
+    assert result.json["format"] == 1
+    (table,) = result.json["tables"]
+    assert (table["table"], table["rows"], table["conditions"]) == ("jog", 2, 2)
+    assert table["covered"]["method"] == "exact"
+    assert table["covered"]["value"] == table["covered"]["lower"] == table["covered"]["upper"] == 0.5
+    assert table["gaps"]["complete"] is True
+    items = [(g["cells"], round(g["share"], 9), round(g["new_share"], 9)) for g in table["gaps"]["items"]]
+    assert items == [({"speed": "(4..10]", "gait": "Walk"}, 0.3, 0.3), ({"speed": "[0..4)", "gait": "Run"}, 0.2, 0.2)]
+    assert all(isinstance(g["id"], str) and g["id"] for g in table["gaps"]["items"])
+    assert table["findings"] == []
+    assert table["overlap"]["mean"] == 0.5
+    assert [round(share, 9) for share in table["overlap"]["histogram"]] == [0.5, 0.5]
+    assert (table["telemetry"], table["baseline"], table["gates"]) == (None, None, [])
+
+
+def test_findings_have_the_fields_of_a_check():
+    write(JOG + "jog,1..2,Walk\n")
+    (finding,) = run("coverage", "tables", "--json").json["tables"][0]["findings"]
+    wanted = {"rule": "subsumed-row", "level": "warning", "row": 2, "asset": "jog", "line": 4, "column": None, "by": [0]}
+    assert {key: finding[key] for key in wanted} == wanted
+    assert finding["message"]
+
+
+def test_the_same_tables_give_the_same_bytes():
+    first = run("coverage", "tables", "--json", "--work", "0", "--samples", "1000")
+    assert first.out == run("coverage", "tables", "--json", "--work", "0", "--samples", "1000").out
+
+
+@pytest.mark.parametrize("path", ["tables", "tables/contextdb.toml", "tables/jog.csv", "jog"])
+def test_a_path_is_a_folder_a_file_or_the_name_of_a_table(path: str):
+    assert [t["table"] for t in run("coverage", path, "--json").json["tables"]] == ["jog"]
+
+
+@pytest.mark.parametrize(("bar", "code"), [("0", 0), ("49.99", 0), ("50", 0), ("50%", 0), ("50.0000001", 1), ("99", 1), ("100", 1)])
+def test_the_exit_code_says_whether_the_bar_is_kept(bar: str, code: int):
+    result = run("coverage", "tables", "--fail-under", bar)
+    assert (result.code, result.err) == (code, "")
+
+
+def test_a_covered_table_reaches_a_hundred_and_one_with_a_sliver_open_does_not():
+    write("Asset,speed,gait\nall,Any,Any\n")
+    assert run("coverage", "tables", "--fail-under", "100").code == 0
+    write("Asset,speed,gait\nall,0..9.9999999999999,Any\n")
+    result = run("coverage", "tables", "--fail-under", "100")
+    assert result.code == 1
+    assert "100 % of the contexts" not in result.out
+    assert "(exact)" in result.out
+
+
+def test_an_estimate_is_held_to_the_bar_by_its_lower_bound():
+    rows = "".join(f"a{i},{i / 50}..{i / 50 + 0.1:.3f},{'Walk' if i % 2 else 'Run'}\n" for i in range(300))
+    write("Asset,speed,gait\n" + rows)
+    plain = run("coverage", "tables", "--json").json["tables"][0]["covered"]
+    guess = run("coverage", "tables", "--json", "--work", "0", "--samples", "50").json["tables"][0]["covered"]
+    assert plain["method"] == "exact"
+    assert guess["lower"] <= plain["value"] <= guess["upper"]
+    bar = str(100 * (guess["lower"] + guess["upper"]) / 2)
+    options = ("coverage", "tables", "--fail-under", bar)
+    assert run(*options, "--work", "0", "--samples", "50").code == (1 if guess["lower"] < guess["upper"] else 0)
+
+
+def test_any_table_below_the_bar_fails():
+    write("Asset,speed,gait\nall,Any,Any\n", "all")
+    result = run("coverage", "tables", "--fail-under", "60", "--json")
+    assert result.code == 1
+    assert {t["table"]: [g["passed"] for g in t["gates"]] for t in result.json["tables"]} == {"jog": [False], "all": [True]}
+    assert result.json["passed"] is False
+
+
+def test_a_baseline_of_the_same_tables_passes():
+    baseline()
+    result = run("coverage", "tables", "--baseline", "before.json")
+    assert result.code == 0
+    assert "as before; 0 new gaps, 0 closed" in result.out
+
+
+def test_a_new_gap_fails_unless_the_drop_is_allowed():
+    baseline()
+    write("Asset,speed,gait\nwalk,0..4,Walk\nrun,6..10,Run\n")
+    result = run("coverage", "tables", "--baseline", "before.json", "--json")
+    assert result.code == 1
+    change = result.json["tables"][0]["baseline"]
+    assert round(change["drop"], 9) == 0.1
+    assert len(change["opened"]) == 2
+    assert run("coverage", "tables", "--baseline", "before.json", "--max-drop", "10").code == 0
+    assert run("coverage", "tables", "--baseline", "before.json", "--max-drop", "9.9").code == 1
+
+
+def test_a_closed_gap_passes_and_is_told():
+    baseline()
+    write(JOG + "stroll,(4..10],Walk\n")
+    result = run("coverage", "tables", "--baseline", "before.json")
+    assert result.code == 0
+    assert "0 new gaps, 1 closed" in result.out
+    assert "- 30.00 %  speed: (4..10], gait: Walk" in result.out
+
+
+def test_tables_that_came_and_went_since_the_baseline_fail_nothing():
+    write(JOG, "run")
+    baseline()
+    Path("tables/run.csv").unlink()
+    write("Asset,speed,gait\n", "new")
+    result = run("coverage", "tables", "--baseline", "before.json")
+    assert result.code == 0
+    assert "No longer there: run." in result.out
+
+
+def test_an_output_file_is_written_and_nothing_is_printed():
+    result = run("coverage", "tables", "-o", "report.txt", "--fail-under", "90")
+    assert (result.code, result.out) == (1, "")
+    assert "50.00 % of the contexts have a valid row" in Path("report.txt").read_text(encoding="utf-8")
+
+
+def test_a_gap_is_told_by_number_and_by_id():
+    by_number = run("coverage", "jog", "--gap", "2")
+    assert by_number.code == 0
+    assert by_number.lines[0].startswith("Gap 2 of 2 in jog (")
+    gap_id = by_number.lines[0].partition("(")[2].partition(")")[0]
+    assert run("coverage", "jog", "--gap", gap_id).out == by_number.out
+    assert "contextdb query tables/jog.csv speed=2 gait=Run --unknown any --explain" in by_number.out
+
+
+def test_a_row_is_explained_by_number_and_by_asset():
+    write(JOG + "jog,1..2,Walk\n")
+    result = run("coverage", "jog", "--explain", "jog")
+    assert result.code == 0
+    assert result.out == run("coverage", "jog", "--explain", "2").out
+    assert result.lines == [
+        "line 4 jog of jog (row 2)",
+        "valid in 5.00 % of the contexts",
+        "",
+        'warning subsumed-row: wherever it is valid, line 2 ("walk") is valid too.',
+        "  line 2 walk, valid in 20.00 %",
+    ]
+    assert "needless" in run("coverage", "jog", "--explain", "walk").out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("nowhere",), "nowhere: there is no such table."),
+        (("tables", "--fail-under", "120"), "is no percentage"),
+        (("tables", "--fail-under", "nan"), "is no percentage"),
+        (("tables", "--max-drop", "1"), "--max-drop compares with a baseline."),
+        (("tables", "--baseline", "nowhere.json"), "nowhere.json"),
+        (("tables", "--baseline", "tables/jog.csv"), "tables/jog.csv: the baseline cannot be read"),
+        (("tables", "--seed", "-1"), ""),
+        (("tables", "--samples", "many"), "is no whole number"),
+        (("tables", "--format", "htm"), 'Did you mean "html"?'),
+        (("jog", "--gap", "9"), 'there is no gap "9".'),
+        (("jog", "--gap", "1", "--explain", "1"), "do not go together"),
+        (("jog", "--gap", "1", "--format", "html"), "--format html does not go with them"),
+        (("jog", "--explain", "wlak"), 'Did you mean "walk"?'),
+        (("jog", "--explain", "2"), 'there is no row "2".'),
+    ],
+)
+def test_bad_use_exits_with_2_and_says_what_is_wrong(arguments: tuple[str, ...], said: str):
+    result = run("coverage", *arguments)
+    assert (result.code, result.out) == (2, "")
+    assert said in result.err
+    assert "Traceback" not in result.err
+
+
+def test_a_table_that_cannot_be_read_exits_with_2_and_names_every_fault():
+    write(JOG + "x,5..,Wlak\n")
+    write("Asset,speed\na,oops\n", "other")
+    result = run("coverage", "tables")
+    assert result.code == 2
+    assert 'jog.csv, line 4, column "gait"' in result.err
+    assert 'other.csv, line 2, column "speed"' in result.err
+
+
+def test_a_folder_without_tables_and_a_table_without_rows():
+    Path("empty").mkdir()
+    assert run("coverage", "empty").code == 2
+    write("Asset,speed,gait\n")
+    result = run("coverage", "tables", "--fail-under", "1")
+    assert result.code == 1
+    assert "0 % of the contexts have a valid row" in result.out
+
+
+@pytest.mark.parametrize("table", ["locomotion", "hit_mid_air", "contested_catch"])
+@pytest.mark.parametrize("format_name", ["text", "markdown"])
+def test_the_report_of_a_sample_table_is_the_golden_one(table: str, format_name: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setenv("COLUMNS", "100")
+    result: Result = run("coverage", f"tables/{table}.csv", "--format", format_name, "--fail-under", "10")
+    golden = ROOT / "tests" / "golden" / f"coverage_{table}.{'txt' if format_name == 'text' else 'md'}"
+    assert result.out == golden.read_text(encoding="utf-8")
+    assert max(map(len, result.lines)) <= 100 or format_name == "markdown"
+
+
+def test_the_json_of_the_sample_tables_is_what_the_page_holds(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(ROOT)
+    document = json.loads(run("coverage", "tables", "--json").out)
+    assert [t["table"] for t in document["tables"]] == ["hit_mid_air", "contested_catch", "locomotion"]
+    page = run("coverage", "tables", "--format", "html").out
+    assert all(f">{t['table']}</h2>" in page for t in document["tables"])
+
+
+def test_recorded_moments_are_held_to_their_own_bar(here: Path):
+    Path("seen.csv").write_text("speed,gait,n\n1,Walk,97\n9,Run,2\n9,Walk,1\n", encoding="utf-8")
+    told = ("coverage", "jog", "--telemetry", "seen*.csv", "--count", "n")
+    result = run(*told, "--json", "--fail-under-telemetry", "99")
+    assert (result.code, result.err) == (0, "")
+    (table,) = result.json["tables"]
+    seen = table["telemetry"]
+    assert (seen["rows"], seen["distinct"], seen["covered"]) == (3, 3, 0.99)
+    assert run(*told, "--fail-under-telemetry", "99.5").code == 1
+    text = run(*told)
+    assert "99.00 % of 100 recorded moments have a valid row (3 distinct)." in text.out
+    assert "1.00 %  speed: (4..10], gait: Walk" in text.out
+
+
+def test_telemetry_that_cannot_be_read_whole_is_no_answer(here: Path):
+    Path("good.csv").write_text("speed,gait\n1,Walk\n", encoding="utf-8")
+    Path("seen.parquet").write_bytes(b"PAR1 cut off")
+    result = run("coverage", "jog", "--telemetry", "good.csv", "--telemetry", "seen.parquet", "--fail-under-telemetry", "1")
+    assert result.code == 2
+    assert "seen.parquet" in result.err
+    assert "not read: seen.parquet" in result.out
+
+
+@pytest.mark.parametrize(
+    "option", [("--fail-under-telemetry", "9"), ("--count", "n"), ("--engine", "dask"), ("--scheduler", "x"), ("--resume", "x")]
+)
+def test_options_about_telemetry_want_files(option: tuple[str, str]):
+    result = run("coverage", "tables", *option)
+    assert (result.code, result.out) == (2, "")
+    assert f"{option[0]} is about recorded contexts. Accepted: --telemetry GLOB" in result.err

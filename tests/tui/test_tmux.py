@@ -1,0 +1,123 @@
+"""The editor in a real terminal: what no simulated one shows, such as how keys, pastes and the mouse arrive.
+
+Nothing sleeps to be safe: each step waits until the screen shows what it is to show.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent.parent
+RAW = b"Asset,speed,hit\r\n" + b"".join(b"clip_%02d,%d,True\r\n" % (i, i) for i in range(40))
+DEADLINE_S = 30.0
+
+pytestmark = pytest.mark.skipif(shutil.which("tmux") is None, reason="tmux is not installed")
+
+
+@dataclass
+class Terminal:
+    """A tmux of its own, with the editor in it."""
+
+    socket: str
+    folder: Path
+
+    def tmux(self, *words: str) -> str:
+        done = subprocess.run(
+            ["tmux", "-S", self.socket, "-f", os.devnull, *words], capture_output=True, check=True, encoding="utf-8"
+        )
+        return done.stdout
+
+    def start(self, term: str, **more: str) -> None:
+        environment = {
+            "TERM": term,
+            "PYTHONPATH": str(ROOT),
+            "XDG_STATE_HOME": str(self.folder),
+            "XDG_CONFIG_HOME": str(self.folder),
+        }
+        said = [f"{name}={value}" for name, value in (environment | more).items()]
+        command = f"env -u COLORTERM {' '.join(said)} {sys.executable} -m contextdb edit t.csv; echo exit code $?; cat"
+        self.tmux("new-session", "-d", "-x", "80", "-y", "24", "-c", str(self.folder), command)
+
+    def keys(self, *keys: str) -> None:
+        self.tmux("send-keys", *keys)
+
+    def raw(self, text: str) -> None:
+        self.tmux("send-keys", "-l", text)
+
+    def mouse(self, button: int, x: int, y: int) -> None:
+        """A press and a release, as a terminal sends them; x and y from 0."""
+        self.raw(f"\x1b[<{button};{x + 1};{y + 1}M\x1b[<{button};{x + 1};{y + 1}m")
+
+    @property
+    def screen(self) -> str:
+        return self.tmux("capture-pane", "-p")
+
+    def wait(self, *texts: str) -> str:
+        """The screen, once it shows all of these."""
+        end = time.monotonic() + DEADLINE_S
+        while not all(text in (shown := self.screen) for text in texts):
+            assert time.monotonic() < end, f"{texts} not on the screen:\n{shown}"
+            time.sleep(0.02)
+        return shown
+
+
+@pytest.fixture
+def terminal(tmp_path: Path) -> Iterator[Terminal]:
+    (tmp_path / "t.csv").write_bytes(RAW)
+    made = Terminal(str(tmp_path / "socket"), tmp_path)
+    yield made
+    subprocess.run(["tmux", "-S", made.socket, "kill-server"], capture_output=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("term", "more"), [("screen-256color", {}), ("xterm", {}), ("xterm-256color", {"NO_COLOR": "1"})], ids=["256", "16", "none"]
+)
+def test_the_editor_works_in_a_real_terminal(terminal, term, more):
+    terminal.start(term, **more)
+    terminal.wait("clip_00", "row 1 · Asset", "Save")
+
+    terminal.keys("Down", "Right")
+    terminal.raw("2..25")  # all at once, as over a slow line
+    terminal.keys("Enter")
+    terminal.wait("row 3 · speed", "2..25", "t *")
+
+    terminal.tmux("set-buffer", "7\tFalse\n8..9\tFalse\n")
+    terminal.tmux("paste-buffer", "-p")  # bracketed; tmux makes its line ends \r
+    terminal.wait("Paste 2 × 2.", "8..9")
+
+    lines = terminal.screen.splitlines()
+    y = next(at for at, line in enumerate(lines) if "clip_05" in line)
+    terminal.mouse(0, lines[y].index("clip_05"), y)
+    terminal.wait("row 6 · Asset")
+    for _ in range(3):
+        terminal.mouse(65, 20, 10)
+    shown = terminal.wait("clip_20")
+    assert "row 6 · Asset" in shown
+
+    terminal.keys("C-s")
+    terminal.wait("Saved t.csv.")
+    expected = RAW.replace(b"clip_01,1,", b"clip_01,2..25,").replace(b"clip_02,2,True", b"clip_02,7,False")
+    assert (terminal.folder / "t.csv").read_bytes() == expected.replace(b"clip_03,3,True", b"clip_03,8..9,False")
+
+    terminal.keys("C-q")
+    terminal.wait("exit code 0")
+
+
+def test_quitting_with_unsaved_edits_asks_and_saves(terminal):
+    terminal.start("screen-256color")
+    terminal.wait("row 1 · Asset", "Save")
+    terminal.raw("first")
+    terminal.keys("Enter", "C-q")
+    terminal.wait("edits that are not saved")
+    terminal.keys("s")
+    terminal.wait("exit code 0")
+    assert (terminal.folder / "t.csv").read_bytes() == RAW.replace(b"clip_00", b"first")

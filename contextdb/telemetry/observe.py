@@ -1,0 +1,151 @@
+"""Hold recorded contexts against a table: the share of real moments with a valid row, and where the others are."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Literal
+
+from contextdb.classes import TagMasks
+from contextdb.compiled import CompiledTable
+from contextdb.contexts import context_files
+from contextdb.covering.factors import TagFactor
+from contextdb.covering.space import Space, require_counts
+from contextdb.errors import ContextError, Fault, FileError, in_quotes, nearest, some
+from contextdb.table import Table
+from contextdb.telemetry.engines import serially, with_dask
+from contextdb.telemetry.keys import estimated
+from contextdb.telemetry.observed import BadFile, FactNote, Observed
+from contextdb.telemetry.parts import Part, Plan, added, nothing
+from contextdb.telemetry.saved_parts import SavedParts
+from contextdb.telemetry.seen_gaps import seen_gaps
+
+Engine = Literal["local", "dask"]
+ENGINES: tuple[Engine, ...] = ("local", "dask")
+MOST_GAPS = 20
+Tell = Callable[[int, int], None]
+"""Is told how many files are done, and how many there are."""
+
+
+def observe(
+    table: Table | CompiledTable,
+    files: str | Path | Sequence[str | Path],
+    *,
+    count: str | None = None,
+    engine: Engine = "local",
+    scheduler: str | None = None,
+    progress: Tell | None = None,
+    resume: str | Path | None = None,
+    max_gaps: int = MOST_GAPS,
+) -> Observed:
+    """Hold recorded contexts against a table. Files are streamed, and only sums are kept.
+
+    Parameters
+    ----------
+    files : path or glob, or several
+        CSV or Parquet files with a column for each fact and a row for each moment.
+    count : str, optional
+        A column that says how often each row's moment was seen, a whole number from 0 up.
+    engine : {"local", "dask"}
+        This process, or Dask (`pip install "contextdb[dask]"`): the workers of `scheduler`, or a cluster of this machine's own.
+    progress : callable of (int, int), optional
+        Is told how many files are done, of how many; first with 0.
+    resume : path of a folder, optional
+        Where the sums of finished files are kept. A run that was interrupted goes on there; a changed file or table is read anew.
+    max_gaps : int
+        At most so many gaps are named.
+
+    Returns
+    -------
+    Observed
+        The same for any engine, and for files in any order. Files that cannot be read stand in `unread`; nothing of such a file is
+        counted.
+
+    Raises
+    ------
+    TableError
+        The table has cells that cannot be read.
+    FileError, ContextError
+        There is no such file, or none of them can be read; an engine that there is not.
+    EngineError
+        Dask is missing or does not answer, or files were not finished on its workers: they are named.
+    """
+    require_counts(max_gaps=max_gaps)
+    if engine not in ENGINES:
+        near = nearest(str(engine), ENGINES)
+        raise ContextError(Fault(f"there is no engine {in_quotes(str(engine))}.", some(ENGINES), in_quotes(near) if near else ""))
+    compiled = table if isinstance(table, CompiledTable) else table.compile()
+    space = Space.of(compiled)
+    plan = Plan(compiled, count, _tag_factors(space, compiled))
+    paths = _paths(files)
+    total, unread = nothing(plan), []
+    for path, part in _parts(plan, paths, engine, scheduler, resume, progress):
+        total = added(total, part)
+        unread += [BadFile(str(path), part.faults)] if part.faults else []
+    if len(unread) == len(paths):
+        raise FileError(*(fault for file in unread for fault in file.faults))
+    return _observed(space, compiled, total, sorted(unread, key=lambda f: f.file), max_gaps)
+
+
+def _paths(files: str | Path | Sequence[str | Path]) -> list[Path]:
+    patterns = [files] if isinstance(files, (str, Path)) else list(files)
+    if not patterns:
+        raise FileError(Fault("no file of contexts is given.", "a .csv or .parquet file, or a glob", rule="no-such-path"))
+    found = {os.path.realpath(path): path for pattern in patterns for path in context_files(str(pattern))}
+    return sorted(found.values())
+
+
+def _parts(
+    plan: Plan, paths: Sequence[Path], engine: Engine, scheduler: str | None, resume: str | Path | None, progress: Tell | None
+) -> Iterator[tuple[Path, Part]]:
+    """The part of every file, those that are kept from an earlier run first."""
+    saved = None if resume is None else SavedParts(Path(resume), plan)
+    kept = {path: part for path in paths if saved is not None and (part := saved.get(path)) is not None}
+    keys = {} if saved is None else {path: saved.key(path) for path in paths}
+    n_done = len(kept)
+    _tell(progress, n_done, len(paths))
+    yield from kept.items()
+    left = [path for path in paths if path not in kept]
+    if not left:
+        return
+    for path, part in with_dask(plan, left, scheduler) if engine == "dask" else serially(plan, left):
+        if saved is not None:
+            saved.put(path, part, keys[path])
+        n_done += 1
+        _tell(progress, n_done, len(paths))
+        yield path, part
+
+
+def _tell(progress: Tell | None, n_done: int, n_files: int) -> None:
+    if progress is not None:
+        progress(n_done, n_files)
+
+
+def _tag_factors(space: Space, compiled: CompiledTable) -> dict[str, tuple[TagFactor, ...]]:
+    found = {}
+    for at, condition in enumerate(compiled.conditions):
+        if isinstance(compiled.masks[at], TagMasks):
+            found[condition.name] = tuple(f for n in space.of_condition[at] if isinstance(f := space.factors[n], TagFactor))
+    return found
+
+
+def _observed(space: Space, compiled: CompiledTable, total: Part, unread: Sequence[BadFile], most: int) -> Observed:
+    gaps = seen_gaps(space, compiled, total, most)
+    outside = [FactNote(n, total.outside[n], total.examples[n]) for n in compiled.asked if total.outside[n]]
+    return Observed(
+        table=compiled.name,
+        files=total.files,
+        rows=total.rows,
+        moments=total.moments,
+        distinct=estimated(total.hashes, total.is_full),
+        distinct_is_exact=not total.is_full,
+        uncovered=total.uncovered,
+        hits=tuple(total.hits.tolist()),
+        gaps=gaps.gaps,
+        elsewhere=gaps.elsewhere,
+        missing=tuple(FactNote(n, total.missing[n]) for n in compiled.asked if total.missing[n]),
+        outside=tuple(outside),
+        unknown_columns=tuple(sorted(total.columns)),
+        unread=tuple(unread),
+    )

@@ -1,0 +1,131 @@
+"""Gaps that the game was in: recorded contexts without a row, widened to boxes and ranked by their moments."""
+
+from __future__ import annotations
+
+import json
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.bitmask import Flags
+from contextdb.classes import TagMasks, ValueMasks
+from contextdb.compiled import CompiledTable
+from contextdb.covering.factors import Factor, NumberFactor, ValueFactor
+from contextdb.covering.gaps import gap_id, nearest_row, widened
+from contextdb.covering.space import Box, Space
+from contextdb.covering.witness import BoxSet
+from contextdb.telemetry.observed import SeenGap
+from contextdb.telemetry.parts import Part
+
+Points = NDArray[np.int64]
+"""A class for each context and factor, -1 where the fact is missing or outside the domain: int64 [N, F]."""
+TRIED = 4
+"""Boxes that are made for each gap that is named, so that the largest are among them."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeenGaps:
+    """The largest gaps, and the moments without a row that no box of the domains holds."""
+
+    gaps: tuple[SeenGap, ...]
+    elsewhere: float
+
+
+def seen_gaps(space: Space, compiled: CompiledTable, part: Part, most: int) -> SeenGaps:
+    """Widen the contexts without a row, those of most moments first, until `most` gaps are found."""
+    points = _points(space, compiled, part)
+    is_placed = (points >= 0).all(axis=1)
+    kept = int(part.open_moments.sum())
+    scale = part.uncovered / kept if kept else 0.0
+    elsewhere = int(part.open_moments[~is_placed].sum())
+    moments = part.open_moments[is_placed]
+    rows = BoxSet.of(space.full, space.boxes)
+    boxes = _boxes(space, rows, points[is_placed], moments, most * TRIED)
+    found = _ranked(space, boxes, points[is_placed], moments)[:most]
+    gaps, before = [], np.zeros(len(moments), np.bool_)
+    for box, inside in found:
+        n, n_new = int(moments[inside].sum()), int(moments[inside & ~before].sum())
+        before |= inside
+        cells, nearest = space.cells(box), nearest_row(space, compiled, rows, box)
+        sizes = _scaled(n, scale, part), n * scale / part.moments, n_new * scale / part.moments
+        gaps.append(SeenGap(gap_id(cells), *sizes, cells, nearest, part.has_all_open))
+    return SeenGaps(tuple(gaps), _scaled(elsewhere, scale, part))
+
+
+def _scaled(moments: int, scale: float, part: Part) -> float:
+    return moments if part.has_all_open else moments * scale
+
+
+def _boxes(space: Space, rows: BoxSet, points: Points, moments: NDArray[np.int64], most: int) -> list[tuple[Box, Flags]]:
+    """Boxes round the contexts of most moments, each with the contexts in it."""
+    order = sorted(range(len(rows.full)), key=lambda f: (rows.restricts[f].bit_count(), -f))
+    left = np.lexsort((*points.T[::-1], -moments))
+    found: list[tuple[Box, Flags]] = []
+    while len(left) and len(found) < most:
+        box = widened(space, rows, tuple(points[left[0]].tolist()), order)
+        inside = _inside(box, points)
+        inside[left[0]] = True
+        found.append((box, inside))
+        left = left[~inside[left]]
+    return found
+
+
+def _inside(box: Box, points: Points) -> Flags:
+    inside = np.ones(len(points), np.bool_)
+    for f, side in enumerate(box):
+        held = np.array([side >> k & 1 for k in range(side.bit_length() + 1)], np.bool_)
+        inside &= held[np.minimum(points[:, f], len(held) - 1)]
+    return inside
+
+
+def _ranked(
+    space: Space, boxes: Sequence[tuple[Box, Flags]], points: Points, moments: NDArray[np.int64]
+) -> list[tuple[Box, Flags]]:
+    key = [(-int(moments[inside].sum()), json.dumps(space.cells(box), ensure_ascii=False)) for box, inside in boxes]
+    return [boxes[i] for i in sorted(range(len(boxes)), key=key.__getitem__)]
+
+
+def _points(space: Space, compiled: CompiledTable, part: Part) -> Points:
+    """Each context's class in every factor."""
+    stack, keys = compiled.stack, part.open_keys
+    points = np.full((len(keys), len(space.factors)), -1, np.int64)
+    slot, wide, tag = 0, stack.n_plain, stack.n_codes
+    wides = set(stack.wide[:, 0].tolist())
+    for at, masks in enumerate(compiled.masks):
+        numbers = space.of_condition[at]
+        if isinstance(masks, TagMasks):
+            points[:, list(numbers)] = keys[:, tag : tag + len(numbers)]
+            tag += len(numbers)
+        else:
+            own = keys[:, wide] if at in wides else keys[:, slot] - stack.starts[at]
+            classes = _classes(masks, space.factors[numbers[0]])
+            points[:, numbers[0]] = np.array([*classes, -1], np.int64)[np.clip(own, 0, len(classes))]
+        wide += at in wides
+        slot += 0 if at in wides else stack.n_slots[at]
+    return points
+
+
+def _classes(masks: object, factor: Factor) -> list[int]:
+    """For each class of a column the class of the factor that holds it, or one that no row tells from it; -1: outside."""
+    if isinstance(masks, ValueMasks):
+        assert isinstance(factor, ValueFactor)
+        place = {value: k for k, value in enumerate(factor.values)}
+        named = [place.get(value, -1) for value in masks.values]
+        return [*named, len(factor.values)] if masks.has_others else named
+    assert isinstance(factor, NumberFactor)
+    bounds = [float(b) for b in masks.bounds]  # type: ignore[attr-defined]
+    return [_span_of(low, stop, factor) for low, stop in zip([-math.inf, *bounds], [*bounds, math.nan], strict=True)]
+
+
+def _span_of(low: float, stop: float, factor: NumberFactor) -> int:
+    """The span that holds the least number of the domain from `low` on, if it is below `stop` (NaN: there is none)."""
+    first = max(low, factor.spans[0][0])
+    if factor.kind == "int" and math.isfinite(first):
+        first = float(math.ceil(first))
+    if first >= stop or first > factor.spans[-1][1]:
+        return -1
+    return bisect_right([s[0] for s in factor.spans], first) - 1

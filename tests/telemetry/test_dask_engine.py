@@ -1,0 +1,79 @@
+"""Telemetry on a real Dask cluster: the same sums, also when a worker is killed; a failure names the files."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+import polars as pl
+import pytest
+
+from contextdb.table import Table
+from contextdb.telemetry import observe
+from contextdb.telemetry.engines import EngineError
+
+SCHEMA = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}
+TABLE = Table.from_columns({"Asset": ["a", "b"], "speed": ["0..2", "4..5"]}, SCHEMA)
+N_FILES = 12
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """Twelve files; the moments of file i are i..i+1."""
+    for i in range(N_FILES):
+        pl.DataFrame({"speed": [i + k / 5000 for k in range(5000)]}).write_parquet(tmp_path / f"{i:02}.parquet")
+    return tmp_path
+
+
+@pytest.fixture
+def cluster():
+    """Two workers, each a process."""
+    distributed = pytest.importorskip("distributed", reason='dask is not installed: pip install "contextdb[dask]"')
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as made:
+        yield made
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
+def test_a_worker_killed_half_way_changes_no_sum(recorded, cluster):
+    killed = []
+
+    def kill_one(n_done, n_files):
+        if n_done == 3 and not killed:
+            killed.append(next(iter(cluster.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    found = observe(TABLE, f"{recorded}/*", engine="dask", scheduler=cluster.scheduler_address, progress=kill_one)
+    assert killed
+    assert found == observe(TABLE, f"{recorded}/*")
+    assert found.moments == 5000 * N_FILES
+
+
+def test_files_that_kill_every_worker_are_named(recorded, cluster, monkeypatch):
+    monkeypatch.setattr("contextdb.telemetry.engines._observe", die)
+    with pytest.raises(EngineError, match=r"could not be finished: .*00\.parquet"):
+        observe(TABLE, str(recorded / "00.parquet"), engine="dask", scheduler=cluster.scheduler_address)
+
+
+def die(table: bytes, path: str) -> None:
+    """What a worker does when it runs out of memory."""
+    os._exit(1)
+
+
+def test_a_scheduler_that_does_not_answer_is_told(recorded, monkeypatch):
+    pytest.importorskip("distributed", reason='dask is not installed: pip install "contextdb[dask]"')
+    with pytest.raises(EngineError, match="does not answer"):
+        observe(TABLE, f"{recorded}/*", engine="dask", scheduler="nonsense://nowhere")
+
+
+def test_without_dask_the_error_says_how_to_install_it(recorded, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(EngineError, match=r'pip install "contextdb\[dask\]"'):
+        observe(TABLE, f"{recorded}/*", engine="dask")
+
+
+def test_a_misspelt_engine_is_told_the_nearest(recorded):
+    from contextdb.errors import ContextError
+
+    with pytest.raises(ContextError, match='Did you mean "dask"'):
+        observe(TABLE, f"{recorded}/*", engine="dsk")

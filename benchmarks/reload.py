@@ -109,12 +109,14 @@ def main() -> None:
     for shape in generator.SHAPES:
         figures = measured(shape, 3 if options.quick else 9)
         print(f"\nreload at {shape.name}: milliseconds, median (lowest … highest)")
-        print_aligned(
-            [[n, f"{s.median_us / 1e3:,.2f}", f"({s.low_us / 1e3:,.2f} … {s.high_us / 1e3:,.2f})"] for n, s in figures.items()]
-        )
+        print_aligned([(name, f"{s.median_us / 1e3:,.2f}", _spread(s)) for name, s in figures.items()])
         report[shape.name] = {name: vars(summary) for name, summary in figures.items()}
     if options.json:
         options.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+def _spread(summary: timing.Summary) -> str:
+    return f"({summary.low_us / 1e3:,.2f} … {summary.high_us / 1e3:,.2f})"
 
 
 if __name__ == "__main__":

@@ -103,7 +103,27 @@ def test_the_artefact_of_a_sample_table_is_asked_as_the_table(here: Path, monkey
     assert run("query", artefact, *arguments) == run("query", "tables/hit_mid_air.csv", *arguments)
 
 
+@pytest.mark.parametrize("name", ["facts.py", "new/facts.pyi"])
+def test_the_facts_of_all_tables_are_written_as_python_types_where_that_is_asked_for(here: Path, name: str):
+    result = run("compile", "game", "--stubs", name)
+    assert (result.code, result.lines) == (0, ["game/run.safetensors", "game/jog.safetensors", name])
+    text = (here / name).read_text(encoding="utf-8")
+    assert "RunningFacts = TypedDict(" in text
+    assert "JogFacts = TypedDict(" in text
+
+
 # ---- what is refused
+
+
+@pytest.mark.parametrize(
+    ("name", "mend"),
+    [("facts", ' Did you mean "facts.py"?'), ("facts.txt", ' Did you mean "facts.py"?'), ("game", ""), ("new/", "")],
+)
+def test_types_go_into_a_python_file(here: Path, name: str, mend: str):
+    assert refused("game", "--stubs", name) == (
+        f"{name}: this is no name of a Python file. Accepted: a name that ends in .py or .pyi.{mend}"
+    )
+    assert artefacts(here) == []
 
 
 @pytest.mark.parametrize("out", ["run.bin", "run", "run.safetensor"])

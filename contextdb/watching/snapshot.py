@@ -1,0 +1,124 @@
+"""One version of a project: read from bytes that were all on the disk at one time, compiled, and never changed.
+
+`next_snapshot` makes a version from the one before: files whose bytes are the same are not read again, and of the others only the
+columns that changed are compiled. The disk is touched only to say why a file that is missing could not be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from contextdb.compiled import CompiledTable
+from contextdb.disk import read_bytes
+from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError
+from contextdb.parquet import read_parquet
+from contextdb.project import SCHEMA_FILE, Project, twice_named
+from contextdb.schema import EMPTY, Schema, read_schema
+from contextdb.source import read_csv
+from contextdb.table import Table
+from contextdb.watching.sharing import table_like
+from contextdb.watching.stamps import Digests, digests_of
+
+Contents = Mapping[Path, bytes]
+Found = Sequence[tuple[str, Path]]
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One version of a project, compiled. It never changes, so that a game can ask several tables of one and the same version."""
+
+    number: int
+    """1 for the version that the watch began with, one more for each that came after it."""
+    project: Project = field(repr=False)
+    tables: Mapping[str, CompiledTable] = field(repr=False)
+    """Every table compiled, by name."""
+    changed: tuple[str, ...]
+    """The tables that are new or differ from the version before."""
+    digests: Digests = field(repr=False)
+    """Of each file, as it was read."""
+
+    def __getitem__(self, name: str) -> CompiledTable:
+        """One compiled table; a name that is not there raises TableError and names the nearest."""
+        return self.tables[self.project[name].name]
+
+
+def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Schema:
+    """What the folder's contextdb.toml says; the same object as before when its bytes are the same.
+
+    Raises
+    ------
+    FileError
+        It was there and is not, or may not be read.
+    SchemaError
+        It says something that cannot be meant.
+    """
+    path = folder / SCHEMA_FILE
+    raw = contents.get(path)
+    if raw is None:
+        if last is not None and path in last.digests:
+            gone = "the file is gone; the tables stay as they were."
+            raise FileError(Fault(gone, mend="to put it back", place=Place(str(path)), rule="no-such-path"))
+        if path.exists():
+            read_bytes(path)
+        return EMPTY
+    if last is not None and digests_of({path: raw})[path] == last.digests.get(path):
+        return last.project.schema
+    return read_schema(_decoded(raw, path), str(path))
+
+
+def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents, last: Snapshot | None = None) -> Snapshot:
+    """The version that the files now are; `found` are the names and files of the tables.
+
+    Raises
+    ------
+    ContextDBError
+        With every fault of every table.
+    """
+    digests = digests_of(contents)
+    tables: dict[str, Table] = {}
+    faults: list[Fault] = []
+    for name, path in found:
+        try:
+            tables[name] = _table(path, folder, schema, contents, digests, last)
+        except ContextDBError as error:
+            faults += error.faults
+    faults += twice_named(found)
+    if faults:
+        raise TableError(*faults)
+    before = last.project.tables if last else {}
+    compiled = {n: last.tables[n] if last and before.get(n) is t else _compiled(t) for n, t in tables.items()}
+    changed = tuple(n for n, t in tables.items() if before.get(n) is not t)
+    return Snapshot(last.number + 1 if last else 1, Project(folder, schema, tables), compiled, changed, digests)
+
+
+def _table(path: Path, folder: Path, schema: Schema, contents: Contents, digests: Digests, last: Snapshot | None) -> Table:
+    settings = schema.settings_for(path.relative_to(folder).as_posix())
+    old = last.project.tables.get(settings.name) if last else None
+    if path not in contents:
+        read_bytes(path)  # raises FileError, which says why it cannot be read
+        raise FileError(Fault("the file came while the folder was read.", mend="to save it again", place=Place(str(path))))
+    is_same = old is not None and old.path == path and last is not None and digests[path] == last.digests.get(path)
+    if is_same and old is not None and old.schema is schema:
+        return old
+    read = read_parquet if path.suffix.lower() == ".parquet" else read_csv
+    source, columns = (old.source, old.columns) if is_same and old and old.source else read(contents[path], str(path))
+    table = table_like(old, columns, schema, settings, path, source)
+    table.require_readable()
+    return table
+
+
+def _compiled(table: Table) -> CompiledTable:
+    """The table compiled, and made ready for the first query, which else would wait for it."""
+    compiled = table.compile()
+    compiled.query({}, unknown="any")
+    return compiled
+
+
+def _decoded(raw: bytes, path: Path) -> str:
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(str(path), line))) from None

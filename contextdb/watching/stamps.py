@@ -1,0 +1,51 @@
+"""What the file system says of a project's files without reading them. An edge: this touches the disk.
+
+A stamp is (inode, size, time of the last write, time of the last change of any kind), or None for a file that is not there or
+cannot be looked at. File systems tell times in steps, the coarsest of them 2 s (FAT), so that equal stamps promise equal bytes
+only when the last write lies longer ago than that.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from contextdb.disk import read_bytes
+from contextdb.errors import ContextDBError
+
+COARSEST_TICK_S = 2.0
+"""So long after a write a second one can leave the stamp as it is."""
+
+Stamp = tuple[int, int, int, int] | None
+Stamps = Mapping[Path, Stamp]
+Digests = Mapping[Path, bytes]
+
+
+def look(paths: Iterable[Path]) -> dict[Path, Stamp]:
+    """The stamp of each file."""
+    return {path: _stamp(path) for path in paths}
+
+
+def read_all(paths: Iterable[Path]) -> dict[Path, bytes]:
+    """The bytes of those files that are there and may be read."""
+    found = {}
+    for path in paths:
+        try:
+            found[path] = read_bytes(path)
+        except ContextDBError:  # why it cannot be read is told by whoever needs it
+            continue
+    return found
+
+
+def digests_of(contents: Mapping[Path, bytes]) -> Digests:
+    """BLAKE2b-128 of each file's bytes."""
+    return {path: hashlib.blake2b(raw, digest_size=16).digest() for path, raw in contents.items()}
+
+
+def _stamp(path: Path) -> Stamp:
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns

@@ -25,7 +25,10 @@ Nanoseconds = NDArray[np.int64]
 
 WARM_UP = 5
 COLD_BYTES = 32 << 20
-PACKAGES = ("contextdb", "numpy", "polars", "numba", "duckdb", "zen-engine", "pyroaring", "pyarrow", "scipy", "faiss-cpu", "textual", "textual-fastdatatable")
+PACKAGES = (
+    "contextdb", "numpy", "polars", "numba", "duckdb", "zen-engine", "pyroaring", "pyarrow", "scipy", "faiss-cpu", "textual",
+    "textual-fastdatatable", "daff",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

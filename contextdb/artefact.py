@@ -9,6 +9,8 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     CCC.FIELD              as in contextdb.classes, for condition number CCC: `masks` (and `bounds`), or `low`, `high`, `any_mask`
     CCC.codes              int32 [R]             which of the distinct texts each row holds
     CCC.texts              uint8                 JSON list of the distinct texts
+    slots.CCC.codes        as CCC.codes and CCC.texts, for the columns of slots, named in `about`
+    slots.CCC.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
 
 The metadata hold `contextdb` (the version of this layout), `about` (JSON: name, policy, fallback, conditions and the kind of each
@@ -59,6 +61,9 @@ def save(compiled: CompiledTable, path: Path) -> None:
         tensors[f"{at:03d}.texts"] = texts_to_array(list(texts.texts))
         if soft is not None:
             tensors[f"{at:03d}.soft.penalties"] = soft[1]
+    for at, column in enumerate(compiled.slots or ()):
+        tensors[f"slots.{at:03d}.codes"] = column.codes
+        tensors[f"slots.{at:03d}.texts"] = texts_to_array(list(column.texts))
     about = json.dumps(
         {
             "name": compiled.name,
@@ -68,6 +73,7 @@ def save(compiled: CompiledTable, path: Path) -> None:
             "conditions": [_condition_to_json(c) for c in compiled.conditions],
             "columns": kinds,
         }
+        | ({"slots": [c.name for c in compiled.slots]} if compiled.slots is not None else {})
         | ({"computed_from": [_condition_to_json(c) for c in _computed_from(compiled)]} if compiled.derivation else {})
     )
     write_tensors(path, COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about)})
@@ -111,6 +117,16 @@ def _table(about: dict[str, Any], tensors: Tensors) -> CompiledTable:
         policy=about["policy"],
         fallback=about["fallback"],
         derivation=_derivation(about, conditions),
+        slots=_slots(about, tensors),
+    )
+
+
+def _slots(about: dict[str, Any], tensors: Tensors) -> tuple[TextColumn, ...] | None:
+    if "slots" not in about:
+        return None
+    return tuple(
+        TextColumn(name, tuple(texts_from_array(tensors[f"slots.{at:03d}.texts"])), tensors[f"slots.{at:03d}.codes"])
+        for at, name in enumerate(about["slots"])
     )
 
 

@@ -203,8 +203,8 @@ def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
 def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "error") -> ManyMatches:
     """Encode the columns of many contexts; see `CompiledTable.query_many`."""
     check_mode(unknown)
-    columns = _columns_of(contexts)
-    n_contexts = _common_length(columns)
+    columns = facts_of(contexts)
+    n_contexts = common_length(columns)
     if compiled.derivation is not None:
         columns = compiled.derivation.complete_frame(columns, n_contexts)
     absent = [n for n in compiled.asked if n not in columns]
@@ -342,7 +342,7 @@ def _in_context(error: Exception, row: int, name: str, value: object) -> Context
     return ContextError(Fault(f"{type(value).__name__} is no fact.", "one value in each context", place=place))
 
 
-def _columns_of(contexts: object) -> dict[str, Any]:
+def facts_of(contexts: object) -> dict[str, Any]:
     """The columns of some contexts by name."""
     if isinstance(contexts, pl.DataFrame):
         return {name: contexts[name] for name in contexts.columns}
@@ -359,7 +359,8 @@ def _columns_of(contexts: object) -> dict[str, Any]:
     return dict(contexts)
 
 
-def _common_length(columns: Mapping[str, Any]) -> int:
+def common_length(columns: Mapping[str, Any]) -> int:
+    """How many contexts equally long columns hold; 0 without a column."""
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         raise ContextError(Fault(f"the columns are not equally long: {lengths}.", "one fact for each context in every column"))

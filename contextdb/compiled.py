@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,11 +40,19 @@ if TYPE_CHECKING:
     import polars as pl
 
     from contextdb.batch import ManyMatches
+    from contextdb.casting.facts import Actors, Prefer
+    from contextdb.casting.many import ManyCastMatches
+    from contextdb.casting.roles import TableRoles
     from contextdb.explain import Explanation
     from contextdb.expressions import Derivation
     from contextdb.pick import Memory, Rng
     from contextdb.shapes import Policy
     from contextdb.table import Table
+
+    ManyContexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
+
+SLOT_COLUMNS = ("Mandatory_Slots", "Optional_Slots")
+"""The outputs that say which roles a row fills."""
 
 SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 
@@ -70,6 +78,8 @@ class CompiledTable:
     fallback: str | None = None
     derivation: Derivation | None = None
     """How the conditions that are derived are computed; None where none is."""
+    slots: tuple[TextColumn, ...] | None = None
+    """The outputs of `SLOT_COLUMNS` that the table has; None where that is not known."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -91,6 +101,7 @@ class CompiledTable:
             policy=table.settings.policy,
             fallback=table.settings.fallback,
             derivation=table.schema.derivation_of(c.condition.name for c in table.conditions),
+            slots=tuple(c for c in table.columns if c.name in SLOT_COLUMNS and c.name in table.settings.outputs),
         )
 
     @property
@@ -111,8 +122,8 @@ class CompiledTable:
         """The rows that may match at all, as an integer."""
         return bitmask.to_int(self.enabled)
 
-    def query(self, context: Context, unknown: Unknown = "error") -> Matches:
-        """Find the rows whose every cell accepts its fact.
+    def query(self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None) -> Matches:
+        """Find the rows whose every cell accepts its fact, and whose roles can be filled.
 
         Parameters
         ----------
@@ -121,6 +132,13 @@ class CompiledTable:
             are passed over.
         unknown : {"error", "any", "never"}
             What a missing fact (absent, None or NaN) does: raises; its condition is ignored; only cells that are Any accept it.
+        actors : mapping of str to sequence of mapping, optional
+            Who may play each role: `{"Defender": [{"id": 7, "DepthChart": "CB"}]}`. `m.casting(row)` then says who plays what.
+            An actor offered for several roles, as one object or with an equal "id", plays one. A role whose facts stand in the
+            context instead is not cast; one with neither has nobody.
+        prefer : str, mapping of role to str, or function of role and actor, optional
+            The number fact by which actors are preferred, lowest first ("-speed": highest first). The casting with the lowest sum
+            is the best; actors without it come last. Default: in the order in which they are offered.
 
         Raises
         ------
@@ -132,26 +150,49 @@ class CompiledTable:
         -----
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
+        if actors is not None:
+            from contextdb.casting.stage import query_with_actors
+
+            return query_with_actors(self, context, actors, prefer, unknown)
         try:
             return self._ask(context)
         except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
             return self.with_penalties(self.matches(*self._bits_carefully(context, unknown)), context, unknown)
 
+    @overload
+    def query_many(self, contexts: ManyContexts, unknown: Unknown = "error") -> ManyMatches: ...
+
+    @overload
     def query_many(
-        self, contexts: Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame, unknown: Unknown = "error"
-    ) -> ManyMatches:
+        self, contexts: ManyContexts, unknown: Unknown = "error", *, actors: Actors | Sequence[Actors], prefer: Prefer = None
+    ) -> ManyCastMatches: ...
+
+    def query_many(
+        self,
+        contexts: ManyContexts,
+        unknown: Unknown = "error",
+        *,
+        actors: Actors | Sequence[Actors] | None = None,
+        prefer: Prefer = None,
+    ) -> ManyMatches | ManyCastMatches:
         """Find the valid rows for many contexts at once: counts, hits and masks.
 
         Parameters
         ----------
         contexts : polars DataFrame, or mapping of str to list or array
             One column for each condition, equally long; others are passed over.
+        actors : mapping, or sequence of one mapping for each context, optional
+            Who may play each role, as in `query`; one mapping is for all contexts. `many[i]` is then the answer of context i.
 
         Raises
         ------
         ContextError
             As `query`, naming the first contexts concerned.
         """
+        if actors is not None:
+            from contextdb.casting.many import query_many_with_actors
+
+            return query_many_with_actors(self, contexts, actors, prefer, unknown)
         from contextdb.batch import query_many
 
         return query_many(self, contexts, unknown)
@@ -180,8 +221,15 @@ class CompiledTable:
 
         return query_codes(self, codes)
 
-    def explain(self, context: Context, unknown: Unknown = "error") -> Explanation:
-        """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first."""
+    def explain(
+        self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
+    ) -> Explanation:
+        """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
+        which role cannot be filled, and whose fact is in the way."""
+        if actors is not None:
+            from contextdb.casting.explaining import explain_with_actors
+
+            return explain_with_actors(self, context, actors, prefer, unknown)
         from contextdb.explain import explain
 
         return explain(self, context, unknown)
@@ -203,13 +251,19 @@ class CompiledTable:
         costs = np.zeros(self.n_rows)
         if any(self.soft):
             facts = self.read_context(context, unknown)
-            for condition, soft in zip(self.conditions, self.soft, strict=True):
-                fact = facts[condition.name]
-                if soft is not None and not (fact is None and unknown == "any"):
-                    masks, row_penalties = soft
-                    fails = ~bitmask.unpack(bitmask.from_int(_bits_of(masks, fact)[0], self.n_rows), self.n_rows)
-                    costs += np.where(fails, row_penalties, 0.0)
+            for at, condition in enumerate(self.conditions):
+                if self.soft[at] is not None:
+                    costs += self.column_penalties(at, facts[condition.name], unknown)
         return costs
+
+    def column_penalties(self, at: int, fact: Fact, unknown: Unknown) -> NDArray[np.float64]:
+        """What the soft cells of one condition cost with a fact in canonical form: float64 [n_rows]."""
+        soft = self.soft[at]
+        if soft is None or (fact is None and unknown == "any"):
+            return np.zeros(self.n_rows)
+        masks, row_penalties = soft
+        fails = ~bitmask.unpack(bitmask.from_int(_bits_of(masks, fact)[0], self.n_rows), self.n_rows)
+        return np.where(fails, row_penalties, 0.0)
 
     def with_penalties(self, matches: Matches, context: Context, unknown: Unknown = "error") -> Matches:
         """An answer that knows what the soft cells cost in its context, if the table has any."""
@@ -226,8 +280,16 @@ class CompiledTable:
     def _cells_read(self) -> dict[int, tuple[Cell, ...]]:
         return {}
 
-    def read_context(self, context: Context, unknown: Unknown = "error") -> dict[str, Fact]:
-        """Every condition's fact in canonical form, None where it is missing; raises ContextError as `query` does."""
+    @cached_property
+    def roles(self) -> TableRoles:
+        """The roles of the table and the rows that need them."""
+        from contextdb.casting.roles import TableRoles
+
+        return TableRoles(self)
+
+    def read_context(self, context: Context, unknown: Unknown = "error", names: Sequence[str] | None = None) -> dict[str, Fact]:
+        """The fact of every condition, or of those named, in canonical form, None where it is missing; raises ContextError as
+        `query` does."""
         check_mode(unknown)
         if not isinstance(context, Mapping):
             raise ContextError(Fault(f"a context is a mapping of facts, not {type(context).__name__}.", "a dict"))
@@ -235,10 +297,11 @@ class CompiledTable:
         faults: list[Fault] = []
         derived: Mapping[str, object] = {}
         try:
-            derived = self.derivation.compute(context) if self.derivation else {}
+            if self.derivation:
+                derived = (self.derivation if names is None else self.derivation.only(names)).compute(context)
         except ContextError as error:
             faults += error.faults
-        for condition in self.conditions:
+        for condition in self.conditions if names is None else (self.conditions[self.places[n]] for n in names):
             name = condition.name
             try:
                 facts[name] = read_fact(derived.get(name) if name in derived else context.get(name), condition)

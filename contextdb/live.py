@@ -19,9 +19,13 @@ from contextdb.lookup import SingleLookup
 from contextdb.matches import Matches
 
 if TYPE_CHECKING:
+    from contextdb.casting.facts import Actors, Prefer
     from contextdb.compiled import CompiledTable
 
 MOST_MOVING = 8
+
+CAST = ""
+"""What stands among the unusual facts while actors are offered, so that a question without actors has nothing to check."""
 
 
 class LiveContext:
@@ -30,6 +34,7 @@ class LiveContext:
     __slots__ = (
         "_answer",
         "_answering",
+        "_cast",
         "_compiled",
         "_facts",
         "_lookups",
@@ -56,6 +61,7 @@ class LiveContext:
         self._still = 0
         self._odd: dict[str, tuple[int, bool]] = {}
         """Facts that are missing or sets: the rows that accept all of it, and whether it is missing."""
+        self._cast: tuple[Actors, Prefer] | None = None
         self._answer = Matches(0, self._answering)
         """The last answer: while the rows stay the same, so does the object."""
         for condition in compiled.conditions:
@@ -88,6 +94,16 @@ class LiveContext:
             if name in self._lookups:
                 self[name] = value
 
+    def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
+        """Offer actors for roles from now on, as `query` takes them; None takes them back. They are read when next asked.
+
+        The mappings are kept, not copied: what the game changes in them counts in the next question.
+        """
+        self._cast = None if actors is None else (actors, prefer)
+        self._odd.pop(CAST, None)
+        if actors is not None:
+            self._odd[CAST] = (0, False)
+
     @property
     def facts(self) -> dict[str, object]:
         """The facts as they were set; None where one is missing."""
@@ -102,6 +118,8 @@ class LiveContext:
             Facts are missing and the context was made with unknown="error".
         """
         if self._odd:
+            if self._cast is not None:
+                return self._compiled.query(self.facts, self._unknown, *self._cast)
             self._read_unusual()
             self._refuse_missing()
         moving = self._moving
@@ -163,7 +181,8 @@ class SoftLiveContext(LiveContext):
 
     def matches(self) -> Matches:
         """The valid rows for the facts as they are now."""
-        return self._compiled.with_penalties(copy(super().matches()), self.facts, self._unknown)
+        answer = super().matches()
+        return answer if self._cast is not None else self._compiled.with_penalties(copy(answer), self.facts, self._unknown)
 
 
 class DerivedLiveContext(LiveContext):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Flags, Rows, Words
+from contextdb.errors import ContextError, Fault
 
 _INT64 = np.dtype(np.int64)
 
@@ -106,6 +108,14 @@ class Matches:
         """The same answer of a table with soft cells; what they cost is worked out when it is asked for."""
         self._penalties = penalties
         return self
+
+    def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
+        """Who plays which role in a valid row, as {role: actor}; for an answer to a query with actors."""
+        raise ContextError(Fault("this question was asked without actors, so nobody is cast.", "query(facts, actors={...})"))
+
+    def castings(self, row: int) -> Sequence[Mapping[str, Mapping[str, Any]]]:
+        """All castings of a valid row, best first; for an answer to a query with actors."""
+        return [self.casting(row)]
 
     def __len__(self) -> int:
         return self.bits.bit_count()

@@ -4,15 +4,18 @@ Exits with 1 when none is.
 
   contextdb query locomotion gait=Walk speed=1.3 direction=0 style=normal
   contextdb query tables/locomotion.csv --unknown any "direction=0 ± 90" --explain
+  contextdb query contested_catch MidAir_Catch_Direction=Top "Defender[0].DepthChart=CB" "Defender[1].DepthChart=FS" --unknown any
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import re
 import sys
 from collections.abc import Iterator
 
+from contextdb.casting.stage import CastMatches
 from contextdb.commands import missing_facts_by_option
 from contextdb.compiled import CompiledTable
 from contextdb.console import aligned, output, printable, styled, terminal_width, wants_colour, width_of
@@ -22,6 +25,9 @@ from contextdb.explain import Explanation, RowExplanation, describe_fact
 from contextdb.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
 from contextdb.places import open_compiled
 from contextdb.report.render_json import as_json
+
+ACTOR_FACT = re.compile(r"([^=]+?)\[([0-9]{1,6})\]\.([^=]+)=(.*)", re.DOTALL)
+"""Role[number].fact=value."""
 
 N_NEAREST = 3
 N_EXPLAINED = 10
@@ -38,15 +44,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--explain", action="store_true", help="for the rows nearest to valid, the cells that fail and what to change"
     )
     parser.add_argument("--most", type=_count, metavar="N", help=f"explain so many rows (default: {N_EXPLAINED})")
+    parser.add_argument(
+        "--prefer", metavar="FACT", help="cast the actors with the lowest FACT first; -FACT, as in --prefer=-speed: the highest"
+    )
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Answer one context."""
     compiled = open_compiled(arguments.table)
-    context = read_facts(arguments.facts, compiled)
+    plain, actors = read_actors(arguments.facts, compiled)
+    if arguments.prefer is not None and actors is None:
+        raise ContextError(Fault("there are no actors to prefer one of.", 'facts of actors, such as "Defender[0].distance=2"'))
+    context = read_facts(plain, compiled)
     with missing_facts_by_option():
-        explanation = compiled.explain(context, arguments.unknown)
+        explanation = compiled.explain(context, arguments.unknown, actors, arguments.prefer)
     most = arguments.most if arguments.most is not None else N_EXPLAINED
     with output():
         if arguments.json:
@@ -79,6 +91,44 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
     return facts
 
 
+def read_actors(given: list[str], compiled: CompiledTable) -> tuple[list[str], dict[str, list[dict[str, object]]] | None]:
+    """The arguments that are no facts of actors, and the actors of those that are, in the order of their numbers; None without.
+
+    Raises
+    ------
+    ContextError
+        For every fact that an actor cannot have or has twice, together.
+    """
+    plain: list[str] = []
+    found: dict[str, dict[int, dict[str, object]]] = {}
+    faults: list[Fault] = []
+    for text in given:
+        match = ACTOR_FACT.match(text)
+        if match is None or any(text.startswith(f"{name}=") for name in compiled.asked):
+            plain.append(text)
+            continue
+        role, number, name, value = match.groups()
+        actor = found.setdefault(role, {}).setdefault(int(number), {})
+        try:
+            if name in actor:
+                raise ContextError(Fault(f"the fact {in_quotes(f'{role}[{number}].{name}')} is given twice.", "each fact once"))
+            condition = compiled.asked.get(f"{role}.{name}")
+            actor[name] = _free_value(value) if condition is None else read_fact_text(value, condition)
+        except ContextError as error:
+            faults += error.faults
+    if faults:
+        raise ContextError(*faults)
+    return plain, {role: [by[n] for n in sorted(by)] for role, by in found.items()} or None
+
+
+def _free_value(text: str) -> object:
+    """A fact of an actor that is no condition, such as an id or a distance: a number where it reads as one."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
 def _split(text: str, compiled: CompiledTable) -> tuple[str, str]:
     """Name and value of FACT=VALUE; a name may hold a "=" itself."""
     ends = [at for at, character in enumerate(text) if character == "="]
@@ -103,7 +153,10 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
     matches = explanation.matches
     always = set(explanation.always_rows())
     context = {n: _json_fact(f, n, compiled) for n, f in explanation.facts.items() if f is not None}
-    rows = [{"row": r, "asset": compiled.assets[r], "always": r in always} for r in matches]
+    rows: list[dict[str, object]] = [{"row": r, "asset": compiled.assets[r], "always": r in always} for r in matches]
+    if isinstance(matches, CastMatches):
+        for row in rows:
+            row["casting"] = {role: offer.label for role, offer in matches.cast(int(str(row["row"]))).items()}
     document: dict[str, object] = {"format": 1, "table": compiled.name, "context": context, "count": len(matches), "matches": rows}
     if explains:
         document["explain"] = [_explained(r) for r in explanation.nearest(most)]
@@ -143,12 +196,19 @@ def _matching(compiled: CompiledTable, explanation: Explanation) -> Iterator[tup
     """The valid rows; where some match only for a part of a set-valued fact, with a word for how."""
     always = set(explanation.always_rows())
     rows = list(explanation.matches)
-    if len(always) == len(rows):
+    if isinstance(explanation.matches, CastMatches):
+        yield "row", "asset", "cast"
+        yield from ((str(r), compiled.assets[r], _cast(explanation.matches, r)) for r in rows)
+    elif len(always) == len(rows):
         yield "row", "asset"
         yield from ((str(r), compiled.assets[r]) for r in rows)
     else:
         yield "row", "matches", "asset"
         yield from ((str(r), "always" if r in always else "may", compiled.assets[r]) for r in rows)
+
+
+def _cast(matches: CastMatches, row: int) -> str:
+    return ", ".join(f"{role}: {offer.label}" for role, offer in matches.cast(row).items())
 
 
 def _nearest_lines(rows: list[RowExplanation], width: int) -> Iterator[str]:

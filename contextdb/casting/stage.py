@@ -1,0 +1,313 @@
+"""Who plays which part: actors cast for the roles of a table's rows.
+
+A condition named `Role.fact` belongs to the role before its first dot. Each actor offered for a role gives a mask of the rows
+whose cells on that role accept it. A row is valid when the roles that it needs can be filled by distinct actors: by Hall's theorem
+when every set of k of them is fitted by at least k actors together. That is counted for all rows at once, in bit slices; the
+casting of one row is searched for when it is asked for.
+
+An actor is one by its `"id"`, else by being one object. Nothing here reads a file or prints.
+
+Source: Hall, "On representatives of subsets", J. London Math. Soc. 10, 1935.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from itertools import combinations
+from operator import or_
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.casting.facts import Actor, Actors, Offer, Prefer, read_offers
+from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
+from contextdb.facts import Context, Fact, Unknown, check_mode
+from contextdb.matches import SetMatches
+
+if TYPE_CHECKING:
+    from contextdb.compiled import CompiledTable
+
+Casting = dict[str, Actor]
+
+
+@dataclass(frozen=True, eq=False)
+class Roles:
+    """What a table says of its roles. Masks are Python integers, row r as bit r."""
+
+    names: tuple[str, ...]
+    """The roles that conditions belong to, in the order of columns, then other words of the slots that actors are offered for."""
+    conditions: Mapping[str, tuple[int, ...]]
+    """The numbers of the conditions of each role."""
+    required: Mapping[str, int]
+    """The rows that cannot do without the role."""
+    optional: Mapping[str, int]
+    """The rows in which the role is cast when somebody fits."""
+
+
+class CastMatches(SetMatches):
+    """The valid rows for a context and actors. `casting(row)` says who plays what."""
+
+    __slots__ = ("_stage",)
+
+    def __init__(self, bits: int, always: int, stage: Stage) -> None:
+        super().__init__(bits, stage.compiled.answering, always)
+        self._stage = stage
+
+    def casting(self, row: int) -> Casting:
+        """The best casting of a valid row, as {role: actor}: most optional roles filled, then by preference, then as offered."""
+        self._require_valid(row)
+        return self._stage.best(row)
+
+    def cast(self, row: int) -> dict[str, Offer]:
+        """The same as `casting`, each actor with where it was offered."""
+        self._require_valid(row)
+        return dict(_first(*self._stage.parts(row)))
+
+    def castings(self, row: int) -> list[Casting]:
+        """All castings of a valid row that fill as many optional roles as can be, best first."""
+        self._require_valid(row)
+        return self._stage.all(row)
+
+    def _require_valid(self, row: int) -> None:
+        if row not in self:
+            raise ContextError(Fault(f"row {row} is not valid, so nobody is cast for it.", "one of the valid rows, m.indices"))
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The actors of one moment against the roles of a table."""
+
+    compiled: CompiledTable
+    roles: Roles
+    offers: Mapping[str, tuple[Offer, ...]]
+    """Who is offered for each role, without repeats."""
+    plain_facts: Mapping[int, Fact]
+    """The facts of the conditions that are no role's, by their number."""
+    unknown: Unknown
+
+    @cached_property
+    def bits(self) -> int:
+        """The rows whose needed roles can be filled, going by what the cells accept of each actor."""
+        return self._castable([{o.key: o.some for o in self.offers[n]} for n in self.roles.names])
+
+    @cached_property
+    def always(self) -> int:
+        """The same where an actor must fit with every value of its set-valued facts: rows that certainly match."""
+        return self._castable([{o.key: o.every for o in self.offers[n]} for n in self.roles.names])
+
+    def matches(self, plain: Mapping[int, tuple[int, int]]) -> CastMatches:
+        """The valid rows, from those that may and those that always accept each plain fact."""
+        some_bits, every = self.compiled.enabled_bits & self.bits, self.compiled.enabled_bits & self.always
+        for some_rows, all_rows in plain.values():
+            some_bits &= some_rows
+            every &= all_rows
+        found = CastMatches(some_bits, every, self)
+        if any(self.compiled.soft):
+            found.with_penalties(lambda: self.penalties(found))
+        return found
+
+    def penalties(self, matches: CastMatches) -> NDArray[np.float64]:
+        """What the soft cells of valid rows cost with the best casting of each: float64 [n_rows]. A role that is not cast costs
+        nothing."""
+        compiled = self.compiled
+        costs = np.zeros(compiled.n_rows)
+        for at, fact in self.plain_facts.items():
+            costs += compiled.column_penalties(at, fact, self.unknown)
+        for row in matches:
+            needed, wanted = self.parts(row)
+            for _, offer in _first(needed, wanted):
+                costs[row] += sum(compiled.column_penalties(at, f, self.unknown)[row] for at, f in offer.facts.items())
+        return costs
+
+    def best(self, row: int) -> Casting:
+        """The best casting of a row that can be cast."""
+        needed, wanted = self.parts(row)
+        return _as_casting(_first(needed, wanted))
+
+    def all(self, row: int) -> list[Casting]:
+        """Every casting of a row with the most optional roles, best first."""
+        needed, wanted = self.parts(row)
+        most = len(_first(needed, wanted)) - len(needed)
+        found = [c for chosen in _subsets(wanted, most) for c in _assignments(needed + chosen)]
+        order = [name for name, _ in needed + wanted]
+        return [_as_casting(c) for c in sorted(found, key=lambda c: _key(c, order))]
+
+    def parts(self, row: int) -> tuple[list[Part], list[Part]]:
+        """The roles that a row needs and those that it may fill, each with the actors who fit, best first."""
+        needed, wanted = [], []
+        for name in self.roles.names:
+            fitting = sorted((o for o in self.offers[name] if o.some >> row & 1), key=lambda o: (o.cost, o.place))
+            if self.roles.required[name] >> row & 1:
+                needed.append((name, fitting))
+            elif self.roles.optional[name] >> row & 1:
+                wanted.append((name, fitting))
+        return needed, wanted
+
+    def _castable(self, fits: Sequence[Mapping[object, int]]) -> int:
+        """The rows in which every set of k needed roles is fitted by at least k actors together."""
+        all_rows = (1 << self.compiled.n_rows) - 1
+        required = [self.roles.required[n] for n in self.roles.names]
+        return all_rows & ~_lacking(fits, required, 0, {}, all_rows, 0)
+
+
+Part = tuple[str, list[Offer]]
+Chosen = list[tuple[str, Offer]]
+
+
+def _lacking(
+    fits: Sequence[Mapping[object, int]], required: Sequence[int], at: int, joint: dict[object, int], rows: int, k: int
+) -> int:
+    """The rows of `rows` in which some set of needed roles, `joint` and more from number `at` on, has too few actors."""
+    lacking = 0
+    for i in range(at, len(fits)):
+        left = rows & required[i] & ~lacking
+        if left:
+            union = dict(joint)
+            for key, bits in fits[i].items():
+                union[key] = union.get(key, 0) | bits
+            lacking |= left & ~_at_least(k + 1, union)
+            lacking |= _lacking(fits, required, i + 1, union, left & ~lacking, k + 1)
+    return lacking
+
+
+def _at_least(k: int, masks: Mapping[object, int]) -> int:
+    """The rows that at least k of the masks hold."""
+    if k == 1:
+        return reduce(or_, masks.values(), 0)
+    counts = [0] * k
+    """Entry i: the rows that more than i of the masks so far hold."""
+    for mask in masks.values():
+        for i in range(k - 1, 0, -1):
+            counts[i] |= counts[i - 1] & mask
+        counts[0] |= mask
+    return counts[-1]
+
+
+def _first(needed: list[Part], wanted: list[Part]) -> Chosen:
+    """The best assignment that fills the needed roles and as many others as can be."""
+    order = [name for name, _ in needed + wanted]
+    for most in range(len(wanted), -1, -1):
+        found = [c for chosen in _subsets(wanted, most) if (c := _best(needed + chosen)) is not None]
+        if found:
+            return min(found, key=lambda c: _key(c, order))
+    return []
+
+
+def _best(parts: list[Part]) -> Chosen | None:
+    """The best assignment of all roles. Of each role only as many actors as there are roles can matter: one of its best is free."""
+    few = [(name, fitting[: len(parts)]) for name, fitting in parts]
+    order = [name for name, _ in parts]
+    return min(_assignments(few), key=lambda c: _key(c, order), default=None)
+
+
+def _assignments(parts: Sequence[Part], taken: frozenset[object] = frozenset()) -> Iterator[Chosen]:
+    """Every way to give each role one of its actors, none of them two."""
+    if not parts:
+        yield []
+        return
+    (name, fitting), rest = parts[0], parts[1:]
+    for offer in fitting:
+        if offer.key not in taken:
+            for others in _assignments(rest, taken | {offer.key}):
+                yield [(name, offer), *others]
+
+
+def _subsets(parts: Sequence[Part], size: int) -> Iterator[list[Part]]:
+    return (list(c) for c in combinations(parts, size))
+
+
+def _key(chosen: Chosen, order: Sequence[str]) -> tuple[int, float, tuple[int, ...]]:
+    """What castings are compared by: actors without a preference, the sum of costs, and the places at which they are offered."""
+    offers = dict(chosen)
+    costs = [offers[n].cost for n in order if n in offers]
+    places = tuple(offers[n].place if n in offers else 1 << 30 for n in order)
+    return sum(c[0] for c in costs), sum(c[1] for c in costs), places
+
+
+def _as_casting(chosen: Chosen) -> Casting:
+    return {name: offer.actor for name, offer in chosen}
+
+
+def query_with_actors(
+    compiled: CompiledTable, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
+) -> CastMatches:
+    """The rows valid for a context and actors; see `CompiledTable.query`.
+
+    Raises
+    ------
+    ContextError
+        As `query`, and for actors that cannot be read, with the role and the actor.
+    """
+    stage, plain = set_stage(compiled, context, actors, prefer, unknown)
+    return stage.matches(plain)
+
+
+def set_stage(
+    compiled: CompiledTable, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
+) -> tuple[Stage, dict[int, tuple[int, int]]]:
+    """The actors of a moment against the roles, and for each condition that is no role's the rows that may and always accept."""
+    check_mode(unknown)
+    roles = roles_of(compiled, context, actors)
+    cast = {at for places in roles.conditions.values() for at in places}
+    names = {at: c.name for at, c in enumerate(compiled.conditions) if at not in cast}
+    read = compiled.read_context(context, unknown, list(names.values()))
+    facts = {at: read[name] for at, name in names.items()}
+    plain = {at: compiled.condition_bits(at, fact, unknown) for at, fact in facts.items()}
+    offers = read_offers(compiled, roles.conditions, context, actors, prefer, unknown)
+    return Stage(compiled, roles, offers, facts, unknown), plain
+
+
+def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles:
+    """The roles that are cast: all but those whose facts stand in the context, as plain facts.
+
+    Raises
+    ------
+    ContextError
+        Actors for a role that the table does not have, or for one whose facts the context gives.
+    """
+    if not isinstance(actors, Mapping):
+        raise ContextError(Fault(f"actors are a mapping of roles, not {type(actors).__name__}.", '{"Defender": [{...}, {...}]}'))
+    if compiled.slots is None:
+        found = "this compiled file does not say which slots are mandatory."
+        raise ContextError(Fault(found, "the table itself, compiled by Table.compile()"))
+    if not isinstance(context, Mapping):
+        raise ContextError(Fault(f"a context is a mapping of facts, not {type(context).__name__}.", "a dict"))
+    members, slots = compiled.roles.conditions, compiled.roles.slot_rows
+    _require_roles(actors, list(dict.fromkeys([*members, *(w for words in slots.values() for w in words)])))
+    plain = {n for n in members if n not in actors and _given(compiled, n, context)}
+    _refuse_both(compiled, actors, context)
+    names = tuple(n for n in (*members, *(a for a in actors if a not in members)) if n not in plain)
+    mandatory, maybe = (slots.get(c, {}) for c in ("Mandatory_Slots", "Optional_Slots"))
+    conditions = {n: members.get(n, ()) for n in names}
+    optional = {n: maybe.get(n, 0) & ~mandatory.get(n, 0) for n in names}
+    required = {n: (mandatory.get(n, 0) | compiled.roles.constrained(conditions[n])) & ~optional[n] for n in names}
+    return Roles(names, conditions, required, optional)
+
+
+def _given(compiled: CompiledTable, role: str, context: Context) -> list[str]:
+    """The facts of a role that stand in the context itself."""
+    known = (n for n in (*compiled.asked, *compiled.places) if n.startswith(f"{role}."))
+    return [n for n in known if context.get(n) is not None]
+
+
+def _refuse_both(compiled: CompiledTable, actors: Actors, context: Context) -> None:
+    for role in actors:
+        for name in _given(compiled, role, context):
+            found = f"{in_quotes(name)} is given as a fact, and actors are offered for {in_quotes(role)}."
+            raise ContextError(Fault(found, "the facts of a role from its actors, or without actors for it", rule="wrong-fact"))
+
+
+def _require_roles(actors: Actors, known: Sequence[str]) -> None:
+    faults = []
+    for role in actors:
+        if role not in known:
+            near = nearest(str(role), known)
+            accepted = some(known) if known else "no actors: the table has no roles"
+            faults.append(
+                Fault(f"there is no role {in_quotes(str(role))}.", accepted, in_quotes(near) if near else "", rule="unknown-fact")
+            )
+    if faults:
+        raise ContextError(*faults)

@@ -1,0 +1,212 @@
+"""Actors cast for roles: against every assignment tried by hand, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import contextdb as cdb
+from contextdb.errors import ContextError
+from contextdb.schema import TableSettings
+
+ROLES = ("Defender", "Receiver", "Thrower", "Judge")
+SLOTS = ("Mandatory_Slots", "Optional_Slots")
+SCHEMA = {f"{role}.kind": {"type": "enum", "values": ["a", "b", "c"]} for role in ROLES} | {"is_wet": {"type": "bool"}}
+
+
+def table_of(rows, roles=ROLES):
+    """A compiled table from rows of cells by column; columns that a row leaves out are Any."""
+    names = ["Asset Name", *SLOTS, "is_wet", *(f"{r}.kind" for r in roles)]
+    columns = {name: [row.get(name, f"row {i}" if name == "Asset Name" else "") for i, row in enumerate(rows)] for name in names}
+    return cdb.Table.from_columns(columns, SCHEMA, TableSettings(name="table", outputs=SLOTS)).compile()
+
+
+def every_casting(row, context, actors, roles=ROLES):
+    """All castings of a row that fill the most optional roles, tried one by one; None where the row is not valid."""
+    if row.get("is_wet", "Any") not in ("Any", "", str(context["is_wet"])):
+        return None
+    mandatory, optional = (row.get(s, "").split() for s in SLOTS)
+    needed = [r for r in roles if r not in optional or r in mandatory]
+    needed = [r for r in needed if r in mandatory or row.get(f"{r}.kind", "Any") not in ("Any", "")]
+    wanted = [r for r in roles if r in optional and r not in mandatory]
+    choices = [actors.get(r, []) for r in needed] + [[*actors.get(r, []), None] for r in wanted]
+    found = []
+    for chosen in product(*choices):
+        cast = {r: a for r, a in zip(needed + wanted, chosen, strict=True) if a is not None}
+        ids = [a["id"] for a in cast.values()]
+        fits = all(row.get(f"{r}.kind", "Any") in ("Any", "") or a["kind"] in row[f"{r}.kind"].split() for r, a in cast.items())
+        if len(set(ids)) == len(ids) and fits:
+            found.append(cast)
+    most = max(map(len, found), default=0)
+    return [c for c in found if len(c) == most] or None
+
+
+@st.composite
+def moments(draw, max_actors=6, max_rows=70):
+    people = [
+        {"id": i, "kind": draw(st.sampled_from("abc")), "distance": draw(st.integers(0, 9))}
+        for i in range(draw(st.integers(0, max_actors)))
+    ]
+    actors = {r: [p for p in people if draw(st.booleans())] for r in ROLES}
+    kinds = st.sampled_from(["Any", "Any", "a", "b", "a c", "b c"])
+    slots = st.lists(st.sampled_from([*ROLES, "Embed"]), max_size=2, unique=True).map(" ".join)
+    row = st.fixed_dictionaries(
+        {f"{r}.kind": kinds for r in ROLES} | dict.fromkeys(SLOTS, slots) | {"is_wet": st.sampled_from(["Any", "True"])}
+    )
+    return draw(st.lists(row, min_size=1, max_size=max_rows)), {"is_wet": draw(st.booleans())}, actors
+
+
+def as_ids(cast):
+    return {role: actor["id"] for role, actor in cast.items()}
+
+
+@settings(max_examples=120, deadline=None)
+@given(moments(max_actors=5, max_rows=4))
+def test_valid_rows_and_castings_are_those_of_trying_every_assignment(moment):
+    rows, context, actors = moment
+    matches = table_of(rows).query(context, actors=actors, prefer="distance")
+    expected = [every_casting(row, context, actors) for row in rows]
+    assert matches.indices.tolist() == [i for i, found in enumerate(expected) if found is not None]
+    for row in matches:
+        castings = matches.castings(row)
+        key = lambda c: sorted(as_ids(c).items())  # noqa: E731
+        assert sorted(castings, key=key) == sorted(expected[row], key=key)
+        least = min(sum(a["distance"] for a in c.values()) for c in expected[row])
+        assert sum(a["distance"] for a in matches.casting(row).values()) == least
+        assert castings[0] == matches.casting(row)
+
+
+@settings(max_examples=40, deadline=None)
+@given(moments(max_actors=22, max_rows=70))
+def test_every_valid_row_has_a_casting_and_every_other_a_reason(moment):
+    rows, context, actors = moment
+    compiled = table_of(rows)
+    matches = compiled.query(context, actors=actors)
+    explanation = compiled.explain(context, actors=actors)
+    assert explanation.matches == matches
+    for r in range(len(rows)):
+        told = explanation.row(r)
+        assert told.is_valid == (r in matches)
+        if r in matches:
+            cast = as_ids(matches.casting(r))
+            assert len(set(cast.values())) == len(cast)
+            assert all(any(a["id"] == i for a in actors[role]) for role, i in cast.items())
+
+
+def actor(kind, **more):
+    return {"kind": kind, **more}
+
+
+def test_one_actor_offered_for_two_roles_plays_one():
+    compiled = table_of([{"Defender.kind": "a", "Receiver.kind": "a"}])
+    one = actor("a")
+    assert not compiled.query({"is_wet": True}, actors={"Defender": [one], "Receiver": [one]})
+    other = actor("a")
+    assert compiled.query({"is_wet": True}, actors={"Defender": [one], "Receiver": [other]})
+    same = actor("a", id=7)
+    assert not compiled.query({"is_wet": True}, actors={"Defender": [same], "Receiver": [dict(same)]})
+
+
+def test_the_better_actor_is_left_to_the_role_that_only_he_can_play():
+    compiled = table_of([{"Defender.kind": "a b", "Receiver.kind": "a"}])
+    near, far = actor("a", id="near", distance=1), actor("b", id="far", distance=9)
+    both = [near, far]
+    cast = compiled.query({"is_wet": True}, actors={"Defender": both, "Receiver": both}, prefer="distance").casting(0)
+    assert cast == {"Defender": far, "Receiver": near}
+
+
+def test_a_minus_prefers_the_highest_and_an_actor_without_the_fact_comes_last():
+    compiled = table_of([{"Defender.kind": "a"}])
+    offered = [actor("a", id=0), actor("a", id=1, speed=3), actor("a", id=2, speed=5)]
+    matches = compiled.query({"is_wet": True}, actors={"Defender": offered}, prefer="-speed")
+    assert [c["Defender"]["id"] for c in matches.castings(0)] == [2, 1, 0]
+    matches = compiled.query({"is_wet": True}, actors={"Defender": offered}, prefer=lambda role, a: abs(a["id"] - 1))
+    assert matches.casting(0)["Defender"]["id"] == 1
+
+
+def test_an_optional_role_that_nobody_fits_stays_empty_and_excludes_nothing():
+    compiled = table_of([{"Optional_Slots": "Judge", "Judge.kind": "c"}])
+    assert compiled.query({"is_wet": True}, actors={"Judge": [actor("a")]}).casting(0) == {}
+    assert set(compiled.query({"is_wet": True}, actors={"Judge": [actor("c")]}).casting(0)) == {"Judge"}
+
+
+def test_a_mandatory_role_must_be_filled_even_without_a_cell():
+    compiled = table_of([{"Mandatory_Slots": "Embed, Judge"}])
+    assert not compiled.query({"is_wet": True}, actors={})
+    assert compiled.query({"is_wet": True}, actors={"Judge": [actor("a")]})
+
+
+def test_a_role_whose_facts_are_given_as_plain_facts_is_not_cast():
+    compiled = table_of([{"Defender.kind": "a", "Receiver.kind": "b"}])
+    matches = compiled.query({"is_wet": True, "Receiver.kind": "b"}, actors={"Defender": [actor("a")]}, unknown="any")
+    assert set(matches.casting(0)) == {"Defender"}
+    with pytest.raises(ContextError, match="is given as a fact, and actors"):
+        compiled.query({"is_wet": True, "Defender.kind": "b"}, actors={"Defender": [actor("a")]})
+
+
+@pytest.mark.parametrize(
+    ("actors", "told"),
+    [
+        ({"Defnder": []}, 'no role "Defnder".*Did you mean "Defender"'),
+        ([], "mapping of roles"),
+        ({"Defender": {"kind": "a"}}, "of type dict"),
+        ({"Defender": None}, "of type NoneType"),
+        ({"Defender": [3]}, r"Defender\[0\] is of type int"),
+        ({"Defender": [{}]}, r"Defender\[0\].*missing"),
+        ({"Defender": [{"knd": "a"}]}, "Defender.knd"),
+        ({"Defender": [actor("z")]}, "not a declared value"),
+        ({"Defender": [{"kind": "a", "Defender.kind": "b"}]}, "told twice"),
+        ({"Defender": [{"kind": "a", 3: 4}]}, "name is of type int"),
+        ({"Defender": [actor("a", id=[])]}, "id of .* is of type list"),
+        ({"Defender": [actor("a", id=1)], "Receiver": [actor("b", id=1)]}, 'have the id "1", and "kind" differs'),
+    ],
+)
+def test_actors_that_cannot_be_read_are_refused_with_the_reason(actors, told):
+    with pytest.raises(ContextError, match=told):
+        table_of([{}]).query({"is_wet": True}, actors=actors)
+
+
+def test_a_missing_fact_of_an_actor_is_refused_ignored_or_accepted_by_any_alone():
+    compiled = table_of([{"Defender.kind": "a"}, {"Mandatory_Slots": "Defender"}])
+    actors = {"Defender": [{"Defender.kind": None}]}
+    assert compiled.query({"is_wet": True}, "any", actors).indices.tolist() == [0, 1]
+    assert compiled.query({"is_wet": True}, "never", actors).indices.tolist() == [1]
+    with pytest.raises(ContextError, match="missing"):
+        compiled.query({"is_wet": True}, "error", actors)
+
+
+def test_without_actors_a_role_s_fact_is_a_plain_fact_and_nobody_is_cast():
+    compiled = table_of([{"Defender.kind": "a"}])
+    facts = {"is_wet": True, **{f"{r}.kind": "a" for r in ROLES}}
+    matches = compiled.query(facts)
+    assert len(matches) == 1
+    with pytest.raises(ContextError, match="without actors"):
+        matches.casting(0)
+
+
+def test_nobody_is_cast_for_a_row_that_is_not_valid():
+    matches = table_of([{"Defender.kind": "a"}]).query({"is_wet": True}, actors={})
+    with pytest.raises(ContextError, match="row 0 is not valid"):
+        matches.casting(0)
+
+
+@pytest.mark.parametrize(
+    ("prefer", "told"),
+    [("distnce", 'no actor tells "distnce".*"distance"'), (3, "is of type int"), ("kind", "cannot be preferred by")],
+)
+def test_a_preference_that_cannot_be_meant_is_refused(prefer, told):
+    with pytest.raises(ContextError, match=told):
+        table_of([{}]).query({"is_wet": True}, actors={"Defender": [actor("a", distance=1)]}, prefer=prefer)
+
+
+def test_a_compiled_file_that_does_not_know_its_slots_is_not_asked_with_actors():
+    with pytest.raises(ContextError, match="which slots are mandatory"):
+        replace(table_of([{}]), slots=None).query({"is_wet": True}, actors={})
+
+
+def test_a_table_without_rows_casts_nobody():
+    assert len(table_of([]).query({"is_wet": True}, actors={"Judge": [actor("a")]})) == 0

@@ -26,6 +26,7 @@ COMMANDS = {
     "coverage": "which contexts have no asset, and whether that is enough",
     "diff": "what changed between two versions of a table",
     "merge": "join what two sides made of one table",
+    "git": "let git merge and show tables cell by cell",
     "import": "bring in a table from another program: CSV, Excel, JSON, DMN, Unreal",
     "export": "write a table for another program",
     "compile": "write the binary artefact for the game",

@@ -24,7 +24,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_difference_is_told_by_columns_rows_and_cells():
-    result = run("diff", "a.csv", "b.csv")
+    result = run("diff", "a.csv", "b.csv", "--no-effects")
     assert (result.code, result.err) == (1, "")
     assert result.lines == [
         "b.csv: 1 row added, 1 row renamed, 1 row moved, 1 column added, 1 column moved, 2 cells changed, 1 cell written otherwise",
@@ -92,9 +92,9 @@ def test_many_differences_are_cut_unless_all_are_asked_for(here):
     rows = [f"a{i},{i}" for i in range(100)]
     (here / "x.csv").write_text("\n".join(["A,x", *rows]), encoding="utf-8")
     (here / "y.csv").write_text("\n".join(["A,x", *(f"{row}5" for row in rows)]), encoding="utf-8")
-    result = run("diff", "x.csv", "y.csv")
+    result = run("diff", "x.csv", "y.csv", "--no-effects")
     assert result.lines[-1] == "  … and 60 more; --all shows every one"
-    assert len(run("diff", "x.csv", "y.csv", "--all").lines) == 203
+    assert len(run("diff", "x.csv", "y.csv", "--all", "--no-effects").lines) == 203
 
 
 def test_markdown_of_many_differences_fits_into_a_comment(here):
@@ -130,3 +130,38 @@ def test_what_cannot_be_read_exits_with_2(here):
     (here / "c.csv").write_text("<<<<<<< ours\nA\n", encoding="utf-8")
     assert "unresolved git conflict" in refused("a.csv", "c.csv").err
     assert "required" in refused("a.csv").err
+
+
+# ---- what a change does
+
+
+def test_what_a_change_does_stands_below_it(here):
+    (here / "c.csv").write_text(BEFORE.replace("jump,Any,False\n", ""), encoding="utf-8")
+    lines = run("diff", "a.csv", "c.csv").lines
+    told = lines[lines.index("what it does") :]
+    assert told[2] == "  jump loses 50.00 %"
+    assert told[3] == "    50.00 %  hit: False"
+    assert "  gaps opened" in told
+    assert "what it does" not in run("diff", "a.csv", "c.csv", "--no-effects").out
+
+
+def test_what_a_change_does_stands_in_the_json_and_the_markdown(here):
+    (here / "c.csv").write_text(BEFORE.replace("jump,Any,False\n", ""), encoding="utf-8")
+    found = run("diff", "a.csv", "c.csv", "--json").json["effects"]
+    assert [(one["asset"], one["after"]) for one in found["assets"]] == [("jump", 0.0)]
+    assert found["gaps"]["complete"] is True
+    assert "- jump loses 50.00 %" in run("diff", "a.csv", "c.csv", "--format", "markdown").lines
+
+
+def test_a_change_of_writing_only_does_nothing(here):
+    (here / "c.csv").write_text(BEFORE.replace("9.99", "9.990"), encoding="utf-8")
+    result = run("diff", "a.csv", "c.csv", "--json")
+    assert (result.code, result.json["effects"]) == (1, None)
+
+
+def test_what_cannot_be_told_is_said_with_its_place(here):
+    (here / "contextdb.toml").write_text('[conditions.speed]\ntype = "number"\n', encoding="utf-8")
+    (here / "c.csv").write_text(BEFORE.replace("5..9", "fast"), encoding="utf-8")
+    result = run("diff", "a.csv", "c.csv")
+    assert result.code == 1
+    assert "That cannot be told: c.csv, line 3" in result.out

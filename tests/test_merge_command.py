@@ -183,6 +183,36 @@ def test_marks_that_do_not_go_together_are_no_versions(text):
     assert versions_of(text.encode()) is None
 
 
+# ---- the meaning of a clean merge
+
+PAIR = '[conditions.speed]\ntype = "number"\nmin = 0\nmax = 10\n[tables.ours]\npolicy = "POLICY"\n'
+
+
+def test_a_gap_that_neither_side_had_is_told_and_is_refused_only_when_strict(here):
+    (here / "contextdb.toml").write_text(PAIR.replace("POLICY", "collect"), encoding="utf-8")
+    base = "A,speed\nslow,0..6\nfast,4..10\n"
+    sides = {"ours": base.replace("0..6", "0..4"), "theirs": base.replace("4..10", "6..10")}
+    result = run("merge", *put(base=base, **sides))
+    assert (result.code, result.out) == (0, "")
+    assert "a gap that neither side had: speed: (4..6) (20.00 % of the contexts)" in result.err
+    assert run("merge", *put(base=base, **sides), "--strict").code == 1
+
+
+def test_an_overlap_that_neither_side_had_is_told_where_the_policy_is_unique(here):
+    (here / "contextdb.toml").write_text(PAIR.replace("POLICY", "unique"), encoding="utf-8")
+    base = "A,speed\nslow,0..4\nfast,6..10\n"
+    result = run("merge", *put(base=base, ours=base.replace("0..4", "0..5.5"), theirs=base.replace("6..10", "4.5..10")))
+    assert result.code == 0
+    assert "as on neither side" in result.err
+
+
+def test_a_gap_that_one_side_opened_is_not_told_again(here):
+    (here / "contextdb.toml").write_text(PAIR.replace("POLICY", "collect"), encoding="utf-8")
+    base = "A,speed\nslow,0..6\nfast,6..10\n"
+    result = run("merge", *put(base=base, ours=base.replace("0..6", "0..4"), theirs=base + "run,8..9\n"), "--strict")
+    assert (result.code, result.err) == (0, "")
+
+
 # ---- bad use
 
 

@@ -10,14 +10,20 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
 from contextdb.commands.diff_views import as_markdown, as_text
+from contextdb.commands.effects_views import effects_json, effects_markdown, effects_text
 from contextdb.console import output, wants_colour
 from contextdb.diff import Diff, diff
+from contextdb.errors import ContextDBError, Fault
 from contextdb.exit_codes import ExitCode
 from contextdb.places import table_path
 from contextdb.project import load_table
 from contextdb.report.render_json import as_json
+
+if TYPE_CHECKING:
+    from contextdb.effects import Effects
 
 FORMATS = ("text", "markdown", "json")
 
@@ -28,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("after", metavar="B", help="the table as it is")
     parser.add_argument("--format", choices=FORMATS, default="text", metavar="FORMAT", help=f"{', '.join(FORMATS)} (default: text)")
     parser.add_argument("--json", action="store_const", const="json", dest="format", help="the same as --format json")
+    parser.add_argument("--no-effects", action="store_false", dest="effects", help="leave out what the change does")
     parser.add_argument("--all", action="store_true", help="print every difference, not the first of each kind")
 
 
@@ -35,15 +42,33 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Compare two tables. Cells that cannot be read are compared as texts."""
     before, after = (load_table(table_path(text), strict=False) for text in (arguments.before, arguments.after))
     found = diff(before, after)
-    text = _rendered(found, arguments)
+    effect = _effects(found) if arguments.effects and _may_matter(found) else None
+    text = _rendered(found, effect, arguments)
     with output():
         print(text, end="")
     return ExitCode.FOUND if found else ExitCode.OK
 
 
-def _rendered(found: Diff, arguments: argparse.Namespace) -> str:
+def _may_matter(found: Diff) -> bool:
+    """Whether more changed than how things are written and where they stand."""
+    is_other_rows = found.rows_added or found.rows_removed or found.columns_added or found.columns_removed or found.columns_renamed
+    return bool(is_other_rows or found.n_changed)
+
+
+def _effects(found: Diff) -> Effects | Fault:
+    """What the change does, or why that cannot be told."""
+    from contextdb.effects import effects
+
+    try:
+        return effects(found.before, found.after, changes=found)
+    except ContextDBError as error:
+        return error.faults[0]
+
+
+def _rendered(found: Diff, effect: Effects | Fault | None, arguments: argparse.Namespace) -> str:
     if arguments.format == "json":
-        return as_json(found.to_json())
+        return as_json(found.to_json() | {"effects": effects_json(effect)})
     if arguments.format == "markdown":
-        return as_markdown(found, arguments.all)
-    return as_text(found, wants_colour(sys.stdout), arguments.all)
+        return as_markdown(found, arguments.all, effects_markdown(effect, arguments.all))
+    colour = wants_colour(sys.stdout)
+    return as_text(found, colour, arguments.all) + effects_text(effect, colour, arguments.all)

@@ -38,21 +38,21 @@ def as_text(found: Diff, colour: bool, shows_all: bool = False) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def as_markdown(found: Diff, shows_all: bool = False) -> str:
-    """Differences as Markdown, small enough for a comment."""
+def as_markdown(found: Diff, shows_all: bool = False, more: str = "") -> str:
+    """Differences as Markdown with more below it, together small enough for a comment."""
     name = str(found.after.path or found.after.name)
     lines = [f"### {escaped(name)}", "", f"{escaped(found.summary)}"]
     parts = [f"- column {verb}: {escaped(text)}" for verb, text in _columns(found)]
     parts += [f"- row {verb}: {escaped(text)}" for verb, text in _rows(found)]
     rows = [f"| {' | '.join(escaped(shown(t, 200)) for t in _markdown_texts(c))} |" for c in found.cells]
-    room = sys.maxsize if shows_all else MOST_BYTES
+    room = sys.maxsize if shows_all else MOST_BYTES - len(more.encode())
     for head, listed in (([], parts), (["| asset | column | before | after |", "| --- | --- | --- | --- |"], rows)):
         kept = _fitting(listed, room)
         room -= sum(map(_size, kept))
         left = len(listed) - len(kept)
         lines += ["", *head, *kept] if kept else []
         lines += ["", f"… and {left:,} more; `contextdb diff --all` shows every one."] if left else []
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" + more
 
 
 def _fitting(lines: Sequence[str], room: int) -> Sequence[str]:

@@ -49,7 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--type", metavar="NAME=TYPE", action="append", default=[], help="the type of a new condition, or output, priority, …"
     )
     parser.add_argument("--encoding", help="the encoding of a text file (default: told from its bytes)")
-    parser.add_argument("--delimiter", choices=DELIMITERS, help="what stands between fields (default: told from the file)")
+    between = f"what stands between fields: {', '.join(DELIMITERS)} (default: told from the file)"
+    parser.add_argument("--delimiter", metavar="NAME", choices=DELIMITERS, help=between)
     parser.add_argument("--decimal", choices=("comma", "point"), help="what stands in 3,5 (default: told from the cells)")
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
     parser.add_argument("--force", action="store_true", help="write over a table that is there")

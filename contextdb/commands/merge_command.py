@@ -4,12 +4,15 @@ A contextdb.toml is merged key by key. The result is written over OURS, or into 
 between git's marks, row by row, for a person or the editor to decide; a Parquet file then stays as it was. Exits with 0 when all
 went together, with 1 when something is to be decided, with 2 when a file cannot be read.
 
+After a clean merge the meaning is looked at again: gaps, overlaps under the policy "unique" and rows that can play no more that
+neither side had are told on standard error; with --strict they give 1 too.
+
   contextdb merge base.csv ours.csv theirs.csv --out merged.csv
   contextdb merge base.csv ours.csv theirs.csv --take theirs
 
-As a merge driver of git, docs/ci.md tells how it is set up:
+As a merge driver of git, with the lines "*.csv merge=contextdb" and "contextdb.toml merge=contextdb" in .gitattributes:
 
-  contextdb merge %O %A %B --path %P
+  git config merge.contextdb.driver "contextdb merge %O %A %B --path %P"
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ import sys
 from pathlib import Path
 
 from contextdb.console import printable
-from contextdb.diff import Merge, Side, merge
+from contextdb.diff import Merge, Side, diff, merge
 from contextdb.diffing.markers import with_markers
 from contextdb.diffing.reading import merged_bytes, table_of
 from contextdb.diffing.toml_merging import merge_toml
@@ -42,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", metavar="FILE", help="write the result here, and leave OURS as it is")
     parser.add_argument("--path", metavar="PATH", help="the table's file, whose contextdb.toml holds (git: %%P; default: OURS)")
     parser.add_argument("--take", choices=("ours", "theirs"), help="decide all conflicts for one side")
+    parser.add_argument("--strict", action="store_true", help="exit with 1 when the merge brings a gap that neither side had")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -58,7 +62,32 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if not (found.conflicts and is_parquet):
         write_atomic(out, with_markers(found) if found.conflicts else merged_bytes(found))
     _tell(found, path, is_parquet)
-    return ExitCode.FOUND if found.conflicts else ExitCode.OK
+    if found.conflicts:
+        return ExitCode.FOUND
+    return ExitCode.FOUND if _tell_meaning(found, path) and arguments.strict else ExitCode.OK
+
+
+def _tell_meaning(found: Merge, path: Path) -> bool:
+    """Tell what the merge brings that neither side had, and whether that is anything."""
+    if not (diff(found.base, found.ours) and diff(found.base, found.theirs)):
+        return False
+    from contextdb.covering import format_percent
+    from contextdb.effects import merge_effects
+
+    try:
+        effects = merge_effects(found.ours, found.theirs, found.table)
+    except ContextDBError as error:
+        print(printable(f"contextdb: the meaning of the merge was not looked at: {error.faults[0]}"), file=sys.stderr)
+        return False
+    said = [
+        f"a gap that neither side had: {shown(b.text, 400)} ({format_percent(b.share)} of the contexts)." for b in effects.opened
+    ]
+    said += [f"{shown(f.asset or '')}, as on neither side: {f.message}" for f in effects.findings]
+    for text in said[:MOST_TOLD]:
+        print(printable(f"contextdb: {Place(str(path))}: {text}"), file=sys.stderr)
+    if len(said) > MOST_TOLD:
+        print(f"contextdb: … and {len(said) - MOST_TOLD:,} more.", file=sys.stderr)
+    return bool(said)
 
 
 def _merge_toml(path: Path, arguments: argparse.Namespace) -> ExitCode:

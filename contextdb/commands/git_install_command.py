@@ -1,0 +1,51 @@
+"""Let git merge and show tables cell by cell: writes lines of .gitattributes and git's configuration.
+
+What stands there already stays; run again, it changes nothing. Commit .gitattributes; every clone runs this once.
+
+  contextdb git install
+  contextdb git install tables/ --global
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from contextdb.commands import git_setup
+from contextdb.commands.git_setup import Setup, setup_of
+from contextdb.console import output, printable
+from contextdb.errors import plural
+from contextdb.exit_codes import ExitCode
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    git_setup.add_arguments(parser)
+    told = "how git calls contextdb (default: contextdb, or the Python that runs now)"
+    parser.add_argument("--command", metavar="TEXT", dest="command_line", help=told)
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Write what is missing, and say so."""
+    setup = setup_of(arguments)
+    said = [*_attributes(setup), *_configuration(setup)] or ["nothing to do: all is set"]
+    with output():
+        print(*map(printable, said), sep="\n")
+    return ExitCode.OK
+
+
+def _attributes(setup: Setup) -> list[str]:
+    missing = setup.missing_lines()
+    if not missing:
+        return []
+    raw = setup.raw()
+    end = b"\r\n" if b"\r\n" in raw else b"\n"
+    gap = end if raw and not raw.endswith(b"\n") else b""
+    setup.write(raw + gap + b"".join(line + end for line in missing))
+    return [f"{setup.attributes}: {plural(len(missing), 'line')} written; commit it"]
+
+
+def _configuration(setup: Setup) -> list[str]:
+    wrong = {key: value for key, value in setup.settings.items() if setup.value(key) != value}
+    for key, value in wrong.items():
+        setup.set(key, value)
+    return [f"{setup.where}: {', '.join(wrong)} set"] if wrong else []

@@ -1,0 +1,147 @@
+"""What git is told of tables: lines of .gitattributes, and sections of git's configuration. Shared by the `git` commands."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from contextdb.disk import read_bytes, write_atomic
+from contextdb.errors import ContextDBError, Fault, FileError, Place
+
+ATTRIBUTES = ".gitattributes"
+LINES = (
+    b"*.csv merge=contextdb diff=contextdb",
+    b"*.parquet merge=contextdb diff=contextdb",
+    b"contextdb.toml merge=contextdb",
+)
+NAME = "contextdb: tables by asset and cell"
+
+
+@dataclass(frozen=True)
+class Setup:
+    """One folder of a repository and the configuration that is meant. `command` is how git calls contextdb."""
+
+    folder: Path
+    is_global: bool
+    command: str
+
+    @property
+    def attributes(self) -> Path:
+        """The file that says which files are tables."""
+        return self.folder / ATTRIBUTES
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """The keys of git's configuration, and what they say."""
+        return {
+            "merge.contextdb.name": NAME,
+            "merge.contextdb.driver": f"{self.command} merge %O %A %B --path %P",
+            "diff.contextdb.textconv": f"{self.command} git text",
+            "diff.contextdb.xfuncname": r"^([^[:space:]].*)$",
+        }
+
+    def git(self, *arguments: str, accepts: tuple[int, ...] = (0,)) -> str:
+        """What git says on standard output; an error with git's own words where it exits otherwise."""
+        return _git(self.folder, *arguments, accepts=accepts)
+
+    @property
+    def where(self) -> str:
+        """The name of the configuration in messages."""
+        return "git's configuration for all repositories" if self.is_global else "the configuration of this clone"
+
+    def missing_lines(self) -> list[bytes]:
+        """The lines that .gitattributes does not have."""
+        present = self.lines()
+        return [line for line in LINES if line not in present]
+
+    def lines(self) -> list[bytes]:
+        """The lines of .gitattributes, without their ends."""
+        return [line.strip() for line in self.raw().splitlines()]
+
+    def raw(self) -> bytes:
+        """What .gitattributes holds; nothing where it is not there."""
+        return read_bytes(self.attributes) if self.attributes.is_file() else b""
+
+    def value(self, key: str) -> str | None:
+        """What the configuration says under a key."""
+        found = self.git("config", self.scope, "--get", "--null", key, accepts=(0, 1))
+        return found.removesuffix("\0") if found else None
+
+    @property
+    def scope(self) -> str:
+        """The option of `git config`."""
+        return "--global" if self.is_global else "--local"
+
+    def set(self, key: str, value: str) -> None:
+        """Write one key."""
+        self.git("config", self.scope, "--replace-all", key, value)
+
+    def unset(self, key: str) -> None:
+        """Take one key back."""
+        self.git("config", self.scope, "--unset-all", key, accepts=(0, 5))
+
+    def write(self, raw: bytes) -> None:
+        """Write .gitattributes; an empty one is removed."""
+        if raw:
+            write_atomic(self.attributes, raw)
+        else:
+            with _placed(self.attributes):
+                self.attributes.unlink(missing_ok=True)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments that say where."""
+    parser.add_argument("path", metavar="PATH", nargs="?", default=".", help=f"the folder whose {ATTRIBUTES} is meant (default: .)")
+    scope = parser.add_mutually_exclusive_group()
+    scope.add_argument("--local", action="store_false", dest="is_global", help="configure this clone (default)")
+    scope.add_argument("--global", action="store_true", dest="is_global", help="configure all repositories of this user")
+
+
+def setup_of(arguments: argparse.Namespace) -> Setup:
+    """What the arguments mean.
+
+    Raises
+    ------
+    FileError
+        There is no such folder, no git, or the folder is in no repository.
+    """
+    folder = Path(arguments.path)
+    if not os.path.isdir(arguments.path):
+        raise FileError(Fault("there is no such folder.", "a folder of a git repository", place=Place(arguments.path)))
+    if _git(folder, "rev-parse", "--is-inside-work-tree", accepts=(0, 128)).strip() != "true":
+        mend = "git init, or another folder"
+        raise FileError(Fault("the folder is in no git repository.", "a folder of one", f"to call {mend}", Place(str(folder))))
+    return Setup(folder, arguments.is_global, getattr(arguments, "command_line", None) or own_command())
+
+
+def own_command() -> str:
+    """How a shell calls this contextdb: by name where it is found so, else by its interpreter."""
+    return "contextdb" if shutil.which("contextdb") else f"{shlex.quote(Path(sys.executable).as_posix())} -m contextdb"
+
+
+def _git(folder: Path, *arguments: str, accepts: tuple[int, ...]) -> str:
+    try:
+        done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, check=False)
+    except OSError as error:
+        fault = Fault(f"git cannot be run: {error.strerror}.", "git on the search path", "to install git")
+        raise FileError(fault) from None
+    if done.returncode not in accepts:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise ContextDBError(Fault(f"git {arguments[0]} failed: {said[-1] if said else done.returncode}", place=Place(str(folder))))
+    return done.stdout.decode(errors="surrogateescape")
+
+
+@contextmanager
+def _placed(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise FileError(Fault(f"the file cannot be written: {error.strerror}.", place=Place(str(path)))) from None

@@ -1,0 +1,40 @@
+"""Take back what `contextdb git install` wrote: its lines of .gitattributes and its sections of git's configuration.
+
+contextdb git uninstall tables/
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from contextdb.commands.git_setup import LINES, Setup, add_arguments, setup_of
+from contextdb.console import output, printable
+from contextdb.errors import plural
+from contextdb.exit_codes import ExitCode
+
+__all__ = ["add_arguments", "run"]
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Remove what is there, and say so."""
+    setup = setup_of(arguments)
+    said = [*_attributes(setup), *_configuration(setup)] or ["nothing to do: nothing is set"]
+    with output():
+        print(*map(printable, said), sep="\n")
+    return ExitCode.OK
+
+
+def _attributes(setup: Setup) -> list[str]:
+    lines = setup.raw().splitlines(keepends=True)
+    kept = [line for line in lines if line.strip() not in LINES]
+    if len(kept) == len(lines):
+        return []
+    setup.write(b"".join(kept))
+    return [f"{setup.attributes}: {plural(len(lines) - len(kept), 'line')} removed"]
+
+
+def _configuration(setup: Setup) -> list[str]:
+    present = [key for key in setup.settings if setup.value(key) is not None]
+    for key in present:
+        setup.unset(key)
+    return [f"{setup.where}: {', '.join(present)} removed"] if present else []

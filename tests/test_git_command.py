@@ -1,0 +1,228 @@
+"""`contextdb git`: a real repository whose merges, rebases and diffs go cell by cell once one command has been run."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from running import ROOT, run
+
+from contextdb import cli
+
+BASE = "Asset,speed,hit\r\nwalk,0..5,True\r\nrun,5..9,Any\r\njump,Any,False\r\n"
+TOML = '[conditions.speed]\ntype = "number"\nmin = 0.0\nmax = 10.0\n'
+PROGRAM = """import sys
+sys.path.insert(0, {root!r})
+from contextdb import cli
+cli.COMMANDS.update(dict.fromkeys(("merge", "git"), ""))
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+def git(*arguments: str, fails: bool = False) -> str:
+    done = subprocess.run(["git", *arguments], capture_output=True, encoding="utf-8")
+    assert (done.returncode != 0) == fails, done.stderr
+    return done.stdout + done.stderr
+
+
+def commit(message: str) -> None:
+    git("add", "-A")
+    git("commit", "-q", "-m", message)
+
+
+def put(name: str, text: str) -> None:
+    Path(name).parent.mkdir(exist_ok=True)
+    Path(name).write_bytes(text.encode())
+
+
+def read(name: str) -> str:
+    return Path(name).read_bytes().decode()
+
+
+def branched(name: str, ours: str, theirs: str) -> None:
+    git("checkout", "-q", "-b", "other")
+    put(name, theirs)
+    commit("theirs")
+    git("checkout", "-q", "main")
+    put(name, ours)
+    commit("ours")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A repository with one table, in a folder with a blank in its name; nobody's own git configuration holds."""
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    monkeypatch.setitem(cli.COMMANDS, "git", "tables in git")
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", str(tmp_path / "global config"))
+    monkeypatch.setenv("GIT_CONFIG_NOSYSTEM", "1")
+    folder = tmp_path / "my game"
+    folder.mkdir()
+    (tmp_path / "a driver.py").write_text(PROGRAM.format(root=str(ROOT)), encoding="utf-8")
+    monkeypatch.chdir(folder)
+    git("init", "-q", "-b", "main")
+    for key, value in {"user.name": "t", "user.email": "t@example.org", "core.autocrlf": "false"}.items():
+        git("config", key, value)
+    put("my tables/t.csv", BASE)
+    put("my tables/contextdb.toml", TOML)
+    commit("base")
+    return folder
+
+
+@pytest.fixture
+def installed(here: Path) -> Path:
+    assert install().code == 0
+    commit("attributes")
+    return here
+
+
+def install(*arguments: str):
+    program = Path("..", "a driver.py").resolve()
+    return run("git", "install", *arguments, "--command", f"'{Path(sys.executable).as_posix()}' '{program.as_posix()}'")
+
+
+# ---- install, status, uninstall
+
+
+def test_install_says_what_it_wrote_and_does_nothing_the_second_time(here):
+    put(".gitattributes", "*.png binary")
+    first = install()
+    assert first.lines[0] == ".gitattributes: 3 lines written; commit it"
+    assert "merge.contextdb.driver" in first.lines[1]
+    written = read(".gitattributes")
+    assert written.startswith("*.png binary\n*.csv merge=contextdb diff=contextdb\n")
+    assert install().out == "nothing to do: all is set\n"
+    assert read(".gitattributes") == written
+
+
+def test_a_line_that_was_there_already_is_not_written_again(here):
+    put(".gitattributes", "*.csv merge=contextdb diff=contextdb\r\n")
+    install()
+    assert read(".gitattributes").count("*.csv") == 1
+    assert read(".gitattributes").count("\r\n") == 3
+
+
+def test_uninstall_takes_back_these_lines_and_keys_and_nothing_else(here):
+    put(".gitattributes", "*.png binary\n")
+    git("config", "merge.other.driver", "true")
+    before = git("config", "--local", "--list")
+    install()
+    assert run("git", "uninstall").code == 0
+    assert read(".gitattributes") == "*.png binary\n"
+    assert git("config", "--local", "--list") == before
+    assert run("git", "uninstall").out == "nothing to do: nothing is set\n"
+
+
+def test_attributes_that_held_nothing_else_are_removed(here):
+    install()
+    run("git", "uninstall")
+    assert git("status", "--porcelain") == ""
+
+
+def test_status_exits_with_1_until_all_is_set(here):
+    result = run("git", "status")
+    assert (result.code, result.out.count("missing")) == (1, 7)
+    install()
+    result = run("git", "status")
+    assert (result.code, result.out.count("missing")) == (0, 0)
+    assert "merge %O %A %B --path %P" in result.out
+
+
+def test_the_attributes_can_stand_in_a_folder_with_a_blank(here):
+    install("my tables")
+    assert Path("my tables", ".gitattributes").is_file()
+    assert not Path(".gitattributes").exists()
+    assert "my tables/t.csv: merge: contextdb" in git("check-attr", "merge", "my tables/t.csv")
+
+
+def test_the_configuration_of_all_repositories_is_left_to_global(here):
+    before = git("config", "--local", "--list")
+    install("--global")
+    assert git("config", "--local", "--list") == before
+    assert "git text" in git("config", "--global", "diff.contextdb.textconv")
+    run("git", "uninstall", "--global")
+    assert git("config", "--global", "--list") == ""
+
+
+def test_a_folder_of_no_repository_is_named(tmp_path, monkeypatch):
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    monkeypatch.setitem(cli.COMMANDS, "git", "tables in git")
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    result = run("git", "install", tmp_path)
+    assert (result.code, result.out) == (2, "")
+    assert "the folder is in no git repository" in result.err
+    assert run("git", "install", tmp_path / "missing").code == 2
+
+
+def test_a_machine_without_git_is_told_so(here, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    result = run("git", "install")
+    assert result.code == 2
+    assert "git cannot be run" in result.err
+
+
+# ---- what git then does
+
+
+def test_two_branches_merge_and_rebase_cell_by_cell(installed):
+    ours, theirs = BASE.replace("walk,0..5", "walk,1..5"), BASE.replace("0..5,True", "0..5,False")
+    branched("my tables/t.csv", ours, theirs)
+    git("merge", "-q", "other", "-m", "both")
+    assert read("my tables/t.csv") == ours.replace("1..5,True", "1..5,False")
+    git("reset", "-q", "--hard", "HEAD~1")
+    git("rebase", "-q", "other")
+    assert read("my tables/t.csv") == ours.replace("1..5,True", "1..5,False")
+
+
+def test_a_conflict_stands_between_marks_and_the_file_stays_unmerged(installed):
+    branched("my tables/t.csv", BASE.replace("5..9", "1..2"), BASE.replace("5..9", "3..4"))
+    said = git("merge", "-q", "other", "-m", "both", fails=True)
+    assert "my tables/t.csv: run, speed" in said
+    assert "<<<<<<< ours\r\nrun,1..2,Any" in read("my tables/t.csv")
+    assert git("status", "--porcelain") == 'UU "my tables/t.csv"\n'
+
+
+def test_edits_go_into_a_file_that_the_other_branch_renamed(installed):
+    git("checkout", "-q", "-b", "other")
+    git("mv", "my tables/t.csv", "my tables/moved here.csv")
+    commit("renamed")
+    git("checkout", "-q", "main")
+    put("my tables/t.csv", BASE.replace("5..9", "1..2"))
+    commit("ours")
+    git("merge", "-q", "other", "-m", "both")
+    assert read("my tables/moved here.csv") == BASE.replace("5..9", "1..2")
+
+
+def test_columns_added_on_both_sides_are_both_declared(installed):
+    more = [TOML + f'\n[conditions.{name}]\ntype = "bool"\n' for name in ("inAir", "stunned")]
+    branched("my tables/contextdb.toml", *more)
+    git("merge", "-q", "other", "-m", "both")
+    merged = read("my tables/contextdb.toml")
+    assert "[conditions.inAir]" in merged
+    assert "[conditions.stunned]" in merged
+
+
+def test_git_diff_and_git_log_show_the_asset_and_the_cell(installed):
+    put("my tables/t.csv", BASE.replace("5..9", "5..8"))
+    told = git("diff")
+    assert "\n run\n-  speed: 5..9\n+  speed: 5..8\n   hit: Any\n" in told
+    commit("slower")
+    assert "\n run\n-  speed: 5..9\n+  speed: 5..8\n" in git("log", "-p", "-1")
+
+
+def test_the_heading_of_a_hunk_names_its_asset(installed):
+    names = [f"c{i}" for i in range(9)]
+    wide = f"Asset,{','.join(names)}\nwalk,{','.join('1' * 9)}\n"
+    put("wide.csv", wide)
+    commit("wide")
+    put("wide.csv", wide.removesuffix("1\n") + "2\n")
+    assert "@@ walk\n" in git("diff")
+
+
+def test_git_diff_shows_a_file_that_is_no_table_as_it_is(installed):
+    put("my tables/t.csv", BASE + "too,many,cells,here\r\n")
+    assert "+too,many,cells,here" in git("diff")

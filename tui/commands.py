@@ -141,6 +141,7 @@ _OF_ASSETS = (
 _OF_SCREEN = (
     Command("help", "f1", "Help", "Every key, and how cells are written.", "Help", "help", in_footer=True),
     Command("save", "ctrl+s", "Save", "Write the table to its file.", "File", "save", in_footer=True),
+    Command("save-as", "", "Save as", "Write the table to another file, and go on with that.", "File", "save_as"),
     Command("open", "ctrl+o", "Tables", "Go to another table of the folder.", "File", "tables"),
     Command("new-table", "", "New table", "Make a table, with the columns of a blueprint.", "File", "new_table"),
     Command("refresh", "f5", "Refresh", "Take in what changed on the disk, sort and filter anew.", "File", "refresh"),

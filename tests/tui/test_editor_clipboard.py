@@ -114,13 +114,13 @@ def test_a_long_text_that_the_system_took_needs_no_word(system, clipboard):
 
 
 def test_inside_tmux_its_buffer_is_filled_too(system, clipboard, monkeypatch):
-    monkeypatch.setenv("TMUX", "/tmp/tmux,1,0")
+    monkeypatch.setenv("TMUX", "socket,1,0")
     clipboard.copy("é")
     assert system.to_tmux == ["é".encode()]
 
 
 def test_a_tmux_that_does_not_answer_is_no_hindrance(system, clipboard, monkeypatch):
-    monkeypatch.setenv("TMUX", "/tmp/tmux,1,0")
+    monkeypatch.setenv("TMUX", "socket,1,0")
     system.tmux_fails = True
     assert clipboard.copy("a") == ""
 

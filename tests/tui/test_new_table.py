@@ -44,3 +44,19 @@ def test_a_new_table_is_made_from_a_blueprint_and_opens(folder: Path):
     assert (folder / "swim.csv").read_bytes() == b"Asset Name,speed\n"
     assert text.startswith(" swim ")
     assert "the table has no rows: Ctrl+N makes one" in text
+
+
+def test_saving_as_another_table_leaves_the_old_file_and_goes_on_with_the_new_one(folder: Path):
+    before = (folder / "jog.csv").read_bytes()
+
+    async def script(pilot: Pilot[Any]) -> str:
+        await pilot.press("down", "up", "right", *"7..8", "enter")
+        await pilot.app.main.run_command("save-as")
+        await pilot.press(*"dash", "enter")
+        await pilot.pause()
+        return screen_text(pilot.app)
+
+    text = drive(EditorApp(Workspace(folder)), script)
+    assert text.startswith(" dash  ")
+    assert (folder / "jog.csv").read_bytes() == before
+    assert (folder / "dash.csv").read_bytes() == before.replace(b"0..5", b"7..8")

@@ -127,9 +127,9 @@ def test_a_paste_past_the_end_adds_rows_and_leaves_out_columns_and_says_so():
     sheet.go(3, 2)
     done = sheet.paste("True\tx\nmaybe\ty\nFalse\tz")
     assert assets(sheet) == ["walk", "run", "jump", "idle", "", ""]
-    assert done.notes[0] == "2 rows added."
-    assert done.notes[1].startswith("1 column left out")
-    assert done.notes[2] == "1 cell cannot be read."
+    assert done.notes == ("2 rows added.",)
+    assert done.warnings[0].startswith("1 column left out")
+    assert done.warnings[1] == "1 cell cannot be read."
     assert sheet.fault(4, 2)
     sheet.undo()
     assert sheet.table.n_rows == 4

@@ -43,6 +43,8 @@ class Done:
 
     name: str = ""
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    """What did not go as one would think."""
 
 
 class Sheet(ShownTable):
@@ -121,10 +123,9 @@ class Sheet(ShownTable):
         block = placed.block
         self._select(self.selection.at(block.top, block.left, self.shape))
         self._select(self.selection.at(block.bottom - 1, block.right - 1, self.shape, extend=True))
-        notes = [f"{plural(n_new, 'row')} added."] if n_new else []
-        if placed.n_columns_cut:
-            notes.append(f"{plural(placed.n_columns_cut, 'column')} left out: the sheet ends here. Add columns and paste again.")
-        return replace(done, notes=(*notes, *self._unreadable(edit.changes)))
+        cut = f"{plural(placed.n_columns_cut, 'column')} left out: the sheet ends here. Add columns and paste again."
+        notes = (f"{plural(n_new, 'row')} added.",) if n_new else ()
+        return replace(done, notes=notes, warnings=((cut,) if placed.n_columns_cut else ()) + done.warnings)
 
     # ---- edits of rows
 
@@ -240,8 +241,7 @@ class Sheet(ShownTable):
         edit = replace_all(self.table, search, replacement, rows, columns)
         if not edit.changes:
             return Done(notes=(f"{in_quotes(search.text)} is not found.",))
-        done = self._do(edit)
-        return replace(done, notes=self._unreadable(edit.changes))
+        return self._do(edit)
 
     # ---- history
 
@@ -282,7 +282,7 @@ class Sheet(ShownTable):
         if self.recorder is not None:
             self.recorder.did(edit)
         self._follow(before, step)
-        return Done(edit.name)
+        return Done(edit.name, warnings=self._unreadable(edit.changes))
 
     def _set(self, cells: Iterable[tuple[int, int, str]], name: str = "") -> Done:
         rows, names = self.view.rows.tolist(), [c.name for c in self.table.columns]

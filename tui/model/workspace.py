@@ -49,6 +49,21 @@ class Workspace:
         self.sessions[name] = Session(self.files[name], takes_over)
         return self.sessions[name]
 
+    def save_as(self, name: str, other: str, suffix: str = ".csv") -> None:
+        """Write a table, its unsaved edits with it, as another table of the folder; the old file stays as it was last saved.
+
+        Raises
+        ------
+        FileError, TableError, SchemaError
+            As of `Session.save`; nothing has changed then.
+        """
+        path = self.folder / f"{other}{suffix}"
+        session = self.session(name)
+        session.save(path)
+        session.close()
+        del self.sessions[name]
+        self.files[other] = path
+
     @property
     def unsaved(self) -> list[str]:
         """The tables with unsaved edits."""

@@ -176,7 +176,7 @@ class AssetsPane(Pane):
         if place.is_fact:
             self.sheet.set_fact(self.sheet.table.columns[place.column].name, event.text)
             self._close_editor()
-            self._fact_changed()
+            self.grid.post_message(Grid.FactChanged())
             if not is_elsewhere and event.right:
                 self.grid.action_move(0, event.right, False)
             return
@@ -248,8 +248,11 @@ class AssetsPane(Pane):
     def _copy(self, event: Grid.CopyWanted) -> None:
         event.stop()
         problem = self.clipboard.copy(event.text)
-        n_rows = event.text.count("\n") or 1
-        self.post_message(Told(problem or f"Copied {plural(n_rows, 'row')}.", "warning" if problem else "information"))
+        if problem:
+            self.post_message(Told(problem, "warning"))
+        elif event.is_told:
+            rows, columns = self.sheet.block.shape
+            self.post_message(Told(f"Copied {rows:,} × {columns:,}."))
 
     @on(Grid.PasteWanted)
     def _paste(self, event: Grid.PasteWanted) -> None:

@@ -156,7 +156,8 @@ class MainScreen(Screen[None]):
     @on(Edited)
     def _edited(self, event: Edited) -> None:
         done = event.done
-        self.say(" ".join([f"{done.name}." if done.name else "", *done.notes]).strip(), "warning" if done.notes else "information")
+        text = " ".join([f"{done.name}." if done.name else "", *done.notes, *done.warnings]).strip()
+        self.say(text, "warning" if done.warnings else "information")
         self.show()
 
     @on(Grid.Moved)
@@ -279,6 +280,20 @@ class MainScreen(Screen[None]):
         self.show()
         self.say(f"Saved {self.session.path.name}.{note}", "warning" if note else "information")
 
+    def action_save_as(self) -> None:
+        """Ask for a name, write the table to a file of it, and go on with that one."""
+        workspace = self.workspace
+
+        def named(name: str | None) -> None:
+            if name is not None:
+                suffix = self.session.path.suffix
+                self._try(lambda: workspace.save_as(self.table_name, name.strip(), suffix))
+                if name.strip() in workspace.files:
+                    self.app.open_table(name.strip())
+
+        check = partial(name_fault, workspace.folder, taken=workspace.files)
+        self.app.push_screen(AskDialog("Save as", "The name of the other table and its file", "", check), named)
+
     def action_import(self) -> None:
         """Bring rows in from another file."""
         from tui.screens.import_table import ImportDialog
@@ -328,7 +343,7 @@ class MainScreen(Screen[None]):
 
         def made() -> None:
             done = self.session.sheet.apply(edit)
-            self._edited(Edited(replace(done, notes=(*done.notes, *notes))))
+            self._edited(Edited(replace(done, warnings=(*done.warnings, *notes))))
 
         self._try(made)
 

@@ -22,11 +22,12 @@ from textual.strip import Strip
 from contextdb.errors import ContextDBError
 from tui.commands import BY_ID, GRID, JUMPS, bindings
 from tui.messages import Edited, Told
-from tui.model.layout import COMPACT, NARROWEST, WIDEST, Layout, fitted_width, layout
+from tui.model.layout import COMPACT, WIDEST, Layout, fitted_width, layout
 from tui.model.selection import Selection
 from tui.model.sheet import Done, Sheet
 from tui.model.views import Sort
 from tui.widgets.grid_paint import N_HEADERS, Look, Painter
+from tui.widgets.pointer import Pointer
 
 GROUNDS = (
     "row", "row-valid", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test", "selected", "cursor",
@@ -98,6 +99,8 @@ class Grid(ScrollView, can_focus=True):
         """Put a text on the clipboard."""
 
         text: str
+        is_told: bool = True
+        """Nothing else says what was done."""
 
     @dataclass
     class PasteWanted(Message):
@@ -111,8 +114,7 @@ class Grid(ScrollView, can_focus=True):
         self._painter = Painter(sheet, self._style)
         self._styles: dict[tuple[str, str], Style] = {}
         self._widths: dict[str, int] = {}
-        self._drag: tuple[str, int] | None = None
-        """What the mouse drags: ("cells" | "rows" | "columns", -) or ("width", column)."""
+        self._pointer = Pointer(self)
         self._layout: Layout | None = None
         self._laid_out = sheet.table
         """The table that the layout is of: a step may have made another one before the screen is told."""
@@ -144,6 +146,11 @@ class Grid(ScrollView, can_focus=True):
         """Make each column as wide as its texts and its name."""
         for at, column in enumerate(self.sheet.table.columns):
             self._widths[column.name] = self._fitted(at, WIDEST)
+        self.changed()
+
+    def set_width(self, column: int, width: int | None) -> None:
+        """Make a column so wide; None: as wide as its texts."""
+        self._widths[self.sheet.table.columns[column].name] = self._fitted(column, WIDEST) if width is None else width
         self.changed()
 
     @property
@@ -230,7 +237,7 @@ class Grid(ScrollView, can_focus=True):
         if (top, left) != (look.top, look.left):
             self.scroll_to(left, top, animate=False, force=True, immediate=True)
 
-    def _moving(self, move: Callable[[], None]) -> None:
+    def moving(self, move: Callable[[], None]) -> None:
         """Make a move and paint the lines that it touches."""
         before = self.sheet.block
         move()
@@ -243,7 +250,7 @@ class Grid(ScrollView, can_focus=True):
         self.post_message(self.Moved())
 
     def _select(self, change: Callable[[Selection], Selection]) -> None:
-        self._moving(lambda: self.sheet.select(lambda selection, _: change(selection)))
+        self.moving(lambda: self.sheet.select(lambda selection, _: change(selection)))
 
     def action_move(self, down: int, right: int, extend: bool) -> None:
         """An arrow."""
@@ -255,18 +262,18 @@ class Grid(ScrollView, can_focus=True):
         if down > 0 and is_last and not extend:
             self.is_in_test_row = True
             return
-        self._moving(lambda: self.sheet.move(down, right, extend and not self.is_in_test_row))
+        self.moving(lambda: self.sheet.move(down, right, extend and not self.is_in_test_row))
 
     def action_edge(self, down: int, right: int, extend: bool) -> None:
         """Ctrl and an arrow."""
         if not self.is_in_test_row and len(self.sheet.view):
-            self._moving(lambda: self.sheet.move_to_edge(down, right, extend))
+            self.moving(lambda: self.sheet.move_to_edge(down, right, extend))
         elif right:
             self.action_jump("home" if right < 0 else "end", False)
 
     def action_jump(self, jump: str, extend: bool) -> None:
         """Home, End, with Ctrl too."""
-        self._moving(lambda: self.sheet.select(lambda s, shape: JUMPS[jump](s, shape, extend)))
+        self.moving(lambda: self.sheet.select(lambda s, shape: JUMPS[jump](s, shape, extend)))
         if jump in ("home", "first"):  # the frozen columns are seen wherever one is: the others come back too
             self.scroll_to(0, self.look.top, animate=False, force=True, immediate=True)
 
@@ -281,7 +288,7 @@ class Grid(ScrollView, can_focus=True):
             self.scroll_to(look.left, max(0, min(look.top + by, self.max_scroll_y)), animate=False, force=True, immediate=True)
             self.sheet.move(by, 0, extend)
 
-        self._moving(move)
+        self.moving(move)
 
     def action_select_rows(self) -> None:
         self._select(lambda s: s.rows(self.sheet.shape))
@@ -301,7 +308,7 @@ class Grid(ScrollView, can_focus=True):
         if self.is_in_test_row:
             self.is_in_test_row = False
         else:
-            self._moving(lambda: self.sheet.go(*self.sheet.cursor))
+            self.moving(lambda: self.sheet.go(*self.sheet.cursor))
 
     def watch_is_in_test_row(self) -> None:
         if self.is_mounted:
@@ -386,7 +393,7 @@ class Grid(ScrollView, can_focus=True):
 
         def cut() -> Done:
             text, done = self.sheet.cut()
-            self.post_message(self.CopyWanted(text))
+            self.post_message(self.CopyWanted(text, is_told=False))
             return done
 
         self._do(cut)
@@ -428,91 +435,20 @@ class Grid(ScrollView, can_focus=True):
 
     # ---- mouse
 
-    def _place_at(self, x: int, y: int) -> tuple[int, int]:
-        look = self.look
-        row = look.top + y - N_HEADERS
-        return max(0, min(row, len(self.sheet.view) - 1)), look.layout.column_at(x, look.left)
-
     def on_mouse_down(self, event: events.MouseDown) -> None:
-        if event.button != 1:
-            return
-        event.stop()
-        self.focus()
-        look = self.look
-        row, column = self._place_at(event.x, event.y)
-        if event.y < N_HEADERS:
-            self._press_header(event, column, look)
-        elif event.y == look.height - 1:
-            self._moving(lambda: self.sheet.go(self.sheet.cursor[0], column))
-            self.is_in_test_row = True
-        elif self._is_cell_line(event.y, look):
-            self.is_in_test_row = False
-            self._moving(lambda: self.sheet.go(row, column, event.shift))
-            if event.x < look.layout.gutter:
-                self.action_select_rows()
-            self._begin_drag("rows" if event.x < look.layout.gutter else "cells", 0)
-
-    def _press_header(self, event: events.MouseDown, column: int, look: Look) -> None:
-        separator = look.layout.separator_at(event.x, look.left)
-        if separator is not None:
-            self._begin_drag("width", separator)
-            return
-        right = look.layout.place(column, look.left) + look.layout.widths[column]
-        if event.y == 0 and event.x >= right - 2:
-            self.sort_by(column)
-            return
-        self.is_in_test_row = False
-        self._moving(lambda: self.sheet.go(self.sheet.cursor[0], column, event.shift))
-        self.action_select_columns()
-        self._begin_drag("columns", 0)
-
-    def _begin_drag(self, what: str, column: int) -> None:
-        self._drag = (what, column)
-        self.capture_mouse()
+        if event.button == 1:
+            event.stop()
+            self._pointer.press(event)
 
     def on_mouse_move(self, event: events.MouseMove) -> None:
-        if self._drag is None:
-            return
-        event.stop()
-        what, column = self._drag
-        if what == "width":
-            left = self.look.layout.place(column, self.look.left)
-            self._widths[self.sheet.table.columns[column].name] = max(NARROWEST, event.x - left)
-            self.changed()
-            return
-        row, column = self._place_at(event.x, event.y)
-        if event.y >= self.look.height - 1:  # past the foot or the head: the rows come after the mouse
-            row = min(row + 1, len(self.sheet.view) - 1)
-        elif event.y < N_HEADERS:
-            row = max(self.look.top - 1, 0)
-        kind = self.sheet.selection.kind
-        self._moving(lambda: self._drag_to(row, column, kind))
+        self._pointer.move(event)
 
-    def _drag_to(self, row: int, column: int, kind: str) -> None:
-        self.sheet.go(row, column, True)
-        if kind == "rows":
-            self.sheet.select(Selection.rows)
-        elif kind == "columns":
-            self.sheet.select(Selection.columns)
-
-    def on_mouse_up(self, event: events.MouseUp) -> None:
-        self._drag = None
-        self.release_mouse()
+    def on_mouse_up(self) -> None:
+        self._pointer.release()
 
     def on_click(self, event: events.Click) -> None:
-        if event.chain != 2:
-            return
-        look = self.look
-        separator = look.layout.separator_at(event.x, look.left)
-        if event.y < N_HEADERS and separator is not None:
-            self._widths[self.sheet.table.columns[separator].name] = self._fitted(separator, WIDEST)
-            self.changed()
-        elif event.x >= look.layout.gutter and self._is_cell_line(event.y, look):
-            self.action_edit()
-
-    def _is_cell_line(self, y: int, look: Look) -> bool:
-        """Whether cells stand on a line of the window: those of a row, or of the test row."""
-        return y == look.height - 1 or (y >= N_HEADERS and look.top + y - N_HEADERS < len(self.sheet.view))
+        if event.chain == 2:
+            self._pointer.click_twice(event)
 
 
 TOLD = (Edited, Told, Grid.Moved, Grid.FactChanged)

@@ -1,9 +1,9 @@
-"""Draw the pictures of the documents: real terminal sessions as SVG, which load nothing from the network.
+"""Draw the pictures of the documents: terminal sessions and screens of the editor, as SVG that loads nothing from the network.
 
-    python docs/pictures.py
+    python docs/pictures.py [NAME...]
 
-A picture is a session beside a copy of tables/. Its commands run, and what they print is drawn with its colours. The same output
-always gives the same bytes. Every word stands at its own column, so that columns are straight in any monospaced font.
+A session is drawn with what its commands print beside a copy of tables/; a screen with what the editor shows there after some keys.
+The same program always gives the same bytes.
 """
 
 from __future__ import annotations
@@ -17,38 +17,29 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 from itertools import accumulate
 from pathlib import Path
+
+from drawing import Look, Run, Sheet, svg
+from screens import SCENES, Scene, draw_scene
+from slips import Slip, make
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).parent / "pictures"
 
-N_COLUMNS = 100
-COLUMN_PX, LINE_PX, FONT_PX, MARGIN_PX = 8.4, 20, 14, 24
-BACKGROUND, TEXT = "#1b1e25", "#cfd3dc"
-FONTS = "ui-monospace, 'Cascadia Mono', 'SF Mono', Menlo, Consolas, 'DejaVu Sans Mono', monospace"
-STYLES = {
-    "1": 'fill="#ffffff" font-weight="bold"',
-    "2": 'fill="#868d9b"',
-    "31": 'fill="#f0938a"',
-    "32": 'fill="#93cf96"',
-    "33": 'fill="#e3c37f"',
-    "36": 'fill="#80c7d4"',
+PAPER = Sheet(n_columns=100, margin_px=24, ground="#1b1e25", colour="#cfd3dc")
+LOOKS = {
+    "": Look(),
+    "1": Look("#ffffff", is_bold=True),
+    "2": Look("#868d9b"),
+    "31": Look("#f0938a"),
+    "32": Look("#93cf96"),
+    "33": Look("#e3c37f"),
+    "36": Look("#80c7d4"),
 }
 """What `contextdb.console` writes for bold, dim, red, green, yellow and cyan."""
 
 _CODE = re.compile(r"\x1b\[([\d;]*)m")
-_WORDS = re.compile(r"\S+(?: \S+)*")
-
-
-@dataclass(frozen=True)
-class Slip:
-    """A mistake made in a file between two commands: `old`, which stands there, becomes `new`."""
-
-    file: str
-    old: str
-    new: str
 
 
 @dataclass(frozen=True)
@@ -59,7 +50,7 @@ class Picture:
     steps: tuple[str | Slip, ...]
 
 
-PICTURES = {
+PICTURES: dict[str, Picture | Scene] = {
     "session.svg": Picture(
         "A terminal: contextdb query lists the valid assets for a context and why the nearest others are not valid; "
         "contextdb check finds a misspelt cell and names its line and what was meant.",
@@ -68,51 +59,34 @@ PICTURES = {
             Slip("tables/locomotion.csv", "walk_fast,Walk,", "walk_fast,Wallk,"),
             "contextdb check tables/locomotion.csv",
         ),
-    )
+    ),
+    **SCENES,
 }
 
 
-def draw(picture: Picture) -> str:
+def draw(picture: Picture | Scene) -> str:
     """The picture as SVG."""
-    lines = session(picture.steps)
-    width, height = round(N_COLUMNS * COLUMN_PX) + 2 * MARGIN_PX, len(lines) * LINE_PX + 2 * MARGIN_PX
-    drawn = [text for number, line in enumerate(lines) for text in texts(line, MARGIN_PX + number * LINE_PX + FONT_PX)]
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img">'
-    body = [
-        f"<title>{escape(picture.title)}</title>",
-        f'<rect width="{width}" height="{height}" rx="8" fill="{BACKGROUND}"/>',
-        f'<g font-family="{FONTS}" font-size="{FONT_PX}" fill="{TEXT}">',
-        *drawn,
-        "</g>",
-        "</svg>",
-    ]
-    return "\n".join([head, *body, ""])
-
-
-def session(steps: Sequence[str | Slip]) -> list[str]:
-    """The lines of a terminal in which the commands ran, with their colours."""
-    lines: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(ROOT / "tables", Path(folder) / "tables")
-        for step in steps:
-            if isinstance(step, Slip):
-                make(step, Path(folder))
-                continue
-            lines += [*([""] if lines else []), f"\x1b[2m$\x1b[0m \x1b[1m{step}\x1b[0m", *_run(step, folder).splitlines()]
+        if isinstance(picture, Scene):
+            return draw_scene(picture, Path(folder))
+        return svg(picture.title, [runs(line) for line in session(picture.steps, Path(folder))], PAPER)
+
+
+def session(steps: Sequence[str | Slip], folder: Path) -> list[str]:
+    """The lines of a terminal in which the commands ran, with their colours."""
+    lines: list[str] = []
+    for step in steps:
+        if isinstance(step, Slip):
+            make(step, folder)
+            continue
+        lines += [*([""] if lines else []), f"\x1b[2m$\x1b[0m \x1b[1m{step}\x1b[0m", *_run(step, folder).splitlines()]
     return lines
 
 
-def make(slip: Slip, folder: Path) -> None:
-    path = folder / slip.file
-    text = path.read_bytes().decode()
-    if text.count(slip.old) != 1:
-        raise ValueError(f"{slip.old!r} stands {text.count(slip.old)} times in {slip.file}, not once")
-    path.write_bytes(text.replace(slip.old, slip.new).encode())
-
-
-def _run(command: str, folder: str) -> str:
+def _run(command: str, folder: Path) -> str:
     _, *words = shlex.split(command)
-    terminal = {"FORCE_COLOR": "1", "COLUMNS": str(N_COLUMNS), "PYTHONUTF8": "1", "PYTHONPATH": str(ROOT)}
+    terminal = {"FORCE_COLOR": "1", "COLUMNS": str(PAPER.n_columns), "PYTHONUTF8": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-m", "contextdb", *words],
         cwd=folder,
@@ -125,25 +99,24 @@ def _run(command: str, folder: str) -> str:
     return done.stdout
 
 
-def texts(line: str, y: int) -> Iterator[str]:
-    """The words of a line as SVG texts; words with one space between them stay together."""
-    for column, style, text in _runs(line):
-        for words in _WORDS.finditer(text):
-            x = MARGIN_PX + (column + words.start()) * COLUMN_PX
-            attributes = f" {STYLES[style]}" if style else ""
-            yield f'<text x="{x:g}" y="{y}"{attributes}>{escape(words[0], quote=False)}</text>'
-
-
-def _runs(line: str) -> Iterator[tuple[int, str, str]]:
-    """Column, style and text of each stretch of a line that has one style."""
+def runs(line: str) -> Iterator[Run]:
+    """The stretches of a line that have one style each."""
     parts = _CODE.split(line)
-    styles = ["", *(code.strip("0") for code in parts[1::2])]
+    codes = ["", *(code.strip("0") for code in parts[1::2])]
     texts = parts[::2]
     columns = accumulate((len(text) for text in texts), initial=0)
-    yield from ((c, s, t) for c, s, t in zip(columns, styles, texts, strict=False) if t)
+    yield from (Run(column, text, LOOKS[code]) for column, code, text in zip(columns, codes, texts, strict=False) if text)
+
+
+def main(names: Sequence[str]) -> None:
+    """Draw the pictures of these names, or all of them; pictures that nothing draws any more go."""
+    FOLDER.mkdir(exist_ok=True)
+    for name in names or PICTURES:
+        (FOLDER / name).write_bytes(draw(PICTURES[name]).encode())
+    for path in FOLDER.iterdir():
+        if path.name not in PICTURES:
+            path.unlink()
 
 
 if __name__ == "__main__":
-    FOLDER.mkdir(exist_ok=True)
-    for name, picture in PICTURES.items():
-        (FOLDER / name).write_bytes(draw(picture).encode())
+    main(sys.argv[1:])

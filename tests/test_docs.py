@@ -29,8 +29,13 @@ from typing import Any
 
 import pytest
 
+from tui.app import EditorApp
+from tui.editor_settings import read_settings
+from tui.themes import LIGHT
+
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+UTF8 = {**os.environ, "PYTHONUTF8": "1"}
 TERMINAL = {"NO_COLOR": "1", "COLUMNS": "100", "PYTHONUTF8": "1", "PYTHONUNBUFFERED": "1"}
 
 
@@ -170,6 +175,26 @@ def test_an_update_writes_the_real_output_under_each_command():
 def test_a_console_block_refuses_a_command_that_it_does_not_know():
     with pytest.raises(ValueError, match=re.escape("not rm: use a ```sh block")):
         updated(["```console", "$ rm -r tables", "```"])
+
+
+def test_the_page_of_keys_lists_the_commands_of_the_editor():
+    wanted = subprocess.run(
+        [sys.executable, "-c", "import keys; print(keys.page(), end='')"],
+        cwd=ROOT / "docs",
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+    )
+    assert (ROOT / "docs" / "keys.md").read_text(encoding="utf-8") == wanted.stdout, "run: make docs"
+
+
+def test_the_settings_that_the_editors_page_shows_are_taken(tmp_path: Path):
+    lines = (ROOT / "docs" / "editor.md").read_text(encoding="utf-8").splitlines()
+    (block,) = (block for block in blocks(lines) if block.language == "toml")
+    path = tmp_path / "editor.toml"
+    path.write_text("\n".join(lines[block.first : block.stop]), encoding="utf-8")
+    settings = read_settings(path, EditorApp.theme_names())
+    assert settings.theme == LIGHT
+    assert settings.keys == {"duplicate": "ctrl+u", "sort": "alt+o,f10"}
 
 
 if __name__ == "__main__" and sys.argv[1:] == ["--update"]:

@@ -25,6 +25,8 @@ SPEED = Domain("number", None, 0.0, 10.0)
 
 
 def short(value: object) -> str:
+    if isinstance(value, frozenset):
+        return "+".join(sorted(value))
     return value.kind if isinstance(value, Domain) else str(value)[:40]
 
 
@@ -107,7 +109,9 @@ def test_a_text_may_be_any_text():
 
 
 @pytest.mark.parametrize(
-    "value", [{"InAir", "Stunned"}, ["InAir", "Stunned"], ("Stunned", "InAir"), "InAir Stunned", " InAir  Stunned "], ids=str
+    "value",
+    [{"InAir", "Stunned"}, ["InAir", "Stunned"], ("Stunned", "InAir"), "InAir Stunned", " InAir  Stunned "],
+    ids=["set", "list", "tuple", "text", "blanks"],
 )
 def test_tags_may_be_any_collection_of_texts_or_a_text(value):
     assert read(value, STATE) == frozenset(("InAir", "Stunned"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 from collections.abc import Iterator
@@ -28,6 +29,27 @@ DOMAINS = {
     "tags": Domain("tags", ("InAir", "Catching", "Stunned", "Move.Run")),
 }
 """What the tables of cells in docs/designers.md are about, by heading."""
+
+FACTS = {
+    "speed": 3.5,
+    "heading": 170.0,
+    "target_heading": -170.0,
+    "vx": 3.0,
+    "vz": 4.0,
+    "moving": True,
+    "gait": "Run",
+    "Defender.Tags": {"Move.Run"},
+    "Stage Name": "arena",
+}
+"""What the examples of expressions in docs/format.md are computed from."""
+FACT_TYPES: dict[str, dict[str, object]] = {
+    **{name: {"type": "number"} for name in ("speed", "vx", "vz")},
+    **{name: {"type": "angle"} for name in ("heading", "target_heading")},
+    "moving": {"type": "bool"},
+    "gait": {"type": "enum", "values": ["Walk", "Run"]},
+    "Defender.Tags": {"type": "tags", "values": ["Move.Run", "Stunned"]},
+    "Stage Name": {"type": "text"},
+}
 
 
 def named(path: Path) -> str:
@@ -120,6 +142,24 @@ def test_every_example_of_a_contextdb_toml_is_accepted():
     for example in examples:
         schema = read_schema(example, "contextdb.toml")
         MotionConfig.from_dict(schema.motion, file="contextdb.toml")
+
+
+def results_on_the_format_page() -> Iterator[tuple[str, object]]:
+    """Each example of an expression with what the page says it gives."""
+    section = sections(text_of("docs/format.md"))["Expressions"]
+    for row in re.findall(r"^\| .* \| (`.*`) \| (.*) \|$", section, re.M):
+        sources = [found.strip().strip("`").strip() for found in re.findall(r"``.+?``|`.+?`", row[0])]
+        yield from zip(sources, (ast.literal_eval(text) for text in row[1].split(", ")), strict=True)
+
+
+@pytest.mark.parametrize(("source", "result"), list(results_on_the_format_page()))
+def test_an_example_of_an_expression_gives_what_the_page_says(source: str, result: object):
+    kinds = {bool: {"type": "bool"}, str: {"type": "enum", "values": ["fast", "slow"]}}
+    schema = FACT_TYPES | {"result": {**kinds.get(type(result), {"type": "number"}), "expr": source}}
+    table = contextdb.Table.from_columns({"Asset Name": ["a"], "result": ["Any"]}, schema=schema)
+    live = table.compile().live({name: FACTS[name] for name in table.compile().asked})
+    assert live["result"] == result
+    assert type(live["result"]) is type(result) or not isinstance(result, bool)
 
 
 def test_the_format_page_names_every_section_and_key_of_contextdb_toml():

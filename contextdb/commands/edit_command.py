@@ -1,7 +1,7 @@
 """Edit tables in the terminal: cells, a test context, coverage, priorities.
 
-contextdb edit tables/
-contextdb edit tables/hit_mid_air.csv --theme contextdb-light
+  contextdb edit tables/
+  contextdb edit tables/hit_mid_air.csv --theme contextdb-light
 """
 
 from __future__ import annotations

@@ -1,0 +1,42 @@
+"""Write docs/keys.md: every command of the editor with its keys, out of the list that the editor itself is made from.
+
+python docs/keys.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from tui.commands import COMMANDS, Command
+from tui.screens.help import key_name
+
+PAGE = Path(__file__).parent / "keys.md"
+HEAD = """# Keys
+
+Every command of [the editor](editor.md), with its keys, and its name for a
+[file of your own keys](editor.md#keys-and-colours-of-your-own). A command without keys is in the palette (Ctrl+P) or on the line of
+tools. In a dialog the keys stand at its foot. This page is written by `python docs/keys.py`.
+"""
+
+
+def page() -> str:
+    """The page as it should be now."""
+    groups = dict.fromkeys(command.group for command in COMMANDS)
+    return "\n".join([HEAD, *(_section(group) for group in groups)])
+
+
+def _section(group: str) -> str:
+    lines = [_line(command) for command in COMMANDS if command.group == group]
+    return "\n".join([f"## {group}", "", "| keys | name | does |", "| --- | --- | --- |", *lines, ""])
+
+
+def _line(command: Command) -> str:
+    keys = ", ".join(key_name(key) for key in command.keys.split(",") if key and key != "ctrl+@")
+    return f"| {keys} | `{command.id}` | {command.about} |"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,5 +1,7 @@
 """Edit tables in the terminal: cells, a test context, coverage, priorities.
 
+It needs a terminal; without one it exits with 2.
+
   contextdb edit tables/
   contextdb edit tables/hit_mid_air.csv --theme contextdb-light
 """

@@ -11,7 +11,7 @@ from importlib.resources import files
 
 from contextdb import __version__
 from contextdb.console import printable
-from contextdb.covering import format_percent
+from contextdb.covering import CoverageReport, format_percent
 from contextdb.report.coverage_heat import heat_map
 from contextdb.report.coverage_results import CoverageResults, Measured, gap_size
 from contextdb.report.coverage_text import by_rule
@@ -36,8 +36,7 @@ def render(results: CoverageResults) -> str:
     sections = "".join(_section(measured, number) for number, measured in enumerate(results.tables))
     names = [printable(m.report.table) for m in results.tables]
     title = f"Coverage of {names[0]}" if len(names) == 1 else f"Coverage of {len(names)} tables"
-    anchors = "".join(f'<a href="#t{i}">{escape(name)}</a>' for i, name in enumerate(names))
-    links = f"<nav>{anchors}</nav>" if len(names) > 1 else ""
+    summary = _summary(results.tables) if len(names) > 1 else ""
     verdict = f'<p class="{"passed" if results.passed else "failed"}">{escape(results.verdict)}</p>' if results.verdict else ""
     gone = f"<p>No longer there: {escape(printable(', '.join(results.gone)))}.</p>" if results.gone else ""
     return (
@@ -45,13 +44,39 @@ def render(results: CoverageResults) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>\n{_part('coverage.css')}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n{verdict}{gone}{links}\n<main>\n{sections}</main>\n"
+        f"<h1>{escape(title)}</h1>\n{verdict}{gone}{summary}\n<main>\n{sections}</main>\n"
         f'<p class="muted">contextdb {__version__}</p>\n<script>\n{_part("coverage.js")}</script>\n</body>\n</html>\n'
     )
 
 
 def _part(name: str) -> str:
     return files("contextdb.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _summary(tables: Sequence[Measured]) -> str:
+    columns = [("table", False), ("covered", True), ("gaps", True), ("rows", True), ("bars", False), ("", False)]
+    is_held = any(m.gates for m in tables)
+    lines = [_summary_line(measured, number, is_held) for number, measured in enumerate(tables)]
+    return _table("Tables", columns if is_held else [*columns[:4], columns[5]], lines)
+
+
+def _summary_line(measured: Measured, number: int, is_held: bool) -> list[str]:
+    report = measured.report
+    name = f'<td class="k"><a href="#t{number}">{_text(report.table)}</a></td>'
+    gaps = _cell(f"{len(report.gaps):,}{'' if report.gaps_complete else '+'}", len(report.gaps))
+    line = [name, _cell(format_percent(report.lower), report.lower), gaps, _cell(f"{report.n_rows:,}", report.n_rows)]
+    return [*line, *([_word(_kept(measured))] if is_held else []), f'<td class="share">{_bar(report)}</td>']
+
+
+def _kept(measured: Measured) -> str:
+    missed = [gate.name for gate in measured.gates if not gate.passed]
+    return f"missed: {', '.join(missed)}" if missed else "kept" if measured.gates else ""
+
+
+def _bar(report: CoverageReport) -> str:
+    ends = [(report.upper, "open"), (report.lower, "")] if report.lower < report.upper else [(report.lower, "")]
+    inner = "".join(f'<i class="{name}" style="width:{_width(share)}"></i>' for share, name in ends)
+    return f'<div class="bar" role="img" aria-label="{escape(report.headline)}">{inner}</div>'
 
 
 def _section(measured: Measured, number: int) -> str:
@@ -71,9 +96,7 @@ def _size(measured: Measured) -> str:
 def _head(measured: Measured) -> Iterator[str]:
     report = measured.report
     yield _paragraph(report.headline, "headline")
-    ends = [(report.upper, "open"), (report.lower, "")] if report.lower < report.upper else [(report.lower, "")]
-    inner = "".join(f'<i class="{name}" style="width:{_width(share)}"></i>' for share, name in ends)
-    yield f'<div class="bar" role="img" aria-label="{escape(report.headline)}">{inner}</div>\n'
+    yield f"{_bar(report)}\n"
     yield from (_paragraph(sentence, "muted") for sentence in assumed_sentences(report))
     if measured.gates:
         items = (

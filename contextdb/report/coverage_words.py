@@ -27,7 +27,7 @@ def assumed_sentences(report: CoverageReport) -> Iterator[str]:
     if report.weighted:
         yield f"Weighed by the values of {', '.join(report.weighted)}; those of the others count the same."
     if report.assumptions:
-        yield f"Left out is what breaks {_some(report.assumptions, ' or ')}."
+        yield f"Only contexts that can happen count: {_some(report.assumptions, '; ')}."
     if report.sampled:
         yield f"Known to samples only: {_some(report.sampled, '; ')}."
     if report.assumed:

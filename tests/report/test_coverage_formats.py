@@ -117,6 +117,15 @@ def test_hostile_names_leave_every_other_format_whole(name: str, asset: str):
     assert "<" not in texts["markdown"].replace("\\<", "")
 
 
+def test_a_page_of_several_tables_begins_with_all_of_them():
+    both = coverage_formats.render("html", CoverageResults((PLAIN, replace(PLAIN, gates=()))))
+    assert texts_of(PLAIN)["html"].count('href="#t') == 0
+    summary = both[: both.index("<article>")]
+    assert re.findall(r'href="(#t\d)"', summary) == ["#t0", "#t1"]
+    assert [f'id="{anchor}"' in both for anchor in ("t0", "t1")] == [True, True]
+    assert summary.count("missed: fail-under, max-drop") == 1
+
+
 def test_the_page_needs_no_network():
     page = texts_of(PLAIN)["html"]
     assert not re.search(r"https?:|//[a-z]|url\(|@import|\bsrc=", page)

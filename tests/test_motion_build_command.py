@@ -193,6 +193,14 @@ def test_a_terminal_sees_a_bar_and_a_file_does_not(here: Path, monkeypatch: pyte
     assert "3/3" in terminal.getvalue()
 
 
+def test_a_search_that_must_build_first_shows_the_same_bar(here: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("TERM", "xterm")
+    terminal = Terminal()
+    with contextlib.redirect_stderr(terminal), contextlib.redirect_stdout(io.StringIO()):
+        assert main(["motion", "search", "game", "jog", "--query", "jog@0.5"]) == 0
+    assert "building" in terminal.getvalue()
+
+
 def test_an_interrupted_build_says_so_and_keeps_what_was_done(here: Path):
     real = building.extract
 

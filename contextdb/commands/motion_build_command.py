@@ -13,16 +13,16 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from contextdb.commands.motion_bar import building_bar
 from contextdb.console import aligned, output, printable
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
 from contextdb.exit_codes import ExitCode
 from contextdb.motion.storage import building
-from contextdb.motion.storage.building import Built, Progress, saved_path
+from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.stored import save_database
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Build and save; prints a line for each database."""
     project = MotionProject.load(arguments.path)
     targets = project.targets(arguments.out, arguments.database)
-    with _bar() as progress:
+    with building_bar() as progress:
         built = building.build_all(
             project.config,
             project.folder,
@@ -146,20 +146,3 @@ def _cells(project: MotionProject, name: str, built: Built, target: Path) -> lis
         f"{len(built.cached):,}",
         str(target),
     ]
-
-
-@contextmanager
-def _bar() -> Iterator[Progress | None]:
-    """What shows the progress on standard error, where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
-
-    name = TextColumn("{task.description}", markup=False)
-    columns = (TextColumn("building"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), name)
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, total, clip: bar.update(task, completed=done, total=total, description=printable(clip))

@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 from contextdb.commands import missing_facts_by_option
+from contextdb.commands.motion_bar import building_bar
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.query_command import read_facts
 from contextdb.compiled import CompiledTable
@@ -51,7 +52,9 @@ class Stage:
     def of(cls, path: str) -> Stage:
         """Read a project, open its databases where they are saved and up to date, and build the others."""
         motion, project = MotionProject.load(path), Project.load(path)
-        return cls(motion.folder, motion.config, open_or_build(motion.config, motion.folder, motion.assets), project)
+        with building_bar() as progress:
+            databases = open_or_build(motion.config, motion.folder, motion.assets, progress)
+        return cls(motion.folder, motion.config, databases, project)
 
     @cached_property
     def _compiled(self) -> dict[str, CompiledTable]:

@@ -55,6 +55,9 @@ docs: $(VENV)/.dev
 
 bench: $(VENV)/.bench
 	$(PY) benchmarks/query.py
+	$(PY) benchmarks/casting.py
+	$(PY) benchmarks/reload.py
+	$(PY) benchmarks/c_header.py
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/editor.py
 

@@ -1,22 +1,33 @@
 """Casting two football teams for the rows of a table, beside a plain loop over rows and actors.
 
-    python -m benchmarks.casting
+    python benchmarks/casting.py                 two football teams
+    python benchmarks/casting.py --quick         fewer repeats
+    python benchmarks/casting.py --json FILE     the same figures for programs
 
-22 actors are offered for each of 3 roles of 1,000 rows; the loop reads the cells once, then tries actors role by role.
+22 actors are offered for each of 3 roles of 1,000 rows; the loop reads the cells once, then tries actors role by role. The valid
+rows of both are compared before anything is timed.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import random
-import statistics
-import time
+import sys
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+if __package__ in (None, ""):
+    sys.path[0] = str(Path(__file__).parent.parent)  # not this folder: its coverage.py is no package of that name
 
 import contextdb as cdb
+from benchmarks import timing
+from benchmarks.sections import print_aligned
 from contextdb.cells import Cell
 from contextdb.compiled import CompiledTable
 
-N_ROWS, N_ACTORS, N_TIMES = 1_000, 22, 30
+N_ROWS, N_ACTORS = 1_000, 22
 ROLES = ("Defender", "Receiver", "Thrower")
 POSITIONS = ["CB", "FS", "SS", "LB", "WR", "QB"]
 FACTS: dict[str, dict[str, object]] = {
@@ -67,38 +78,50 @@ def _can_cast(roles: list[list[tuple[str, Cell]]], actors: list[Actor], taken: f
     )
 
 
-def timed(ask: Callable[[], object], n_times: int = N_TIMES) -> tuple[float, float]:
-    """The median and the largest of some times, in milliseconds."""
-    times = []
-    for _ in range(n_times):
-        start = time.perf_counter()
-        ask()
-        times.append((time.perf_counter() - start) * 1e3)
-    return statistics.median(times), max(times)
-
-
-def main() -> None:
-    """Print one line a way."""
+def measured(repeats: int) -> dict[str, timing.Summary]:
+    """What each way takes; they take turns."""
     rng = random.Random(0)
     table, actors = made_table(rng), made_actors(rng)
     compiled: CompiledTable = table.compile()
     offered = dict.fromkeys(ROLES, actors)
     cells = [[[(fact, table.condition(f"{r}.{fact}").cell(row)) for fact in FACTS] for r in ROLES] for row in range(N_ROWS)]
     valid = compiled.query({}, actors=offered, prefer="distance")
-    assert valid.indices.tolist() == rows_by_loop(cells, actors)
+    if valid.indices.tolist() != rows_by_loop(cells, actors):
+        raise AssertionError("the loop finds other rows")
 
     def with_castings() -> object:
         matches = compiled.query({}, actors=offered, prefer="distance")
         return [matches.casting(row) for row in matches]
 
-    print(f"{N_ROWS:,} rows, {len(ROLES)} roles, {N_ACTORS} actors for each; {len(valid)} rows valid; median and largest")
-    for name, ask in (
-        ("query with actors", lambda: compiled.query({}, actors=offered, prefer="distance").bits),
-        ("query, and the best casting of every valid row", with_castings),
-        ("a plain loop, valid rows alone", lambda: rows_by_loop(cells, actors)),
-    ):
-        median, largest = timed(ask)
-        print(f"{name:<50} {median:8.2f} ms  {largest:8.2f} ms")
+    ways: dict[str, Callable[[], object]] = {
+        "query with actors": lambda: compiled.query({}, actors=offered, prefer="distance").bits,
+        f"the same, and the best casting of {len(valid)} valid rows": with_castings,
+        "a plain loop, valid rows alone": lambda: rows_by_loop(cells, actors),
+    }
+    rounds: dict[str, list[timing.Nanoseconds]] = {name: [] for name in ways}
+    with timing.no_collection():
+        for _ in range(repeats):
+            for name, ask in ways.items():
+                rounds[name].append(timing.timed(lambda way: way(), [ask]))
+    return {name: timing.Summary.of(times) for name, times in rounds.items()}
+
+
+def main() -> None:
+    """Measure every way, print the figures, and write them as JSON when that is asked for."""
+    parser = argparse.ArgumentParser(description="Measure casting.")
+    parser.add_argument("--quick", action="store_true", help="fewer repeats")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to a file")
+    options = parser.parse_args()
+    report: dict[str, Any] = {"format": 1, "machine": timing.machine(), "versions": timing.versions()}
+    print(" · ".join(f"{key} {value}" for key, value in (report["machine"] | report["versions"]).items()))
+    figures = measured(5 if options.quick else 30)
+    print(f"\ntwo football teams: {N_ACTORS} actors, {len(ROLES)} roles, {N_ROWS:,} rows; milliseconds, median (lowest … highest)")
+    print_aligned(
+        [(n, f"{s.median_us / 1e3:,.2f}", f"({s.low_us / 1e3:,.2f} … {s.high_us / 1e3:,.2f})") for n, s in figures.items()]
+    )
+    report["casting"] = {name: vars(summary) for name, summary in figures.items()}
+    if options.json:
+        options.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

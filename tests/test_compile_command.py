@@ -112,7 +112,47 @@ def test_the_facts_of_all_tables_are_written_as_python_types_where_that_is_asked
     assert "JogFacts = TypedDict(" in text
 
 
+@pytest.mark.parametrize("name", ["tables.h", "new/tables.hpp"])
+def test_one_header_for_all_tables_is_written_where_that_is_asked_for(here: Path, name: str):
+    result = run("compile", "game", "--c-header", name)
+    assert (result.code, result.lines) == (0, ["game/run.safetensors", "game/jog.safetensors", name])
+    text = (here / name).read_text(encoding="ascii")
+    assert "cdb_running_query(const cdb_running *opened, const cdb_running_facts *facts" in text
+    assert "double speed;" in text
+    assert "} cdb_jog;" in text
+    assert "#ifndef CDB_TABLES_H" in text
+
+
+def test_a_table_that_no_c_program_can_ask_is_left_out_of_the_header_and_told(here: Path):
+    (here / "game" / "contextdb.toml").write_text(TOML + 'when = "When"\n', encoding="utf-8")
+    (here / "game" / "jog.csv").write_text("Asset,speed,When\njog,2..4,speed > 3\n", encoding="utf-8")
+    result = run("compile", "game", "--c-header", "t.h")
+    assert (result.code, len(result.lines)) == (0, 3)
+    assert (
+        'contextdb: t.h: the table "jog" is left out: its rows have rules of their own (when), which C cannot work out.'
+        in result.err.splitlines()
+    )
+
+
 # ---- what is refused
+
+
+@pytest.mark.parametrize(
+    ("name", "mend"),
+    [("tables", ' Did you mean "tables.h"?'), ("t.c", ' Did you mean "t.h"?'), ("game", ""), ("new/", "")],
+)
+def test_a_header_has_the_suffix_of_one(here: Path, name: str, mend: str):
+    assert refused("game", "--c-header", name) == (
+        f"{name}: this is no name of a C header. Accepted: a name that ends in .h, .hpp, .hh or .hxx.{mend}"
+    )
+    assert artefacts(here) == []
+
+
+def test_a_name_that_no_text_of_c_can_hold_is_told_before_anything_is_written(here: Path):
+    long = "x" * 4001
+    (here / "game" / "run.csv").write_text(f"Asset,{long}\nrun,True\n", encoding="utf-8")
+    assert "has 4,001 bytes. Accepted: names of at most 4,000 bytes" in refused("game", "--c-header", "t.h")
+    assert artefacts(here) == []
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from running import run
 
 from contextdb.commands.demo_command import sample_folder
+from contextdb.commands.demo_teams import CATCH, cast_lines, players
 from contextdb.motion import RECIPES, Markup, load_bvh
 from contextdb.project import Project
 
@@ -30,3 +31,26 @@ def test_the_sample_markup_fits_the_made_clips(tmp_path):
     clips = [load_bvh(path) for path in sorted(tmp_path.glob("game/clips/*.bvh"))]
     markup = Markup.load(tmp_path / "game" / "clips" / "marks.csv")
     assert markup.faults_for([clip.name for clip in clips], {clip.name: clip.duration_s for clip in clips}, rate=30.0) == []
+
+
+def test_of_two_teams_it_casts_the_nearest_who_fits_and_says_of_everybody_near_why_he_does_not():
+    everybody = players()
+    assert sorted(str(p["team"]) for p in everybody) == ["away"] * 11 + ["home"] * 11
+    assert len({p["id"] for p in everybody}) == 22
+    compiled = Project.load(sample_folder())["contested_catch"].compile()
+    fitting = [
+        p for p in everybody if compiled.query({**CATCH, **{f"Defender.{f}": p.get(f) for f in p}}, "never").assets
+    ]  # without actors: each player's facts as plain facts
+    told = list(cast_lines(compiled))
+    cast = [line for line in told if "Defender is" in line]
+    assert [line.partition(": Defender is ")[2] for line in cast] == [min(fitting, key=lambda p: p["distance"])["name"]]
+    reasons = told[told.index("   Why nobody else who is near:") + 1 : -1]
+    near = [p for p in everybody if p["distance"] < 3]
+    assert sorted(line.partition(" of ")[2].partition(",")[0] for line in reasons) == sorted(
+        str(p["name"]) for p in near if p not in fitting
+    )
+
+
+def test_it_prints_the_cast_between_the_first_answer_and_the_search():
+    out = run("demo").out
+    assert out.index("3. A ball in the air") < out.index("Defender is Marsh") < out.index("4. Clips") < out.index("7. The same")

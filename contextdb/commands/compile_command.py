@@ -1,12 +1,13 @@
 """Write the binary artefact for the game: .safetensors, opened there by memory map.
 
 Prints the path of each file that was written. --stubs also writes the facts of all these tables as Python types, for completion
-in editors and for type checkers.
+in editors and for type checkers; --c-header one header for games in C or C++, which opens the artefacts and asks them.
 
   contextdb compile tables/                  one artefact beside each table
   contextdb compile tables/ -o build/        all of them into a folder
   contextdb compile tables/hit_mid_air.csv -o hit_mid_air.safetensors
   contextdb compile tables/ -o build/ --stubs game/facts.py
+  contextdb compile tables/ -o build/ --c-header game/tables.h
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ import sys
 from pathlib import Path, PurePath
 
 from contextdb.artefact import SUFFIX
+from contextdb.c_face import c_header_of
 from contextdb.console import output, printable, progress
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
-from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.places import table_path
 from contextdb.project import SCHEMA_FILE, Project, load_table
@@ -27,7 +29,8 @@ from contextdb.stubs import stubs_of
 from contextdb.table import Table
 
 SEPARATORS = ("/", "\\")
-STUB_SUFFIXES = (".py", ".pyi")
+STUBS = (".py", ".pyi")
+HEADERS = (".h", ".hpp", ".hh", ".hxx")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,26 +38,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or one table")
     parser.add_argument("-o", "--out", metavar="FILE", help="the artefact, or a folder for several (default: beside each table)")
     parser.add_argument("--stubs", metavar="FILE", help="also write the facts of the tables as Python types: a .py or .pyi file")
+    parser.add_argument(
+        "--c-header", metavar="FILE", help="also write one C99 header that opens the artefacts and asks them: a .h file"
+    )
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Compile one table or a folder of them; prints the path of each file."""
-    stubs = None if arguments.stubs is None else _stubs_target(arguments.stubs)
+    stubs = None if arguments.stubs is None else _written_as(arguments.stubs, STUBS, "a Python file")
+    header = None if arguments.c_header is None else _written_as(arguments.c_header, HEADERS, "a C header")
     tables = _tables(arguments.path)
     targets = [_target(table, arguments.out, len(tables)) for table in tables]
     _require_different(targets)
+    header_text = None if header is None else _header_text(tables, header)
     for table, target in progress(list(zip(tables, targets, strict=True)), "compiling"):
         compiled = table.compile()
         make_folder(target.parent)
         compiled.save(target)
         _print_path(target)
-        size = f"{plural(table.n_rows, 'row')}, {plural(len(table.conditions), 'condition')}, {compiled.nbytes:,} bytes of masks"
+        n_rows, n_conditions = plural(compiled.n_rows, "row"), plural(len(compiled.conditions), "condition")
+        size = f"{n_rows}, {n_conditions}, {compiled.nbytes:,} bytes of masks"
         print(printable(f"{table.name}: {size}"), file=sys.stderr)
     if stubs is not None:
-        make_folder(stubs.parent)
-        write_atomic(stubs, stubs_of({table.name: table.compile() for table in tables}).encode("utf-8"))
-        _print_path(stubs)
+        _write(stubs, stubs_of({table.name: table.compile() for table in tables}))
+    if header is not None and header_text is not None:
+        _write(header, header_text)
     return ExitCode.OK
+
+
+def _header_text(tables: list[Table], path: Path) -> str:
+    """The header, before anything is written; tables that it leaves out are told."""
+    text, held_back = c_header_of({table.name: table.compile() for table in tables}, f"CDB_{path.stem}_H")
+    for table in held_back:
+        print(
+            printable(f"contextdb: {path}: the table {in_quotes(table.table)} is left out: {table.why}, which C cannot work out."),
+            file=sys.stderr,
+        )
+    return text
+
+
+def _write(path: Path, text: str) -> None:
+    make_folder(path.parent)
+    write_atomic(path, text.encode("utf-8"))
+    _print_path(path)
 
 
 def _print_path(path: Path) -> None:
@@ -62,12 +88,13 @@ def _print_path(path: Path) -> None:
         print(printable(str(path)))
 
 
-def _stubs_target(text: str) -> Path:
+def _written_as(text: str, suffixes: tuple[str, ...], what: str) -> Path:
     path = Path(text)
-    if path.suffix in STUB_SUFFIXES and not text.endswith(SEPARATORS) and not os.path.isdir(text):
+    if path.suffix in suffixes and not text.endswith(SEPARATORS) and not os.path.isdir(text):
         return path
-    mend = "" if os.path.isdir(text) or text.endswith(SEPARATORS) else path_in_quotes(path.with_suffix(".py"))
-    raise FileError(Fault("this is no name of a Python file.", "a name that ends in .py or .pyi", mend, Place(text)))
+    mend = "" if os.path.isdir(text) or text.endswith(SEPARATORS) else path_in_quotes(path.with_suffix(suffixes[0]))
+    accepted = f"a name that ends in {', '.join(suffixes[:-1])} or {suffixes[-1]}"
+    raise FileError(Fault(f"this is no name of {what}.", accepted, mend, Place(text)))
 
 
 def _tables(text: str) -> list[Table]:

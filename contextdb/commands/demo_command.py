@@ -1,4 +1,5 @@
-"""The whole way on the sample tables: a context, the valid assets, why the others are not, and a search of the valid clips' frames.
+"""The whole way on the sample tables: a context, the valid assets, why the others are not, a player of two teams cast for a role,
+and a search of the valid clips' frames.
 
 The clips are made by formulas, not captured; they are written as BVH files and read back like any others.
 """
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import contextdb
+from contextdb.commands.demo_teams import cast_lines
 from contextdb.compiled import CompiledTable
 from contextdb.console import aligned, output, styled, wants_colour
 from contextdb.disk import make_folder
@@ -115,6 +117,9 @@ def _steps(folder: Path) -> Iterator[str]:
     yield "2. A moment of the game: a tackler, and somebody in the air. Which animations are valid?"
     yield ""
     yield from _answer(project["hit_mid_air"].compile(), TACKLE)
+    yield "3. A ball in the air and two teams. Which contested catches are valid, and who plays the Defender?"
+    yield ""
+    yield from cast_lines(project["contested_catch"].compile())
     yield from _motion(project, folder)
 
 
@@ -133,12 +138,12 @@ def _answer(compiled: CompiledTable, context: Context) -> Iterator[str]:
 def _motion(project: Project, folder: Path) -> Iterator[str]:
     stage = Stage.of(project, folder)
     loco = stage.databases["loco"]
-    yield "3. Clips for the locomotion table: made by formulas, not captured; written as BVH and read back"
+    yield "4. Clips for the locomotion table: made by formulas, not captured; written as BVH and read back"
     yield ""
     size = f"{plural(stage.n_clips, 'clip')}, {plural(loco.n_frames, 'frame')}, {loco.n_features} numbers a frame"
     yield f"   {size}: feet, hips and the way ahead"
     yield ""
-    yield "4. Someone walks as if tired and has just recovered. The table says which clips are valid; only their frames are ranked"
+    yield "5. Someone walks as if tired and has just recovered. The table says which clips are valid; only their frames are ranked"
     yield ""
     query = stage.query("walk_tired", 60)
     valid = stage.table.query(REST)
@@ -149,11 +154,11 @@ def _motion(project: Project, folder: Path) -> Iterator[str]:
         [_hit("best frame of all clips", loco, query), _hit("best frame of the valid ones", loco, query, valid)], indent="   "
     )
     yield ""
-    yield "5. Someone walks and is tired by now. Tired clips have a database of their own, and it comes first: while its best"
+    yield "6. Someone walks and is tired by now. Tired clips have a database of their own, and it comes first: while its best"
     yield "   cost is under its threshold it wins outright, even where another clip would cost less"
     yield ""
     yield from _choice(stage, TIRED, stage.query("walk", 60))
-    yield "6. The same, turning sharply: no tired clip fits well, so all valid clips are searched and the lowest cost wins"
+    yield "7. The same, turning sharply: no tired clip fits well, so all valid clips are searched and the lowest cost wins"
     yield ""
     yield from _choice(stage, TURN, stage.query("walk", 40, TURN_DPS))
     yield 'Next: "contextdb query --help", and docs/tutorial.md.'

@@ -1,0 +1,215 @@
+
+/* ---- Arrays: type, shape and place of each must be those that its reader takes for granted. */
+
+/* An array of the file, as its header tells it. */
+typedef struct cdbi_array {
+    const unsigned char *at;
+    size_t n_bytes;
+    size_t shape[3];
+    size_t n_dimensions;
+    char dtype[4];
+} cdbi_array;
+
+/* Read an entry such as {"dtype": "U64", "shape": [3, 16], "data_offsets": [0, 384]}; its bytes lie within the file. */
+static inline cdbi_array cdbi_read_array(const cdb_table *table, cdbi_json *entry)
+{
+    cdbi_array array;
+    cdbi_json dtype = cdbi_member(entry, "dtype"), shape = cdbi_member(entry, "shape"), offsets = cdbi_member(entry,
+        "data_offsets");
+    size_t n = 0;
+    uint64_t start, stop;
+    memset(&array, 0, sizeof array);
+    cdbi_text(&dtype, array.dtype, sizeof array.dtype);
+    cdbi_take(&shape, '[');
+    while (cdbi_next(&shape, ']', &n)) {
+        uint64_t size = cdbi_whole(&shape);
+        if (n > 3 || size > table->data_size) cdbi_fail(&shape, "an array has a shape that no file can have");
+        else array.shape[n - 1] = (size_t)size;
+    }
+    array.n_dimensions = n;
+    cdbi_take(&offsets, '[');
+    start = cdbi_whole(&offsets);
+    cdbi_take(&offsets, ',');
+    stop = cdbi_whole(&offsets);
+    cdbi_take(&offsets, ']');
+    if (start > stop || stop > table->data_size) cdbi_fail(&offsets, "an array does not lie within the file");
+    if (dtype.why || shape.why || offsets.why) cdbi_fail(entry, dtype.why ? dtype.why : shape.why ? shape.why : offsets.why);
+    else {
+        array.at = table->data + start;
+        array.n_bytes = (size_t)(stop - start);
+        cdbi_skip(entry, 0);
+    }
+    return array;
+}
+
+/* Whether an array holds 8-byte numbers of a kind in so many dimensions, the last of which is `width`, and has their bytes. */
+static inline int cdbi_fits(const cdbi_array *array, const char *dtype, size_t n_dimensions, size_t width)
+{
+    size_t n = array->n_bytes / 8, i;
+    if (strcmp(array->dtype, dtype) != 0 || array->n_dimensions != n_dimensions || array->n_bytes % 8 != 0) return 0;
+    if (array->shape[n_dimensions - 1] != width || ((uintptr_t)array->at & 7) != 0) return 0;
+    for (i = 0; i < n_dimensions; i++)
+        if (array->shape[i] == 0) return n == 0;
+    for (i = 0; i < n_dimensions; i++) {
+        if (n % array->shape[i] != 0) return 0;
+        n /= array->shape[i];
+    }
+    return n == 1;
+}
+
+static inline const uint64_t *cdbi_words(const cdbi_array *array)
+{
+    return (const uint64_t *)(const void *)array->at;
+}
+
+/* Take an array for the column that its key, such as "003.masks", is about; 0 where it does not fit. */
+static inline int cdbi_take_part(cdb_column *column, const char *part, const cdbi_array *array, size_t n_words)
+{
+    if (strcmp(part, "masks") == 0) {
+        column->masks = cdbi_words(array);
+        column->n_masks = array->shape[0];
+        return cdbi_fits(array, "U64", 2, n_words);
+    }
+    if (strcmp(part, "bounds") == 0) {
+        column->bounds = (const double *)(const void *)array->at;
+        column->n_bounds = array->shape[0];
+        return cdbi_fits(array, "F64", 1, array->shape[0]);
+    }
+    if (strcmp(part, "any_mask") == 0) {
+        column->any_mask = cdbi_words(array);
+        return cdbi_fits(array, "U64", 1, n_words);
+    }
+    if (strcmp(part, "low") != 0 && strcmp(part, "high") != 0) return 1;
+    if ((column->low || column->high) && (column->n_layers != array->shape[0] || column->n_digits != array->shape[1])) return 0;
+    column->n_layers = array->shape[0];
+    column->n_digits = array->shape[1];
+    if (part[0] == 'l') column->low = cdbi_words(array);
+    else column->high = cdbi_words(array);
+    return cdbi_fits(array, "U64", 3, n_words);
+}
+
+/* The column whose part a key names, and the part behind "CCC."; NULL where the key is about no column. */
+static inline cdb_column *cdbi_column_of(const cdbi_opening *opening, const char *key, const char **part)
+{
+    size_t number = 0, i;
+    const char *at = key;
+    for (; *at >= '0' && *at <= '9' && at < key + 9; at++) number = number * 10 + (size_t)(*at - '0');
+    if (at < key + 3 || *at != '.') return NULL;
+    *part = at + 1;
+    for (i = 0; i < opening->schema->n_conditions; i++) {
+        cdb_column *column = &opening->columns[(number + i) % opening->schema->n_conditions];
+        if (column->kind != 0 && column->file_index == number) return column;
+    }
+    return NULL;
+}
+
+static inline void cdbi_assets(cdbi_opening *opening, const cdbi_array *array)
+{
+    const char *start = (const char *)array->at;
+    cdbi_json json;
+    cdbi_list list;
+    json.at = start;
+    json.end = start + array->n_bytes;
+    json.why = NULL;
+    list = cdbi_texts(opening, &json);
+    cdbi_peek(&json);
+    if (json.why || json.at != json.end || list.n != opening->table->n_rows || strcmp(array->dtype, "U8") != 0)
+        cdbi_refuse(opening, CDB_BAD_FILE, "the names of the assets cannot be read", -1, "assets");
+    opening->table->assets = list.texts;
+}
+
+/* Take every array that is asked for. */
+static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
+{
+    cdb_table *table = opening->table;
+    size_t n = 0;
+    char key[CDBI_KEY];
+    const char *part = NULL;
+    cdbi_take(&header, '{');
+    while (opening->status == CDB_OK && cdbi_next(&header, '}', &n)) {
+        cdb_column *column;
+        cdbi_array array;
+        int fits = 1;
+        cdbi_key(&header, key);
+        if (strcmp(key, "__metadata__") == 0) {
+            cdbi_skip(&header, 0);
+            continue;
+        }
+        array = cdbi_read_array(table, &header);
+        if (header.why) break;
+        column = cdbi_column_of(opening, key, &part);
+        if (column) fits = cdbi_take_part(column, part, &array, table->n_words);
+        else if (strcmp(key, "assets") == 0 && !table->assets) cdbi_assets(opening, &array);
+        else if (strcmp(key, "enabled") == 0) {
+            table->enabled = cdbi_words(&array);
+            fits = cdbi_fits(&array, "U64", 1, table->n_words);
+        } else if (strcmp(key, "priorities") == 0) {
+            table->priorities = (const int64_t *)(const void *)array.at;
+            fits = cdbi_fits(&array, "I64", 1, table->n_rows);
+        } else if (strcmp(key, "row_weights") == 0) {
+            table->row_weights = (const double *)(const void *)array.at;
+            fits = cdbi_fits(&array, "F64", 1, table->n_rows);
+        }
+        if (!fits) cdbi_refuse(opening, CDB_BAD_FILE, "an array has another type, shape or place than it must have", -1, key);
+    }
+    if (header.why) cdbi_refuse(opening, CDB_BAD_FILE, header.why, -1, "");
+}
+
+static inline int cdbi_is_nan(double number)
+{
+    uint64_t bits; /* by its bits: fast-math options take x != x away */
+    memcpy(&bits, &number, sizeof bits);
+    return (bits & 0x7FFFFFFFFFFFFFFF) > 0x7FF0000000000000;
+}
+
+static inline int cdbi_is_infinite(double number)
+{
+    uint64_t bits;
+    memcpy(&bits, &number, sizeof bits);
+    return (bits & 0x7FFFFFFFFFFFFFFF) == 0x7FF0000000000000;
+}
+
+/* A whole number for each double, in their order. Compared as doubles, tiny ones would be 0 to a machine that was told to flush. */
+#define CDBI_MINUS_ZERO 0x7FFFFFFFFFFFFFFFU
+
+static inline uint64_t cdbi_place(double number)
+{
+    uint64_t bits;
+    memcpy(&bits, &number, sizeof bits);
+    return bits >> 63 ? ~bits : bits | 0x8000000000000000U;
+}
+
+/* Whether a column has all its arrays, as long as each other, and its bounds ascend. */
+static inline int cdbi_is_whole(const cdb_column *column, cdb_type type)
+{
+    size_t i, n_fine = (size_t)1 << column->shift, n_coarse;
+    if (column->kind == CDBI_VALUE) return column->masks && column->n_masks == column->texts.n + (type == CDB_TEXT) + 1;
+    if (column->kind == CDBI_SLOTS)
+        return column->masks && column->n_masks % 3 == 0 && column->n_masks / 3 == column->texts.n + column->n_negated;
+    if (!column->bounds) return 0;
+    for (i = 0; i < column->n_bounds; i++)
+        if (cdbi_is_nan(column->bounds[i]) || (i > 0 && cdbi_place(column->bounds[i - 1]) >= cdbi_place(column->bounds[i])))
+            return 0;
+    if (column->kind == CDBI_FLAT) return column->masks && column->n_masks == column->n_bounds + 2;
+    if (!column->low || !column->high || !column->any_mask || column->n_digits < n_fine || (column->n_digits - n_fine) % 2 != 0)
+        return 0;
+    n_coarse = (column->n_digits - n_fine) / 2;
+    return (column->n_bounds >> column->shift) < n_coarse;
+}
+
+/* Whether every part of the table is there and no row beyond the last is enabled. */
+static inline void cdbi_check(cdbi_opening *opening)
+{
+    const cdb_table *table = opening->table;
+    size_t i;
+    if (!table->enabled || !table->priorities || !table->row_weights || (table->n_rows > 0 && !table->assets)) {
+        cdbi_refuse(opening, CDB_BAD_FILE, "the file lacks a part", -1, "");
+        return;
+    }
+    if (table->n_rows % 64 != 0 && table->enabled[table->n_words - 1] >> (table->n_rows % 64) != 0)
+        cdbi_refuse(opening, CDB_BAD_FILE, "rows are enabled that are not there", -1, "enabled");
+    for (i = 0; i < opening->schema->n_conditions && opening->status == CDB_OK; i++)
+        if (opening->columns[i].kind != 0 && !cdbi_is_whole(&opening->columns[i], opening->schema->conditions[i].type))
+            cdbi_refuse(opening, CDB_BAD_FILE, "its arrays are not there, do not go together, or do not ascend", (int)i,
+                cdbi_name(opening, i));
+}

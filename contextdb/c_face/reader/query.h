@@ -1,0 +1,280 @@
+
+/* ---- Asking */
+
+#define CDBI_MASKS 64
+#define CDBI_BLOCK 4
+
+/* The same angle from -180 up to, not including, 180. Exact: each step takes a number from one less than twice as large. */
+static inline double cdbi_wrapped(double degrees)
+{
+    double rest = degrees < 0 ? -degrees : degrees, turn = 360;
+    while (turn <= rest / 2) turn *= 2;
+    for (; turn >= 360; turn /= 2)
+        if (rest >= turn) rest -= turn;
+    if (degrees < 0) return rest > 180 ? 360 - rest : -rest;
+    return rest >= 180 ? rest - 360 : rest;
+}
+
+/* How many bounds are not above a number. */
+static inline size_t cdbi_class(const cdb_column *column, double number)
+{
+    const double *from = column->bounds;
+    size_t n = column->n_bounds;
+    uint64_t place = cdbi_place(number);
+    if (place == CDBI_MINUS_ZERO) place++;
+    while (n > 1) {
+        size_t half = n / 2;
+        from = cdbi_place(from[half - 1]) <= place ? from + half : from;
+        n -= half;
+    }
+    return (size_t)(from - column->bounds) + (n == 1 && cdbi_place(*from) <= place);
+}
+
+static inline size_t cdbi_text_class(const cdb_column *column, const char *text)
+{
+    size_t low = 0, high = column->texts.n;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        int order = strcmp(column->texts.texts[middle], text);
+        if (order == 0) return column->classes[middle];
+        if (order < 0) low = middle + 1;
+        else high = middle;
+    }
+    return column->texts.n;
+}
+
+static inline int cdbi_has(const cdb_condition *condition, const cdbi_list *list, size_t at, const cdb_fact *fact)
+{
+    size_t width = cdbi_tag_words(condition), i;
+    int64_t j;
+    if (width > 0) {
+        for (i = 0; i < width; i++)
+            if (list->bits[at * width + i] & fact->tags[i]) return 1;
+        return 0;
+    }
+    for (j = 0; j < fact->texts.count; j++)
+        if (cdbi_covers(list->texts[at], fact->texts.texts[j])) return 1;
+    return 0;
+}
+
+/* Whether the fact has all that a part needs and nothing that it bans. */
+static inline int cdbi_is_in(const cdb_condition *condition, const cdbi_part *part, const cdb_fact *fact)
+{
+    size_t i;
+    for (i = 0; i < part->needs.n; i++)
+        if (!cdbi_has(condition, &part->needs, i, fact)) return 0;
+    for (i = 0; i < part->bans.n; i++)
+        if (cdbi_has(condition, &part->bans, i, fact)) return 0;
+    return 1;
+}
+
+/* The answer of a slot of a tags column: does the fact have its tag, or does its cell, which begins with "not", hold? */
+static inline size_t cdbi_answer(const cdb_column *column, const cdb_condition *condition, size_t slot, const cdb_fact *fact)
+{
+    const cdbi_slot *negated;
+    size_t i;
+    if (slot < column->texts.n) return (size_t)cdbi_has(condition, &column->texts, slot, fact);
+    negated = &column->negated[slot - column->texts.n];
+    for (i = 0; i < negated->n; i++)
+        if (cdbi_is_in(condition, &negated->parts[i], fact) == negated->parts[i].is_complement) return 0;
+    return 1;
+}
+
+static inline int cdbi_is_missing(const cdb_condition *condition, const cdb_fact *fact)
+{
+    switch (condition->type) {
+    case CDB_BOOL:
+    case CDB_ENUM: return fact->whole == CDB_MISSING;
+    case CDB_INT: return fact->whole == CDB_MISSING_INT;
+    case CDB_NUMBER:
+    case CDB_ANGLE: return cdbi_is_nan(fact->number);
+    case CDB_TEXT: return fact->text == NULL;
+    case CDB_TAGS: break;
+    }
+    return condition->n_values > 0 ? fact->tags == NULL || (fact->tags[0] & 1) == 0 : fact->texts.count < 0;
+}
+
+static inline int cdbi_is_wrong(const cdb_condition *condition, const cdb_fact *fact)
+{
+    if (condition->type == CDB_BOOL) return fact->whole < 0 || fact->whole > 1;
+    if (condition->type == CDB_ENUM) return fact->whole < 0 || (uint64_t)fact->whole >= condition->n_values;
+    return condition->type == CDB_ANGLE && cdbi_is_infinite(fact->number);
+}
+
+static inline double cdbi_number(const cdb_condition *condition, const cdb_fact *fact)
+{
+    if (condition->type == CDB_INT) return (double)fact->whole;
+    return condition->type == CDB_ANGLE ? cdbi_wrapped(fact->number) : fact->number;
+}
+
+/* The mask of a fact, or of a missing one that only Any accepts; NULL for a column that keeps none for each class. */
+static inline const uint64_t *cdbi_mask(const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact,
+    int is_missing, size_t n_words)
+{
+    if (column->kind != CDBI_VALUE && column->kind != CDBI_FLAT) return NULL;
+    if (is_missing) return column->masks + (column->n_masks - 1) * n_words;
+    if (column->kind == CDBI_FLAT) return column->masks + cdbi_class(column, cdbi_number(condition, fact)) * n_words;
+    if (condition->type == CDB_TEXT) return column->masks + cdbi_text_class(column, fact->text) * n_words;
+    return column->masks + (size_t)fact->whole * n_words;
+}
+
+/* rows = from & all masks, some words at a time: as a rule few masks leave no row of a block, and the others need not be read. */
+static inline void cdbi_and(uint64_t *rows, const uint64_t *from, const uint64_t *const *masks, size_t n_masks, size_t n_words)
+{
+    size_t at = 0, i, j;
+    for (; at + CDBI_BLOCK <= n_words; at += CDBI_BLOCK) {
+        uint64_t left[CDBI_BLOCK], some = 1;
+        for (j = 0; j < CDBI_BLOCK; j++) left[j] = from[at + j];
+        for (i = 0; i < n_masks && some; i++)
+            for (some = 0, j = 0; j < CDBI_BLOCK; j++) {
+                left[j] &= masks[i][at + j];
+                some |= left[j];
+            }
+        for (j = 0; j < CDBI_BLOCK; j++) rows[at + j] = left[j];
+    }
+    for (; at < n_words; at++) {
+        uint64_t left = from[at];
+        for (i = 0; i < n_masks && left; i++) left &= masks[i][at];
+        rows[at] = left;
+    }
+}
+
+/* rows &= the mask of a wide column, put together from the two digits of the fact's class. */
+static inline void cdbi_and_wide(uint64_t *rows, const cdb_column *column, double number, size_t n_words)
+{
+    size_t found = cdbi_class(column, number), n_fine = (size_t)1 << column->shift, n_coarse = (column->n_digits - n_fine) / 2;
+    size_t after = (found >> column->shift) * n_words, same = after + n_coarse * n_words;
+    size_t fine = (2 * n_coarse + (found & (n_fine - 1))) * n_words, layer, at, step = column->n_digits * n_words;
+    for (at = 0; at < n_words; at++) {
+        uint64_t some = 0;
+        for (layer = 0; layer < column->n_layers && rows[at]; layer++) {
+            const uint64_t *low = column->low + layer * step + at, *high = column->high + layer * step + at;
+            some |= (low[after] | (low[same] & low[fine])) & (high[after] | (high[same] & high[fine]));
+        }
+        rows[at] &= some;
+    }
+}
+
+static inline void cdbi_and_slots(uint64_t *rows, const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact,
+    size_t n_words)
+{
+    size_t slot, n_slots = column->n_masks / 3;
+    int is_missing = cdbi_is_missing(condition, fact);
+    for (slot = 0; slot < n_slots; slot++) {
+        const uint64_t *mask = column->masks + (3 * slot + (is_missing ? 2 : cdbi_answer(column, condition, slot, fact))) * n_words;
+        cdbi_and(rows, rows, &mask, 1, n_words);
+    }
+}
+
+/* Wide columns and columns of tags, for the rows that the others left. */
+static inline void cdbi_and_others(uint64_t *rows, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown)
+{
+    size_t i;
+    for (i = 0; i < schema->n_conditions; i++) {
+        int is_missing;
+        if (columns[i].kind != CDBI_WIDE && columns[i].kind != CDBI_SLOTS) continue;
+        is_missing = cdbi_is_missing(&schema->conditions[i], &facts[i]);
+        if (is_missing && unknown == CDB_UNKNOWN_ANY) continue;
+        if (columns[i].kind == CDBI_SLOTS) cdbi_and_slots(rows, &columns[i], &schema->conditions[i], &facts[i], table->n_words);
+        else if (is_missing) cdbi_and(rows, rows, &columns[i].any_mask, 1, table->n_words);
+        else cdbi_and_wide(rows, &columns[i], cdbi_number(&schema->conditions[i], &facts[i]), table->n_words);
+    }
+}
+
+static inline cdb_status cdbi_fact_fault(cdb_fault *fault, cdb_status status, const cdb_schema *schema, size_t at, uint64_t *rows,
+    size_t n_words)
+{
+    const char *reason = status == CDB_MISSING_FACT ? "the fact is missing" : "the fact is not one that the condition can have";
+    memset(rows, 0, n_words * sizeof *rows);
+    return cdbi_fault(fault, status, reason, (int)at, schema->conditions[at].name);
+}
+
+/* The rows whose every cell accepts its fact, one bit a row, in `rows`, which has room for `room` words; words behind those of the
+ * table become 0. Facts stand in the order of the schema. On a fault no row is valid. */
+static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
+{
+    const uint64_t *masks[CDBI_MASKS], *mask, *from = table->enabled;
+    size_t n = 0, i, n_words = table->n_words;
+    int has_others = 0, is_missing;
+    memset(rows, 0, room * sizeof *rows);
+    if (room < n_words)
+        return cdbi_fault(fault, CDB_TOO_SHORT, "the array for the rows is shorter than a mask of the table", -1, "");
+    for (i = 0; i < schema->n_conditions; i++) {
+        if (columns[i].kind == 0) continue;
+        is_missing = cdbi_is_missing(&schema->conditions[i], &facts[i]);
+        if (is_missing && unknown == CDB_UNKNOWN_ERROR) return cdbi_fact_fault(fault, CDB_MISSING_FACT, schema, i, rows, n_words);
+        if (is_missing && unknown == CDB_UNKNOWN_ANY) continue;
+        if (!is_missing && cdbi_is_wrong(&schema->conditions[i], &facts[i]))
+            return cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i, rows, n_words);
+        mask = cdbi_mask(&columns[i], &schema->conditions[i], &facts[i], is_missing, n_words);
+        if (!mask) has_others = 1;
+        else masks[n++] = mask;
+        if (n == CDBI_MASKS) {
+            cdbi_and(rows, from, masks, n, n_words);
+            from = rows;
+            n = 0;
+        }
+    }
+    cdbi_and(rows, from, masks, n, n_words);
+    if (has_others) cdbi_and_others(rows, table, columns, schema, facts, unknown);
+    return cdbi_fault(fault, CDB_OK, "", -1, "");
+}
+
+/* ---- Answers */
+
+static inline int64_t cdb_count(const uint64_t *rows, size_t n_words)
+{
+    uint64_t count = 0;
+    size_t i;
+    for (i = 0; i < n_words; i++) {
+        uint64_t word = rows[i];
+        word -= (word >> 1) & 0x5555555555555555;
+        word = (word & 0x3333333333333333) + ((word >> 2) & 0x3333333333333333);
+        word = (word + (word >> 4)) & 0x0F0F0F0F0F0F0F0F;
+        count += (word * 0x0101010101010101) >> 56;
+    }
+    return (int64_t)count;
+}
+
+/* The next valid row behind `row`; -1 behind the last. The first one: behind -1. */
+static inline int64_t cdb_next_row(const uint64_t *rows, size_t n_words, int64_t row)
+{
+    size_t at = (size_t)((row + 1) / 64);
+    uint64_t word = at < n_words ? rows[at] & (~(uint64_t)0 << ((row + 1) % 64)) : 0;
+    int64_t bit = 0, step;
+    while (word == 0) {
+        if (++at >= n_words) return -1;
+        word = rows[at];
+    }
+    for (step = 32; step > 0; step /= 2)
+        if ((word & (((uint64_t)1 << step) - 1)) == 0) {
+            word >>= step;
+            bit += step;
+        }
+    return (int64_t)at * 64 + bit;
+}
+
+/* The name of a row's asset, in UTF-8; NULL for a row that is not there. */
+static inline const char *cdb_asset(const cdb_table *table, int64_t row)
+{
+    return row >= 0 && (uint64_t)row < table->n_rows ? table->assets[row] : NULL;
+}
+
+/* ---- Facts that are missing, and lists of facts */
+
+static inline double cdb_missing_number(void)
+{
+    uint64_t bits = 0x7FF8000000000000;
+    double number;
+    memcpy(&number, &bits, sizeof number);
+    return number;
+}
+
+/* Put a tag into a set of declared tags, which is then known. */
+static inline void cdb_add_tag(uint64_t *words, size_t tag)
+{
+    words[0] |= 1;
+    words[tag / 64] |= (uint64_t)1 << (tag % 64);
+}

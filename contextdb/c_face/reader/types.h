@@ -1,0 +1,141 @@
+/* A compiled table (a .safetensors artefact of contextdb), read in C99 or C++ without a library.
+ *
+ *   cdb_open    takes the bytes of an artefact, checks all that will ever be read of them, and keeps pointers into them
+ *   cdb_query   the rows that are valid for some facts, one bit a row; takes no memory
+ *   cdb_close   gives back what cdb_open took
+ *
+ * The faces of single tables, further down, call these with types of their own. Bit r % 64 of word r / 64 is row r. A table that is
+ * open is never changed and may be asked from several threads. The layout of the file is told in docs/format.md of contextdb.
+ */
+
+#if defined(__BYTE_ORDER__) && defined(__ORDER_LITTLE_ENDIAN__)
+#if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error "artefacts of contextdb are little-endian, and so must the machine be that maps them"
+#endif
+#elif defined(__BIG_ENDIAN__) || defined(__ARMEB__) || defined(__AARCH64EB__) || defined(__MIPSEB__) || defined(_M_PPC)
+#error "artefacts of contextdb are little-endian, and so must the machine be that maps them"
+#endif
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#ifdef CDB_FILES /* define it before this header is included, to have cdb_read_file */
+#include <stdio.h>
+#endif
+
+#ifndef CDB_MALLOC /* define both to bring your own; cdb_open calls the one, cdb_close the other, nothing else does */
+#include <stdlib.h>
+#define CDB_MALLOC(size) malloc(size)
+#define CDB_FREE(block) free(block)
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef char cdbi_doubles_have_8_bytes[sizeof(double) == 8 ? 1 : -1];
+
+#define CDB_FALSE 0
+#define CDB_TRUE 1
+#define CDB_MISSING (-1)            /* a bool, an enum or a list of tags that is not known */
+#define CDB_MISSING_INT INT64_MIN   /* an int that is not known; a number or an angle: NaN; a text: NULL */
+
+typedef enum cdb_type { CDB_BOOL, CDB_INT, CDB_NUMBER, CDB_ANGLE, CDB_ENUM, CDB_TEXT, CDB_TAGS } cdb_type;
+
+typedef enum cdb_unknown {          /* what a missing fact does */
+    CDB_UNKNOWN_ERROR,              /* the query fails and names it */
+    CDB_UNKNOWN_ANY,                /* its condition is passed over */
+    CDB_UNKNOWN_NEVER               /* only cells that are Any accept it */
+} cdb_unknown;
+
+typedef enum cdb_status {
+    CDB_OK,
+    CDB_CANNOT_READ,                /* the file is not there, or the system refuses */
+    CDB_NO_MEMORY,
+    CDB_BAD_FILE,                   /* truncated, damaged, of another layout, or no artefact at all */
+    CDB_OTHER_TABLE,                /* an artefact, but not one that this header, or any in C, can answer for */
+    CDB_MISSING_FACT,
+    CDB_WRONG_FACT,
+    CDB_TOO_SHORT                   /* the array for the answer has fewer words than the table */
+} cdb_status;
+
+#define CDB_NAME_BYTES 96
+
+typedef struct cdb_fault {
+    cdb_status status;
+    const char *reason;             /* never NULL, never to be freed */
+    int condition;                  /* the number of the condition concerned, or -1 */
+    char name[CDB_NAME_BYTES];      /* what is concerned: a condition, a part of the file; or "" */
+} cdb_fault;
+
+typedef struct cdb_texts {          /* a fact of a condition of tags whose names are not declared */
+    const char *const *texts;
+    int64_t count;                  /* CDB_MISSING where the tags are not known */
+} cdb_texts;
+
+typedef union cdb_fact {
+    int64_t whole;                  /* bool, int, enum (the number of its value) */
+    double number;                  /* number, angle (degrees) */
+    const char *text;               /* text, in UTF-8 */
+    const uint64_t *tags;           /* declared tags: bit 0 says that they are known, bit i that tag i of the schema is there */
+    cdb_texts texts;                /* other tags */
+} cdb_fact;
+
+typedef struct cdb_condition {
+    const char *name;
+    cdb_type type;
+    const char *expr;               /* how the tables derive it from other facts, or NULL; in C the game gives it */
+    const char *const *values;      /* of an enum, from 0; of tags, from 1: values[0] is then "" */
+    size_t n_values;                /* 0 where none are declared */
+} cdb_condition;
+
+typedef struct cdb_schema {
+    const cdb_condition *conditions;
+    size_t n_conditions;
+} cdb_schema;
+
+/* What follows is filled by cdb_open; read it, and do not write. */
+
+typedef struct cdbi_list {
+    const char **texts;
+    size_t n;
+    uint64_t *bits;                 /* for each text, which declared tags cover it */
+} cdbi_list;
+
+typedef struct cdbi_part {          /* all of `needs` and none of `bans`, or the complement of that */
+    cdbi_list needs, bans;
+    int is_complement;
+} cdbi_part;
+
+typedef struct cdbi_slot {          /* sets of tags that are in every part */
+    cdbi_part *parts;
+    size_t n;
+} cdbi_slot;
+
+typedef struct cdb_column {
+    int kind;                       /* 0: the table has no such column, and asks for no such fact */
+    size_t file_index;
+    const uint64_t *masks;
+    size_t n_masks;
+    const double *bounds;
+    size_t n_bounds;
+    const uint64_t *low, *high, *any_mask;
+    size_t n_layers, n_digits;
+    unsigned shift;
+    cdbi_list texts;                /* the values of a text column, ascending; or the tags that have a slot */
+    uint32_t *classes;              /* the class of each of these values */
+    cdbi_slot *negated;             /* the slots behind those of single tags */
+    size_t n_negated;
+} cdb_column;
+
+typedef struct cdb_table {
+    size_t n_rows;
+    size_t n_words;                 /* words of a mask: n_rows / 64, rounded up */
+    const uint64_t *enabled;
+    const int64_t *priorities;      /* one for each row, for picking; 0 where the table has none */
+    const double *row_weights;      /* one for each row; 1 where the table has none */
+    const char **assets;
+    void *blocks;                   /* the memory that was taken */
+    const unsigned char *data;
+    size_t data_size;
+} cdb_table;

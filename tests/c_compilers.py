@@ -1,0 +1,68 @@
+"""Compiles the C programs of the tests with every compiler that is there, under its sanitizers where it has them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+PROGRAMS = Path(__file__).parent / "c_programs"
+STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wsign-conversion", "-Wcast-qual", "-Werror"]
+SANITIZED = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+C = ["-xc", "-std=c99", *STRICT]
+CXX = ["-xc++", "-std=c++11", *STRICT]
+
+
+@cache
+def c_compiler() -> str | None:
+    """The C compiler: $CC, else the first one that is found."""
+    return next((path for name in (os.environ.get("CC", "cc"), "gcc", "clang") if (path := shutil.which(name))), None)
+
+
+@cache
+def cxx_compiler() -> str | None:
+    """The C++ compiler: $CXX, else the first one that is found."""
+    return next((path for name in (os.environ.get("CXX", "c++"), "g++", "clang++") if (path := shutil.which(name))), None)
+
+
+def compiler_for(options: list[str]) -> str:
+    """The compiler for a language; the test is skipped where there is none."""
+    found = c_compiler() if options[0] == "-xc" else cxx_compiler()
+    if found is None:
+        pytest.skip(f"no compiler for {options[0].removeprefix('-x')} was found")
+    return found
+
+
+@cache
+def sanitizers(compiler: str) -> tuple[str, ...]:
+    """The options for sanitizers, where a program that was compiled with them runs."""
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        source, program = Path(folder, "empty.c"), Path(folder, "empty.exe")
+        source.write_text("int main(void) { return 0; }\n", encoding="ascii")
+        done = subprocess.run([compiler, *SANITIZED, str(source), "-o", str(program)], capture_output=True)
+        runs = done.returncode == 0 and subprocess.run([str(program)], capture_output=True).returncode == 0
+        return tuple(SANITIZED) if runs else ()
+
+
+def built(source: Path, program: Path, options: list[str], *more: str) -> Path:
+    """Compile one source, with the header beside the program; no warning is let pass."""
+    compiler = compiler_for(options)
+    command = [compiler, *options, *more, f"-I{program.parent}", str(source), "-o", str(program)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode or done.stderr:
+        pytest.fail(f"{' '.join(command)}\n{done.stderr}", pytrace=False)
+    return program
+
+
+def ran(program: Path, *arguments: str | Path, cwd: Path | None = None) -> str:
+    """What a program prints; it must end well, without a word from a sanitizer."""
+    done = subprocess.run([str(program), *map(str, arguments)], capture_output=True, encoding="utf-8", cwd=cwd)
+    if done.returncode or done.stderr:
+        pytest.fail(f"{program.name} ended with {done.returncode}\n{done.stdout[-2000:]}{done.stderr}", pytrace=False)
+    return done.stdout

@@ -1,0 +1,134 @@
+/* Asks artefacts of any table without a face of its own: ask IN OUT.
+ *
+ * IN: a schema, some artefacts and some contexts, as whole numbers of 8 bytes, little-endian, and texts: their length without the 0
+ * at their end, then their bytes. OUT: for each artefact the status of opening it; where that is 0, for each context the status,
+ * the number of words, and the words of the answer. Artefacts lie in blocks of just their size, so that a sanitizer sees what is
+ * read beyond. */
+
+#include "tables.h"
+
+#include <stdio.h>
+
+static char *at;
+
+static int64_t whole(void)
+{
+    int64_t value;
+    memcpy(&value, at, 8);
+    at += 8;
+    return value;
+}
+
+static const char *text(void)
+{
+    int64_t length = whole();
+    const char *found = at;
+    if (length < 0) return NULL;
+    at += length + 1;
+    return found;
+}
+
+static const char **texts(int64_t n)
+{
+    const char **list = (const char **)calloc((size_t)n + 1, sizeof *list);
+    int64_t i;
+    for (i = 0; i < n; i++) list[i] = text();
+    return list;
+}
+
+static cdb_fact fact(const cdb_condition *condition)
+{
+    cdb_fact found;
+    memset(&found, 0, sizeof found);
+    if (condition->type == CDB_TEXT) found.text = text();
+    else if (condition->type == CDB_TAGS && condition->n_values > 0) {
+        size_t size = (condition->n_values + 63) / 64 * 8;
+        uint64_t *words = (uint64_t *)malloc(size);
+        memcpy(words, at, size);
+        at += size;
+        found.tags = words;
+    } else if (condition->type == CDB_TAGS) {
+        found.texts.count = whole();
+        found.texts.texts = texts(found.texts.count < 0 ? 0 : found.texts.count);
+    } else {
+        memcpy(&found, at, 8);
+        at += 8;
+    }
+    return found;
+}
+
+static void put(FILE *out, int64_t value)
+{
+    fwrite(&value, 8, 1, out);
+}
+
+/* One answer: rows met one after another must be those that are counted, and their assets must be there to read. */
+static void answer(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
+    cdb_unknown unknown)
+{
+    uint64_t *rows = (uint64_t *)malloc(table->n_words * 8 + 8);
+    cdb_fault fault;
+    cdb_status status = cdb_query(table, columns, schema, facts, unknown, rows, table->n_words, &fault);
+    int64_t row, n = 0;
+    for (row = cdb_next_row(rows, table->n_words, -1); row >= 0; row = cdb_next_row(rows, table->n_words, row))
+        n += strlen(cdb_asset(table, row)) < 100000;
+    put(out, n == cdb_count(rows, table->n_words) ? (int64_t)status : -1);
+    put(out, (int64_t)table->n_words);
+    fwrite(rows, 8, table->n_words, out);
+    free(rows);
+}
+
+int main(int argc, char **argv)
+{
+    FILE *in = argc == 3 ? fopen(argv[1], "rb") : NULL, *out = argc == 3 ? fopen(argv[2], "wb") : NULL;
+    static cdb_condition *conditions; /* static: what they hold to the end is no leak */
+    static cdb_column *columns;
+    static cdb_schema schema;
+    static cdb_unknown *unknown;
+    static cdb_fact *facts;
+    static char *input;
+    char *artefacts;
+    int64_t n_artefacts, n_contexts, n, i, j;
+    long size;
+    if (!in || !out || fseek(in, 0, SEEK_END) != 0 || (size = ftell(in)) < 0) return 2;
+    rewind(in);
+    at = input = (char *)malloc((size_t)size + 1);
+    if (!at || fread(at, 1, (size_t)size, in) != (size_t)size) return 2;
+    n = whole();
+    conditions = (cdb_condition *)calloc((size_t)n + 1, sizeof *conditions);
+    columns = (cdb_column *)calloc((size_t)n + 1, sizeof *columns);
+    for (i = 0; i < n; i++) {
+        conditions[i].name = text();
+        conditions[i].type = (cdb_type)whole();
+        conditions[i].expr = text();
+        conditions[i].n_values = (size_t)whole();
+        conditions[i].values = texts((int64_t)conditions[i].n_values);
+    }
+    schema.conditions = conditions;
+    schema.n_conditions = (size_t)n;
+    n_artefacts = whole();
+    artefacts = at;
+    for (i = 0; i < n_artefacts; i++) text();
+    n_contexts = whole();
+    unknown = (cdb_unknown *)calloc((size_t)n_contexts + 1, sizeof *unknown);
+    facts = (cdb_fact *)calloc((size_t)(n_contexts * n) + 1, sizeof *facts);
+    for (i = 0; i < n_contexts; i++) {
+        unknown[i] = (cdb_unknown)whole();
+        for (j = 0; j < n; j++) facts[i * n + j] = fact(&conditions[j]);
+    }
+    at = artefacts;
+    for (i = 0; i < n_artefacts; i++) {
+        int64_t length = whole();
+        void *bytes = malloc((size_t)length + !length);
+        cdb_table table;
+        cdb_fault fault;
+        memcpy(bytes, at, (size_t)length);
+        at += length + 1;
+        put(out, (int64_t)cdb_open(&table, columns, &schema, bytes, (size_t)length, &fault));
+        if (fault.status == CDB_OK)
+            for (j = 0; j < n_contexts; j++) answer(out, &table, columns, &schema, facts + j * n, unknown[j]);
+        cdb_close(&table);
+        free(bytes);
+    }
+    return fclose(out) != 0;
+}

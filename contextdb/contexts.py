@@ -58,13 +58,18 @@ def context_files(pattern: str) -> list[Path]:
         return [Path(pattern)]
     found = sorted(Path(p) for p in glob.glob(pattern, recursive=True) if os.path.isfile(p))
     if not found:
-        folder = Path(pattern).parent
-        near = nearest(Path(pattern).name, sorted(os.listdir(folder))) if os.path.isdir(folder) else None
-        mend = path_in_quotes(folder / near) if near else ""
-        raise FileError(
-            Fault("no file of contexts is there.", "a .csv or .parquet file, or a glob", mend, Place(pattern), "no-such-path")
-        )
+        accepted = "a .csv or .parquet file, or a glob"
+        raise FileError(Fault("no file of contexts is there.", accepted, _near(Path(pattern)), Place(pattern), "no-such-path"))
     return found
+
+
+def _near(path: Path) -> str:
+    """What may have been meant by a name that is no file's: the files of a folder, or a file of nearly that name."""
+    if os.path.isdir(path):
+        suffixes = {file.suffix for file in path.iterdir()}
+        return next((path_in_quotes(path / f"*{suffix}") for suffix in (".parquet", ".csv") if suffix in suffixes), "")
+    near = nearest(path.name, sorted(os.listdir(path.parent))) if os.path.isdir(path.parent) else None
+    return path_in_quotes(path.parent / near) if near else ""
 
 
 def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
@@ -78,28 +83,29 @@ def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
     if path.suffix.lower() == ".parquet":
         return Contexts(path, _read_parquet(path, compiled))
     source, columns = read_texts(path)
-    known = _known(compiled)
+    known = known_conditions(compiled)
     series, faults = [], []
     for column in columns:
         condition = known.get(column.name)
         if condition is None:
-            series.append(_nothing(column.name, column.n_rows))
+            series.append(without_facts(column.name, column.n_rows))
             continue
-        values, wrong = _read_column(column.texts, condition)
+        values, wrong = read_texts_as(column.texts, condition)
         faults += [f.at(Place(str(path), source.line(int((column.codes == i).argmax())), column.name)) for i, f in wrong]
-        distinct = pl.Series(column.name, values, dtype=_dtype(condition), strict=False)
+        distinct = pl.Series(column.name, values, dtype=fact_type(condition), strict=False)
         series.append(distinct.gather(column.codes) if len(distinct) else distinct)
     if faults:
         raise ContextError(*sorted(faults, key=lambda fault: fault.place.line or 0))
     return Contexts(path, pl.DataFrame(series), source)
 
 
-def _known(compiled: CompiledTable) -> dict[str, Condition]:
+def known_conditions(compiled: CompiledTable) -> dict[str, Condition]:
     """The conditions that columns may be about; derived ones too, which the table then refuses."""
     return compiled.asked | {c.name: c for c in compiled.conditions}
 
 
-def _read_column(texts: Sequence[str], condition: Condition) -> tuple[list[object], list[tuple[int, Fault]]]:
+def read_texts_as(texts: Sequence[str], condition: Condition) -> tuple[list[object], list[tuple[int, Fault]]]:
+    """Texts as facts, and what is wrong with which of them."""
     values: list[object] = []
     faults: list[tuple[int, Fault]] = []
     for i, text in enumerate(texts):
@@ -114,7 +120,8 @@ def _read_column(texts: Sequence[str], condition: Condition) -> tuple[list[objec
     return values, faults
 
 
-def _dtype(condition: Condition) -> pl.DataType:
+def fact_type(condition: Condition) -> pl.DataType:
+    """The type of a column of facts."""
     kind = condition.domain.kind
     if kind in NUMERIC:
         return pl.Float64()
@@ -126,15 +133,15 @@ def _read_parquet(path: Path, compiled: CompiledTable) -> pl.DataFrame:
         scan = pl.scan_parquet(path, glob=False)
         names = scan.collect_schema().names()
         n_rows = scan.select(pl.len()).collect().item()
-        known = _known(compiled)
+        known = known_conditions(compiled)
         asked = [n for n in names if n in known]
         facts = scan.select(by_name(asked)).collect().get_columns() if asked else []
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         read_texts(path)  # says what is wrong with the file
         raise TableError(Fault(f"cannot read the file: {error}.", "a whole Parquet file", place=Place(str(path)))) from None
-    return pl.DataFrame([*facts, *(_nothing(n, n_rows) for n in names if n not in known)])
+    return pl.DataFrame([*facts, *(without_facts(n, n_rows) for n in names if n not in known)])
 
 
-def _nothing(name: str, n_rows: int) -> pl.Series:
+def without_facts(name: str, n_rows: int) -> pl.Series:
     """A column without a fact."""
     return pl.repeat(None, n_rows, dtype=pl.Null, eager=True).alias(name)

@@ -10,7 +10,7 @@ import errno
 import os
 import secrets
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -38,8 +38,8 @@ def read_bytes(path: str | Path) -> bytes:
         return file.read_bytes()
 
 
-def write_atomic(path: str | Path, data: bytes) -> None:
-    """Replace a file's bytes in one step, or make the file.
+def write_atomic(path: str | Path, data: bytes | Iterable[bytes]) -> None:
+    """Replace a file's bytes, given whole or in pieces, in one step, or make the file.
 
     A link stays a link, and the file it leads to is replaced; mode and, where that is permitted, owner stay.
 
@@ -50,7 +50,7 @@ def write_atomic(path: str | Path, data: bytes) -> None:
         stays.
     """
     file = Path(path)
-    with _refused(file, lambda error, at: _why_unwritten(error, at, len(data))):
+    with _refused(file, lambda error, at: _why_unwritten(error, at, len(data) if isinstance(data, bytes) else None)):
         target = Path(os.path.realpath(file))
         old = target.stat() if target.exists() else None
         if old is not None:
@@ -92,7 +92,7 @@ def _require_writable(file: Path, old: os.stat_result) -> None:
         raise FileError(Fault("the file is marked read-only.", "a file that may be written", mend, Place(str(file))))
 
 
-def _write_new(temporary: Path, data: bytes, old: os.stat_result | None) -> None:
+def _write_new(temporary: Path, data: bytes | Iterable[bytes], old: os.stat_result | None) -> None:
     """Write a file that is not there yet and have the system put it on the disk."""
     handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:
@@ -100,9 +100,10 @@ def _write_new(temporary: Path, data: bytes, old: os.stat_result | None) -> None
             with suppress(OSError, AttributeError):  # only root may give a file away; Windows has no chown
                 os.chown(temporary, old.st_uid, old.st_gid)
             os.chmod(temporary, stat.S_IMODE(old.st_mode))
-        rest = memoryview(data)
-        while rest:
-            rest = rest[os.write(handle, rest) :]
+        for piece in [data] if isinstance(data, bytes) else data:
+            rest = memoryview(piece)
+            while rest:
+                rest = rest[os.write(handle, rest) :]
         os.fsync(handle)
     finally:
         os.close(handle)
@@ -167,11 +168,16 @@ def _missing(file: Path) -> Fault:
     return Fault(f"there is no such {what}.", place=place, rule="no-such-path")
 
 
-def _why_unwritten(error: OSError, file: Path, size: int) -> Fault:
+def _why_unwritten(error: OSError, file: Path, size: int | None) -> Fault:
     place, folder = Place(str(file)), path_in_quotes(Path(os.path.realpath(file)).parent)
     kept = " The old file is as it was." if os.path.exists(file) else ""
     if error.errno in _FULL:
-        return Fault(f"the disk is full.{kept}", f"{size:,} free bytes", "to free some space and save again", place)
+        return Fault(
+            f"the disk is full.{kept}",
+            "more room" if size is None else f"{size:,} free bytes",
+            "to free some space and save again",
+            place,
+        )
     if error.errno == errno.EROFS:
         return Fault(f"the folder {folder} is on a disk that cannot be written.{kept}", mend="to save elsewhere", place=place)
     if isinstance(error, (FileNotFoundError, NotADirectoryError)):

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -275,3 +278,17 @@ def test_options_about_telemetry_want_files(option: tuple[str, str]):
     result = run("coverage", "tables", *option)
     assert (result.code, result.out) == (2, "")
     assert f"{option[0]} is about recorded contexts. Accepted: --telemetry GLOB" in result.err
+
+
+def test_the_report_is_the_same_to_the_byte_on_one_core_and_on_four(here: Path):
+    rows = [f"clip{i},{i % 7}..{i % 7 + 2},{'Walk' if i % 3 else 'Any'}" for i in range(60)]
+    write("\n".join(["Asset,speed,gait", *rows, ""]))
+    moments = [f"{i / 40},{'Run' if i % 2 else 'Walk'}" for i in range(400)]
+    Path("moments.csv").write_text("\n".join(["speed,gait", *moments, ""]), encoding="utf-8")
+    command = [sys.executable, "-m", "contextdb", "coverage", "tables", "--telemetry", "moments.csv", "--format", "json"]
+    reports = []
+    for cores in ("1", "4"):
+        threads = {"NUMBA_NUM_THREADS": cores, "POLARS_MAX_THREADS": cores, "PYTHONPATH": str(ROOT)}
+        reports.append(subprocess.run(command, env=os.environ | threads, stdout=subprocess.PIPE, check=True).stdout)
+    assert json.loads(reports[0])["tables"][0]["telemetry"]["rows"] == 400
+    assert reports[0] == reports[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator
 from pathlib import Path
 
 import polars as pl
@@ -17,6 +18,7 @@ from contextdb.contexts import read_contexts
 from contextdb.errors import ContextError
 from contextdb.facts import describe
 from contextdb.table import Table
+from contextdb.telemetry import evaluate_file
 
 TOML = """
 [conditions.state]
@@ -166,12 +168,14 @@ def test_a_missing_file_is_named_with_the_nearest(here: Path):
     assert refused("moves", "none/*.csv") == [
         "none/*.csv: no file of contexts is there. Accepted: a .csv or .parquet file, or a glob."
     ]
-    assert refused("moves", "data")[0].startswith("data: no file of contexts is there.")
+    assert refused("moves", "data") == [
+        'data: no file of contexts is there. Accepted: a .csv or .parquet file, or a glob. Did you mean "data/*.csv"?'
+    ]
 
 
 def test_a_file_of_another_kind_is_refused(here: Path):
     (here / "data" / "c.json").write_text("[]", encoding="utf-8")
-    assert refused("moves", "data/c.json")[0].startswith('data/c.json: a table file does not end in ".json".')
+    assert refused("moves", "data/c.json")[0].startswith('data/c.json: a file of contexts does not end in ".json".')
 
 
 @pytest.mark.parametrize("unknown", ["error", "any", "never"])
@@ -402,6 +406,61 @@ def test_nothing_is_written_when_a_context_is_wrong(here: Path):
     (here / "data" / "b.csv").write_text("speed\nfast\n", encoding="utf-8")
     assert refused("moves", "data/*.csv", "--out", "answers.csv", "--unknown", "any")
     assert not (here / "answers.csv").exists()
+
+
+def test_an_interrupted_run_leaves_the_old_answers_and_nothing_else(here: Path, monkeypatch: pytest.MonkeyPatch):
+    (here / "data" / "b.csv").write_text(WHOLE, encoding="utf-8")
+    (here / "answers.csv").write_text("of yesterday", encoding="utf-8")
+    true, before = evaluate_file.TelemetryFile.chunks, sorted(here.iterdir())
+
+    def interrupted(file: evaluate_file.TelemetryFile, wanted: object) -> Iterator[object]:
+        yield from true(file, wanted)  # type: ignore[arg-type]
+        if file.path.name == "b.csv":
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(evaluate_file.TelemetryFile, "chunks", interrupted)
+    result = run("evaluate", "moves", "data/*.csv", "--out", "answers.csv")
+    assert (result.code, result.out) == (130, "")
+    assert (here / "answers.csv").read_text(encoding="utf-8") == "of yesterday"
+    assert sorted(here.iterdir()) == before
+
+
+@pytest.mark.parametrize("name", ["answers.csv", "answers.parquet"])
+def test_answers_do_not_depend_on_how_much_is_read_at_once(here: Path, monkeypatch: pytest.MonkeyPatch, name: str):
+    rows = WHOLE.splitlines()
+    (here / "data" / "b.csv").write_text("\n".join(rows[:1] + rows[1:] * 30) + "\n", encoding="utf-8")
+    frame = pl.DataFrame({"speed": [float(i % 9) for i in range(500)], "ok": [i % 3 == 0 for i in range(500)]})
+    frame.write_parquet(here / "data" / "c.parquet", row_group_size=100)
+    told = ("evaluate", "moves", "data/[abc].*", "--unknown", "any", "--json", "--out", name)
+    whole = run(*told)
+    at_once = (here / name).read_bytes() if name.endswith("csv") else pl.read_parquet(here / name)
+    monkeypatch.setattr("contextdb.telemetry.chunks.ROWS", 7)
+    monkeypatch.setattr("contextdb.telemetry.chunks.BYTES", 50)
+    monkeypatch.setattr(evaluate_file, "MOST_ANSWERS", 3)
+    assert run(*told) == whole
+    assert whole.json["contexts"] == 624
+    if name.endswith("csv"):
+        assert (here / name).read_bytes() == at_once
+    else:
+        assert pl.read_parquet(here / name).equals(at_once)
+
+
+@pytest.mark.parametrize(
+    ("name", "place"), [("c.csv", 'c.csv, line 42, column "speed"'), ("c.parquet", 'c.parquet, row 40, column "speed"')]
+)
+def test_the_place_of_a_fault_counts_what_was_read_before(here: Path, monkeypatch: pytest.MonkeyPatch, name: str, place: str):
+    frame = pl.DataFrame({"speed": ["1"] * 40 + ["fast"] + ["1"] * 9})
+    frame.write_csv(here / name) if name == "c.csv" else frame.write_parquet(here / name)
+    monkeypatch.setattr("contextdb.telemetry.chunks.ROWS", 6)
+    monkeypatch.setattr("contextdb.telemetry.chunks.BYTES", 16)
+    (line,) = refused("moves", name, "--unknown", "any")
+    assert line.startswith(f'{place}: cannot read "fast" as a number.')
+
+
+def test_a_scheduler_wants_the_engine_that_has_one(here: Path):
+    assert refused("moves", "data/a.csv", "--scheduler", "tcp://x:1") == [
+        "--scheduler is the address of Dask's. Accepted: --engine dask beside it."
+    ]
 
 
 # ---- reading contexts

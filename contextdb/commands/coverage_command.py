@@ -27,6 +27,7 @@ from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
 from contextdb.exit_codes import ExitCode
+from contextdb.nesting.flat import FlatTable
 from contextdb.places import table_path
 from contextdb.project import SCHEMA_FILE, Project, load_table
 from contextdb.report import coverage_formats
@@ -60,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Measure one table or a folder of them."""
     _require_sense(arguments)
-    tables = tables_at(arguments.path)
+    tables = [table.flat() for table in tables_at(arguments.path)]
     baseline = _read_baseline(arguments.baseline) if arguments.baseline else None
     if arguments.gap is not None or arguments.explain is not None:
         text, code = _details(arguments, _only(tables)), ExitCode.OK
@@ -85,7 +86,8 @@ def _code(results: CoverageResults) -> ExitCode:
 
 
 def tables_at(text: str) -> list[Table]:
-    """The tables under a path: a folder of them, one file, or a table by its name.
+    """The tables under a path: a folder of them, one file, or a table by its name. Of a folder those that stand in no other: the
+    others are measured where they stand.
 
     Raises
     ------
@@ -94,7 +96,8 @@ def tables_at(text: str) -> list[Table]:
     """
     if not os.path.isdir(text) and Path(text).name != SCHEMA_FILE:
         return [load_table(table_path(text))]
-    found = list(Project.load(text).tables.values())
+    project = Project.load(text)
+    found = [table for name, table in project.tables.items() if name not in project.inner]
     if not found:
         accepted = f"a folder with {SCHEMA_FILE} and a .csv or .parquet file for each table"
         raise FileError(Fault("the folder holds no table.", accepted, place=Place(text), rule="no-tables"))
@@ -119,7 +122,7 @@ def _results(arguments: argparse.Namespace, tables: Sequence[Table], baseline: d
     from contextdb.report.coverage_results import CoverageResults
 
     measured = tuple(_measured(arguments, table, baseline) for table in tables)
-    names = {table.name for table in tables}
+    names = {table.name for table in tables} | {n for t in tables if isinstance(t, FlatTable) for n in t.expansion.names}
     is_folder = os.path.isdir(arguments.path) or Path(arguments.path).name == SCHEMA_FILE
     gone = tuple(name for name in baseline or () if name not in names) if is_folder else ()
     return CoverageResults(measured, gone)
@@ -140,7 +143,7 @@ def _measured(arguments: argparse.Namespace, table: Table, baseline: dict[str, E
     if baseline is not None and table.name in baseline:
         change = compared(opened(table), found.report, baseline[table.name])
         gates.append(max_drop(change, arguments.max_drop or 0.0))
-    return replace(found, change=change, gates=tuple(gates))
+    return coverage_telemetry.ranked(arguments, replace(found, change=change, gates=tuple(gates)), table)
 
 
 def measure(arguments: argparse.Namespace, table: Table) -> Measured:
@@ -159,7 +162,7 @@ def measure(arguments: argparse.Namespace, table: Table) -> Measured:
                 max_gaps=MOST_GAPS,
                 progress=None if told is None else lambda _, share: told(int(1000 * share), 1000),
             )
-        seen = coverage_telemetry.observed(arguments, table)
+        seen = coverage_telemetry.observed(arguments, table, report.gaps)
         compared = pairs(table, seed=arguments.seed, samples=min(arguments.samples, PAIR_SAMPLES))
     lines = tuple(table.place(row).line for row in range(table.n_rows))
     return Measured(report, str(table.path) if table.path else None, tuple(table.assets), lines, compared, telemetry=seen)
@@ -182,7 +185,7 @@ def _details(arguments: argparse.Namespace, table: Table) -> str:
     if arguments.explain is not None:
         row = _row(arguments.explain, table)
         return row_details(measure(arguments, table), row, width)
-    measured = measure(arguments, table)
+    measured = coverage_telemetry.ranked(arguments, measure(arguments, table), table)
     gaps = measured.report.gaps
     text = arguments.gap
     found = [g for i, g in enumerate(gaps, 1) if text in (str(i), g.id)]

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from contextdb.console import printable
 from contextdb.errors import ContextError, Fault
 
 if TYPE_CHECKING:
+    from contextdb.covering import Gap
+    from contextdb.report.coverage_results import Measured
     from contextdb.table import Table
     from contextdb.telemetry import Observed
 
@@ -57,8 +60,8 @@ def require_telemetry(arguments: argparse.Namespace) -> None:
             raise ContextError(Fault(f"{option} is about recorded contexts.", "--telemetry GLOB beside it"))
 
 
-def observed(arguments: argparse.Namespace, table: Table) -> Observed | None:
-    """What the recorded contexts say of a table; None where no files were named. Files that cannot be read are told."""
+def observed(arguments: argparse.Namespace, table: Table, known: Sequence[Gap]) -> Observed | None:
+    """What the recorded contexts say of a table and its gaps; None where no files were named. Files not read are told."""
     if not arguments.telemetry:
         return None
     from contextdb.telemetry import observe
@@ -72,6 +75,7 @@ def observed(arguments: argparse.Namespace, table: Table) -> Observed | None:
             scheduler=arguments.scheduler,
             progress=tell,
             resume=arguments.resume,
+            known=known,
         )
     for file in found.unread:
         for fault in file.faults:
@@ -79,8 +83,19 @@ def observed(arguments: argparse.Namespace, table: Table) -> Observed | None:
     return found
 
 
+def ranked(arguments: argparse.Namespace, measured: Measured, table: Table) -> Measured:
+    """What was measured, with the gaps ranked by the recorded contexts, where there are any."""
+    if measured.telemetry is None:
+        return measured
+    from contextdb.covering.assumed import opened
+    from contextdb.telemetry.gap_list import ranked as by_moments
+
+    report = by_moments(measured.report, opened(table), measured.telemetry, arguments.work, arguments.samples)
+    return replace(measured, report=report)
+
+
 @contextmanager
-def bar(label: str) -> Iterator[Callable[[int, int], None] | None]:
+def bar(label: str) -> Iterator[Callable[[float, int], None] | None]:
     """A bar, told how much is done of how much; on standard error where that is a terminal, else None."""
     if not sys.stderr.isatty():
         yield None

@@ -4,35 +4,47 @@ A file of contexts has a column for each fact and a row for each moment.
 
   contextdb evaluate tables/hit_mid_air.csv moments.csv
   contextdb evaluate hit_mid_air "telemetry/*.parquet" --unknown any --out answers.parquet
+  contextdb evaluate hit_mid_air "telemetry/*.parquet" --engine dask --scheduler tcp://10.0.0.5:8786
+
+Files are streamed. The answers stand in FILE when all of them do: a run that fails or is interrupted leaves FILE as it was. With
+--engine dask the workers read the files, and write beside FILE, by the names that they have here.
 """
 
 from __future__ import annotations
 
 import argparse
-import io
 import os
+import secrets
+import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 
-from contextdb.batch import ManyMatches
 from contextdb.bitmask import Rows
 from contextdb.commands import missing_facts_by_option
+from contextdb.commands.coverage_telemetry import ENGINES, bar
 from contextdb.compiled import CompiledTable
-from contextdb.console import aligned, output, printable, progress, styled, wants_colour
-from contextdb.contexts import context_files, read_contexts
-from contextdb.disk import path_in_quotes, write_atomic
-from contextdb.errors import Fault, FileError, Place, plural
+from contextdb.console import aligned, output, printable, styled, wants_colour
+from contextdb.contexts import context_files
+from contextdb.disk import make_folder, path_in_quotes, write_atomic
+from contextdb.errors import ContextError, Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import UNKNOWN_MODES
 from contextdb.places import open_compiled
 from contextdb.report.render_json import as_json
 
+if TYPE_CHECKING:
+    from contextdb.telemetry.evaluate_file import Answered
+
 N_SHOWN = 15
 OUT_SUFFIXES = (".csv", ".parquet")
+PIECE_BYTES = 1 << 22
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,35 +52,87 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("table", metavar="TABLE", help="a .csv, .parquet or .safetensors file, or the name of a table")
     parser.add_argument("contexts", metavar="CONTEXTS", help="a CSV or Parquet file with a column for each fact, or a glob")
     parser.add_argument("--out", metavar="FILE", help="write each context's valid rows: .csv or .parquet")
-    parser.add_argument("--engine", choices=("local",), default="local", help="where to work it out (default: local, all cores)")
+    parser.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
     parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="what a missing fact does (default: error)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Evaluate the files one after the other; only sums are kept, and with --out the answers."""
+    """Evaluate the files; only sums are kept, and with --out the answers, in a folder beside it until all are there."""
+    if arguments.scheduler is not None and arguments.engine != "dask":
+        raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask beside it"))
     compiled = open_compiled(arguments.table)
     files = context_files(arguments.contexts)
     out = None if arguments.out is None else _out_file(Path(arguments.out), files)
-    n_contexts = n_without = 0
-    hits = np.zeros(compiled.n_rows, np.int64)
-    answers = []
-    for path in progress(files, "evaluating"):
-        with missing_facts_by_option():
-            many = read_contexts(path, compiled).ask(compiled, arguments.unknown)
-        n_without += int((many.counts == 0).sum())
-        hits += many.hits
-        if out is not None:
-            answers.append(_answers(compiled, many, path, n_contexts))
-        n_contexts += len(many)
-    if out is not None:
-        _write(pl.concat(answers), out)
+    with _folder_beside(out) as folder:
+        answered = _answered(arguments, compiled, files, folder)
+        if out is not None and folder is not None:
+            _write(answered, folder, out)
+    sums = list(answered.values())
+    n_contexts, n_without = sum(a.contexts for a in sums), sum(a.without for a in sums)
+    hits = np.sum([a.hits for a in sums], axis=0)
     with output():
         if arguments.json:
             print(as_json(_document(compiled, n_contexts, n_without, hits)), end="")
         else:
             print(*_lines(compiled, n_contexts, n_without, hits), sep="\n")
     return ExitCode.OK
+
+
+def _answered(
+    arguments: argparse.Namespace, compiled: CompiledTable, files: Sequence[Path], folder: Path | None
+) -> dict[Path, Answered]:
+    """What the contexts of each file found, in the order of the files.
+
+    Raises
+    ------
+    ContextDBError
+        A file cannot be read, holds facts that the table cannot be asked with, or was not finished; then nothing is told.
+    """
+    from contextdb.telemetry.engines import with_dask
+    from contextdb.telemetry.evaluate_file import Question, evaluate_file
+
+    question = Question(compiled, arguments.unknown, folder)
+    found: dict[Path, Answered] = {}
+    with bar("evaluating") as tell:
+
+        def tell_share(share: float) -> None:
+            if tell is not None:
+                tell(len(found) + share, len(files))
+
+        here = ((path, evaluate_file(question, path, tell_share)) for path in files)
+        there = with_dask(evaluate_file, question, files, arguments.scheduler) if arguments.engine == "dask" else here
+        for path, answered in there:
+            if answered.faults and arguments.engine == "local":
+                raise _by_option(answered.faults)
+            found[path] = answered
+            tell_share(0.0)
+    if faults := [fault for path in files for fault in found[path].faults]:
+        raise _by_option(faults)
+    return {path: found[path] for path in files}
+
+
+def _by_option(faults: Sequence[Fault]) -> ContextError:
+    try:
+        with missing_facts_by_option():
+            raise ContextError(*faults)
+    except ContextError as error:
+        return error
+
+
+@contextmanager
+def _folder_beside(out: Path | None) -> Iterator[Path | None]:
+    """A folder for what is not finished, beside the file that it becomes; it goes, whatever happens."""
+    if out is None:
+        yield None
+        return
+    folder = out.parent.resolve() / f".contextdb-{secrets.token_hex(8)}"
+    make_folder(folder)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _out_file(out: Path, files: Sequence[Path]) -> Path:
@@ -87,28 +151,26 @@ def _out_file(out: Path, files: Sequence[Path]) -> Path:
     return out
 
 
-def _answers(compiled: CompiledTable, many: ManyMatches, path: Path, first: int) -> pl.DataFrame:
-    assets = np.array(compiled.assets, object)
-    rows = many.lists()
-    return pl.DataFrame(
-        {
-            "context": np.arange(first, first + len(many)),
-            "file": [printable(str(path))] * len(many),
-            "count": many.counts,
-            "rows": pl.Series([r.tolist() for r in rows], dtype=pl.List(pl.Int64)),
-            "assets": pl.Series([assets[r].tolist() for r in rows], dtype=pl.List(pl.String)),
-        }
-    )
+def _write(answered: Mapping[Path, Answered], folder: Path, out: Path) -> None:
+    """Join the answers of the files, numbering contexts through, into one file; streamed."""
+    from contextdb.telemetry.evaluate_file import answers_of
 
-
-def _write(answers: pl.DataFrame, path: Path) -> None:
-    buffer = io.BytesIO()
-    if path.suffix == ".parquet":
-        answers.write_parquet(buffer)
-    else:
-        joined = (pl.col("rows").cast(pl.List(pl.String)).list.join(" "), pl.col("assets").list.join(" | "))
-        answers.with_columns(*joined).write_csv(buffer)
-    write_atomic(path, buffer.getvalue())
+    frames, first = [], 0
+    for path, own in answered.items():
+        scan = pl.scan_parquet(answers_of(folder, path), glob=False)
+        frames.append(scan.with_columns(pl.col("context") + first))
+        first += own.contexts
+    joined, whole = pl.concat(frames), folder / f"answers{out.suffix}"
+    try:
+        if out.suffix == ".parquet":
+            joined.sink_parquet(whole)
+        else:
+            texts = (pl.col("rows").cast(pl.List(pl.String)).list.join(" "), pl.col("assets").list.join(" | "))
+            joined.with_columns(*texts).sink_csv(whole)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise FileError(Fault(f"the answers cannot be written: {error}.", "room on the disk", place=Place(str(out)))) from None
+    with whole.open("rb") as file:
+        write_atomic(out, iter(partial(file.read, PIECE_BYTES), b""))
 
 
 def _document(compiled: CompiledTable, n_contexts: int, n_without: int, hits: Rows) -> dict[str, object]:

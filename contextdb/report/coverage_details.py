@@ -26,6 +26,8 @@ def _gap_lines(measured: Measured, gap: Gap, table: Table, width: int) -> Iterat
     yield f"Gap {report.gaps.index(gap) + 1} of {len(report.gaps)} in {printable(report.table)} ({gap.id}): {size}"
     if gap.share and gap.new_share != gap.share:
         yield f"{format_percent(gap.new_share)} of the contexts are in no gap before it"
+    if gap.telemetry is not None:
+        yield f"{format_percent(gap.telemetry)} of the recorded moments"
     yield ""
     yield from aligned(list(gap.cells.items()) or [("every context", "")], indent="  ")
     if gap.nearest is not None:

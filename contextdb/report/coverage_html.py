@@ -13,7 +13,7 @@ from contextdb import __version__
 from contextdb.console import printable
 from contextdb.covering import CoverageReport, format_percent
 from contextdb.report.coverage_heat import heat_map
-from contextdb.report.coverage_results import CoverageResults, Measured, gap_size
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
 from contextdb.report.coverage_words import (
     assumed_sentences,
@@ -128,7 +128,7 @@ def _telemetry(measured: Measured) -> Iterator[str]:
         return
     yield "<h3>Recorded moments</h3>\n"
     yield _paragraph(seen.headline)
-    lines = [[_cell(format_percent(gap.share), gap.share), _cell(gap.text)] for gap in seen.gaps]
+    lines = [[_cell(format_percent(gap.share), gap.share), _cell(gap.text)] for gap in measured.seen_elsewhere]
     if lines:
         yield _table("Moments without a valid row", [("share of the moments", True), ("contexts", False)], lines)
     yield from (_paragraph(f"{sentence}.", "muted") for sentence in facts_sentences(seen))
@@ -141,10 +141,12 @@ def _gaps(measured: Measured) -> Iterator[str]:
     if not report.gaps:
         return
     columns = [("", True), ("share", True), ("in no gap above", True), ("contexts without a valid row", False), ("nearest", False)]
+    columns[2:2] = [("of the moments", True)] if has_moments(report) else []
     lines = [
         [
             _cell(str(i), i),
             _cell(gap_size(gap), gap.share),
+            *([_cell(gap_moments(gap), gap.telemetry or 0.0)] if has_moments(report) else []),
             _cell(format_percent(gap.new_share), gap.new_share),
             _cell(gap.text),
             _cell(nearest_sentence(measured, gap).removeprefix("nearest: ")),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from xml.etree import ElementTree as ET
 
 from contextdb.console import printable
-from contextdb.report.coverage_results import CoverageResults, Measured
+from contextdb.covering import Gap
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments
 from contextdb.report.coverage_words import gaps_sentence
 from contextdb.report.results import as_path
 
@@ -52,7 +53,11 @@ def _lines(measured: Measured) -> list[str]:
     lines = [report.headline, gaps_sentence(report)]
     if measured.change is not None:
         lines += [f"new gap: {gap.text}" for gap in measured.change.opened[:MOST_GAPS]]
-    lines += [f"gap: {gap.text}" for gap in report.gaps[:MOST_GAPS]]
+    lines += [f"gap: {gap.text}{_moments(gap)}" for gap in report.gaps[:MOST_GAPS]]
     if len(report.gaps) > MOST_GAPS:
         lines.append(f"… and {len(report.gaps) - MOST_GAPS:,} more")
     return [printable(line) for line in lines]
+
+
+def _moments(gap: Gap) -> str:
+    return "" if gap.telemetry is None else f" ({gap_moments(gap)} of the recorded moments)"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextdb.covering import Gap, format_percent
 from contextdb.covering.baseline import EarlierGap
 from contextdb.errors import plural
-from contextdb.report.coverage_results import CoverageResults, Measured, gap_size
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
 from contextdb.report.coverage_words import (
     assumed_sentences,
@@ -83,9 +83,10 @@ def _telemetry(measured: Measured, most: int) -> Iterator[str]:
     if seen is None:
         return
     yield escaped(seen.headline)
-    if seen.gaps[:most]:
+    others = measured.seen_elsewhere[:most]
+    if others:
         yield "\n| share of the moments | contexts without a valid row |\n| --- | --- |"
-        yield from (f"| {escaped(format_percent(gap.share))} | {escaped(cells_text(gap.cells))} |" for gap in seen.gaps[:most])
+        yield from (f"| {escaped(format_percent(gap.share))} | {escaped(cells_text(gap.cells))} |" for gap in others)
     if facts := list(facts_sentences(seen)):
         yield "\n" + "\n".join(f"- {escaped(sentence)}" for sentence in facts)
 
@@ -110,12 +111,14 @@ def _gaps(measured: Measured, most: int) -> Iterator[str]:
     yield f"{escaped(gaps_sentence(report))}."
     shown = report.gaps[:most]
     if shown:
-        yield "\n| | share | contexts without a valid row | nearest |\n| --- | --- | --- | --- |"
+        head, line, blank = (" moments |", " --- |", " |") if has_moments(report) else ("", "", "")
+        yield f"\n| | share |{head} contexts without a valid row | nearest |\n| --- | --- |{line} --- | --- |"
         for i, gap in enumerate(shown, 1):
             near = nearest_sentence(measured, gap).removeprefix("nearest: ")
-            yield f"| {i} | {escaped(gap_size(gap))} | {escaped(cells_text(gap.cells))} | {escaped(near)} |"
+            moments = f" {escaped(gap_moments(gap))} |" if has_moments(report) else ""
+            yield f"| {i} | {escaped(gap_size(gap))} |{moments} {escaped(cells_text(gap.cells))} | {escaped(near)} |"
         if len(shown) < len(report.gaps):
-            yield f"| | | … and {len(report.gaps) - len(shown):,} more | |"
+            yield f"| | |{blank} … and {len(report.gaps) - len(shown):,} more | |"
 
 
 def _pairs(measured: Measured, most: int) -> Iterator[str]:

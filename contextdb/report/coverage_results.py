@@ -14,7 +14,7 @@ from contextdb.findings import Finding
 from contextdb.report.results import CheckReport, TableSummary
 
 if TYPE_CHECKING:
-    from contextdb.telemetry.observed import Observed
+    from contextdb.telemetry.observed import Observed, SeenGap
 
 ROUNDING = 1e-12
 """Shares are as exact as this; a bar of 100 % takes nothing less all the same."""
@@ -62,6 +62,12 @@ class Measured:
         """A row as people find it: its line, else its number, and its asset."""
         line = self.lines[row]
         return f"{f'row {row}' if line is None else f'line {line}'} {self.assets[row]}".rstrip()
+
+    @property
+    def seen_elsewhere(self) -> tuple[SeenGap, ...]:
+        """The gaps of the recording that are not in the list of gaps."""
+        listed = {gap.id for gap in self.report.gaps}
+        return () if self.telemetry is None else tuple(gap for gap in self.telemetry.gaps if gap.id not in listed)
 
     def worst_pairs(self, most: int) -> list[Slice]:
         """Of each pair of conditions the combination that is covered least; the worst of these, the largest of equals first."""
@@ -163,6 +169,16 @@ def gap_size(gap: Gap) -> str:
     return f"{'' if gap.is_exact else '≈ '}{format_percent(gap.share)}" if gap.share else "point"
 
 
+def gap_moments(gap: Gap) -> str:
+    """The share of the recorded moments in a gap as people read it; "" where none were observed."""
+    return "" if gap.telemetry is None else format_percent(gap.telemetry)
+
+
+def has_moments(report: CoverageReport) -> bool:
+    """Whether gaps know their share of the recorded moments."""
+    return any(gap.telemetry is not None for gap in report.gaps)
+
+
 def _findings(measured: Measured) -> Iterator[Finding]:
     report = measured.report
     for gate in measured.gates:
@@ -180,7 +196,8 @@ def _findings(measured: Measured) -> Iterator[Finding]:
 
 def _gap_finding(measured: Measured, gap: Gap, is_new: bool) -> Finding:
     size = "single points" if not gap.share else f"{gap_size(gap)} of the contexts"
-    message = f"no row is valid for {gap.text} ({size}; gap {gap.id})."
+    moments = "" if gap.telemetry is None else f", {gap_moments(gap)} of the recorded moments"
+    message = f"no row is valid for {gap.text} ({size}{moments}; gap {gap.id})."
     if is_new:
         return Finding("new-gap", "warning", message, measured.report.table, measured.file)
     return Finding("gap", "info", message, measured.report.table, measured.file)

@@ -9,7 +9,7 @@ from contextdb.console import printable, styled, width_of
 from contextdb.covering import Gap, format_percent
 from contextdb.errors import plural
 from contextdb.findings import LEVELS, Finding
-from contextdb.report.coverage_results import CoverageResults, Measured, gap_size
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_words import (
     assumed_sentences,
     cells_text,
@@ -91,9 +91,15 @@ def _gaps(measured: Measured, colour: bool, width: int, most: int) -> Iterator[s
     report = measured.report
     yield from (styled(line, "bold", colour) for line in wrapped(gaps_sentence(report), width))
     shown = report.gaps[:most]
-    number, share = len(str(len(shown))), max((width_of(gap_size(g)) for g in shown), default=0)
-    for i, gap in enumerate(shown, 1):
-        head = f"{INDENT}{i:>{number}}  {gap_size(gap):>{share}}  "
+    sizes = [[gap_size(gap), *([gap_moments(gap)] if has_moments(report) else [])] for gap in shown]
+    if has_moments(report):
+        sizes.insert(0, ["contexts", "moments"])
+    number, widths = len(str(len(shown))), [max(map(width_of, column)) for column in zip(*sizes, strict=True)]
+    columns = ["".join(f"{size:>{width}}  " for size, width in zip(own, widths, strict=True)) for own in sizes]
+    if has_moments(report):
+        yield f"{INDENT}{'':>{number}}  {columns.pop(0)}".rstrip()
+    for i, (gap, column) in enumerate(zip(shown, columns, strict=True), 1):
+        head = f"{INDENT}{i:>{number}}  {column}"
         yield from hanging(head, cells_text(gap.cells), width)
         if gap.nearest is not None:
             yield from hanging(" " * width_of(head), nearest_sentence(measured, gap), width)
@@ -169,7 +175,7 @@ def _telemetry(measured: Measured, colour: bool, width: int) -> Iterator[str]:
         return
     yield styled("Recorded moments", "bold", colour)
     yield from hanging(INDENT, seen.headline, width)
-    for gap in seen.gaps[:MOST_ITEMS]:
+    for gap in measured.seen_elsewhere[:MOST_ITEMS]:
         yield from hanging(f"{INDENT}{'' if gap.is_exact else '≈ '}{format_percent(gap.share)}  ", cells_text(gap.cells), width)
     never = seen.never_used
     if never:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from contextdb.covering import CoverageReport, Gap, Slice, format_percent
 from contextdb.covering.baseline import Change
 from contextdb.covering.shares import told_apart
-from contextdb.errors import plural
-from contextdb.report.coverage_results import Measured
+from contextdb.errors import in_quotes, nearest, plural
+from contextdb.report.coverage_results import Measured, has_moments
 
 if TYPE_CHECKING:
     from contextdb.telemetry.observed import FactNote, Observed
@@ -46,7 +46,8 @@ def gaps_sentence(report: CoverageReport) -> str:
             return "No gap: every context has a valid row"
         return "No gap was found; that there is none is not proved"
     listed = "all of them" if report.gaps_complete else "there are more"
-    return f"Contexts without a valid row: {plural(len(report.gaps), 'gap')}, {listed}; the largest first"
+    order = "those of most recorded moments first" if has_moments(report) else "the largest first"
+    return f"Contexts without a valid row: {plural(len(report.gaps), 'gap')}, {listed}; {order}"
 
 
 def nearest_sentence(measured: Measured, gap: Gap) -> str:
@@ -105,13 +106,19 @@ def change_sentence(measured: Measured, change: Change) -> str:
 def facts_sentences(seen: Observed) -> Iterator[str]:
     """What is wrong with recorded facts."""
     for word, notes in (("missing", seen.missing), ("outside the domain", seen.outside)):
-        told = [f"{note.condition} in {plural(note.moments, 'moment')}{_examples(note)}" for note in notes]
+        told = [f"{note.condition} in {plural(note.moments, 'moment')}{_examples(note) or _meant(note, seen)}" for note in notes]
         if told:
             yield f"{word}: {_some(told, ', ')}"
     if seen.unknown_columns:
         yield f"columns that the table does not ask for: {_some(seen.unknown_columns, ', ')}"
     if seen.unread:
         yield f"not read: {_some([file.file for file in seen.unread], ', ')}"
+
+
+def _meant(note: FactNote, seen: Observed) -> str:
+    """The column that may have been meant for a fact that is missing everywhere."""
+    near = nearest(note.condition, seen.unknown_columns) if note.moments == seen.moments else None
+    return f" (is it {in_quotes(near)}?)" if near else ""
 
 
 def _examples(note: FactNote) -> str:

@@ -62,6 +62,36 @@ RULES: dict[str, Rule] = {
         "A row names no asset.",
         "Name the asset of the row, or delete the row.",
     ),
+    "no-such-table": Rule(
+        "error",
+        "A row stands for a table that is not there.",
+        "Correct the name after the @, bring the table back, or put the asset in quotes where its name begins with @.",
+    ),
+    "cyclic-tables": Rule(
+        "error",
+        "A table stands in itself, by way of the tables inside it.",
+        "Take one of the rows on the way out, or let it stand for another table.",
+    ),
+    "unusable-table": Rule(
+        "error",
+        "A row stands for a table that cannot be used.",
+        "Mend the faults of that table; its own check tells them.",
+    ),
+    "unlike-conditions": Rule(
+        "error",
+        "A condition has another type in a table inside the table.",
+        "Declare the condition in contextdb.toml, so that its type is no guess.",
+    ),
+    "too-many-rows": Rule(
+        "error",
+        "With the rows of its inner tables a table has too many rows.",
+        "Let rows of one table stand for another in fewer places.",
+    ),
+    "shut-out-row": Rule(
+        "info",
+        "A row of an inner table can never be valid where the table stands.",
+        "Nothing, where the inner table stands in several places; else widen one of the two cells, or delete the row.",
+    ),
     "duplicate-asset": Rule(
         "warning",
         "An asset stands in more than one row.",
@@ -146,6 +176,16 @@ RULES: dict[str, Rule] = {
         "info",
         "Every cell of a condition is Any, so it excludes no row.",
         "Nothing need be done; delete the column where nobody is going to fill it.",
+    ),
+    "always-true": Rule(
+        "info",
+        "A rule is true in every context of the declared values and bounds, so it excludes nothing.",
+        "Nothing need be done; empty the cell, or correct the rule where it was to exclude something.",
+    ),
+    "never-true": Rule(
+        "warning",
+        "A rule is false in every context of the declared values and bounds, so its row never matches.",
+        "Correct the rule, or widen `min`, `max` or `values` of its conditions. To switch a row off, use an `enabled` column.",
     ),
     "unused-condition": Rule(
         "info",

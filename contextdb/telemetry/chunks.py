@@ -6,6 +6,7 @@ batch at a time.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -34,6 +35,8 @@ class Chunk:
     first_row: int
     is_text: bool
     """Facts are written as on the command line."""
+    share_done: float = 1.0
+    """How much of the file is behind with this chunk, 0…1."""
     raw: bytes = b""
     starts: list[int] = field(default_factory=list)
     """Where in `raw` each row begins."""
@@ -77,13 +80,18 @@ def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple
         asked = [name for name in names if name in wanted]
         chosen = scan.select(by_name(asked))
         done = 0
-        if not asked or not n_rows:
-            yield names, Chunk(n_rows, pl.DataFrame(), 0, False)
+        if not n_rows:
+            yield names, Chunk(0, pl.DataFrame(), 0, False)
+        if not asked:
+            for start in range(0, n_rows, ROWS):
+                stop = min(start + ROWS, n_rows)
+                yield names, Chunk(stop - start, pl.DataFrame(), start, False, stop / n_rows)
+        if not n_rows or not asked:
             return
         for batch in _batches(chosen, n_rows):
             for start in range(0, len(batch), ROWS):
                 part = batch.slice(start, ROWS)
-                yield names, Chunk(len(part), part, done, False)
+                yield names, Chunk(len(part), part, done, False, min(1.0, (done + len(part)) / n_rows))
                 done += len(part)
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         read_texts(path)  # says what is wrong with the file
@@ -103,7 +111,7 @@ def _batches(scan: pl.LazyFrame, n_rows: int) -> Iterator[pl.DataFrame]:
 def _csv_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple[str, ...], Chunk]]:
     names: tuple[str, ...] | None = None
     head = b""
-    n_rows, n_lines = 0, 0
+    n_rows, n_lines, n_bytes, size = 0, 0, 0, max(1, os.path.getsize(path)) if path.exists() else 1
     for raw in _pieces(path):
         require_text(raw, str(path))
         records, strays = find_records(head + raw)
@@ -117,7 +125,9 @@ def _csv_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple[str
             lead = 0
         else:
             lead = len(head)
-        chunk = _csv_chunk(head[:lead] + raw, records, names, wanted, n_rows, n_lines - head[:lead].count(b"\n"))
+        n_bytes += len(raw)
+        before = n_lines - head[:lead].count(b"\n")
+        chunk = _csv_chunk(head[:lead] + raw, records, names, wanted, n_rows, before, min(1.0, n_bytes / size))
         n_lines += line_of(raw, len(raw)) - 1
         n_rows += chunk.n_rows
         if chunk.n_rows:
@@ -129,7 +139,13 @@ def _csv_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple[str
 
 
 def _csv_chunk(
-    raw: bytes, records: Records, names: tuple[str, ...], wanted: Collection[str], first_row: int, lines_before: int
+    raw: bytes,
+    records: Records,
+    names: tuple[str, ...],
+    wanted: Collection[str],
+    first_row: int,
+    lines_before: int,
+    share_done: float,
 ) -> Chunk:
     starts, stops = records.starts[1:].tolist(), records.stops[1:].tolist()
     places = [at for at, name in enumerate(names) if name in wanted]
@@ -140,7 +156,7 @@ def _csv_chunk(
         schema = dict.fromkeys(map(str, range(len(names))), pl.String)
         frame = pl.read_csv(rows, has_header=False, schema=schema).select(map(str, places))
         frame = frame.rename({str(at): names[at] for at in places})
-    return Chunk(len(starts), frame, first_row, True, raw, starts, lines_before)
+    return Chunk(len(starts), frame, first_row, True, share_done, raw, starts, lines_before)
 
 
 def _pieces(path: Path) -> Iterator[bytes]:

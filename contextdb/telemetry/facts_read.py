@@ -1,6 +1,7 @@
 """Columns of recorded facts, read so that no fact can stop the evaluation: N rows.
 
-What is outside a condition's domain becomes missing, and is noted; numbers outside their bounds stay, and are noted too.
+What is outside a condition's domain becomes missing, and is noted; numbers outside their bounds stay, and are noted too. Columns
+that are plainly typed are read as a whole; of others each distinct value once.
 """
 
 from __future__ import annotations
@@ -23,18 +24,24 @@ PLAIN_NUMBER = r"^[ \t]*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?[ \t]
 MOST_EXAMPLES = 5
 
 
+Doubles = NDArray[np.float64]
+
+
 @dataclass(frozen=True, eq=False)
 class FactColumn:
-    """The facts of one condition: what `query_many` takes, which are missing, and which lie outside the domain."""
+    """The facts of one condition, which are missing, and which lie outside the domain; None where none does."""
 
-    values: pl.Series
-    missing: Flags
-    outside: Flags
+    values: Doubles | pl.Series
+    """Numbers: float64 [N], NaN where missing. Others: a series, null where missing; that of an enum is a `pl.Enum`."""
+    missing: Flags | None
+    outside: Flags | None
     given: pl.Series
     """As the file has them."""
 
     def examples(self, counted: Flags) -> tuple[str, ...]:
         """A few of the values outside, the first by their letters, of the rows that count."""
+        if self.outside is None:
+            return ()
         found = self.given.filter(pl.Series(self.outside & counted))
         if isinstance(found.dtype, pl.Float32 | pl.Float64 | pl.String) or found.dtype.is_integer():
             texts = found.unique().to_list()
@@ -49,31 +56,63 @@ def read_facts(given: pl.Series, condition: Condition, is_text: bool) -> FactCol
     if kind in NUMERIC:
         return _numbers(given, condition, is_text)
     if kind == "bool" and given.dtype == pl.Boolean:
-        nothing = np.zeros(len(given), np.bool_)
-        return FactColumn(given, given.is_null().to_numpy(), nothing, given)
+        return FactColumn(given, _nulls(given), None, given)
     if kind == "enum" and given.dtype == pl.String and not is_text:
         return _names(given, condition)
     return _each(given, condition, is_text)
 
 
+def _nulls(series: pl.Series) -> Flags | None:
+    return series.is_null().to_numpy() if series.null_count() else None
+
+
+def _some(flags: Flags) -> Flags | None:
+    return flags if flags.any() else None
+
+
 def _names(given: pl.Series, condition: Condition) -> FactColumn:
     """Values of an enum, all at once."""
-    known = given.cast(pl.Enum(list(condition.domain.values or ())), strict=False)
-    missing = given.is_null()
-    outside = (known.is_null() & ~missing).to_numpy()
-    return FactColumn(known if outside.any() else given, missing.to_numpy(), outside, given)
+    known = given.cast(_dtype(condition), strict=False)
+    n_outside = known.null_count() - given.null_count()
+    outside = (known.is_null() & given.is_not_null()).to_numpy() if n_outside else None
+    return FactColumn(known, _nulls(given), outside, given)
 
 
 def _numbers(given: pl.Series, condition: Condition, is_text: bool) -> FactColumn:
-    domain = condition.domain
+    if not is_text and given.dtype.is_numeric() and not given.dtype.is_decimal():
+        facts = _doubles(given)
+        if _is_inside(facts, condition):
+            return FactColumn(facts, None, None, given)
+        return _judged(facts.copy(), np.zeros(len(facts), np.bool_), condition, given)
     if is_text and given.dtype == pl.String:
         facts, read = _number_texts(given, condition)
-    elif given.dtype.is_numeric() and not given.dtype.is_decimal():
-        facts, read = given.cast(pl.Float64).fill_null(np.nan).to_numpy().copy(), None
     else:
         read = _each(given, condition, is_text)
-        facts = read.values.cast(pl.Float64).fill_null(np.nan).to_numpy().copy()
-    wrong = np.zeros(len(facts), np.bool_) if read is None else read.outside.copy()
+        facts = _doubles(pl.Series(read.values)).copy()
+    wrong = np.zeros(len(facts), np.bool_) if read is None or read.outside is None else read.outside.copy()
+    return _judged(facts, wrong, condition, given)
+
+
+def _doubles(series: pl.Series) -> Doubles:
+    """Numbers as float64 [N], NaN where missing; they may be the series' own and are not to be written to."""
+    wide = series.cast(pl.Float64)
+    return (wide.fill_null(np.nan) if wide.null_count() else wide).to_numpy()
+
+
+def _is_inside(facts: Doubles, condition: Condition) -> bool:
+    """Whether no fact is missing or outside the domain, as far as that is quickly said."""
+    domain = condition.domain
+    if domain.kind == "int" or not len(facts):
+        return False
+    low, high = facts.min(), facts.max()  # NaN where one of them is
+    return bool(
+        np.isfinite(low) and np.isfinite(high) if domain.kind == "angle" else low >= domain.minimum and high <= domain.maximum
+    )
+
+
+def _judged(facts: Doubles, wrong: Flags, condition: Condition, given: pl.Series) -> FactColumn:
+    """Numbers, of which some may be known to be no fact."""
+    domain = condition.domain
     if domain.kind == "int":
         wrong |= ~np.isnan(facts) & (facts != np.trunc(facts))
     if domain.kind == "angle":
@@ -82,20 +121,22 @@ def _numbers(given: pl.Series, condition: Condition, is_text: bool) -> FactColum
     missing = np.isnan(facts) & ~wrong
     if domain.kind != "angle":
         wrong = wrong | (facts < domain.minimum) | (facts > domain.maximum)
-    return FactColumn(pl.Series(facts, nan_to_null=False), missing, wrong, given)
+    return FactColumn(facts, _some(missing), _some(wrong), given)
 
 
-def _number_texts(given: pl.Series, condition: Condition) -> tuple[NDArray[np.float64], FactColumn]:
+def _number_texts(given: pl.Series, condition: Condition) -> tuple[Doubles, FactColumn | None]:
     """Numbers written as texts: plain ones at once, all others one by one."""
     is_plain = given.str.contains(PLAIN_NUMBER).fill_null(False).to_numpy()
-    plain = given.str.strip_chars(" \t").cast(pl.Float64, strict=False)
+    facts = _doubles(given.str.strip_chars(" \t").cast(pl.Float64, strict=False)).copy()
     others = np.flatnonzero(~is_plain)
-    facts = plain.fill_null(np.nan).to_numpy().copy()
-    outside = np.zeros(len(given), np.bool_)
+    if not len(others):
+        return facts, None
     read = _each(given.gather(others), condition, True)
-    facts[others] = read.values.cast(pl.Float64).fill_null(np.nan).to_numpy()
-    outside[others] = read.outside
-    return facts, FactColumn(plain, np.isnan(facts) & ~outside, outside, given)
+    facts[others] = _doubles(pl.Series(read.values))
+    outside = np.zeros(len(given), np.bool_)
+    if read.outside is not None:
+        outside[others] = read.outside
+    return facts, FactColumn(facts, None, outside, given)
 
 
 def _each(given: pl.Series, condition: Condition, is_text: bool) -> FactColumn:
@@ -116,7 +157,7 @@ def _each(given: pl.Series, condition: Condition, is_text: bool) -> FactColumn:
     distinct = pl.Series(facts, dtype=_dtype(condition), strict=False)
     taken = distinct.gather(codes) if len(codes) else distinct.clear()
     is_wrong = np.array(wrong, np.bool_)[codes] if len(codes) else np.zeros(0, np.bool_)
-    return FactColumn(taken, taken.is_null().to_numpy() & ~is_wrong, is_wrong, given)
+    return FactColumn(taken, _some(taken.is_null().to_numpy() & ~is_wrong), _some(is_wrong), given)
 
 
 def _coded(given: pl.Series) -> tuple[NDArray[np.int64], list[object]]:
@@ -143,6 +184,8 @@ def _dtype(condition: Condition) -> pl.DataType:
     kind = condition.domain.kind
     if kind in NUMERIC:
         return pl.Float64()
+    if kind == "enum":
+        return pl.Enum(list(condition.domain.values or ()))
     return pl.Boolean() if kind == "bool" else pl.List(pl.String) if kind == "tags" else pl.String()
 
 

@@ -1,7 +1,7 @@
 """Contexts as keys: which are the same, how many there are, and a sample of them that can be summed over files.
 
-A key is what the table can tell of a context: int32 codes. The smallest hashes seen are a uniform sample of the distinct contexts
-that is the same in whichever order files come; as long as it is not full it is all of them.
+N contexts, K words a key. The smallest hashes seen are a uniform sample of the distinct contexts that is the same in
+whichever order files come; as long as it is not full it is all of them. Where numba is not there numpy does the same, slower.
 
 Source: Bar-Yossef et al., "Counting distinct elements in a data stream", RANDOM 2002 (the k-th smallest hash as an estimator).
 """
@@ -15,51 +15,67 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
+from contextdb.telemetry.number_classes import NumberClasses
 
-Keys = NDArray[np.int32]
+KeyWords = NDArray[np.uint64]
+"""uint64 [K, N]"""
 Hashes = NDArray[np.uint64]
 Counts = NDArray[np.int64]
+NUMPY_BLOCK = 2048
 
-MOST_HASHES = 1 << 16
+
+def add_numbers(facts: NDArray[np.float64], among: NumberClasses, shift: int, word: NDArray[np.uint64]) -> None:
+    """Put the class of each number into `word` uint64 [N] at bit `shift`."""
+    if kernels := load_kernels():
+        kernels.add_numbers(facts, among.ended, among.low, among.scale, among.before, shift, word)
+    else:
+        classes = np.where(np.isnan(facts), len(among.bounds) + 1, np.searchsorted(among.bounds, facts, "right"))
+        word |= classes.astype(np.uint64) << np.uint64(shift)
 
 
-def row_hashes(keys: Keys) -> Hashes:
+def add_classes(classes: NDArray[np.int32] | NDArray[np.uint8], shift: int, word: NDArray[np.uint64]) -> None:
+    """Put each class into `word` uint64 [N] at bit `shift`."""
+    if kernels := load_kernels():
+        kernels.add_classes(classes, shift, word)
+    else:
+        word |= classes.astype(np.uint64) << np.uint64(shift)
+
+
+def hashes_of(words: KeyWords) -> Hashes:
     """A 64-bit number for each key, the same on every machine."""
-    out = np.zeros(len(keys), np.uint64)
-    if kernels := _kernels():
-        kernels.hash_rows(keys, out)
+    out = np.zeros(words.shape[1], np.uint64)
+    if kernels := load_kernels():
+        kernels.hash_words(words, out)
         return out
-    for column in keys.T.astype(np.int64):
-        out = (out ^ column.view(np.uint64)) + np.uint64(0x9E3779B97F4A7C15)
+    for word in words:
+        out = (out ^ word) + np.uint64(0x9E3779B97F4A7C15)
         out = (out ^ (out >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
         out = (out ^ (out >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
         out = out ^ (out >> np.uint64(31))
     return out
 
 
-def grouped(keys: Keys, moments: Counts) -> tuple[Hashes, NDArray[np.int64], Counts]:
-    """The distinct keys: their hashes, the first row of each, and the sum of their moments."""
-    hashes = row_hashes(keys)
-    distinct, first, inverse = np.unique(hashes, return_index=True, return_inverse=True)
-    if not np.array_equal(keys[first][inverse], keys):  # two keys of one hash: once in 2^28 chunks
-        _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        distinct = hashes[first]
-    sums = np.zeros(len(first), np.int64)
-    np.add.at(sums, inverse.reshape(-1), moments)
-    return distinct, first, sums
-
-
-def add_hits(masks: Words, moments: Counts, hits: Counts) -> None:
-    """Add the moments of each context to the rows that its mask holds; `hits` is int64 [64 W]."""
-    if kernels := _kernels():
-        kernels.add_hits(masks, moments, hits)
+def grouped(words: KeyWords, moments: Counts) -> tuple[Hashes, NDArray[np.int32], Counts]:
+    """The distinct keys that have moments: their hashes, the first context of each, and the sum of their moments."""
+    hashes = hashes_of(words)
+    if kernels := load_kernels():
+        table = np.zeros(2 << max(1, len(hashes)).bit_length(), np.int32)
+        first, sums = np.empty(len(hashes), np.int32), np.empty(len(hashes), np.int64)
+        n = kernels.group(words, hashes, moments, table, first, sums)
+        first, sums = first[:n], sums[:n]
     else:
-        hits += moments @ bitmask.unpack(masks, len(hits)).astype(np.int64)
+        counted = np.flatnonzero(moments)
+        _, at, inverse = np.unique(words[:, counted], axis=1, return_index=True, return_inverse=True)
+        first, sums = counted[at].astype(np.int32), np.zeros(len(at), np.int64)
+        np.add.at(sums, inverse.reshape(-1), moments[counted])
+    return hashes[first], first, sums
 
 
-def smallest(hashes: Hashes, most: int = MOST_HASHES) -> Hashes:
-    """The smallest of some hashes, each once, ascending."""
-    return np.unique(hashes)[:most]
+def begins(ordered: Hashes) -> NDArray[np.bool_]:
+    """Which of some ascending hashes differ from the one before."""
+    found = np.ones(len(ordered), np.bool_)
+    found[1:] = ordered[1:] != ordered[:-1]
+    return found
 
 
 def estimated(hashes: Hashes, is_full: bool) -> int:
@@ -69,7 +85,18 @@ def estimated(hashes: Hashes, is_full: bool) -> int:
     return round((len(hashes) - 1) / ((float(hashes[-1]) + 1.0) / 2.0**64))
 
 
-def _kernels() -> ModuleType | None:
+def rows_of(masks: Words) -> NDArray[np.int64]:
+    """The rows that masks uint64 [N, W] hold, one mask after the other."""
+    if kernels := load_kernels():
+        found = np.empty(int(bitmask.count(masks).sum()), np.int64)
+        kernels.list_rows(masks, found)
+        return found
+    blocks = (masks[start : start + NUMPY_BLOCK] for start in range(0, len(masks), NUMPY_BLOCK))
+    return np.concatenate([np.zeros(0, np.int64), *(np.nonzero(bitmask.unpack(b, 64 * b.shape[1]))[1] for b in blocks)])
+
+
+def load_kernels() -> ModuleType | None:
+    """The compiled kernels; None where numba is not installed."""
     try:
         from contextdb.telemetry import kernels
     except ImportError:

@@ -4,28 +4,33 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 from contextdb.classes import TagMasks
 from contextdb.compiled import CompiledTable
 from contextdb.contexts import context_files
+from contextdb.covering.assumed import opened
 from contextdb.covering.factors import TagFactor
+from contextdb.covering.report import Gap
+from contextdb.covering.ruled import RuledTable
 from contextdb.covering.space import Space, require_counts
 from contextdb.errors import ContextError, Fault, FileError, in_quotes, nearest, some
 from contextdb.table import Table
-from contextdb.telemetry.engines import serially, with_dask
+from contextdb.telemetry.engines import ENGINES, Engine, with_dask
+from contextdb.telemetry.gap_list import box_of
 from contextdb.telemetry.keys import estimated
-from contextdb.telemetry.observed import BadFile, FactNote, Observed
+from contextdb.telemetry.observe_file import observe_file
+from contextdb.telemetry.observed import BadFile, FactNote, Observed, SeenGap
 from contextdb.telemetry.parts import Part, Plan, added, nothing
 from contextdb.telemetry.saved_parts import SavedParts
 from contextdb.telemetry.seen_gaps import seen_gaps
 
-Engine = Literal["local", "dask"]
-ENGINES: tuple[Engine, ...] = ("local", "dask")
 MOST_GAPS = 20
-Tell = Callable[[int, int], None]
-"""Is told how many files are done, and how many there are."""
+MOST_THREADS = 4
+"""Beside those that read: more would wait for them, and each holds a chunk in memory."""
+Tell = Callable[[float, int], None]
+"""Is told how many files are done, and how many there are; a file that is half done counts half."""
 
 
 def observe(
@@ -38,6 +43,7 @@ def observe(
     progress: Tell | None = None,
     resume: str | Path | None = None,
     max_gaps: int = MOST_GAPS,
+    known: Sequence[Gap] = (),
 ) -> Observed:
     """Hold recorded contexts against a table. Files are streamed, and only sums are kept.
 
@@ -49,12 +55,14 @@ def observe(
         A column that says how often each row's moment was seen, a whole number from 0 up.
     engine : {"local", "dask"}
         This process, or Dask (`pip install "contextdb[dask]"`): the workers of `scheduler`, or a cluster of this machine's own.
-    progress : callable of (int, int), optional
-        Is told how many files are done, of how many; first with 0.
+    progress : callable of (float, int), optional
+        Is told how many files are done, of how many; first with 0. A file that is half done counts half, where it is read here.
     resume : path of a folder, optional
         Where the sums of finished files are kept. A run that was interrupted goes on there; a changed file or table is read anew.
     max_gaps : int
-        At most so many gaps are named.
+        At most so many gaps are named, besides those that are known.
+    known : sequence of Gap, optional
+        Gaps of the table, as `coverage` gives them: moments are counted into these first.
 
     Returns
     -------
@@ -64,10 +72,10 @@ def observe(
 
     Raises
     ------
-    TableError
-        The table has cells that cannot be read.
+    TableError, ExpressionError
+        The table has cells, or an assumption, that cannot be read.
     FileError, ContextError
-        There is no such file, or none of them can be read; an engine that there is not.
+        There is no such file, or none of them can be read; an engine that there is not; a compiled table with rules.
     EngineError
         Dask is missing or does not answer, or files were not finished on its workers: they are named.
     """
@@ -75,8 +83,8 @@ def observe(
     if engine not in ENGINES:
         near = nearest(str(engine), ENGINES)
         raise ContextError(Fault(f"there is no engine {in_quotes(str(engine))}.", some(ENGINES), in_quotes(near) if near else ""))
-    compiled = table if isinstance(table, CompiledTable) else table.compile()
-    space = Space.of(compiled)
+    ready = opened(table)
+    compiled, space = ready.compiled, ready.space
     plan = Plan(compiled, count, _tag_factors(space, compiled))
     paths = _paths(files)
     total, unread = nothing(plan), []
@@ -85,7 +93,20 @@ def observe(
         unread += [BadFile(str(path), part.faults)] if part.faults else []
     if len(unread) == len(paths):
         raise FileError(*(fault for file in unread for fault in file.faults))
-    return _observed(space, compiled, total, sorted(unread, key=lambda f: f.file), max_gaps)
+    boxes = [box for gap in known if (box := box_of(space, gap.cells)) is not None]
+    gaps = seen_gaps(space, compiled, total, max_gaps, boxes)
+    named = tuple(gap if ready.ruled is None else _told(gap, ready.ruled) for gap in gaps.gaps)
+    return _observed(compiled, total, sorted(unread, key=lambda f: f.file), named, gaps.elsewhere)
+
+
+def _told(gap: SeenGap, ruled: RuledTable) -> SeenGap:
+    """A gap in which cells of columns that the table does not have are a rule."""
+    if ruled.column is None:
+        return gap
+    near = gap.nearest
+    is_rule = near is not None and near.condition in ruled.rules
+    told = replace(near, condition=ruled.column, cell="Any") if near is not None and is_rule else near
+    return replace(gap, cells=ruled.cells(gap.cells), nearest=told)
 
 
 def _paths(files: str | Path | Sequence[str | Path]) -> list[Path]:
@@ -109,7 +130,15 @@ def _parts(
     left = [path for path in paths if path not in kept]
     if not left:
         return
-    for path, part in with_dask(plan, left, scheduler) if engine == "dask" else serially(plan, left):
+
+    def tell_share(share: float) -> None:
+        if share < 1.0:
+            _tell(progress, n_done + share, len(paths))
+
+    n_threads = min(os.cpu_count() or 1, MOST_THREADS)
+    here = ((path, observe_file(plan, path, n_threads, tell_share)) for path in left)
+    mend = "to run again; with a resume folder, finished files are not read again"
+    for path, part in with_dask(observe_file, plan, left, scheduler, mend) if engine == "dask" else here:
         if saved is not None:
             saved.put(path, part, keys[path])
         n_done += 1
@@ -117,7 +146,7 @@ def _parts(
         yield path, part
 
 
-def _tell(progress: Tell | None, n_done: int, n_files: int) -> None:
+def _tell(progress: Tell | None, n_done: float, n_files: int) -> None:
     if progress is not None:
         progress(n_done, n_files)
 
@@ -130,20 +159,21 @@ def _tag_factors(space: Space, compiled: CompiledTable) -> dict[str, tuple[TagFa
     return found
 
 
-def _observed(space: Space, compiled: CompiledTable, total: Part, unread: Sequence[BadFile], most: int) -> Observed:
-    gaps = seen_gaps(space, compiled, total, most)
+def _observed(
+    compiled: CompiledTable, total: Part, unread: Sequence[BadFile], gaps: tuple[SeenGap, ...], elsewhere: float
+) -> Observed:
     outside = [FactNote(n, total.outside[n], total.examples[n]) for n in compiled.asked if total.outside[n]]
     return Observed(
         table=compiled.name,
         files=total.files,
         rows=total.rows,
         moments=total.moments,
-        distinct=estimated(total.hashes, total.is_full),
+        distinct=min(estimated(total.hashes, total.is_full), total.rows),
         distinct_is_exact=not total.is_full,
         uncovered=total.uncovered,
         hits=tuple(total.hits.tolist()),
-        gaps=gaps.gaps,
-        elsewhere=gaps.elsewhere,
+        gaps=gaps,
+        elsewhere=elsewhere,
         missing=tuple(FactNote(n, total.missing[n]) for n in compiled.asked if total.missing[n]),
         outside=tuple(outside),
         unknown_columns=tuple(sorted(total.columns)),

@@ -19,10 +19,9 @@ import numpy as np
 
 from contextdb.disk import make_folder, read_bytes, write_atomic
 from contextdb.errors import ContextDBError
-from contextdb.telemetry.keys import MOST_HASHES
-from contextdb.telemetry.parts import MOST_OPEN, Part, Plan
+from contextdb.telemetry.parts import MOST_HASHES, MOST_OPEN, Part, Plan
 
-VERSION = 1
+VERSION = 2
 _ARRAYS = ("hits", "hashes", "open_hashes", "open_keys", "open_moments")
 _PLAIN = ("rows", "moments", "uncovered", "is_full", "has_all_open", "files")
 

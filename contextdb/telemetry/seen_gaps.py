@@ -35,8 +35,11 @@ class SeenGaps:
     elsewhere: float
 
 
-def seen_gaps(space: Space, compiled: CompiledTable, part: Part, most: int) -> SeenGaps:
-    """Widen the contexts without a row, those of most moments first, until `most` gaps are found."""
+def seen_gaps(space: Space, compiled: CompiledTable, part: Part, most: int, known: Sequence[Box] = ()) -> SeenGaps:
+    """Widen the contexts without a row that lie in no known gap, those of most moments first, until `most` gaps are found.
+
+    Of the known gaps those are named that the game was in.
+    """
     points = _points(space, compiled, part)
     is_placed = (points >= 0).all(axis=1)
     kept = int(part.open_moments.sum())
@@ -44,8 +47,10 @@ def seen_gaps(space: Space, compiled: CompiledTable, part: Part, most: int) -> S
     elsewhere = int(part.open_moments[~is_placed].sum())
     moments = part.open_moments[is_placed]
     rows = BoxSet.of(space.full, space.boxes)
-    boxes = _boxes(space, rows, points[is_placed], moments, most * TRIED)
-    found = _ranked(space, boxes, points[is_placed], moments)[:most]
+    held = [(box, _inside(box, points[is_placed])) for box in dict.fromkeys(known)]
+    boxes = [(box, inside) for box, inside in held if inside.any()]
+    boxes += _boxes(space, rows, points[is_placed], moments, most * TRIED, boxes)
+    found = _ranked(space, boxes, points[is_placed], moments)[: most + len(held)]
     gaps, before = [], np.zeros(len(moments), np.bool_)
     for box, inside in found:
         n, n_new = int(moments[inside].sum()), int(moments[inside & ~before].sum())
@@ -60,10 +65,14 @@ def _scaled(moments: int, scale: float, part: Part) -> float:
     return moments if part.has_all_open else moments * scale
 
 
-def _boxes(space: Space, rows: BoxSet, points: Points, moments: NDArray[np.int64], most: int) -> list[tuple[Box, Flags]]:
-    """Boxes round the contexts of most moments, each with the contexts in it."""
+def _boxes(
+    space: Space, rows: BoxSet, points: Points, moments: NDArray[np.int64], most: int, known: Sequence[tuple[Box, Flags]]
+) -> list[tuple[Box, Flags]]:
+    """Boxes round the contexts of most moments that no known one holds, each with the contexts in it."""
     order = sorted(range(len(rows.full)), key=lambda f: (rows.restricts[f].bit_count(), -f))
     left = np.lexsort((*points.T[::-1], -moments))
+    for _, inside in known:
+        left = left[~inside[left]]
     found: list[tuple[Box, Flags]] = []
     while len(left) and len(found) < most:
         box = widened(space, rows, tuple(points[left[0]].tolist()), order)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import polars as pl
 import pytest
+from running import run
 
 from contextdb.table import Table
 from contextdb.telemetry import observe
@@ -50,7 +52,7 @@ def test_a_worker_killed_half_way_changes_no_sum(recorded, cluster):
 
 
 def test_files_that_kill_every_worker_are_named(recorded, cluster, monkeypatch):
-    monkeypatch.setattr("contextdb.telemetry.engines._observe", die)
+    monkeypatch.setattr("contextdb.telemetry.engines._run", die)
     with pytest.raises(EngineError, match=r"could not be finished: .*00\.parquet"):
         observe(TABLE, str(recorded / "00.parquet"), engine="dask", scheduler=cluster.scheduler_address)
 
@@ -77,3 +79,64 @@ def test_a_misspelt_engine_is_told_the_nearest(recorded):
 
     with pytest.raises(ContextError, match='Did you mean "dask"'):
         observe(TABLE, f"{recorded}/*", engine="dsk")
+
+
+# ---- contextdb evaluate
+
+
+@pytest.fixture
+def table_file(tmp_path):
+    """The table as a file, in a folder of its own."""
+    folder = tmp_path / "tables"
+    folder.mkdir()
+    (folder / "contextdb.toml").write_text('[conditions.speed]\ntype = "number"\nmin = 0\nmax = 10\n', encoding="utf-8")
+    (folder / "t.csv").write_text("Asset,speed\na,0..2\nb,4..5\n", encoding="utf-8")
+    return str(folder / "t.csv")
+
+
+def test_evaluate_on_workers_gives_the_bytes_that_one_process_gives_though_one_is_killed(recorded, cluster, table_file):
+    told = ("evaluate", table_file, f"{recorded}/*.parquet", "--json")
+    here = run(*told, "--out", str(recorded / "here.csv"))
+    pid = next(iter(cluster.workers.values())).pid
+    with ThreadPoolExecutor(1) as pool:
+        there = pool.submit(
+            run, *told, "--out", str(recorded / "there.csv"), "--engine", "dask", "--scheduler", cluster.scheduler_address
+        )
+        while not (held := list(recorded.glob(".contextdb-*/*"))) and not there.done():
+            pass
+        assert held
+        os.kill(pid, signal.SIGKILL)
+        found = there.result()
+    assert (found.code, found.json) == (0, here.json)
+    assert found.json["contexts"] == 5000 * N_FILES
+    assert (recorded / "there.csv").read_bytes() == (recorded / "here.csv").read_bytes()
+    assert not list(recorded.glob(".contextdb-*"))
+
+
+def test_evaluate_names_the_faults_of_every_file_and_writes_nothing(recorded, cluster, table_file):
+    for name in ("03", "07"):
+        path = recorded / f"{name}.parquet"
+        path.write_bytes(path.read_bytes()[:-50])
+    told = ("evaluate", table_file, f"{recorded}/*.parquet", "--out", str(recorded / "answers.csv"))
+    found = run(*told, "--engine", "dask", "--scheduler", cluster.scheduler_address)
+    assert (found.code, found.out) == (2, "")
+    assert "03.parquet: " in found.err
+    assert "07.parquet: " in found.err
+    assert not list(recorded.glob("*answers*"))
+
+
+def test_evaluate_that_kills_every_worker_names_the_files(recorded, cluster, table_file, monkeypatch):
+    monkeypatch.setattr("contextdb.telemetry.engines._run", die)
+    told = ("evaluate", table_file, str(recorded / "00.parquet"), "--out", str(recorded / "answers.csv"))
+    found = run(*told, "--engine", "dask", "--scheduler", cluster.scheduler_address)
+    assert (found.code, found.out) == (2, "")
+    assert "1 file could not be finished: " in found.err
+    assert "00.parquet" in found.err
+    assert not list(recorded.glob("*answers*")) + list(recorded.glob(".contextdb-*"))
+
+
+def test_an_opened_artefact_is_asked_on_workers_too(recorded, cluster, table_file):
+    artefact = str(recorded / "t.safetensors")
+    assert run("compile", table_file, "-o", artefact).code == 0
+    told = (f"{recorded}/0*.parquet", "--json", "--engine", "dask", "--scheduler", cluster.scheduler_address)
+    assert run("evaluate", artefact, *told).json["rows"] == run("evaluate", table_file, *told).json["rows"]

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import ContextDBError
+from contextdb.report.coverage_words import facts_sentences
 from contextdb.schema import EMPTY, conditions_from_dict
 from contextdb.table import Table
 from contextdb.telemetry import observe
@@ -321,3 +322,44 @@ def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path, monkeypatch)
     (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbfspeed,n\r\n1,2\r\n3,4\r\n4.5,1")
     found = observe(SMALL, tmp_path / "a.csv", count="n")
     assert (found.hits, found.uncovered, found.unknown_columns) == ((2, 1), 4, ())
+
+
+def test_progress_is_told_inside_a_file_too(tmp_path, monkeypatch):
+    monkeypatch.setattr("contextdb.telemetry.chunks.ROWS", 25)
+    for name in "ab":
+        pl.DataFrame({"speed": [1.0] * 100}).write_parquet(tmp_path / f"{name}.parquet")
+    told = []
+    observe(SMALL, f"{tmp_path}/*", progress=lambda *args: told.append(args))
+    assert told == [(0, 2), (0.25, 2), (0.5, 2), (0.75, 2), (1, 2), (1.25, 2), (1.5, 2), (1.75, 2), (2, 2)]
+
+
+def test_files_that_say_nothing_to_the_table_are_counted_in_pieces(tmp_path, monkeypatch):
+    monkeypatch.setattr("contextdb.telemetry.chunks.ROWS", 30)
+    pl.DataFrame({"frame": list(range(100))}).write_parquet(tmp_path / "a.parquet")
+    found = observe(SMALL, tmp_path / "a.parquet")
+    assert (found.rows, found.uncovered, found.elsewhere, found.distinct) == (100, 100, 100, 1)
+
+
+def test_a_table_of_very_many_bounds_is_observed_as_it_is_queried(tmp_path):
+    cells = [f"{k / 7:.6f}..{k / 7 + 3:.6f}" for k in range(6000)]
+    table = Table.from_columns({"Asset": ["a"] * 6000, "x": cells}, {"x": {"type": "number"}})
+    facts = [None if k % 11 == 0 else k / 3 - 100 for k in range(3000)]
+    pl.DataFrame({"x": facts}).write_parquet(tmp_path / "a.parquet")
+    found = observe(table, tmp_path / "a.parquet")
+    many = table.compile().query_many({"x": facts}, "never")
+    assert found.hits == tuple(many.hits.tolist())
+    assert found.uncovered == int((many.counts == 0).sum())
+
+
+def test_columns_whose_fact_is_missing_everywhere_and_others_like_it_are_told_together(tmp_path):
+    pl.DataFrame({"sped": [1.0, 2.0], "build": ["x", "y"]}).write_parquet(tmp_path / "a.parquet")
+    sentences = list(facts_sentences(observe(SMALL, tmp_path / "a.parquet")))
+    assert sentences[0] == 'missing: speed in 2 moments (is it "sped"?)'
+
+
+def test_a_column_of_tags_that_no_row_asks_for_is_read(tmp_path):
+    table = Table.from_columns({"Asset": ["a"], "speed": ["0..2"], "tags": ["Any"]}, {k: SCHEMA[k] for k in ("speed", "tags")})
+    pl.DataFrame({"speed": [1.0, 3.0], "tags": [["Move"], None]}).write_parquet(tmp_path / "a.parquet")
+    found = observe(table, tmp_path / "a.parquet")
+    assert (found.hits, found.uncovered, found.distinct) == ((1,), 1, 2)
+    assert [f.condition for f in found.missing] == ["tags"]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import sys
 
 import polars as pl
 import pytest
 
 from contextdb.table import Table
-from contextdb.telemetry import engines, observe
+from contextdb.telemetry import observe
 
 SCHEMA = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}
 TABLE = Table.from_columns({"Asset": ["a", "b"], "speed": ["0..2", "4..5"]}, SCHEMA)
@@ -28,13 +29,14 @@ def recorded(tmp_path):
 def read(monkeypatch):
     """The names of the files that are read."""
     seen = []
-    true = engines.observe_file
+    module = sys.modules["contextdb.telemetry.observe"]
+    true = module.observe_file
 
-    def spied(plan, path):
+    def spied(plan, path, *more):
         seen.append(os.path.basename(path))
-        return true(plan, path)
+        return true(plan, path, *more)
 
-    monkeypatch.setattr(engines, "observe_file", spied)
+    monkeypatch.setattr(module, "observe_file", spied)
     return seen
 
 

@@ -1,0 +1,176 @@
+"""Ask a table with every context of a file: the one function that every engine runs for `contextdb evaluate`.
+
+A chunk at a time is read, as strictly as a single query reads its facts, and only sums are kept. The answers, where they are
+wanted, go into Parquet files of a folder, a chunk each; the folder takes its name when the last is written, so that it is there
+whole or not at all, and a file that is asked twice, since a worker died, is there once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from contextdb.batch import ManyMatches
+from contextdb.bitmask import Rows
+from contextdb.compiled import CompiledTable
+from contextdb.console import printable
+from contextdb.contexts import fact_type, known_conditions, read_texts_as, without_facts
+from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place
+from contextdb.facts import Unknown
+from contextdb.telemetry.chunks import Chunk, TelemetryFile
+from contextdb.telemetry.keys import rows_of
+
+MOST_ANSWERS = 1 << 21
+"""Valid rows, summed over contexts, that are written at once."""
+MOST_CONTEXTS = 1 << 14
+EMPTY: dict[str, pl.DataType] = {
+    "context": pl.Int64(),
+    "file": pl.String(),
+    "count": pl.Int64(),
+    "rows": pl.List(pl.Int64),
+    "assets": pl.List(pl.String),
+}
+"""The columns of answers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What each context is asked."""
+
+    compiled: CompiledTable
+    unknown: Unknown
+    folder: Path | None = None
+    """Where answers go: those of a file into a folder in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answered:
+    """Sums over the contexts of a file."""
+
+    contexts: int
+    without: int
+    """Contexts without a valid row."""
+    hits: Rows
+    faults: tuple[Fault, ...] = ()
+    """Why the file could not be answered; the sums are of nothing then."""
+
+
+def evaluate_file(question: Question, path: Path, tell: Callable[[float], None] | None = None) -> Answered:
+    """Ask the table with every context of a file; one that cannot be read, or asked with, gives its faults."""
+    compiled = question.compiled
+    n_contexts = n_without = 0
+    hits = np.zeros(compiled.n_rows, np.int64)
+    try:
+        with _answers_folder(question.folder, path) as folder:
+            for i, (names, chunk) in enumerate(TelemetryFile(path).chunks(set(known_conditions(compiled)))):
+                facts = _facts(compiled, names, chunk, str(path))
+                many = _asked(question, facts, chunk, str(path))
+                n_without += int((many.counts == 0).sum())
+                hits += many.hits
+                if folder is not None:
+                    _write(question, facts, many.counts, n_contexts, printable(str(path)), folder / f"{i:08}")
+                n_contexts += chunk.n_rows
+                if tell is not None:
+                    tell(chunk.share_done)
+    except ContextDBError as error:
+        return Answered(0, 0, np.zeros(compiled.n_rows, np.int64), error.faults)
+    return Answered(n_contexts, n_without, hits)
+
+
+def answers_of(folder: Path, path: Path) -> list[Path]:
+    """The Parquet files with the answers of a file, in their order."""
+    return sorted((folder / _name(path)).glob("*.parquet"))
+
+
+def _name(path: Path) -> str:
+    return hashlib.sha256(os.fsencode(path)).hexdigest()[:24]
+
+
+@contextmanager
+def _answers_folder(folder: Path | None, path: Path) -> Iterator[Path | None]:
+    """A folder for the answers of a file that takes its name at the end."""
+    if folder is None:
+        yield None
+        return
+    whole, growing = folder / _name(path), folder / f"{_name(path)}.{secrets.token_hex(4)}"
+    try:
+        growing.mkdir()  # not the folders above: they are gone where the run has ended
+        yield growing
+        if not whole.exists():  # else an earlier worker finished it, and died before it could say so
+            os.rename(growing, whole)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise FileError(
+            Fault(f"the answers cannot be written: {error}.", "room in that folder", place=Place(str(folder)))
+        ) from None
+    finally:
+        shutil.rmtree(growing, ignore_errors=True)
+
+
+def _facts(compiled: CompiledTable, names: tuple[str, ...], chunk: Chunk, file: str) -> pl.DataFrame:
+    """The facts as `query_many` takes them. Other columns are all null: their names may tell of a misspelling."""
+    known = known_conditions(compiled)
+    series, faults = [], []
+    for name in names:
+        condition = known.get(name)
+        if condition is None or not chunk.n_rows:
+            series.append(without_facts(name, chunk.n_rows))
+        elif not chunk.is_text:
+            series.append(chunk.frame[name])
+        else:
+            texts = chunk.frame[name].fill_null("")
+            distinct = texts.unique(maintain_order=True)
+            codes = texts.cast(pl.Enum(distinct)).to_physical().cast(pl.Int64)
+            values, wrong = read_texts_as(distinct.to_list(), condition)
+            firsts = [(int((codes == i).arg_max() or 0), fault) for i, fault in wrong]
+            faults += [fault.at(Place(file, chunk.line(row), name)) for row, fault in firsts]
+            series.append(pl.Series(name, values, dtype=fact_type(condition), strict=False).gather(codes))
+    if faults:
+        raise ContextError(*sorted(faults, key=lambda fault: fault.place.line or 0))
+    return pl.DataFrame(series)
+
+
+def _asked(question: Question, facts: pl.DataFrame, chunk: Chunk, file: str) -> ManyMatches:
+    try:
+        return question.compiled.query_many(facts, question.unknown)
+    except ContextError as error:
+        raise ContextError(*(_placed(fault, chunk, file) for fault in error.faults)) from None
+
+
+def _placed(fault: Fault, chunk: Chunk, file: str) -> Fault:
+    row = fault.place.row
+    line, at = (None, None) if row is None else (chunk.line(row), chunk.first_row + row)
+    return replace(fault, place=Place(file, line, fault.place.column, at))
+
+
+def _write(question: Question, facts: pl.DataFrame, counts: Rows, first: int, file: str, stem: Path) -> None:
+    """Write the answers of a chunk, as many contexts at once as have not too many valid rows."""
+    if not len(counts):
+        pl.DataFrame(schema=EMPTY).write_parquet(f"{stem}-0.parquet")
+    start = i = 0
+    while start < len(counts):
+        within = np.cumsum(counts[start : start + MOST_CONTEXTS])
+        stop = start + max(1, int(np.searchsorted(within, MOST_ANSWERS, "right")))
+        answers = _answers(question, facts[start:stop], first + start, file)
+        answers.write_parquet(f"{stem}-{i:08}.parquet", compression="lz4")
+        start, i = stop, i + 1
+
+
+def _answers(question: Question, facts: pl.DataFrame, first: int, file: str) -> pl.DataFrame:
+    many = question.compiled.query_many(facts, question.unknown)
+    contexts = np.arange(first, first + len(many))
+    rows = pl.Series("rows", rows_of(many.mask))
+    assets = pl.Series("assets", list(question.compiled.assets), dtype=pl.String).gather(rows)
+    flat = pl.DataFrame([pl.Series("context", np.repeat(contexts, many.counts)), rows, assets])
+    listed = flat.group_by("context", maintain_order=True).agg("rows", "assets")
+    every = pl.DataFrame({"context": contexts, "file": [file] * len(many), "count": many.counts})
+    joined = every.join(listed, on="context", how="left", maintain_order="left")
+    return joined.with_columns(pl.col("rows").fill_null([]), pl.col("assets").fill_null([]))

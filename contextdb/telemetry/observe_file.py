@@ -1,0 +1,183 @@
+"""Hold one telemetry file against a table: the one function that every engine runs.
+
+A chunk at a time is read, its contexts are written as keys, and of each distinct key the valid rows are looked up once. Chunks are
+worked out side by side, as many as there are cores; their sums are the same in any order.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.bitmask import Flags
+from contextdb.errors import ContextDBError
+from contextdb.telemetry import parts
+from contextdb.telemetry.chunks import Chunk, TelemetryFile
+from contextdb.telemetry.counts import moments_of
+from contextdb.telemetry.facts_read import FactColumn, read_facts
+from contextdb.telemetry.fields import Fields
+from contextdb.telemetry.keys import NUMPY_BLOCK, Counts, Hashes, KeyWords, grouped, load_kernels
+from contextdb.telemetry.parts import Part, Plan, most_examples, nothing, require_countable
+from contextdb.telemetry.smallest import SmallestHashes, SmallestKeys
+
+Chunks = Iterable[tuple[tuple[str, ...], Chunk]]
+TellRows = Callable[[float], None]
+"""Is told which share of a file is done."""
+
+
+def observe_file(plan: Plan, path: str | Path, n_threads: int = 1, tell: TellRows | None = None) -> Part:
+    """Hold one file against the table; a file that cannot be read gives a part that says why."""
+    file = TelemetryFile(Path(path))
+    sums = _Sums(plan)
+    try:
+        chunks = file.chunks({*plan.compiled.asked, *([plan.count] if plan.count else [])})
+        for found in _worked_out(plan, chunks, str(path), n_threads):
+            sums.add(found)
+            if tell is not None:
+                tell(found.share_done)
+    except ContextDBError as error:
+        return nothing(plan, error.faults)
+    return sums.part()
+
+
+def _worked_out(plan: Plan, chunks: Chunks, file: str, n_threads: int) -> Iterator[_Found]:
+    if n_threads == 1:
+        yield from (_observe_chunk(plan, names, chunk, file) for names, chunk in chunks)
+        return
+    waiting: deque[Future[_Found]] = deque()
+    with ThreadPoolExecutor(n_threads) as pool:
+        for names, chunk in chunks:
+            waiting.append(pool.submit(_observe_chunk, plan, names, chunk, file))
+            if len(waiting) > n_threads:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What a chunk holds: its distinct contexts (M of them), and what is wrong with its facts."""
+
+    rows: int
+    moments: int
+    hits: Counts
+    hashes: Hashes
+    words: KeyWords
+    first: NDArray[np.int32]
+    """For each distinct context its column in `words`."""
+    sums: Counts
+    is_open: Flags
+    missing: Mapping[str, int]
+    outside: Mapping[str, int]
+    examples: Mapping[str, tuple[str, ...]]
+    columns: frozenset[str]
+    share_done: float
+
+
+def _observe_chunk(plan: Plan, names: tuple[str, ...], chunk: Chunk, file: str) -> _Found:
+    moments = moments_of(plan.count, names, chunk, file)
+    asked = plan.compiled.asked
+    total = int(moments.sum())
+    read = {n: read_facts(chunk.frame[n], c, chunk.is_text) for n, c in asked.items() if n in names and chunk.n_rows}
+    fields = plan.fields
+    words = fields.words(read, chunk.n_rows)
+    hashes, first, sums = grouped(words, moments)
+    hits, is_open = _evaluated(fields, words, first, sums)
+    outside = {n: int(moments[c.outside].sum()) for n, c in read.items() if c.outside is not None}
+    return _Found(
+        rows=chunk.n_rows,
+        moments=total,
+        hits=hits,
+        hashes=hashes,
+        words=words,
+        first=first,
+        sums=sums,
+        is_open=is_open,
+        missing={n: _missing(read.get(n), moments, total) for n in asked},
+        outside=outside,
+        examples={n: read[n].examples(moments > 0) for n, found in outside.items() if found},
+        columns=frozenset(n for n in names if n not in asked and n != plan.count),
+        share_done=chunk.share_done,
+    )
+
+
+def _missing(column: FactColumn | None, moments: Counts, total: int) -> int:
+    if column is None:
+        return total
+    return 0 if column.missing is None else int(moments[column.missing].sum())
+
+
+def _evaluated(fields: Fields, words: KeyWords, rows: NDArray[np.int32], sums: Counts) -> tuple[Counts, Flags]:
+    """The moments in which each row is valid, and which contexts have no row: int64 [n_rows], bool [M]."""
+    compiled = fields.compiled
+    stack = compiled.stack
+    hits, is_open = np.zeros(64 * len(compiled.enabled), np.int64), np.ones(len(rows), np.bool_)
+    if kernels := load_kernels():
+        given = (fields.table[: stack.n_codes], fields.groups, fields.numbers, stack.masks, stack.wide, compiled.enabled)
+        kernels.evaluate(words, rows, sums, *given, hits, is_open)
+    else:
+        codes = fields.codes(words[:, rows])[:, : stack.n_codes]
+        for start in range(0, len(codes), NUMPY_BLOCK):
+            masks = compiled.stack.masks_of(codes[start : start + NUMPY_BLOCK], compiled.enabled)
+            is_open[start : start + NUMPY_BLOCK] = ~masks.any(axis=1)
+            hits += sums[start : start + NUMPY_BLOCK] @ bitmask.unpack(masks, len(hits)).astype(np.int64)
+    return hits[: compiled.n_rows], is_open
+
+
+class _Sums:
+    """Sums over the chunks of a file."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.rows = self.moments = self.uncovered = 0
+        self.hits = np.zeros(plan.compiled.n_rows, np.int64)
+        self.missing: Counter[str] = Counter()
+        self.outside: Counter[str] = Counter()
+        self.examples: dict[str, tuple[str, ...]] = {}
+        self.columns: frozenset[str] = frozenset()
+        self.distinct = SmallestHashes(parts.MOST_HASHES)
+        self.open = SmallestKeys(parts.MOST_OPEN, plan.fields.n_words)
+
+    def add(self, found: _Found) -> None:
+        """Add a chunk."""
+        require_countable(self.moments + found.moments)
+        self.rows += found.rows
+        self.moments += found.moments
+        self.uncovered += int(found.sums[found.is_open].sum())
+        self.hits += found.hits
+        self.missing.update(found.missing)
+        self.outside.update(found.outside)
+        self.examples = most_examples(self.examples, found.examples)
+        self.columns |= found.columns
+        self.distinct.add(found.hashes)
+        at = np.flatnonzero(found.is_open)
+        self.open.add(found.hashes[at], found.words, found.first[at], found.sums[at])
+
+    def part(self) -> Part:
+        """The sums as they are kept."""
+        hashes, is_full = self.distinct.found()
+        open_hashes, words, moments, has_all = self.open.found()
+        return Part(
+            rows=self.rows,
+            moments=self.moments,
+            uncovered=self.uncovered,
+            hits=self.hits,
+            missing=+self.missing,
+            outside=+self.outside,
+            examples=self.examples,
+            columns=self.columns,
+            hashes=hashes,
+            is_full=is_full,
+            open_hashes=open_hashes,
+            open_keys=self.plan.fields.codes(words),
+            open_moments=moments,
+            has_all_open=has_all,
+            files=1,
+        )

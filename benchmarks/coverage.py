@@ -4,7 +4,8 @@
     python benchmarks/coverage.py --quick         the two small sizes
     python benchmarks/coverage.py --json FILE     the same figures for programs
 
-Every part of a report is timed by itself: the count within its budget, 200,000 samples, gaps, findings.
+Every part of a report is timed by itself: the count within its budget, 200,000 samples, gaps, findings. Beside it, where the
+package `dd` is installed, the decision diagram of the same rows; then all overlaps and gaps of tables of published sizes.
 Memory is the highest of the process so far, so sizes go upwards. The first calls of each kernel are not timed.
 """
 
@@ -26,6 +27,7 @@ if __package__ in (None, ""):
 
 import contextdb as cdb
 from benchmarks import timing
+from benchmarks.coverage_peers import PUBLISHED, diagram_of, diagrams, published_figures
 from benchmarks.coverage_tables import SHAPES, SIZES, made_table
 from benchmarks.sections import print_aligned
 from contextdb.covering import coverage
@@ -51,7 +53,9 @@ HEADER = (
     "findings",
     "rows told",
     "memory",
+    "diagram",
 )
+PUBLISHED_HEADER = ("published size", "overlaps", "time", "covered", "time", "gaps", "time")
 
 
 def main() -> None:
@@ -59,7 +63,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure context coverage.")
     parser.add_argument("--quick", action="store_true", help="the two small sizes")
     parser.add_argument("--size", type=int, metavar="ROWS", help="one size only")
-    parser.add_argument("--work", type=int, default=WORK, help="row visits for the count")
+    parser.add_argument("--work", type=int, default=WORK, help="steps of the count")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to a file")
     options = parser.parse_args()
     sizes = [s for s in (SIZES[:2] if options.quick else SIZES) if options.size in (None, s[0])]
@@ -67,19 +71,24 @@ def main() -> None:
     print("\n".join(f"{name}: {facts}" for name, facts in report.items() if name != "format"))
     coverage(made_table("few", 100, 12), work=100_000, samples=5000)
     report["tables"] = []
+    peer = diagrams()
+    print(f"diagrams: {peer[0]}" if peer else "diagrams: skipped, the package dd is not installed")
     lines: list[tuple[str, ...]] = [HEADER]
     for n_rows, n_conditions in sizes:
         for shape in SHAPES:
-            figures = measured(made_table(shape, n_rows, n_conditions), options.work)
+            figures = measured(made_table(shape, n_rows, n_conditions), options.work, peer and peer[1])
             report["tables"].append(figures)
             lines.append(_line(figures))
             print_aligned([lines[0], lines[-1]])
     print_aligned(lines)
+    if not options.quick and options.size is None:
+        report["published"] = [published_figures(*size) for size in PUBLISHED]
+        print_aligned([PUBLISHED_HEADER, *map(_published_line, report["published"])])
     if options.json:
         options.json.write_text(json.dumps(report, indent=1) + "\n")
 
 
-def measured(table: cdb.Table, work: int) -> dict[str, Any]:
+def measured(table: cdb.Table, work: int, peer: Any) -> dict[str, Any]:
     """Each part of one table's coverage, with its time."""
     compiled = table.compile()
     space, space_s = _timed(lambda: Space.of(compiled))
@@ -107,6 +116,7 @@ def measured(table: cdb.Table, work: int) -> dict[str, Any]:
         "findings_s": findings_s,
         "findings": len(findings),
         "findings_complete": judge.is_complete,
+        "diagram": diagram_of(space, peer) if peer else "-",
         "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
     }
 
@@ -132,6 +142,19 @@ def _line(figures: dict[str, Any]) -> tuple[str, ...]:
         f"{figures['findings_s']:.3f} s",
         f"{figures['findings']}{'' if figures['findings_complete'] else '+'}",
         f"{figures['memory_mb']} MB",
+        figures["diagram"],
+    )
+
+
+def _published_line(figures: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        figures["table"],
+        f"{figures['overlaps']:,}",
+        f"{figures['overlaps_s']:.3f} s",
+        f"{figures['covered']:.6f}{'' if figures['is_exact'] else '+'}",
+        f"{figures['count_s']:.3f} s",
+        f"{figures['gaps']:,}{'' if figures['gaps_complete'] else '+'}",
+        f"{figures['gaps_s']:.3f} s",
     )
 
 

@@ -7,12 +7,13 @@ shares are estimates.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from contextdb.compiled import CompiledTable
 from contextdb.conditions import Condition
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
+from contextdb.covering.ruled import RuledTable, without_rules
 from contextdb.covering.space import CellBox, Space, WeightsOf, used_factors
 from contextdb.expressions import Assumptions, Derivation, Expression, assumptions_of
 from contextdb.expressions.tokens import written_name
@@ -32,6 +33,8 @@ class Opened:
     """What was taken into account, as contextdb.toml has it."""
     sampled: tuple[str, ...] = ()
     """What of it only samples know."""
+    ruled: RuledTable | None = None
+    """What the rules of the table have become; None where a compiled table was given."""
 
 
 def opened(
@@ -43,11 +46,14 @@ def opened(
 ) -> Opened:
     """A table with its space; see `contextdb.covering.coverage` for the arguments and what is raised."""
     if isinstance(table, CompiledTable):
+        table.refuse_rules("what they leave is worked out from the table itself")
         return Opened(table, None, Space.of(table, impossible, weights, progress), None)
+    ruled = without_rules(table.flat())
+    table = ruled.table
     compiled = table.compile()
-    if not assume:
-        return Opened(compiled, table, Space.of(compiled, impossible, weights, progress), None)
-    assumed = assumptions_of(table)
+    if not assume and not ruled.rules:
+        return Opened(compiled, table, Space.of(compiled, impossible, weights, progress), None, ruled=ruled)
+    assumed = assumptions_of(table if assume else replace(table, settings=replace(table.settings, assume=())))
     space = Space.of(compiled, [*impossible, *assumed.boxes], weights, progress)
     texts = tuple(expression.text for expression in assumed.expressions)
     restricted = _restricted(space)
@@ -56,9 +62,10 @@ def opened(
     derivation = table.schema.derivation_of([*(c.name for c in compiled.conditions), *named])
     unboxed = _that_matter(assumed.unboxed, derivation, restricted)
     if not drawn and not unboxed:
-        return Opened(compiled, table, space, None, texts)
-    sampled = (*(f"{c.name} = {c.expr}" for c in drawn), *(expression.text for expression in unboxed))
-    return Opened(compiled, table, space, Drawer(space, derivation, unboxed), texts, sampled)
+        return Opened(compiled, table, space, None, texts, ruled=ruled)
+    told = (c.name if c.name in ruled.rules else f"{c.name} = {c.expr}" for c in drawn)
+    sampled = (*told, *(expression.text for expression in unboxed))
+    return Opened(compiled, table, space, Drawer(space, derivation, unboxed), texts, sampled, ruled)
 
 
 def _restricted(space: Space) -> set[str]:

@@ -14,12 +14,15 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
+from contextdb.check import capped
 from contextdb.covering.assumed import opened
 from contextdb.covering.engine import finding_steps
 from contextdb.covering.judge import Judge
 from contextdb.errors import ContextDBError
 from contextdb.expressions import ExpressionError, assumptions_of, names_in
 from contextdb.findings import Finding
+from contextdb.nesting.flat import FlatTable
+from contextdb.nesting_findings import own_findings
 from contextdb.schema import Schema
 from contextdb.table import Table
 from contextdb.toml_lines import Path
@@ -31,7 +34,8 @@ WORK = 4_000_000
 def check_rows(table: Table, work: int = WORK) -> list[Finding]:
     """What is wrong with the rows of a table that can be read, those of the whole table first; nothing where cells cannot be read.
 
-    The same table and work give the same findings. Rows that could not be decided within the work have none.
+    The same table and work give the same findings. Rows that could not be decided within the work have none; of a rule
+    that many rows break the first are named, and how many more there are.
     """
     if table.faults:
         return []
@@ -41,7 +45,7 @@ def check_rows(table: Table, work: int = WORK) -> list[Finding]:
         return [_of_schema(table, "bad-assumption", fault.message) for fault in error.faults]
     if contradictions:
         return [_of_schema(table, "no-context", f"no context is possible: {fault.message}") for fault in contradictions]
-    found = [*_always_any(table), *_judged(table, work)]
+    found = capped([*_always_any(table), *_judged(table, work)])
     return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
 
 
@@ -52,8 +56,10 @@ def _judged(table: Table, work: int) -> list[Finding]:
         ready = opened(table)
     except ContextDBError:  # such as a domain without a value: said of the cells already
         return []
-    judge = Judge(ready.space, ready.compiled, table, finding_steps(work, len(ready.space.boxes)), drawer=ready.drawer)
-    return [finding for finding in judge.findings() if finding.rule != "identical-rows"]
+    judge = Judge(ready.space, ready.compiled, ready.table, finding_steps(work, len(ready.space.boxes)), drawer=ready.drawer)
+    found = [finding for finding in judge.findings() if finding.rule != "identical-rows"]
+    found = found if ready.ruled is None else list(ready.ruled.findings(found))
+    return list(own_findings(ready.table, found)) if isinstance(ready.table, FlatTable) else found
 
 
 def _always_any(table: Table) -> Iterator[Finding]:
@@ -75,6 +81,7 @@ def unused_conditions(schema: Schema, tables: Iterable[Table], lines: Mapping[Pa
     tables = list(tables)
     used = {column.name for table in tables for column in table.columns}
     used.update(name for table in tables for text in table.settings.assume for name in names_in(text))
+    used.update(name for table in tables if table.when is not None for name in table.when.names)
     waiting = [name for name in used if name in schema.conditions]
     while waiting:
         expr = schema.conditions[waiting.pop()].expr

@@ -1,8 +1,7 @@
 """How much of a space some boxes leave uncovered: exactly where the work budget allows, else sound bounds.
 
-The share that no box holds is summed from products and sums of numbers from 0 up, so it is 0 exactly when nothing is left that has
-a measure. Equal parts are recognised by 128-bit hashes. The budget counts row visits, never time: the same input gives the same
-numbers.
+Equal parts are recognised by 128-bit hashes. A share that is so small that roundings could hide it is 0 only where a search proves
+that no context of any measure is left. The budget counts steps, never time: the same input gives the same numbers.
 """
 
 from __future__ import annotations
@@ -13,14 +12,23 @@ from threading import Thread
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.space import Box, Space, used_factors
+from contextdb.covering.space import Box, Space, runs_of, used_factors
+from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 
-SLACKS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
-"""Bounds are first worked out coarsely, then finer and finer, so that they are even when the budget ends."""
 ROUNDING = 1e-12
 """Bounds that are not equal are moved apart by so much, which is more than all roundings."""
+EXACT = 1e-10
+"""Bounds that nothing but roundings keeps apart by less are one number."""
+TINY = 1e-9
+"""Below this a search tells whether anything is left at all."""
+LEAST_STEPS = 200
+STEP = 2000
+"""A step of that search costs as much as so many of the count; it may take a few in any case."""
+EXACT_FIRST = 6
+"""So many eighths of the work go to the exact share; when they do not do, the rest goes to better bounds."""
 LOG2_KNOWN = 20
 """How many parts are remembered, as a power of two; 32 bytes each."""
 POLL_S = 0.02
@@ -56,13 +64,11 @@ def uncovered_share(
         return Bounds(1.0, 1.0)
     if full in boxes:
         return Bounds(0.0, 0.0)
-    sides = [[box[f] for f in used] for box in boxes]
-    return _count(sides, [full[f] for f in used], [weights[f] for f in used], work, progress)
+    sides = [tuple(box[f] for f in used) for box in boxes]
+    return _count(sides, tuple(full[f] for f in used), [weights[f] for f in used], work, progress)
 
 
-def _within(
-    weights: np.ndarray[tuple[int], np.dtype[np.float64]], side: int | None
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _within(weights: NDArray[np.float64], side: int | None) -> NDArray[np.float64]:
     if side is None:
         return weights
     flags = np.array([side >> k & 1 for k in range(len(weights))], np.bool_)
@@ -71,84 +77,120 @@ def _within(
     return inside / total if total > 0.0 else np.where(flags, 1.0 / flags.sum(), 0.0)
 
 
-def runs_of(side: int) -> list[tuple[int, int]]:
-    """A set of classes as runs: first class, and the one after the last."""
-    runs, at = [], 0
-    while side:
-        skip = (side & -side).bit_length() - 1
-        side >>= skip
-        length = (~side & (side + 1)).bit_length() - 1
-        runs.append((at + skip, at + skip + length))
-        side >>= length
-        at += skip + length
-    return runs
+def _count(boxes: list[Box], full: Box, weights: list[NDArray[np.float64]], work: int, progress: Progress) -> Bounds:
+    boxes = [box for box, has_measure in zip(boxes, _has_measure(boxes, weights), strict=True) if has_measure]
+    if not boxes:
+        return Bounds(1.0, 1.0)
+    table = table_of(boxes, full, [len(own) for own in weights])
+    low, high, done, is_cut = _run(table, np.concatenate(weights), work, progress)
+    if is_cut or high - low > EXACT:
+        return Bounds(max(0.0, low - ROUNDING), min(1.0, high + ROUNDING), done)
+    if high < TINY and high > 0.0:
+        return _tiny(boxes, full, weights, max(0, work - done), low, high, done, progress)
+    share = (low + high) / 2.0
+    return Bounds(share, share, done)
 
 
-def _count(
-    boxes: list[list[int]],
-    full: list[int],
-    weights: list[np.ndarray[tuple[int], np.dtype[np.float64]]],
+def _tiny(
+    boxes: list[Box],
+    full: Box,
+    weights: list[NDArray[np.float64]],
     work: int,
+    low: float,
+    high: float,
+    done: int,
     progress: Progress,
 ) -> Bounds:
-    from contextdb.covering.kernels import CUT, WORK, uncovered
+    """Whether a share that may come from roundings is 0: an open context of some measure shows that it is not."""
+    within = tuple(sum(1 << k for k, w in enumerate(own.tolist()) if w > 0.0) for own in weights)
+    rows = BoxSet.of(full, boxes, progress)
+    try:
+        point = rows.outside(rows.all, within, Steps(LEAST_STEPS + work // STEP, progress))
+    except OutOfSteps:
+        return Bounds(max(0.0, low - ROUNDING), high + ROUNDING, done)
+    if point is None:
+        return Bounds(0.0, 0.0, done)
+    least = float(np.prod([own[k] for own, k in zip(weights, point, strict=True)]))
+    share = max(least, (low + high) / 2.0)
+    return Bounds(share, share, done)
 
+
+def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int]) -> tuple[NDArray[Any], ...]:
+    """The boxes as `part_kernels` wants them; `n_classes` are those of each factor."""
     rng = np.random.default_rng(0)
-    n_boxes, n_factors = len(boxes), len(full)
     number: dict[tuple[int, int], int] = {}
-    cells = np.full((n_boxes, n_factors), -1, np.int32)
+    cells = np.full((len(boxes), len(full)), -1, np.int32)
     for i, box in enumerate(boxes):
         for f, side in enumerate(box):
             if side != full[f]:
                 cells[i, f] = number.setdefault((f, side), len(number))
     runs = [runs_of(side) for _, side in number]
     first = np.cumsum([0, *map(len, runs)]).astype(np.int64)
-    sizes = np.array([sum(float(weights[f][a:b].sum()) for a, b in own) for (f, _), own in zip(number, runs, strict=True)])
     hashes = rng.integers(1, 2**63, (len(number), 2), np.uint64)
-    is_used = cells >= 0
-    volumes = np.prod(np.where(is_used, sizes[cells], 1.0), axis=1)
-    has_volume = volumes > 0.0
-    cells, is_used, volumes = cells[has_volume], is_used[has_volume], volumes[has_volume]
-    masks = np.zeros((len(cells), (n_factors + 63) // 64), np.uint64)
-    for f in range(n_factors):
-        masks[:, f >> 6] |= is_used[:, f].astype(np.uint64) << np.uint64(f & 63)
-    box_hashes = np.bitwise_xor.reduce(np.where(is_used[:, :, None], hashes[cells], np.uint64(0)), axis=1)
-    edges = np.cumsum([0, *map(len, weights)]).astype(np.int64)
     flat = np.array([r for own in runs for r in own], np.int32).reshape(-1, 2)
-    marks = rng.integers(1, 2**63, len(cells), np.uint64)
-    tables = (cells, flat, first, sizes, hashes, np.concatenate(weights), edges, marks)
-    known = np.zeros((1 << LOG2_KNOWN, 2), np.uint64), np.zeros((1 << LOG2_KNOWN, 2))
-    lower, upper, done = 0.0, 1.0, 0
-    for slack in SLACKS if len(cells) > 200 else SLACKS[-1:]:
-        state = np.array([done, work, 0, 0], np.int64)
-        with np.errstate(over="ignore"):
-            arguments = (np.arange(len(cells), dtype=np.int32), box_hashes, masks, volumes, 1.0, slack, tables, known, state)
-            low, high = uncovered(*arguments) if progress.is_silent else _watched(uncovered, arguments, state, progress)
-        done = int(state[WORK])
-        if state[CUT] == 0 or low == high:
-            return Bounds(float(high), float(high), done)
-        lower, upper = max(lower, float(low) - ROUNDING), min(upper, float(high) + ROUNDING)
-        if done >= work:
-            break
-    return Bounds(max(0.0, lower), min(1.0, upper), done)
+    edges = np.cumsum([0, *n_classes]).astype(np.int64)
+    return cells, flat, first, hashes, edges
 
 
-def _watched(
-    loop: Callable[..., Any], arguments: tuple[Any, ...], state: np.ndarray[tuple[int], np.dtype[np.int64]], progress: Progress
-) -> Any:
-    """Run the loop on a thread of its own, so that it can be told of and stopped: a limit below 0 ends it."""
-    from contextdb.covering.kernels import LIMIT, WORK
+def _has_measure(boxes: Sequence[Box], weights: Sequence[NDArray[np.float64]]) -> list[bool]:
+    """Whether each box holds a class of some weight of every factor."""
+    some = [sum(1 << k for k, w in enumerate(own.tolist()) if w > 0.0) for own in weights]
+    return [all(side & own for side, own in zip(box, some, strict=True)) for box in boxes]
+
+
+def _run(
+    table: tuple[NDArray[Any], ...], weights: NDArray[np.float64], work: int, progress: Progress
+) -> tuple[float, float, int, bool]:
+    """Bounds of the share, the work done, and whether it was cut short."""
+    from contextdb.covering.count_kernels import CUT, LIMIT, SHARED, WORK, uncovered
+    from contextdb.covering.part_kernels import part_of
+
+    n_boxes, n_factors = table[0].shape
+    salts = np.zeros(n_factors, np.uint64)
+    low, high = 0.0, 1.0
+    with np.errstate(over="ignore"):
+        part = part_of(np.arange(n_boxes), np.arange(n_factors), weights, salts, table)
+        known = np.zeros((1 << LOG2_KNOWN, 2), np.uint64), np.zeros((1 << LOG2_KNOWN, 2))
+        state = np.zeros(5, np.int64)
+        for state[SHARED], state[LIMIT] in ((0, work * EXACT_FIRST // 8), (1, work)):
+            scratch = scratch_of(part, int(np.diff(table[4]).max()))
+            arguments = (part, 0, len(part[0]), weights, salts, table, scratch, known, state)
+            state[CUT] = 0
+            found = uncovered(*arguments) if progress.is_silent else _watched(uncovered, arguments, state, work, progress)
+            low, high = max(low, float(found[0])), min(high, float(found[1]))
+            if not state[CUT] or state[WORK] >= work:
+                break
+    return low, high, int(state[WORK]), bool(state[CUT])
+
+
+def scratch_of(part: tuple[NDArray[Any], ...], n_classes: int) -> tuple[NDArray[Any], ...]:
+    """Room for the loop, every box of the part open at depth 0; as deep as factors and boxes one after the other may lead."""
+    (n_factors, n_words), n_boxes = part[1].shape, len(part[9])
+    depth = 6 * n_factors + 160
+    opened, kept = np.zeros((depth, n_words), np.uint64), np.zeros((depth, n_words), np.uint64)
+    listed = np.zeros((depth, n_factors), np.int64)
+    listed[0] = np.arange(n_factors)
+    opened[0] = np.uint64(0xFFFFFFFFFFFFFFFF)
+    if n_boxes % 64:
+        opened[0, -1] = np.uint64((1 << n_boxes % 64) - 1)
+    words = np.zeros(n_words, np.uint64)
+    chosen, shares = np.zeros((depth, n_classes), np.int64), np.zeros((depth, n_classes))
+    return opened, kept, listed, chosen, shares, np.zeros((n_boxes, 2), np.uint64), np.zeros(n_boxes), words, words.copy()
+
+
+def _watched(loop: Callable[..., Any], arguments: tuple[Any, ...], state: NDArray[np.int64], work: int, progress: Progress) -> Any:
+    """Run the loop on a thread of its own, so that it can be told of and stopped."""
+    from contextdb.covering.count_kernels import STOP, WORK
 
     answer: list[Any] = []
-    limit = max(1, int(state[LIMIT]))
     thread = Thread(target=lambda: answer.append(loop(*arguments)), daemon=True)
     thread.start()
     try:
         while thread.is_alive():
             thread.join(POLL_S)
-            progress.at(int(state[WORK]) / limit)
+            progress.at(int(state[WORK]) / max(1, work))
     finally:
         if thread.is_alive():
-            state[LIMIT] = -1
+            state[STOP] = 1
             thread.join()
     return answer[0]

@@ -65,7 +65,7 @@ def coverage(
     seed : int
         Where samples start; the same input and seed give the same report.
     work : int
-        Row visits for the exact count, and in proportion steps for gaps and for findings. 0: bounds only.
+        Steps of the exact count, and in proportion of the searches for gaps and findings. 0: bounds only.
     samples : int
         Random contexts, for the estimate where the count is not finished and for overlap. 0: none.
     max_gaps : int
@@ -102,7 +102,8 @@ def coverage(
     require_counts(work=work, samples=samples, max_gaps=max_gaps, seed=seed)
     watcher = Progress(progress, should_stop)
     found = opened(table, impossible, weights, assume, watcher.within("Reading the cells", 0.0, COUNT_AT))
-    return _report(found, seed, work, samples, max_gaps, watcher)
+    report = _report(found, seed, work, samples, max_gaps, watcher)
+    return report if found.ruled is None else found.ruled.told(report)
 
 
 def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, watcher: Progress) -> CoverageReport:
@@ -161,7 +162,7 @@ def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, w
 
 
 def search_steps(work: int, n_boxes: int) -> int:
-    """Search steps for the gaps, that take about as long as so many row visits."""
+    """Search steps for the gaps, that take about as long as so many of the count."""
     return 4 * work // (500 + n_boxes)
 
 

@@ -18,6 +18,8 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import and_
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +30,7 @@ from contextdb.classes import Value
 from contextdb.domains import Domain
 from contextdb.errors import Fault, TableError, plural
 from contextdb.intervals import Span
+from contextdb.nesting_cells import TagMeet
 
 Weights = NDArray[np.float64]
 MOST_ANSWERS = 1 << 14
@@ -132,6 +135,8 @@ class TagFactor:
     def classes(self, accepts: Accepted) -> int:
         """The classes that a set holds, of those of its tags that are here."""
         assert isinstance(accepts, TagSet)
+        if isinstance(accepts, TagMeet):
+            return reduce(and_, (self.classes(part) for part in accepts.parts))
         needs, bans = self._mask(accepts.needs), self._mask(accepts.bans)
         held = [(a & needs == needs and not a & bans) is not accepts.is_complement for a in self.answers]
         return sum(1 << k for k, is_held in enumerate(held) if is_held)

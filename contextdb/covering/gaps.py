@@ -28,7 +28,7 @@ from contextdb.intervals import union
 Measure = Callable[[Box, Sequence[Box]], tuple[float, bool]]
 """Tells which share of the possible contexts is in a box and in none of some others, and whether it is exact."""
 SHARE_WORK = 200_000
-"""Row visits for the share of one gap; one that needs more is the middle of its bounds, and not `is_exact`."""
+"""Steps for the share of one gap; one that needs more is the middle of its bounds, and not `is_exact`."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,14 @@ def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progr
         if not any(all(side >> k & 1 for side, k in zip(box, point, strict=True)) for box in found):
             found.append(_add(seen, widened(space, rows, point, order)))
     left = Steps(steps, progress)
+    is_complete = True
     try:
-        while len(found) < most:
+        for point_left in seen.points(space.full, left):
+            if len(found) >= most:
+                is_complete = False
+                break
             progress.at(len(found) / most)
-            point_left = seen.outside(seen.all, space.full, left)
-            if point_left is None:
-                return FoundGaps(tuple(found), True)
             found.append(_add(seen, widened(space, rows, point_left, order)))
-        is_complete = seen.outside(seen.all, space.full, left) is None
     except OutOfSteps:
         is_complete = False
     return FoundGaps(tuple(found), is_complete)

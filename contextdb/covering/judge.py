@@ -18,11 +18,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.check import check
 from contextdb.compiled import CompiledTable
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
+from contextdb.covering.questions import MANY, Questions
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural
@@ -33,6 +36,8 @@ MOST_CAUSES = 24
 """Up to so many rows the causes of a redundant row are thinned out to those that are needed."""
 QUESTIONS = 40
 """One question may use this part of the steps."""
+STEP, STEP_A_BOX = 100, 0.0625
+"""A step of the search takes as long as so many of the compiled loops, and more for each box."""
 
 
 @dataclass(eq=False)
@@ -97,9 +102,8 @@ class Judge:
             yield from self._contained(i, box, equal)
 
     def _contained(self, i: int, box: Box, equal: int) -> Iterator[Finding]:
-        over = self._holders(box) & ~equal & ~self._impossible
-        if over:
-            other = (over & -over).bit_length() - 1
+        other = self._first_holder(i, box, equal)
+        if other is not None:
             yield self._at(i, "subsumed-row", "warning", f"wherever it is valid, {self._named(other)} is valid too.", 1 << other)
             return
         others = self._meeting(box) & ~equal
@@ -109,14 +113,17 @@ class Judge:
             yield self._at(i, "redundant-row", "info", message, causes)
 
     def _policy(self) -> Iterator[Finding]:
-        if self.compiled.policy == "unique":
+        ways = self.compiled.ways
+        policies = {self.compiled.policy} if ways is None else {table.policy for table in ways.tables}
+        if "unique" in policies:
             yield from self._overlapping()
-        if self.compiled.policy in ("first", "priority"):
+        if not policies.isdisjoint(("first", "priority")):
             for i, box in enumerate(self.space.boxes):
                 self.progress.check()
                 before = self._before(i) & self._meeting(box)
                 if before and self._covered(box, before | self._impossible) and self._is_possible(box):
                     why = "stands above it" if self.compiled.policy == "first" else "has a higher priority"
+                    why = why if ways is None else "comes before it"
                     message = f"the row is never chosen: wherever it is valid, a valid row {why}."
                     yield self._at(
                         i, "never-chosen", "warning", message, self._thinned(box, before | self._impossible) & ~self._impossible
@@ -124,6 +131,9 @@ class Judge:
 
     def _before(self, i: int) -> int:
         """The rows that the policy prefers to row i."""
+        if self.compiled.ways is not None:
+            preferred = self.compiled.ways.preferred_to(self.space.rows[i])
+            return bitmask.to_int(bitmask.pack(preferred[list(self.space.rows)]))
         if self.compiled.policy == "first":
             return (1 << i) - 1
         return self._higher[int(self.compiled.priorities[self.space.rows[i]])]
@@ -144,6 +154,8 @@ class Judge:
             self.progress.check()
             others, joint = 0, None
             for j in _bits(self._meeting(box) & ((1 << i) - 1)):
+                if self.compiled.ways and not self.compiled.ways.forbids_both(self.space.rows[i], self.space.rows[j]):
+                    continue
                 shared = tuple(a & b for a, b in zip(box, self.space.boxes[j], strict=True))
                 if self._is_possible(shared) and self._was_seen(shared):
                     others |= 1 << j
@@ -163,6 +175,8 @@ class Judge:
     def _covered(self, box: Box, by: int) -> bool:
         """Whether some boxes hold all of a box; "no" where that cannot be told within the steps."""
         allowed = min(self.steps, max(200, self.steps // QUESTIONS))
+        if self._questions is not None:
+            return self._asked(self._questions, box, by & self._meeting(box), allowed)
         steps = Steps(allowed, self.progress)
         try:
             answer = self.boxes.outside(by, box, steps) is None
@@ -170,6 +184,20 @@ class Judge:
             self.is_complete, answer = False, False
         self.steps -= allowed - steps.left
         return answer
+
+    @cached_property
+    def _questions(self) -> Questions | None:
+        """Compiled loops that answer where boxes are many."""
+        boxes = self.space.boxes + self.space.impossible
+        return Questions(boxes, self.space.full) if len(boxes) >= MANY and self.space.full else None
+
+    def _asked(self, questions: Questions, box: Box, by: int, allowed: int) -> bool:
+        self.progress.check()
+        step = STEP + int(STEP_A_BOX * len(questions.boxes))
+        is_held, is_certain, done = questions.are_held(box, by, allowed * step) if by and allowed else (False, not by, 0)
+        self.is_complete &= is_certain
+        self.steps -= min(allowed, 1 + done // step)
+        return is_held
 
     def _thinned(self, box: Box, by: int) -> int:
         """Boxes that together hold a box, without those that are not needed."""
@@ -189,15 +217,24 @@ class Judge:
                 found &= self._met[f, side]
         return found
 
-    def _holders(self, box: Box) -> int:
-        found = self.boxes.all
+    def _first_holder(self, i: int, box: Box, equal: int) -> int | None:
+        """The first row that is valid wherever row i is, and elsewhere too."""
+        if self._questions is not None:
+            found = int(self._first_holders[i])
+            return None if found < 0 else found
+        over = self.boxes.all & ~self._impossible & ~equal
         for f, side in enumerate(box):
             if (f, side) not in self._held:
                 self._held[f, side] = self.boxes.holding(f, side)
-            found &= self._held[f, side]
-            if found.bit_count() == 1:
+            over &= self._held[f, side]
+            if not over:
                 break
-        return found
+        return (over & -over).bit_length() - 1 if over else None
+
+    @cached_property
+    def _first_holders(self) -> NDArray[np.int64]:
+        assert self._questions is not None
+        return self._questions.holders(len(self.space.boxes))
 
     def _named(self, i: int) -> str:
         row = self.space.rows[i]

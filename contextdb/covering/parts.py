@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells import Cell, TagSet, format_cell
-from contextdb.covering.count import runs_of
 from contextdb.covering.factors import TagFactor, ValueFactor
-from contextdb.covering.space import Space
+from contextdb.covering.space import Space, runs_of
 
 MOST_PARTS = 8
 """A condition has so many parts at most."""

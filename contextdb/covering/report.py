@@ -39,6 +39,8 @@ class Gap:
     nearest: Nearest | None = None
     is_exact: bool = True
     """False where a share needed too much work: it is then the middle of certain bounds."""
+    telemetry: float | None = None
+    """The share of the recorded moments that lie in it; None where none were observed."""
 
     @property
     def text(self) -> str:
@@ -53,6 +55,7 @@ class Gap:
             "share": self.share,
             "new_share": self.new_share,
             "exact": self.is_exact,
+            "telemetry": self.telemetry,
             "cells": self.cells,
             "nearest": nearest,
         }
@@ -116,7 +119,7 @@ class CoverageReport:
     seed: int
     n_samples: int
     work: int
-    """Row visits spent on counting."""
+    """Steps spent on counting."""
     hits: tuple[float, ...]
     """For each row the share of the possible contexts in which it is valid."""
     assumed: dict[str, str]

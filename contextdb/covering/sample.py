@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
-from contextdb.covering.count import runs_of
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.shares import wilson
-from contextdb.covering.space import Box, Space
+from contextdb.covering.space import Box, Space, runs_of
 from contextdb.covering.witness import Point
 
 Codes = NDArray[np.int32]

@@ -226,6 +226,19 @@ def _read_weights(name: str, parts: Mapping[object, float], conditions: Sequence
     return read
 
 
+def runs_of(side: int) -> list[tuple[int, int]]:
+    """A set of classes as runs: first class, and the one after the last."""
+    runs, at = [], 0
+    while side:
+        skip = (side & -side).bit_length() - 1
+        side >>= skip
+        length = (~side & (side + 1)).bit_length() - 1
+        runs.append((at + skip, at + skip + length))
+        side >>= length
+        at += skip + length
+    return runs
+
+
 def used_factors(boxes: Iterable[Box], full: Box) -> list[int]:
     """The factors that some box restricts."""
     return sorted({f for box in boxes for f, side in enumerate(box) if side != full[f]})

@@ -7,12 +7,11 @@ one that keeps open what another does and more can do nothing better. Exact what
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from contextdb.covering.count import runs_of
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.space import Box
+from contextdb.covering.space import Box, runs_of
 
 Point = tuple[int, ...]
 
@@ -120,6 +119,49 @@ class BoxSet:
         point = self._search(open_boxes, within, list(range(len(within))), steps)
         return None if point is None else tuple(point.get(f, _first(side)) for f, side in enumerate(within))
 
+    def points(self, within: Box, steps: Steps) -> Iterator[Point]:
+        """Contexts of `within` that are in no box, one after the other, until there is none.
+
+        Before the next one is asked for, a box that holds the last one must be added. The search goes on where it was: what was
+        searched once is not searched again. Raises OutOfSteps when the steps, which count down, are used up.
+        """
+        open_boxes = self.all
+        for f, side in enumerate(within):
+            if side != self.full[f]:
+                open_boxes &= self.meeting(f, side)
+        for point in self._points(open_boxes, {}, within, list(range(len(within))), steps):
+            yield tuple(point.get(f, _first(side)) for f, side in enumerate(within))
+
+    def _points(
+        self, open_boxes: int, fixed: dict[int, int], within: Box, free: list[int], steps: Steps
+    ) -> Iterator[dict[int, int]]:
+        known = self.n_boxes
+        while not (now := self._open_now(open_boxes, known, fixed)):
+            yield fixed
+        steps.take()
+        factor = self._next_factor(now, within, free)
+        if factor is None:
+            return
+        rest = [f for f in free if f != factor]
+        searched: set[int] = set()
+        left = self._choices(now, factor, within[factor])
+        while left:
+            bits, k = left.pop(0)
+            n_before = self.n_boxes
+            yield from self._points(bits, fixed | {factor: k}, within, rest, steps)
+            searched.add(k)
+            if self.n_boxes > n_before:
+                now = self._open_now(open_boxes, known, fixed)
+                choices = self._choices(now, factor, within[factor], searched)
+                left = [choice for choice in choices if choice[1] not in searched]
+
+    def _open_now(self, open_boxes: int, known: int, fixed: dict[int, int]) -> int:
+        """Open boxes, and those of the boxes from number `known` on that hold what is fixed."""
+        added = (self.all >> known) << known
+        for f, k in fixed.items():
+            added &= self.accepts[f][k]
+        return open_boxes | added
+
     def _search(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> dict[int, int] | None:
         if not open_boxes:
             return {}
@@ -158,10 +200,10 @@ class BoxSet:
             return max(limits, key=lambda item: (item[1] & single).bit_count())[0]
         return best
 
-    def _choices(self, open_boxes: int, factor: int, side: int) -> list[tuple[int, int]]:
-        """What each class that is worth trying keeps open, and the class: fewest first."""
-        kept: dict[int, int] = {}
+    def _choices(self, open_boxes: int, factor: int, side: int, searched: Collection[int] = ()) -> list[tuple[int, int]]:
+        """What each class that is worth trying keeps open, and the class: fewest first. Of equal classes a searched one counts."""
         own = self.accepts[factor]
+        kept = {own[k] & open_boxes: k for k in searched}
         for first, stop in runs_of(side):
             for k in range(first, stop):
                 kept.setdefault(own[k] & open_boxes, k)

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
+import contextdb as cdb
 from contextdb.commands.check_command import check_path
 from contextdb.covering import coverage
 from contextdb.covering.check_rows import check_rows
@@ -81,3 +82,12 @@ def test_a_check_finds_of_small_tables_what_coverage_finds(seed):
     table = random_table(rng, rng.choice(["collect", "first", "priority", "unique"]))
     found = [f for f in check_rows(table) if f.rule != "always-any"]
     assert found == [f for f in coverage(table, samples=0).findings if f.rule != "identical-rows"]
+
+
+def test_of_a_rule_that_many_rows_break_the_first_are_named_and_how_many_more(monkeypatch):
+    monkeypatch.setattr("contextdb.check.MOST_ROWS", 3)
+    columns = {"Asset": [f"a{i}" for i in range(9)], "speed": ["Any", *(f"{i}..{i + 3}" for i in range(8))]}
+    table = cdb.Table.from_columns(columns, {"speed": {"type": "number", "min": 0.0, "max": 20.0}})
+    found = [f for f in check_rows(table) if f.rule == "subsumed-row"]
+    assert [f.row for f in found] == [1, 2, 3, 4]
+    assert "(5 rows like this one are not listed.)" in found[-1].message

@@ -254,3 +254,10 @@ print(json.dumps(report.to_json()))
         for how in ("with", "without")
     ]
     assert out[0] == out[1] != ""
+
+
+def test_a_text_whose_values_nobody_declares_leaves_every_other_text_open():
+    report = report_of({"mood": ["calm", "angry"]}, {"mood": {"type": "text"}})
+    assert [gap.cells for gap in report.gaps] == [{"mood": "not angry calm"}]
+    assert (report.method, round(report.covered, 12)) == ("exact", round(2 / 3, 12))
+    assert "any other text" in report.assumed["mood"]

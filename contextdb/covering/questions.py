@@ -1,0 +1,78 @@
+"""Questions about many boxes by compiled loops: whether some hold all of another, and which lies within which.
+
+The answers are those of `witness`, which needs no loading and is quicker where boxes are few. Single points count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.covering.count import scratch_of, table_of
+from contextdb.covering.space import Box, runs_of
+
+MANY = 1000
+"""From so many boxes on the loops are worth loading."""
+
+
+@dataclass(frozen=True, eq=False)
+class Questions:
+    """Boxes to be asked about, by number."""
+
+    boxes: Sequence[Box]
+    full: Box
+
+    @cached_property
+    def _table(self) -> tuple[NDArray[Any], ...]:
+        return table_of(self.boxes, self.full, [side.bit_length() for side in self.full])
+
+    def are_held(self, box: Box, by: int, most: int) -> tuple[bool, bool, int]:
+        """Whether the boxes whose bits are in `by` hold all of a box, whether that is certain, and the steps it took."""
+        from contextdb.covering.count_kernels import CUT, LIMIT, WORK
+        from contextdb.covering.part_kernels import part_of
+        from contextdb.covering.search_kernels import leaves_open
+
+        table, n_factors = self._table, len(self.full)
+        chosen = np.flatnonzero(bitmask.unpack(bitmask.from_int(by, len(self.boxes)), len(self.boxes)))
+        inside = self._inside(box)
+        salts = np.zeros(n_factors, np.uint64)
+        state = np.zeros(5, np.int64)
+        with np.errstate(over="ignore"):
+            part = part_of(chosen, np.arange(n_factors), inside, salts, table)
+            state[LIMIT], state[WORK] = most, len(chosen) * n_factors >> 3
+            if not len(part[0]):
+                return bool(len(chosen)), True, int(state[WORK])
+            scratch = scratch_of(part, int(np.diff(table[4]).max()))
+            is_open = leaves_open(part, 0, len(part[0]), inside, salts, table, scratch, state)
+        return not (is_open or state[CUT]), not state[CUT], int(state[WORK])
+
+    def _inside(self, box: Box) -> NDArray[np.float64]:
+        """1 for each class that a box holds, else 0."""
+        inside, edges = np.ones(int(self._table[4][-1])), self._table[4]
+        for f, side in enumerate(box):
+            if side != self.full[f]:
+                inside[edges[f] : edges[f + 1]] = 0.0
+                for first, stop in runs_of(side):
+                    inside[edges[f] + first : edges[f] + stop] = 1.0
+        return inside
+
+    def holders(self, n: int) -> NDArray[np.int64]:
+        """For each of the first n boxes the first of them that holds it whole and is not equal to it; -1: there is none."""
+        from contextdb.covering.part_kernels import part_of
+        from contextdb.covering.search_kernels import first_holders
+
+        n_factors = len(self.full)
+        everything = np.ones(int(self._table[4][-1]))
+        known: dict[Box, int] = {}
+        alike = np.array([known.setdefault(box, i) for i, box in enumerate(self.boxes[:n])], np.int64)
+        found = np.full(n, -1, np.int64)
+        with np.errstate(over="ignore"):
+            part = part_of(np.arange(n), np.arange(n_factors), everything, np.zeros(n_factors, np.uint64), self._table)
+            first_holders(part, alike, found)
+        return found

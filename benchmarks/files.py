@@ -1,6 +1,6 @@
 """What files cost: load, save, diff and merge of a large table, beside polars' plain read and write, and daff.
 
-    python benchmarks/files.py                 100,000 x 60, 1,000 changed cells
+    python benchmarks/files.py                 100,000 x 60, 1,000 changed cells; about a minute
     python benchmarks/files.py --quick         10,000 x 60
     python benchmarks/files.py --json FILE     the same figures for programs
 
@@ -88,6 +88,7 @@ def _works(shape: generator.Shape, folder: Path) -> dict[str, Work]:
     works: dict[str, Work] = {
         "polars read": lambda: pl.read_csv(file, infer_schema=False),
         "load": lambda: cdb.load(file),
+        "load and compile": lambda: cdb.load(file).compile(),
         "polars write": lambda: frame.write_csv(folder / "written.csv"),
         "save": lambda: ours.save(folder / "saved.csv"),
         "diff, shared columns": lambda: diff(base, ours).n_changed,

@@ -167,6 +167,8 @@ def _too_wide(n_fields: int, width: int, place: Place) -> Fault:
 
 
 def _broken(why: str, text: str, line: int, file: str) -> Fault:
+    if "field limit" in why:
+        return Fault(f"a field has more than {MOST_CHARACTERS:,} characters.", "a shorter one", place=Place(file, line))
     said = next((told for part, told in _BROKEN.items() if part in why), why)
     shown_line = next(islice(io.StringIO(text), line - 1, None), "").rstrip("\r\n")
     accepted = "a field in double quotes from its start to its end, each quote in it doubled"

@@ -9,17 +9,18 @@ Source: OMG, Decision Model and Notation 1.3 to 1.5; `bpmn-io/dmn-js` for what e
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
-from contextdb.domains import BOOL, NUMBER, Domain
 from contextdb.errors import Fault, Place, TableError, in_quotes, nearest, shown, some
+from contextdb.exchange.conflicts import require_no_conflicts
+from contextdb.exchange.dmn_types import InputType, Types, children_of, domain_of, tag_of, text_of
 from contextdb.exchange.encodings import decoded
-from contextdb.exchange.feel import cell_of, string_of, value_of
+from contextdb.exchange.feel import STRING, cell_of, string_of, value_of
 from contextdb.exchange.reading import Reading, Remark, capped, listed
 from contextdb.schema import Schema, TableSettings
 from contextdb.source import name_faults
@@ -31,21 +32,24 @@ _LETTERS = {"U": "UNIQUE", "F": "FIRST", "P": "PRIORITY", "A": "ANY", "C": "COLL
 _VERSIONS = {"20151101": "1.1", "20180521": "1.2", "20191111": "1.3", "20211108": "1.4", "20230324": "1.5"}
 _TYPE = re.compile(r"<!(?:DOCTYPE|ENTITY)", re.IGNORECASE)
 _NAME = re.compile(r"[^\W\d][\w ]*(?:\.[^\W\d][\w ]*)*")
-_STRINGS = re.compile(r'\s*"(?:[^"\\]|\\.)*"\s*(?:,\s*"(?:[^"\\]|\\.)*"\s*)*', re.DOTALL)
-_STRING = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _ACCEPTED = "a DMN file with a decision table"
+_HOLDERS = ("decision", "businessKnowledgeModel")
+_NAMES = ("name", "id")
+
+_NOTE = InputType("annotation")
 
 Element = ElementTree.Element
 
 
 @dataclass(frozen=True)
 class _Column:
-    """A column of the decision table: its name, what its type is called, the values it may have, and the texts of its entries."""
+    """A column of the decision table: name, type, the texts of its entries; of an output also its values and its default."""
 
     name: str
-    kind: str
-    values: tuple[str, ...]
+    kind: InputType
     entries: Sequence[str]
+    values: tuple[str, ...] = ()
+    default: str = ""
 
 
 def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
@@ -63,10 +67,11 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
     """
     root = _parsed(raw, file)
     element, name = _chosen(root, decision, file)
-    rules = _children(element, "rule")
-    inputs = [_input(one, at, rules) for at, one in enumerate(_children(element, "input"))]
-    outputs = [_output(one, at, rules, name) for at, one in enumerate(_children(element, "output"))]
-    notes = [_annotation(one, at, rules) for at, one in enumerate(_children(element, "annotation"))] + _descriptions(rules)
+    rules = children_of(element, "rule")
+    types = Types.of(root)
+    inputs = [_input(one, at, rules, types) for at, one in enumerate(children_of(element, "input"))]
+    outputs = [_output(one, at, rules, name) for at, one in enumerate(children_of(element, "output"))]
+    notes = [_annotation(one, at, rules) for at, one in enumerate(children_of(element, "annotation"))] + _descriptions(rules)
     if not outputs:
         raise TableError(Fault("the decision table has no output.", "an output, which names the asset", place=Place(file)))
     policy, policy_remarks = _policy(element)
@@ -81,9 +86,14 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
     if faults:
         raise TableError(*faults)
     plain = tuple(column.name for column in data[1:])
-    settings = TableSettings(name, asset=data[0].name, outputs=plain, policy=policy, priority=_priority_name(columns, policy))
-    schema = Schema(conditions=_declared(inputs), tables={name: settings})
-    remarks = (*_version(root), *policy_remarks, *_expressions(element), *capped([*lost, *lost_values], "such entries"))
+    declared, lost_types = _declared(inputs)
+    fallback, lost_defaults = _fallback(outputs)
+    priority = _priority_name(columns, policy)
+    settings = TableSettings(name, asset=data[0].name, outputs=plain, policy=policy, priority=priority, fallback=fallback)
+    schema = Schema(conditions=declared, tables={name: settings})
+    lost = [*lost, *lost_values, *_notes_on_entries(rules)]
+    told = (*_version(root), *policy_remarks, *_expressions(element), *_results(root, inputs), *lost_types, *lost_defaults)
+    remarks = (*told, *capped(lost, "such entries"))
     return Reading(tuple(columns), "dmn", remarks, schema, outputs=plain)
 
 
@@ -92,6 +102,7 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
 
 def _parsed(raw: bytes, file: str) -> Element:
     text, _ = decoded(raw, file)
+    require_no_conflicts(text, file)
     if _TYPE.search(text):
         raise TableError(
             Fault("the file declares a document type or entities, which no DMN file does.", _ACCEPTED, place=Place(file))
@@ -103,15 +114,15 @@ def _parsed(raw: bytes, file: str) -> Element:
         raise TableError(
             Fault(f"this is no XML that can be read: {shown(str(error))}.", _ACCEPTED, place=Place(file, line))
         ) from None
-    if _tag(root) != "definitions":
-        raise TableError(Fault(f"this is no DMN: its root is <{shown(_tag(root))}>.", _ACCEPTED, place=Place(file)))
+    if tag_of(root) != "definitions":
+        raise TableError(Fault(f"this is no DMN: its root is <{shown(tag_of(root))}>.", _ACCEPTED, place=Place(file)))
     return root
 
 
 def _chosen(root: Element, wanted: str | None, file: str) -> tuple[Element, str]:
     """The decision table that is asked for, and its decision's name."""
     found = [
-        (one, table) for one in root.iter() if _tag(one) == "decision" for table in one.iter() if _tag(table) == "decisionTable"
+        (one, table) for one in root.iter() if tag_of(one) in _HOLDERS for table in one.iter() if tag_of(table) == "decisionTable"
     ]
     names = [one.get("name") or one.get("id") or "decision" for one, _ in found]
     if wanted is not None:
@@ -137,58 +148,40 @@ def _version(root: Element) -> tuple[Remark, ...]:
     return () if version else (Remark(f"the version of DMN is not known, {in_quotes(space)}; it is read as 1.3 to 1.5."),)
 
 
-def _tag(element: Element) -> str:
-    return str(element.tag).rpartition("}")[2]
-
-
-def _children(element: Element, tag: str) -> list[Element]:
-    return [child for child in element if _tag(child) == tag]
-
-
-def _text(element: Element | None) -> str:
-    """The text of the <text> in an element."""
-    found = next((child for child in element if _tag(child) == "text"), None) if element is not None else None
-    return (found.text or "").strip() if found is not None else ""
-
-
 def _entries(rules: Sequence[Element], tag: str, at: int) -> list[str]:
-    entries = (_children(rule, tag) for rule in rules)
-    return [_text(found[at]) if at < len(found) else "" for found in entries]
+    entries = (children_of(rule, tag) for rule in rules)
+    return [text_of(found[at]) if at < len(found) else "" for found in entries]
 
 
 # ---- columns
 
 
-def _input(element: Element, at: int, rules: Sequence[Element]) -> _Column:
-    expression = next(iter(_children(element, "inputExpression")), None)
-    said, label = _text(expression), (element.get("label") or "").strip()
+def _input(element: Element, at: int, rules: Sequence[Element], types: Types) -> _Column:
+    expression = next(iter(children_of(element, "inputExpression")), None)
+    said, label = text_of(expression), (element.get("label") or "").strip()
     name = said if _NAME.fullmatch(said) else label or said or f"input {at + 1}"
-    kind = _type(expression) if expression is not None else ""
-    values = _text(next(iter(_children(element, "inputValues")), None))
-    return _Column(name, kind, (values,) if values else (), _entries(rules, "inputEntry", at))
+    kind = types.of_input(expression, said)
+    allowed = text_of(next(iter(children_of(element, "inputValues")), None)) or kind.allowed
+    return _Column(name, InputType(kind.kind, allowed), _entries(rules, "inputEntry", at))
 
 
 def _output(element: Element, at: int, rules: Sequence[Element], decision: str) -> _Column:
     name = element.get("name") or element.get("label") or (decision if at == 0 else f"output {at + 1}")
-    values = _text(next(iter(_children(element, "outputValues")), None))
-    found = tuple(string_of(literal) for literal in _STRING.findall(values))
-    return _Column(name, _type(element), found, _entries(rules, "outputEntry", at))
-
-
-def _type(element: Element) -> str:
-    """The name of the type of an expression, without its prefix: feel:string is string."""
-    return (element.get("typeRef") or "").rpartition(":")[2].lower()
+    values = text_of(next(iter(children_of(element, "outputValues")), None))
+    found = tuple(string_of(literal) for literal in STRING.findall(values))
+    default = text_of(next(iter(children_of(element, "defaultOutputEntry")), None))
+    return _Column(name, InputType(), _entries(rules, "outputEntry", at), found, default)
 
 
 def _annotation(element: Element, at: int, rules: Sequence[Element]) -> _Column:
     texts = _entries(rules, "annotationEntry", at)
-    return _Column(element.get("name") or f"annotation {at + 1}", "annotation", (), texts)
+    return _Column(element.get("name") or f"annotation {at + 1}", _NOTE, texts)
 
 
 def _descriptions(rules: Sequence[Element]) -> list[_Column]:
     """The descriptions of the rules, which some editors write in place of annotations, where there are any."""
-    texts = [next(((one.text or "").strip() for one in _children(rule, "description")), "") for rule in rules]
-    return [_Column("description", "annotation", (), texts)] if any(texts) else []
+    texts = [next(((one.text or "").strip() for one in children_of(rule, "description")), "") for rule in rules]
+    return [_Column("description", _NOTE, texts)] if any(texts) else []
 
 
 def _conditions(inputs: Sequence[_Column]) -> tuple[list[TextColumn], list[Remark]]:
@@ -196,7 +189,7 @@ def _conditions(inputs: Sequence[_Column]) -> tuple[list[TextColumn], list[Remar
     for one in inputs:
         texts = []
         for rule, entry in enumerate(one.entries, 1):
-            cell = cell_of(entry)
+            cell = cell_of(entry.lower() if one.kind.kind == "boolean" else entry)  # some tools write True
             if cell is None:
                 lost.append(
                     Remark(f"{in_quotes(entry)} is no test that a cell can say; it is kept as text.", _place(rule, one.name), True)
@@ -211,7 +204,7 @@ def _data(outputs: Sequence[_Column]) -> tuple[list[TextColumn], list[Remark]]:
     for one in outputs:
         texts = []
         for rule, entry in enumerate(one.entries, 1):
-            value = entry if one.kind == "annotation" else value_of(entry)
+            value = entry if one.kind == _NOTE else value_of(entry)
             if value is None:
                 lost.append(Remark(f"{in_quotes(entry)} is an expression; it is kept as text.", _place(rule, one.name), True))
             texts.append(entry if value is None else value)
@@ -226,30 +219,52 @@ def _place(rule: int, column: str) -> str:
 def _expressions(element: Element) -> list[Remark]:
     """Inputs that are worked out of others: the game must give such a fact itself."""
     remarks = []
-    for one in _children(element, "input"):
-        said, label = _text(next(iter(_children(one, "inputExpression")), None)), one.get("label")
+    for one in children_of(element, "input"):
+        said, label = text_of(next(iter(children_of(one, "inputExpression")), None)), one.get("label")
         if said and not _NAME.fullmatch(said) and said != label:
             told = f"{in_quotes(said)} is an expression; as a column it is a fact that the game gives."
             remarks.append(Remark(told, f"input {in_quotes(label or said)}", True))
     return remarks
 
 
-def _declared(inputs: Sequence[_Column]) -> dict[str, Condition]:
-    """The conditions whose type the file tells for certain; others are judged by their cells."""
-    domains = {one.name: _domain(one) for one in inputs}
-    return {name: Condition(name, domain) for name, domain in domains.items() if domain is not None}
+def _declared(inputs: Sequence[_Column]) -> tuple[dict[str, Condition], list[Remark]]:
+    """The conditions whose type the file tells for certain, others are judged by their cells; and what of the types is lost."""
+    declared, lost = dict[str, Condition](), list[Remark]()
+    for one in inputs:
+        domain, remarks = domain_of(one.kind, list(one.entries), f"input {in_quotes(one.name)}")
+        lost += remarks
+        if domain is not None:
+            declared[one.name] = Condition(one.name, domain)
+    return declared, lost
 
 
-def _domain(one: _Column) -> Domain | None:
-    if one.kind == "boolean":
-        return BOOL
-    if one.kind in ("number", "double", "decimal"):
-        return NUMBER
-    if one.kind in ("integer", "long"):
-        return Domain("int")
-    if one.values and _STRINGS.fullmatch(one.values[0]):
-        return Domain("enum", tuple(dict.fromkeys(string_of(literal) for literal in _STRING.findall(one.values[0]))))
-    return None
+def _fallback(outputs: Sequence[_Column]) -> tuple[str | None, list[Remark]]:
+    """What the first output is when no rule holds: the table's fallback. Defaults of others have no place in a table."""
+    value = value_of(outputs[0].default)
+    given = [one for one in outputs if one.default and (one is not outputs[0] or value is None)]
+    lost = [
+        Remark(f"the default {in_quotes(one.default)} is not kept.", f"output {in_quotes(one.name)}", is_loss=True) for one in given
+    ]
+    return value or None, lost
+
+
+def _results(root: Element, inputs: Sequence[_Column]) -> Iterator[Remark]:
+    """Inputs that other decisions of the file give: the game must give such a fact itself."""
+    decisions = children_of(root, "decision")
+    results = {one.get(key) for decision in decisions for one in (decision, *children_of(decision, "variable")) for key in _NAMES}
+    for one in inputs:
+        if one.name in results:
+            told = "another decision of the file gives it; as a column it is a fact that the game gives."
+            yield Remark(told, f"input {in_quotes(one.name)}", True)
+
+
+def _notes_on_entries(rules: Sequence[Element]) -> Iterator[Remark]:
+    """Descriptions of single entries, for which a table has no place."""
+    for rule, element in enumerate(rules, 1):
+        for entry in element:
+            note = next(((one.text or "").strip() for one in children_of(entry, "description")), "")
+            if note:
+                yield Remark(f"the note {in_quotes(note)} on an entry is not kept.", f"rule {rule}", True)
 
 
 # ---- the hit policy

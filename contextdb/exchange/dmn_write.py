@@ -6,15 +6,18 @@ nothing, a column of tags becomes an annotation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
+from contextdb.cells import format_number
+from contextdb.condition_column import ConditionColumn
 from contextdb.console import printable
 from contextdb.domains import Domain
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.exchange.feel import literal, unary_tests
 from contextdb.exchange.reading import Remark, capped
 from contextdb.exchange.xlsx_parts import DECLARATION, NEVER, attribute
-from contextdb.table import ConditionColumn, Table
+from contextdb.table import Table
 
 NAMESPACE = "https://www.omg.org/spec/DMN/20191111/MODEL/"
 _POLICIES = {"unique": "UNIQUE", "first": "FIRST", "collect": "COLLECT", "priority": "PRIORITY"}
@@ -37,7 +40,7 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
     outputs = [table.asset_column, *(name for name in _plain(table) if name != table.asset_column)]
     parts = [
         *(_input(column) for column in inputs),
-        *(f'<output id="output_{at}" name="{attribute(name)}" typeRef="string"/>' for at, name in enumerate(outputs, 1)),
+        *(_output(at, name, table.settings.fallback if at == 1 else None) for at, name in enumerate(outputs, 1)),
         *(f'<annotation name="{attribute(column.condition.name)}"/>' for column in tags),
         *(_rule(table, row, inputs, outputs, tags) for row in rows),
     ]
@@ -87,10 +90,23 @@ def _rows(table: Table, inputs: Sequence[ConditionColumn]) -> tuple[list[int], t
 
 def _input(column: ConditionColumn) -> str:
     name, domain = attribute(column.condition.name), column.condition.domain
-    values = ",".join(map(literal, domain.values)) if domain.values else ""
+    values = ",".join(map(literal, domain.values)) if domain.values else _bounds(domain)
     allowed = f"<inputValues><text>{attribute(values)}</text></inputValues>" if values else ""
     expression = f'<inputExpression typeRef="{_TYPES[domain.kind]}"><text>{name}</text></inputExpression>'
     return f'<input label="{name}">{expression}{allowed}</input>'
+
+
+def _bounds(domain: Domain) -> str:
+    """The bounds of numbers as a unary test; nothing where there are none."""
+    low, high = (None if math.isinf(end) else format_number(end) for end in (domain.minimum, domain.maximum))
+    if low is None or high is None:
+        return f">= {low}" if low is not None else f"<= {high}" if high is not None else ""
+    return f"[{low}..{high}]"
+
+
+def _output(number: int, name: str, default: str | None) -> str:
+    entry = f"<defaultOutputEntry><text>{attribute(literal(default))}</text></defaultOutputEntry>" if default else ""
+    return f'<output id="output_{number}" name="{attribute(name)}" typeRef="string">{entry}</output>'
 
 
 def _rule(
@@ -111,9 +127,11 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
         yield Remark("angles are told from -180 to 180; give the decision angles within these.")
     if table.settings.policy == "priority":
         yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
-    for key in ("fallback", "assume"):
-        if getattr(table.settings, key):
-            yield Remark(f"{key} is not kept: a decision table has no such thing.", is_loss=True)
+    if table.settings.when:
+        said = "its rules become an output, which excludes nothing: a cell of a decision table looks at one fact."
+        yield Remark(said, f"column {in_quotes(table.settings.when)}", True)
+    if table.settings.assume:
+        yield Remark("assume is not kept: a decision table has no such thing.", is_loss=True)
 
 
 def _is_angle(domain: Domain) -> bool:

@@ -24,12 +24,15 @@ from contextdb.cells import Cell, NumberSet, ValueSet, format_cell
 from contextdb.domains import NUMBER
 
 _PART = re.compile(r'"(?:[^"\\]|\\.)*"|[^,"]+|.', re.DOTALL)
-_STRING = re.compile(r'"((?:[^"\\]|\\.)*)"', re.DOTALL)
-_ESCAPE = re.compile(r"\\(u[0-9A-Fa-f]{4}|.)", re.DOTALL)
+STRING = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
+"""A string of FEEL."""
+STRINGS = re.compile(rf"\s*{STRING.pattern}\s*(?:,\s*{STRING.pattern}\s*)*", re.DOTALL)
+"""Strings with commas between."""
+_ESCAPE = re.compile(r"\\(u[0-9A-Fa-f]{4}|U(?:0[0-9A-Fa-f]|10)[0-9A-Fa-f]{4}|.)", re.DOTALL)
 _ESCAPED = {"n": "\n", "r": "\r", "t": "\t"}
 _NOT = re.compile(r"not\s*\((.*)\)", re.DOTALL)
 _RANGE = re.compile(rf"([\[\](])\s*({NUMBER_TEXT})\s*\.\.\s*({NUMBER_TEXT})\s*([\[\])])")
-_COMPARED = re.compile(rf"(<=|>=|<|>|=)?\s*({NUMBER_TEXT})")
+_COMPARED = re.compile(rf"(?:\?\s*(?=[<>=]))?(<=|>=|<|>|=)?\s*({NUMBER_TEXT})")
 _OURS = re.compile(rf"([\[(]?)({NUMBER_TEXT})?\.\.({NUMBER_TEXT})?([\])]?)")
 
 
@@ -45,7 +48,7 @@ def cell_of(test: str) -> str | None:
         inner = cell_of(found[1])
         return None if inner is None or inner == "-" else f"not {inner}"
     parts = list(_split(text))
-    if all(_STRING.fullmatch(part) for part in parts):
+    if all(STRING.fullmatch(part) for part in parts):
         return " ".join(quoted(string_of(part)) for part in parts)
     if all(part in ("true", "false") for part in parts):
         return parts[0].capitalize() if len(set(parts)) == 1 else "-"
@@ -66,6 +69,8 @@ def _split(text: str) -> Iterator[str]:
 
 
 def _number_part(part: str) -> str | None:
+    if "inf" in part.casefold():  # a name like any other to FEEL
+        return None
     if found := _COMPARED.fullmatch(part):
         return f"{found[1] or ''}{found[2]}"
     found = _RANGE.fullmatch(part)
@@ -78,11 +83,12 @@ def _number_part(part: str) -> str | None:
 
 def string_of(literal: str) -> str:
     """The text that a string of FEEL means."""
-    return _ESCAPE.sub(lambda found: _unescaped(found[1]), literal[1:-1])
+    text = _ESCAPE.sub(lambda found: _unescaped(found[1]), literal[1:-1])
+    return text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")  # two halves of a pair are one character
 
 
 def _unescaped(escape: str) -> str:
-    return chr(int(escape[1:], 16)) if len(escape) == 5 else _ESCAPED.get(escape, escape)
+    return chr(int(escape[1:], 16)) if len(escape) > 1 else _ESCAPED.get(escape, escape)
 
 
 def value_of(expression: str) -> str | None:
@@ -90,11 +96,11 @@ def value_of(expression: str) -> str | None:
     text = expression.strip()
     if text in ("", "null"):
         return ""
-    if _STRING.fullmatch(text):
+    if STRING.fullmatch(text):
         return string_of(text)
     if text in ("true", "false"):
         return text.capitalize()
-    return text if re.fullmatch(NUMBER_TEXT, text) else None
+    return text if re.fullmatch(NUMBER_TEXT, text) and "inf" not in text.casefold() else None
 
 
 # ---- to FEEL

@@ -86,8 +86,14 @@ def _loaded(text: str, file: str, line: int | None = None) -> Any:
         raise TableError(Fault(f"this is no JSON: {error.msg} at character {error.colno}.", _ACCEPTED, place=place)) from None
     except RecursionError:
         raise TableError(Fault("lists or objects stand in each other too deep.", _ACCEPTED, place=Place(file, line))) from None
-    except ValueError as error:
+    except _TwinError as error:
         raise TableError(Fault(f"{error}.", "each key once in an object", place=Place(file, line))) from None
+    except ValueError:  # Python reads no whole number of more than some thousand digits
+        raise TableError(Fault("a number has too many digits.", "numbers that a double holds", place=Place(file, line))) from None
+
+
+class _TwinError(ValueError):
+    """A key stands twice in one object."""
 
 
 def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -95,7 +101,7 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         seen = set[str]()
         twin = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
-        raise ValueError(f"the key {in_quotes(twin)} stands twice in one object")
+        raise _TwinError(f"the key {in_quotes(twin)} stands twice in one object")
     return found
 
 

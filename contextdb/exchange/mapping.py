@@ -15,9 +15,11 @@ from contextdb.exchange.reading import Reading
 from contextdb.schema import Schema, TableSettings, conditions_from_dict
 from contextdb.sections import condition_to_dict
 
-Job = Literal["asset", "condition", "output", "enabled", "priority", "weight", "left out"]
-JOBS: tuple[Job, ...] = ("asset", "condition", "output", "enabled", "priority", "weight", "left out")
-PLAIN_JOBS: tuple[Job, ...] = ("enabled", "priority", "weight")
+Job = Literal["asset", "condition", "output", "enabled", "priority", "weight", "when", "left out"]
+JOBS: tuple[Job, ...] = ("asset", "condition", "output", "enabled", "priority", "weight", "when", "left out")
+PLAIN_JOBS: tuple[Job, ...] = ("enabled", "priority", "weight", "when")
+_NEVER_GUESSED = ("when",)
+"""Jobs whose word is too common a name to go by."""
 
 _ASSET_NAMES = ("assetname", "asset", "animation", "animationname", "animasset", "clip", "clipname", "rowname", "name")
 
@@ -180,7 +182,7 @@ def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> Job | 
         said = getattr(settings, job)
         if said is not None and (name == said or _folded(name) == _folded(said)):
             return job
-        if said is None and _folded(name) == job and _fits(column, job):
+        if said is None and _folded(name) == job and job not in _NEVER_GUESSED and _fits(column, job):
             return job
     return None
 

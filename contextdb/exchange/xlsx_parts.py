@@ -68,18 +68,28 @@ STYLES = (
 )
 
 
-def workbook(sheet: str) -> str:
-    """The list of sheets: the table's, and the one that keeps its types."""
+def workbook(sheet: str, last_frozen: str) -> str:
+    """The list of sheets: the table's, and the one of types. Each page in print repeats what is frozen on the screen."""
+    name = attribute(sheet.replace("'", "''"))
+    titles = f"'{name}'!$A:${last_frozen},'{name}'!$1:$1"
     return (
         f'{DECLARATION}<workbook xmlns="{_MAIN}" xmlns:r="{_OFFICE}"><bookViews><workbookView/></bookViews><sheets>'
         f'<sheet name="{attribute(sheet)}" sheetId="1" r:id="rId1"/>'
-        f'<sheet name="{TYPES_SHEET}" sheetId="2" r:id="rId2"/></sheets></workbook>'
+        f'<sheet name="{TYPES_SHEET}" sheetId="2" r:id="rId2"/></sheets>'
+        f'<definedNames><definedName name="_xlnm.Print_Titles" localSheetId="0">{titles}</definedName></definedNames></workbook>'
     )
 
 
-def sheet_start() -> str:
-    """How the XML of a sheet begins."""
-    return f'{DECLARATION}<worksheet xmlns="{_MAIN}">'
+def sheet_start(fits_page: bool = False) -> str:
+    """How the XML of a sheet begins; one that `fits_page` is printed as wide as the page."""
+    page = '<sheetPr><pageSetUpPr fitToPage="1"/></sheetPr>' if fits_page else ""
+    return f'{DECLARATION}<worksheet xmlns="{_MAIN}">{page}'
+
+
+def page(fits_page: bool) -> str:
+    """How a sheet is printed: across, and as high as it is."""
+    height = ' fitToHeight="0"' if fits_page else ""
+    return f'<pageSetup orientation="landscape"{height}/>'
 
 
 def shared_strings(texts: list[str]) -> str:

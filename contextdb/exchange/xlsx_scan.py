@@ -72,9 +72,12 @@ def _bomb(archive: zipfile.ZipFile) -> Fault | None:
     infos = archive.infolist()
     total = sum(info.file_size for info in infos)
     steep = [info for info in infos if info.file_size > MOST_RATIO * max(info.compress_size, 1_000)]
-    if total <= MOST_BYTES and not steep:
+    if total > MOST_BYTES:
+        return Fault(f"the workbook would unpack to {total:,} bytes.", f"at most {MOST_BYTES:,}")
+    if not steep:
         return None
-    return Fault(f"the workbook would unpack to {total:,} bytes.", f"at most {MOST_BYTES:,}, packed as Excel packs them")
+    found = f"{steep[0].filename} would unpack from {steep[0].compress_size:,} bytes to {steep[0].file_size:,}, as a bomb does."
+    return Fault(found, f"parts that unpack to at most {MOST_RATIO:,} times their size")
 
 
 def _other_kind(archive: zipfile.ZipFile) -> Fault | None:

@@ -24,6 +24,8 @@ from contextdb.exchange.grid import column_letters
 from contextdb.table import Table
 
 LEAST_WIDTH, MOST_WIDTH, WIDTH_SAMPLE = 8, 44, 2_000
+PAGE_WIDTH = 220
+"""A table of so many characters across is printed on one page's width; a wider one would be too small to read."""
 SPARE_ROWS = 1_000
 """Rows below the table that have drop-downs too."""
 _BLOCK = 5_000
@@ -45,7 +47,7 @@ def write_xlsx(table: Table) -> bytes:
     files = {
         "[Content_Types].xml": parts.CONTENT_TYPES,
         "_rels/.rels": parts.RELATIONS,
-        "xl/workbook.xml": parts.workbook(parts.sheet_name(table.name)),
+        "xl/workbook.xml": parts.workbook(parts.sheet_name(table.name), column_letters(_n_frozen(table) - 1)),
         "xl/_rels/workbook.xml.rels": parts.WORKBOOK_RELATIONS,
         "xl/styles.xml": parts.STYLES,
         "xl/worksheets/sheet1.xml": sheets[0],
@@ -91,22 +93,31 @@ def _unfit(column: TextColumn, text: str) -> Fault:
 def _table_sheet(table: Table, lists: dict[str, tuple[str, ...]], strings: dict[str, int]) -> str:
     n_rows, columns = table.n_rows, table.columns
     last = column_letters(len(columns) - 1)
-    asset = [c.name for c in columns].index(table.asset_column)
-    xml = [parts.sheet_start(), f'<dimension ref="A1:{last}{n_rows + 1}"/>', _frozen(asset + 1), "<cols>"]
+    asset, widths = _asset_at(table), [_width(column) for column in columns]
+    fits_page = sum(widths) <= PAGE_WIDTH
+    xml = [parts.sheet_start(fits_page), f'<dimension ref="A1:{last}{n_rows + 1}"/>', _frozen(_n_frozen(table)), "<cols>"]
     xml += [
-        f'<col min="{at}" max="{at}" width="{_width(column)}" style="{parts.TEXT}" customWidth="1"/>'
-        for at, column in enumerate(columns, 1)
+        f'<col min="{at}" max="{at}" width="{width}" style="{parts.TEXT}" customWidth="1"/>' for at, width in enumerate(widths, 1)
     ]
     xml += ["</cols><sheetData>", _row(1, [(c.name, parts.HEADER) for c in columns], strings)]
     xml += _rows(columns, asset, strings)
-    xml += ["</sheetData>", *_drop_downs(columns, n_rows, lists)]
+    xml += ["</sheetData>", *_drop_downs(columns, n_rows, lists), parts.page(fits_page)]
     xml += [f'<ignoredErrors><ignoredError sqref="A1:{last}{n_rows + 1}" numberStoredAsText="1"/></ignoredErrors></worksheet>']
     return "".join(xml)
 
 
+def _asset_at(table: Table) -> int:
+    return [c.name for c in table.columns].index(table.asset_column)
+
+
+def _n_frozen(table: Table) -> int:
+    """How many columns stay in view: those up to the asset's, unless they would fill the screen."""
+    n_columns = _asset_at(table) + 1
+    return n_columns if n_columns <= 3 else 1
+
+
 def _frozen(n_columns: int) -> str:
-    """The header row stays in view, and the columns up to the asset's unless those would fill the screen."""
-    n_columns = n_columns if n_columns <= 3 else 1
+    """The header row and the first columns stay in view."""
     corner = f"{column_letters(n_columns)}2"
     return (
         '<sheetViews><sheetView tabSelected="1" workbookViewId="0">'
@@ -191,7 +202,7 @@ def _types_sheet(lines: Sequence[str], lists: dict[str, tuple[str, ...]], string
     """Column A: the lines of a contextdb.toml. From column C on: what the drop-downs suggest."""
     distinct = list(dict.fromkeys(lists.values()))
     names = {values: next(name for name, of in lists.items() if of == values) for values in distinct}
-    xml = [parts.sheet_start(), '<cols><col min="1" max="1" width="90" style="1" customWidth="1"/></cols><sheetData>']
+    xml = [parts.sheet_start(fits_page=True), '<cols><col min="1" max="1" width="90" style="1" customWidth="1"/></cols><sheetData>']
     for number in range(1, max([len(lines) + 1, *(len(values) + 1 for values in distinct)]) + 1):
         line = parts.FIRST_LINE if number == 1 else lines[number - 2] if number - 2 < len(lines) else ""
         cells = [(line, parts.HEADER if number == 1 else parts.TEXT), ("", 0)]
@@ -199,4 +210,4 @@ def _types_sheet(lines: Sequence[str], lists: dict[str, tuple[str, ...]], string
             text = names[values] if number == 1 else values[number - 2] if number - 2 < len(values) else ""
             cells.append((text, parts.HEADER if number == 1 else parts.TEXT))
         xml.append(_row(number, cells, strings))
-    return "".join([*xml, "</sheetData></worksheet>"])
+    return "".join([*xml, "</sheetData>", parts.page(fits_page=True), "</worksheet>"])

@@ -123,6 +123,22 @@ def test_what_a_workbook_keeps_of_a_table_survives_a_project_that_knows_nothing_
     assert (again.settings.fallback, again.asset_column) == ("idle", "A")
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_column_of_rules_comes_back_as_one(name: str):
+    columns = [TextColumn.of(n, t) for n, t in {"A": ["x", "y"], "speed": ["5", "Any"], "only": ["speed > 3", ""]}.items()]
+    schema = Table.from_columns({"A": ["x"]}, {"speed": {"type": "number"}}).schema
+    table = build_table("table", columns, schema, TableSettings("table", asset="A", when="only"))
+    again = back(table, name)
+    assert again.settings.when == "only"
+    assert [c.condition for c in again.conditions] == [c.condition for c in table.conditions]
+    assert texts_of(again.columns) == texts_of(table.columns)
+
+
+def test_a_column_that_is_called_when_is_no_column_of_rules_by_its_name():
+    reading = read(b"A,When\nx,True\ny,False\n", "x.csv")
+    assert [column.job for column in propose(reading, EMPTY, TableSettings("x"))] == ["asset", "condition"]
+
+
 @pytest.mark.parametrize("name", ["unreal-csv", "unreal-json"])
 def test_an_unreal_table_gives_the_same_cells_back(name: str):
     columns = {

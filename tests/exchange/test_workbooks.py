@@ -95,6 +95,14 @@ def test_bools_and_enums_have_drop_downs_that_forbid_nothing():
     assert offered == {"B2:B1002": ["True", "False", "Any"], "C2:C1002": ["CB", '"Half, Back"', "Any"]}
 
 
+def test_a_sheet_is_printed_across_with_its_header_and_assets_on_every_page():
+    narrow, wide = ({"Asset": ["x"], **{f"fact number {i}": ["5"] for i in range(n)}} for n in (3, 30))
+    for columns, fits_page in ((narrow, True), (wide, False)):
+        sheet = written_sheet(Table.from_columns(columns, name="it's a table"))
+        assert (sheet.page_setup.orientation, sheet.print_title_rows, sheet.print_title_cols) == ("landscape", "$1:$1", "$A:$A")
+        assert bool(sheet.sheet_properties.pageSetUpPr and sheet.sheet_properties.pageSetUpPr.fitToPage) is fits_page
+
+
 def test_the_same_table_gives_the_same_bytes():
     table = Table.from_columns({"Asset": ["x", "y"], "speed": ["5", "6"]})
     assert write(table, FORMATS["xlsx"])[0] == write(table, FORMATS["xlsx"])[0]
@@ -250,7 +258,7 @@ def test_a_bomb_and_a_document_type_are_refused_before_they_are_unpacked():
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("xl/workbook.xml", bytes(50_000_000))
-    assert "would unpack to 50,000,000 bytes" in refused(out.getvalue())
+    assert "to 50,000,000, as a bomb does" in refused(out.getvalue())
     bomb = _edited(raw, "xl/workbook.xml", b"<workbook", b'<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]><workbook')
     assert "declares a document type" in refused(bomb)
 

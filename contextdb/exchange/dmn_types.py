@@ -1,0 +1,149 @@
+"""What a DMN file says of the values of an input: its type, its item definition, and the values that either allows.
+
+    boolean                            bool
+    number, double, decimal            number; `[0..10]` or `>= 0` as its allowed values give its bounds
+    integer, long                      int, the same
+    string with allowed values         enum
+    string where every test is one     text
+    an item definition                 what it stands for, with its allowed values or its type constraint
+
+Source: OMG, Decision Model and Notation 1.5, 7.3.2 (ItemDefinition) and 8.3.2 (input values).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+from contextdb.domains import BOOL, TEXT, Domain, Kind
+from contextdb.errors import in_quotes
+from contextdb.exchange.feel import STRING, STRINGS, string_of
+from contextdb.exchange.reading import Remark
+
+MOST_LINKS = 20
+"""How many item definitions may stand for one another."""
+
+Element = ElementTree.Element
+_NUMBER = r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?"
+_BOUNDS = (
+    re.compile(rf"\[\s*(?P<low>{_NUMBER})\s*\.\.\s*(?P<high>{_NUMBER})\s*\]"),
+    re.compile(rf">=\s*(?P<low>{_NUMBER})"),
+    re.compile(rf"<=\s*(?P<high>{_NUMBER})"),
+)
+_NUMBERS: dict[str, Kind] = {"number": "number", "double": "number", "decimal": "number", "integer": "int", "long": "int"}
+
+
+@dataclass(frozen=True)
+class InputType:
+    """A type by its name, and the text of the unary tests that its values must pass, which may be empty."""
+
+    kind: str = ""
+    allowed: str = ""
+
+
+def tag_of(element: Element) -> str:
+    """An element's tag without its namespace."""
+    return str(element.tag).rpartition("}")[2]
+
+
+def children_of(element: Element, tag: str) -> list[Element]:
+    """The elements of one tag that stand right in another."""
+    return [child for child in element if tag_of(child) == tag]
+
+
+def text_of(element: Element | None) -> str:
+    """The text of the <text> in an element."""
+    found = next(iter(children_of(element, "text")), None) if element is not None else None
+    return (found.text or "").strip() if found is not None else ""
+
+
+@dataclass(frozen=True)
+class Types:
+    """The types that a file defines, by name; those of the parts of a structure by their path: tApplicant.age."""
+
+    items: dict[str, Element]
+    facts: dict[str, str]
+    """The type of each input datum and each decision's result, by its name."""
+
+    @classmethod
+    def of(cls, root: Element) -> Types:
+        """Read the types of a file."""
+        items = dict(_items(root))
+        named = [one for tag in ("inputData", "decision") for one in children_of(root, tag)]
+        variables = [(one, next(iter(children_of(one, "variable")), None)) for one in named]
+        facts = {(one.get("name") or ""): variable.get("typeRef") or "" for one, variable in variables if variable is not None}
+        return cls(items, facts)
+
+    def of_input(self, expression: Element | None, said: str) -> InputType:
+        """The type of an input, by its own reference or by that of the datum that it names."""
+        own = expression.get("typeRef") if expression is not None else None
+        return self._resolved(own or self._type_of_path(said))
+
+    def _type_of_path(self, path: str) -> str:
+        name, _, rest = path.partition(".")
+        return f"{_plain(self.facts.get(name, ''))}.{rest}" if rest else self.facts.get(path, "")
+
+    def _resolved(self, name: str) -> InputType:
+        allowed = ""
+        for _ in range(MOST_LINKS):
+            item = self.items.get(name, self.items.get(_plain(name)))
+            if item is None:
+                break
+            constraints = [one for tag in ("typeConstraint", "allowedValues") for one in children_of(item, tag)]
+            allowed = allowed or next(filter(None, map(text_of, constraints)), "")
+            name = next((one.text or "" for one in children_of(item, "typeRef")), "").strip()
+        return InputType(_plain(name).lower(), allowed)
+
+
+def _items(root: Element) -> Iterator[tuple[str, Element]]:
+    open_ones = [(one.get("name") or "", one) for one in children_of(root, "itemDefinition")]
+    while open_ones:
+        name, one = open_ones.pop()
+        yield name, one
+        open_ones += [(f"{name}.{part.get('name') or ''}", part) for part in children_of(one, "itemComponent")]
+
+
+def _plain(name: str) -> str:
+    """The name of a type without the prefix of its namespace: feel:string is string."""
+    return name.rpartition(":")[2].strip()
+
+
+def domain_of(kind: InputType, cells: list[str], place: str) -> tuple[Domain | None, list[Remark]]:
+    """The domain that a type means, None where the cells must tell; and what of it could not be kept.
+
+    Parameters
+    ----------
+    cells : list of str
+        The unary tests of the column.
+    """
+    if kind.kind == "boolean":
+        return BOOL, []
+    if kind.kind in _NUMBERS:
+        return _bounded(_NUMBERS[kind.kind], kind.allowed, place)
+    if STRINGS.fullmatch(kind.allowed):
+        return Domain("enum", tuple(dict.fromkeys(string_of(literal) for literal in STRING.findall(kind.allowed)))), []
+    remarks = [_unkept(kind.allowed, place)] if kind.allowed not in ("", "-") else []
+    are_strings = kind.kind == "string" and any(STRING.search(cell) for cell in cells) and all(map(_is_string_test, cells))
+    return (TEXT if are_strings else None), remarks
+
+
+def _is_string_test(test: str) -> bool:
+    return test in ("", "-") or bool(re.fullmatch(r"not\s*\((.*)\)", test, re.DOTALL) or STRINGS.fullmatch(test))
+
+
+def _bounded(kind: Kind, allowed: str, place: str) -> tuple[Domain, list[Remark]]:
+    """A domain of numbers, with the bounds that allowed values give where they are closed."""
+    ends = next((found for pattern in _BOUNDS if (found := pattern.fullmatch(allowed))), None)
+    if ends is not None:
+        low, high = (None if end is None else float(end) for end in map(ends.groupdict().get, ("low", "high")))
+        is_sound = (low is None or high is None or low < high) and not (kind == "int" and any(e and e % 1 for e in (low, high)))
+        if is_sound:
+            return Domain(kind, None, -math.inf if low is None else low, math.inf if high is None else high), []
+    return Domain(kind), [_unkept(allowed, place)] if allowed not in ("", "-") else []
+
+
+def _unkept(allowed: str, place: str) -> Remark:
+    return Remark(f"the allowed values {in_quotes(allowed)} are not kept.", place, True)

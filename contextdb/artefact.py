@@ -11,17 +11,31 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     CCC.texts              uint8                 JSON list of the distinct texts
     slots.CCC.codes        as CCC.codes and CCC.texts, for the columns of slots, named in `about`
     slots.CCC.texts
+    when.codes             as CCC.codes and CCC.texts, for the column of rules, named in `about`
+    when.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
 
+and for a table with tables inside, D the depth, T the number of tables (`contextdb.nesting.ways`; soft cells then have D R rows):
+
+    ways.numbers           int32 [D, R]
+    ways.rows              int32 [D, R]
+    ways.leaves            uint8                 JSON list of R texts
+    ways.TTT.FIELD         priorities, row_weights and lines of table number TTT
+    CCC.layers             int32 [D, R]          which text each depth says
+    CCC.said               uint8                 JSON list of those texts
+
 The metadata hold `contextdb` (the version of this layout), `about` (JSON: name, policy, fallback, conditions and the kind of each
-column; where facts are derived also the conditions that they are computed from) and `digest`, BLAKE2b-128 of `about` and of all
-tensors in the order of their names. Opening checks all of it.
+column; where facts are derived also the conditions that they are computed from; where rows have rules also their column and the
+conditions that they name and that are no columns) and `digest`, BLAKE2b-128 of `about` and of all
+tensors in the order of their names. Opening checks all of it. A table with rules has layout 2, so that what knows only masks does
+not answer without them, and so has one with tables inside and soft cells; any other has layout 1.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,8 +45,11 @@ from contextdb.columns import TextColumn
 from contextdb.compiled import CompiledTable, SoftMasks
 from contextdb.conditions import Condition
 from contextdb.domains import Domain
+from contextdb.nesting.stored import ways_from, ways_to_json, ways_to_tensors
+from contextdb.nesting_cells import TagMeet
 from contextdb.schema import Schema
 from contextdb.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+from contextdb.when import WhenColumn, WhenRules
 
 if TYPE_CHECKING:
     from contextdb.expressions import Derivation
@@ -42,6 +59,7 @@ __all__ = ["SUFFIX", "open_artefact", "save"]
 COMPILED = FileKind(
     "contextdb", 1, "one that contextdb compiled", "a file that this version of contextdb compiled", "to compile the table again"
 )
+WITH_RULES = replace(COMPILED, layout=2, also=(COMPILED.layout,))
 
 
 def save(compiled: CompiledTable, path: Path) -> None:
@@ -64,6 +82,11 @@ def save(compiled: CompiledTable, path: Path) -> None:
     for at, column in enumerate(compiled.slots or ()):
         tensors[f"slots.{at:03d}.codes"] = column.codes
         tensors[f"slots.{at:03d}.texts"] = texts_to_array(list(column.texts))
+    if compiled.when is not None:
+        tensors["when.codes"] = compiled.when.texts.codes
+        tensors["when.texts"] = texts_to_array(list(compiled.when.texts.texts))
+    if compiled.ways is not None:
+        tensors |= ways_to_tensors(compiled.ways)
     about = json.dumps(
         {
             "name": compiled.name,
@@ -75,8 +98,11 @@ def save(compiled: CompiledTable, path: Path) -> None:
         }
         | ({"slots": [c.name for c in compiled.slots]} if compiled.slots is not None else {})
         | ({"computed_from": [_condition_to_json(c) for c in _computed_from(compiled)]} if compiled.derivation else {})
+        | ({"when": _when_to_json(compiled)} if compiled.when else {})
+        | ({"ways": ways_to_json(compiled.ways)} if compiled.ways else {})
     )
-    write_tensors(path, COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about)})
+    is_more = compiled.when is not None or (compiled.ways is not None and any(compiled.soft))
+    write_tensors(path, WITH_RULES if is_more else COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about)})
 
 
 def open_artefact(path: Path) -> CompiledTable:
@@ -89,7 +115,7 @@ def open_artefact(path: Path) -> CompiledTable:
     FileError
         The file cannot be read.
     """
-    tensors, metadata = read_tensors(path, COMPILED)
+    tensors, metadata = read_tensors(path, WITH_RULES)
     with COMPILED.reading(path):
         about = metadata["about"]
         if digest_of(tensors, about) != metadata.get("digest"):
@@ -118,7 +144,25 @@ def _table(about: dict[str, Any], tensors: Tensors) -> CompiledTable:
         fallback=about["fallback"],
         derivation=_derivation(about, conditions),
         slots=_slots(about, tensors),
+        when=_when(about, conditions, tensors),
+        ways=ways_from(about["ways"], tensors, len(conditions)) if "ways" in about else None,
     )
+
+
+def _when_to_json(compiled: CompiledTable) -> dict[str, object]:
+    assert compiled.when is not None
+    return {"name": compiled.when.name, "conditions": [_condition_to_json(c) for c in compiled.ruled]}
+
+
+def _when(about: dict[str, Any], conditions: tuple[Condition, ...], tensors: Tensors) -> WhenRules | None:
+    if "when" not in about:
+        return None
+    known = {c.name: c for c in (*conditions, *map(_condition_from_json, about["when"]["conditions"]))}
+    texts = TextColumn(about["when"]["name"], tuple(texts_from_array(tensors["when.texts"])), tensors["when.codes"])
+    column = WhenColumn.read(texts, known)
+    if column.faults:
+        raise ValueError(column.faults)
+    return WhenRules.of(column)
 
 
 def _slots(about: dict[str, Any], tensors: Tensors) -> tuple[TextColumn, ...] | None:
@@ -133,9 +177,9 @@ def _slots(about: dict[str, Any], tensors: Tensors) -> tuple[TextColumn, ...] | 
 def _derivation(about: dict[str, Any], conditions: tuple[Condition, ...]) -> Derivation | None:
     if "computed_from" not in about:
         return None
-    others = [_condition_from_json(c) for c in about["computed_from"]]
+    others = [_condition_from_json(c) for c in (*about["computed_from"], *about.get("when", {"conditions": ()})["conditions"])]
     known = Schema(conditions={c.name: c for c in (*conditions, *others)})
-    return known.derivation_of(c.name for c in conditions)
+    return known.derivation_of(known.conditions)
 
 
 def _computed_from(compiled: CompiledTable) -> list[Condition]:
@@ -160,7 +204,7 @@ def _add(tensors: Tensors, prefix: str, masks: ColumnMasks) -> dict[str, object]
         return {"kind": "number"}
     if isinstance(masks, ValueMasks):
         return {"kind": "value", "values": list(masks.values), "has_others": masks.has_others}
-    negated = [[sorted(t.needs), sorted(t.bans)] for t in masks.negated]
+    negated = [[_tags_to_json(p) for p in t.parts] if isinstance(t, TagMeet) else _tags_to_json(t)[:2] for t in masks.negated]
     return {"kind": "tags", "tags": list(masks.tags), "negated": negated}
 
 
@@ -174,12 +218,26 @@ def _column(tensors: Tensors, prefix: str, about: dict[str, Any], n_rows: int) -
         return NumberMasks(n_rows, tensors[f"{prefix}.bounds"], masks)
     if kind == "value":
         return ValueMasks(n_rows, tuple(about["values"]), about["has_others"], masks)
-    negated = tuple(TagSet(frozenset(needs), frozenset(bans), True) for needs, bans in about["negated"])
+    negated = tuple(_negated(parts) for parts in about["negated"])
     return TagMasks(n_rows, tuple(about["tags"]), negated, masks)
 
 
 def _soft(tensors: Tensors, prefix: str, about: dict[str, Any] | None, n_rows: int) -> SoftMasks | None:
-    return None if about is None else (_column(tensors, prefix, about, n_rows), tensors[f"{prefix}.penalties"])
+    if about is None:
+        return None
+    penalties = tensors[f"{prefix}.penalties"]
+    return _column(tensors, prefix, about, len(penalties)), penalties
+
+
+def _tags_to_json(tags: TagSet) -> list[object]:
+    return [sorted(tags.needs), sorted(tags.bans), tags.is_complement]
+
+
+def _negated(parts: list[Any]) -> TagSet:
+    """A set of tags with a "not": what it needs and bans; or the parts of a meet, each with whether it is a complement."""
+    if len(parts) == 2 and all(isinstance(name, str) for names in parts for name in names):
+        return TagSet(frozenset(parts[0]), frozenset(parts[1]), True)
+    return TagMeet.of([TagSet(frozenset(needs), frozenset(bans), is_complement) for needs, bans, is_complement in parts])
 
 
 def _condition_to_json(condition: Condition) -> dict[str, object]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,20 +21,21 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.batch_columns import Codes, Contexts, common_length, facts_of, plain_numbers, plain_values, wrapped
 from contextdb.bitmask import Rows, Words
 from contextdb.cells import Cell
 from contextdb.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.facts import Unknown, check_mode, missing_error, misspelt, read_fact
 from contextdb.matches import Matches
+from contextdb.when import ManyRules
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
 
-Contexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
-Codes = NDArray[np.int32]
-
 NUMPY_BLOCK = 2048
+RULED_WORDS = 1 << 21
+"""Words of masks at once for a table with rules: each distinct rule is computed once for all of them."""
 MUCH_WORK = 1 << 18
 """Words of answers from which loading the compiled kernels, a third of a second, is worth it."""
 
@@ -83,6 +84,8 @@ class ManyMatches:
     n_contexts: int
     values: Values
     numbers: Numbers
+    rules: ManyRules | None = None
+    """The rows' own rules, with their facts; None for a table without."""
 
     @property
     def counts(self) -> Rows:
@@ -94,9 +97,14 @@ class ManyMatches:
         """In how many contexts each row is valid: int64 [n_rows]."""
         return self._counts_and_hits[1]
 
-    @cached_property
+    @property
     def codes(self) -> Codes:
         """The codes of every context, as `CompiledTable.encode` gives them for one: int32 [N, P]."""
+        self.compiled.refuse_rules("codes do not keep the facts that they need")
+        return self._codes
+
+    @cached_property
+    def _codes(self) -> Codes:
         values = self.values
         out = np.empty((len(values.slots) + len(self.numbers.slots), self.n_contexts), np.int32)
         present = values.classes >= 0
@@ -110,13 +118,13 @@ class ManyMatches:
     @cached_property
     def mask(self) -> Words:
         """The rows of each context as bits: uint64 [N, W]."""
-        return self._masks_of(self.codes)
+        return self._masks(0, self.n_contexts)
 
     def lists(self) -> list[Rows]:
         """The row numbers of each context: a list of int64 arrays."""
         found: list[Rows] = []
         for start in range(0, self.n_contexts, NUMPY_BLOCK):
-            flags = bitmask.unpack(self._masks_of(self.codes[start : start + NUMPY_BLOCK]), self.compiled.n_rows)
+            flags = bitmask.unpack(self._masks(start, start + NUMPY_BLOCK), self.compiled.n_rows)
             contexts, rows = np.nonzero(flags)
             found += np.split(rows, np.searchsorted(contexts, np.arange(1, len(flags))))
         return found
@@ -130,14 +138,15 @@ class ManyMatches:
 
     @cached_property
     def _counts_and_hits(self) -> tuple[Rows, Rows]:
-        if kernels := load_kernels(self._work):
+        if self.rules is None and (kernels := load_kernels(self._work)):
             return self._with_kernels(kernels)
         counts = np.zeros(self.n_contexts, np.int64)
         hits = np.zeros(self.compiled.n_rows, np.int64)
-        for start in range(0, self.n_contexts, NUMPY_BLOCK):
-            masks = self._masks_of(self.codes[start : start + NUMPY_BLOCK])
+        block = NUMPY_BLOCK if self.rules is None else max(NUMPY_BLOCK, RULED_WORDS // max(1, len(self.compiled.enabled)))
+        for start in range(0, self.n_contexts, block):
+            masks = self._masks(start, start + block)
             counts[start : start + len(masks)] = bitmask.count(masks)
-            hits += bitmask.unpack(masks[masks.any(axis=1)], self.compiled.n_rows).sum(axis=0)
+            hits += np.bincount(bitmask.places(masks)[1], minlength=self.compiled.n_rows)
         return counts, hits
 
     def _with_kernels(self, kernels: ModuleType) -> tuple[Rows, Rows]:
@@ -161,13 +170,20 @@ class ManyMatches:
                 list(pool.map(part, range(n_threads)))
         return counts, hits.sum(axis=0)[: self.compiled.n_rows]
 
+    def _masks(self, start: int, stop: int) -> Words:
+        """The rows of some contexts as bits, by their cells and their rules."""
+        masks = self._masks_of(self._codes[start:stop])
+        if self.rules is not None:
+            self.rules.exclude(masks, start)
+        return masks
+
     def _masks_of(self, codes: Codes) -> Words:
         stack, enabled = self.compiled.stack, self.compiled.enabled
         if kernels := load_kernels(self._work):
             out = np.empty((len(codes), len(enabled)), np.uint64)
             kernels.batch_masks(codes, stack.masks, stack.n_plain, stack.wide, enabled, out)
             return out
-        return _masks_with_numpy(self.compiled, codes)
+        return self.compiled.stack.masks_of(codes, self.compiled.enabled)
 
 
 def load_kernels(work: int = MUCH_WORK) -> ModuleType | None:
@@ -184,6 +200,7 @@ def load_kernels(work: int = MUCH_WORK) -> ModuleType | None:
 
 def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
     """The rows for the codes of one context."""
+    compiled.refuse_rules("codes do not keep the facts that they need")
     stack = compiled.stack
     given = np.asarray(codes)
     if given.shape != (stack.n_codes,) or given.dtype.kind not in "iu":
@@ -194,7 +211,7 @@ def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
     if kernels := load_kernels():
         is_right = kernels.query(stack.masks, given, stack.n_plain, stack.wide, compiled.enabled, mask)
     elif is_right := stack.holds(given):
-        mask = _masks_with_numpy(compiled, given[None])[0]
+        mask = compiled.stack.masks_of(given[None], compiled.enabled)[0]
     if not is_right:
         raise ContextError(Fault("a code is out of range.", "the codes that encode of this same compiled table gives"))
     return compiled.matches(bitmask.to_int(mask))
@@ -211,7 +228,8 @@ def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "
     extra = [n for n in columns if n not in compiled.asked and n not in compiled.places] if absent else []
     if absent and (error := misspelt(absent, extra)) is not None:
         raise error
-    if unknown == "error" and (plain := [n for n in absent if n in compiled.places]):
+    needed = {*compiled.places, *(c.name for c in compiled.ruled)}
+    if unknown == "error" and (plain := [n for n in absent if n in needed]):
         raise missing_error(plain, extra)
     return _Encoder(compiled, n_contexts, unknown).encode(columns)
 
@@ -245,7 +263,15 @@ class _Encoder:
                 self._add_values(at, masks, given, slot)
             wide_slot += is_wide
             slot += 0 if is_wide else stack.n_slots[at]
-        return ManyMatches(self.compiled, self.n_contexts, self._values(), self._numbers())
+        return ManyMatches(self.compiled, self.n_contexts, self._values(), self._numbers(), self._rules())
+
+    def _rules(self) -> ManyRules | None:
+        if self.compiled.when is None:
+            return None
+        rules = ManyRules.read(self.compiled.when, self.columns, self.n_contexts, self.unknown)
+        for condition in self.compiled.ruled if self.unknown == "error" else ():
+            self._refuse_missing(condition.name, rules.missing(condition.name))
+        return rules
 
     def _values(self) -> Values:
         classes = np.array(self.classes, np.int32).reshape(len(self.classes), self.n_contexts)
@@ -262,13 +288,13 @@ class _Encoder:
         condition = self.compiled.conditions[at]
         first = 0 if isinstance(masks, WideMasks) else self.compiled.stack.starts[at]
         missing = first + masks.codes(None)[0]
-        facts = np.full(self.n_contexts, np.nan) if given is None else _plain_numbers(given, condition.domain.kind)
+        facts = np.full(self.n_contexts, np.nan) if given is None else plain_numbers(given, condition.domain.kind)
         if facts is None:
             facts = np.array([np.nan if f is None else f for f in self._read_each(at, given)], np.float64)
         elif condition.domain.kind == "angle":
-            facts = _wrapped(facts)
+            facts = wrapped(facts)
         if self.unknown == "error":
-            self._refuse_missing(at, np.isnan(facts))
+            self._refuse_missing(self.compiled.conditions[at].name, np.flatnonzero(np.isnan(facts)))
         self.facts.append(facts)
         self.slots.append(slot)
         self.bounds.append(masks.bounds)
@@ -278,11 +304,11 @@ class _Encoder:
 
     def _add_values(self, at: int, masks: ValueMasks | TagMasks, given: Any, slot: int) -> None:
         start, n_slots = self.compiled.stack.starts[at], self.compiled.stack.n_slots[at]
-        local = None if given is None or isinstance(masks, TagMasks) else _plain_values(given, masks)
+        local = None if given is None or isinstance(masks, TagMasks) else plain_values(given, masks)
         if local is None:
             local = self._read_values(at, masks, given)
         if n_slots and self.unknown == "error":
-            self._refuse_missing(at, local[0] < 0)
+            self._refuse_missing(self.compiled.conditions[at].name, np.flatnonzero(local[0] < 0))
         for i in range(n_slots):
             step = 3 * i if isinstance(masks, TagMasks) else 0
             absent = 0 if self.unknown == "any" else start + masks.codes(None)[i]
@@ -295,7 +321,7 @@ class _Encoder:
         absent = tuple(3 * i - 1 for i in range(n_slots))  # -1 once the slot's start is taken off
         facts = [None] * self.n_contexts if given is None else self._read_each(at, given)
         if self.unknown == "error":
-            self._refuse_missing(at, np.array([f is None for f in facts], np.bool_))
+            self._refuse_missing(self.compiled.conditions[at].name, np.flatnonzero([f is None for f in facts]))
         codes = [absent if f is None else masks.codes(f) for f in facts]
         return np.array(codes, np.int32).reshape(self.n_contexts, n_slots).T
 
@@ -320,10 +346,8 @@ class _Encoder:
             facts.append(known[key])
         return facts
 
-    def _refuse_missing(self, at: int, missing: NDArray[np.bool_]) -> None:
-        if missing.any():
-            rows = np.flatnonzero(missing)
-            name = self.compiled.conditions[at].name
+    def _refuse_missing(self, name: str, rows: NDArray[np.int64]) -> None:
+        if len(rows):
             derivation = self.compiled.derivation
             if derivation is not None and name in derivation.names:
                 raise derivation.no_values(name, self.columns, rows)
@@ -342,107 +366,8 @@ def _in_context(error: Exception, row: int, name: str, value: object) -> Context
     return ContextError(Fault(f"{type(value).__name__} is no fact.", "one value in each context", place=place))
 
 
-def facts_of(contexts: object) -> dict[str, Any]:
-    """The columns of some contexts by name."""
-    if isinstance(contexts, pl.DataFrame):
-        return {name: contexts[name] for name in contexts.columns}
-    if not isinstance(contexts, Mapping):
-        accepted = "a polars DataFrame, or a mapping of names to equally long columns"
-        raise ContextError(Fault(f"{type(contexts).__name__} is no columns of facts.", accepted))
-    for name, column in contexts.items():
-        is_flat = column.ndim == 1 if isinstance(column, np.ndarray) else isinstance(column, (list, tuple, range, pl.Series))
-        if not is_flat:
-            place = Place(column=str(name))
-            raise ContextError(
-                Fault(f"{type(column).__name__} is no column of facts.", "a list, a flat array or a series", place=place)
-            )
-    return dict(contexts)
-
-
-def common_length(columns: Mapping[str, Any]) -> int:
-    """How many contexts equally long columns hold; 0 without a column."""
-    lengths = {name: len(values) for name, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        raise ContextError(Fault(f"the columns are not equally long: {lengths}.", "one fact for each context in every column"))
-    return next(iter(lengths.values()), 0)
-
-
-def _plain_numbers(given: Any, kind: str) -> NDArray[np.float64] | None:
-    """A column of plain numbers as doubles, NaN where missing; None when it must be read fact by fact."""
-    series = _as_series(given, pl.Float64)
-    if series is None or not (series.dtype.is_numeric() and not series.dtype.is_decimal()):
-        return None
-    facts = series.cast(pl.Float64).to_numpy(writable=False)
-    if series.null_count():
-        facts = series.cast(pl.Float64).fill_null(np.nan).to_numpy()
-    if kind == "int" and not series.dtype.is_integer() and not (np.isnan(facts) | (facts == np.trunc(facts))).all():
-        return None
-    return None if kind == "angle" and np.isinf(facts).any() else facts
-
-
-def _wrapped(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angles in [-180, 180), exactly, as `domains.wrap_angle` does one."""
-    if not ((degrees < -180.0) | (degrees >= 180.0)).any():
-        return degrees
-    rest = np.fmod(degrees, 360.0)
-    return np.where(rest >= 180.0, rest - 360.0, np.where(rest < -180.0, rest + 360.0, rest))
-
-
-def _plain_values(given: Any, masks: ValueMasks) -> Codes | None:
-    """Class numbers int32 [1, N] of a column of plain values, -1 where missing; None when it must be read fact by fact."""
-    is_truth = masks.values == (False, True)
-    series = _as_series(given, pl.Boolean if is_truth else pl.String)
-    if series is None:
-        return None
-    if is_truth:
-        if series.dtype != pl.Boolean:
-            return None
-        return _codes_of(series.cast(pl.Int32))
-    if isinstance(series.dtype, (pl.Categorical, pl.Enum)):
-        series = series.cast(pl.String)
-    if series.dtype != pl.String:
-        return None
-    found = series.cast(pl.Enum([str(v) for v in masks.values]), strict=False)
-    if masks.has_others:
-        codes = found.to_physical().cast(pl.Int32).fill_null(len(masks.values))
-        return pl.select(pl.when(series.is_null()).then(-1).otherwise(codes).cast(pl.Int32)).to_series().to_numpy()[None]
-    if found.null_count() > series.null_count():
-        return None
-    return _codes_of(found.to_physical().cast(pl.Int32))
-
-
-def _codes_of(classes: pl.Series) -> Codes:
-    return (classes.fill_null(-1) if classes.null_count() else classes).to_numpy()[None]
-
-
-def _as_series(given: Any, listed: type[pl.DataType]) -> pl.Series | None:
-    """A column as a polars series, or None when it has no single plain type.
-
-    What is listed must be of the type `listed`: left to itself polars takes a list after its first items for float32 or for truth.
-    """
-    if isinstance(given, pl.Series):
-        return given
-    is_typed = isinstance(given, np.ndarray) and given.dtype.kind in "biuf"
-    try:
-        if is_typed:
-            return pl.Series(given, nan_to_null=False)
-        return pl.Series(list(given), dtype=listed, strict=True, nan_to_null=False) if len(given) else None
-    except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
-        return None
-
-
 def _encode_with_numpy(numbers: Numbers, out: Codes) -> None:
     for j, facts in enumerate(numbers.facts):
         own = numbers.bounds[numbers.edges[j] : numbers.edges[j + 1]]
         classes = numbers.firsts[j] + np.searchsorted(own, facts, "right")
         out[numbers.slots[j]] = np.where(np.isnan(facts), numbers.missing[j], classes)
-
-
-def _masks_with_numpy(compiled: CompiledTable, codes: Codes) -> Words:
-    stack = compiled.stack
-    found = np.broadcast_to(compiled.enabled, (len(codes), len(compiled.enabled))).copy()
-    for j in range(stack.n_plain):
-        found &= stack.masks[codes[:, j]]
-    for i in range(len(stack.wide)):
-        found &= stack.wide_masks(i, codes[:, stack.n_plain + i])
-    return found

@@ -66,3 +66,14 @@ def from_int(bits: int, n_rows: int) -> Words:
     """One mask from a Python integer whose bits are all below `n_rows`."""
     octets = bits.to_bytes(n_words(n_rows) * 8, "little")
     return np.frombuffer(octets, "<u8").astype(np.uint64)
+
+
+def places(masks: Words) -> tuple[Rows, Rows]:
+    """Which mask holds which row, for masks uint64 [N, W]: the numbers of masks, ascending, and of rows, int64 [n] each.
+
+    It costs what is held: far less than unpacking where that is little.
+    """
+    at, word = np.nonzero(masks)
+    octets = masks[at, word].astype("<u8").view(np.uint8).reshape(-1, 8)
+    pair, bit = np.nonzero(np.unpackbits(octets, axis=1, bitorder="little"))
+    return at[pair], 64 * word[pair] + bit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 NUMBER_TEXT = r"[+-]?(?:inf|(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)?)"
 
@@ -11,6 +12,7 @@ _RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)
 _TRUTH = {"true": True, "t": True, "yes": True, "1": True, "false": False, "f": False, "no": False, "0": False}
 
 
+@lru_cache(maxsize=1 << 12)  # the cells of a column repeat its words
 def is_name(text: str) -> bool:
     """Whether a value can stand in a cell without quotes."""
     return bool(_NAME.fullmatch(text)) and not is_reserved(text)

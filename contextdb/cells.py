@@ -343,7 +343,8 @@ def _bare(word: str, text: str, domain: Domain) -> str:
 
 def _read_names(text: str, domain: Domain) -> ValueSet:
     names: list[bool | str] = []
-    for sign, name in _tokens(text, domain):
+    plain = None if '"' in text else (("", _bare(word, text, domain)) for word in text.split())
+    for sign, name in plain or _tokens(text, domain):
         if sign:
             raise _unreadable(text, domain, f'"{sign}" stands before a quoted value')
         if domain.values is not None and name not in domain.known:

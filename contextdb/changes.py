@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.columns import TextColumn
+from contextdb.condition_column import ConditionColumn
 from contextdb.conditions import Condition, infer_condition
 from contextdb.errors import Fault, SchemaError, TableError
 from contextdb.schema import Schema, TableSettings, expression_faults
@@ -34,7 +35,7 @@ from contextdb.sections import (
     settings_with,
 )
 from contextdb.source import name_faults
-from contextdb.table import ConditionColumn, Table
+from contextdb.table import Table
 
 CameFrom = NDArray[np.int64]
 """For each row the row it was before, or -1 for a new one."""
@@ -227,7 +228,8 @@ def _under(
 ) -> Table:
     """The table of these columns under another schema and other settings."""
     before = {c.condition.name: c for c in table.conditions}
-    plain = {settings.asset or columns[0].name, settings.enabled, settings.priority, settings.weight, *settings.outputs}
+    jobs = (settings.enabled, settings.priority, settings.weight, settings.when)
+    plain = {settings.asset or columns[0].name, *jobs, *settings.outputs}
     found = tuple(
         _condition_column(column, before.get(came_from[column.name] or ""), schema.conditions.get(column.name))
         for column in columns
@@ -250,7 +252,8 @@ def _condition_column(column: TextColumn, before: ConditionColumn | None, declar
 
 def _settings_after(settings: TableSettings, renamed: Mapping[str, str]) -> TableSettings:
     """The settings under the new names; a column that is gone has no job."""
-    now: dict[str, Any] = {key: renamed.get(getattr(settings, key) or "") for key in ("asset", "enabled", "priority", "weight")}
+    jobs = ("asset", "enabled", "priority", "weight", "when")
+    now: dict[str, Any] = {key: renamed.get(getattr(settings, key) or "") for key in jobs}
     now["outputs"] = tuple(renamed[name] for name in settings.outputs if name in renamed)
     return replace(settings, **now)
 

@@ -5,15 +5,22 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
+from contextdb import bitmask
 from contextdb.cells import Cell, NumberSet, format_number
+from contextdb.condition_column import ConditionColumn
 from contextdb.domains import Domain
 from contextdb.errors import in_quotes, nearest
+from contextdb.expressions import constant_truth
 from contextdb.findings import Finding, Level
+from contextdb.nesting.names import inner_name
+from contextdb.nesting_findings import check_nesting
 from contextdb.source import Source
-from contextdb.table import ConditionColumn, Table
+from contextdb.table import Table
+from contextdb.when import WhenRules
 
 LINE_ENDS = {"\n": "LF", "\r\n": "CRLF", "\r": "CR"}
 MOST_ROWS = 1000
@@ -22,12 +29,12 @@ MOST_ROWS = 1000
 
 def check(table: Table) -> list[Finding]:
     """Every finding of a table, in the order of its rows, those of the whole table first."""
-    rules = (_whole_table, _unreadable, _cells, _assets, _identical)
-    found = _capped(finding for rule in rules for finding in rule(table))
+    rules = (_whole_table, _unreadable, _cells, _constant_rules, _assets, _identical, check_nesting)
+    found = capped(finding for rule in rules for finding in rule(table))
     return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
 
 
-def _capped(findings: Iterable[Finding]) -> Iterator[Finding]:
+def capped(findings: Iterable[Finding]) -> Iterator[Finding]:
     """The findings; of those of one rule in one column the first `MOST_ROWS`, and one that says how many more there are."""
     counts: Counter[tuple[str, str | None]] = Counter()
     first_left: dict[tuple[str, str | None], Finding] = {}
@@ -117,6 +124,20 @@ def _declared(low: float, high: float) -> str:
     )
 
 
+def _constant_rules(table: Table) -> Iterator[Finding]:
+    """Rules that say the same of every context of the declared values and bounds."""
+    when = WhenRules.of(table.when)
+    for rule in when.rules if when is not None else ():
+        truth = constant_truth(rule.expression)
+        if truth is None:
+            continue
+        kind, level = ("always-true", "info") if truth else ("never-true", "warning")
+        so = "so it excludes nothing" if truth else "so the row never matches"
+        told = f"the rule {in_quotes(rule.expression.text)} is {truth} in every context of the declared values and bounds, {so}."
+        for row in bitmask.rows(bitmask.from_int(rule.rows, table.n_rows)).tolist():
+            yield _at(table, row, kind, cast(Level, level), told, table.settings.when)
+
+
 def _assets(table: Table) -> Iterator[Finding]:
     rows_of: dict[str, list[int]] = defaultdict(list)
     for row, asset in enumerate(table.assets):
@@ -125,7 +146,7 @@ def _assets(table: Table) -> Iterator[Finding]:
         if not asset.strip():
             for row in rows:
                 yield _at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
-        elif len(rows) > 1:
+        elif len(rows) > 1 and inner_name(asset) is None:
             for row in rows[1:]:
                 message = f"the asset {in_quotes(asset)} stands in {_where(table, rows[0])} too."
                 yield _at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
@@ -133,10 +154,11 @@ def _assets(table: Table) -> Iterator[Finding]:
 
 def _identical(table: Table) -> Iterator[Finding]:
     """Rows whose every condition accepts the same values, whatever way it is written. A disabled row is like no other."""
-    if table.n_rows < 2 or not table.conditions:
+    if table.n_rows < 2 or not (table.conditions or table.when):
         return
     disabled = np.where(table.enabled, -1, np.arange(table.n_rows))
-    meanings = [disabled, *(_meanings(column) for column in table.conditions)]
+    rules = [] if table.when is None else [table.when.meanings]
+    meanings = [disabled, *rules, *(_meanings(column) for column in table.conditions)]
     _, first, group = np.unique(np.stack(meanings, axis=1), axis=0, return_index=True, return_inverse=True)
     origin = first[group.reshape(-1)]
     for row in np.flatnonzero(origin != np.arange(table.n_rows)).tolist():

@@ -30,7 +30,9 @@ from contextdb import bitmask
 from contextdb.bitmask import Words
 from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers
 from contextdb.columns import Codes
-from contextdb.domains import Domain
+from contextdb.domains import NUMERIC, Domain
+from contextdb.nesting_cells import TagMeet
+from contextdb.number_cells import CellSpans, spans_of
 
 FLAT_BYTES = 2 << 20
 """A number column whose masks would take more is kept in two digits."""
@@ -204,6 +206,9 @@ class TagMasks:
             is_needed, is_banned = covers(tag, part.needs), _is_banned(tag, part)
             yield not is_needed, not is_banned
         for cell in self.negated:
+            if isinstance(cell, TagMeet):
+                yield not cell.holds_all_of(part), cell.meets(part)
+                continue
             entails = all(covers(t, part.needs) for t in cell.needs) and all(_is_banned(t, part) for t in cell.bans)
             joint = TagSet(part.needs | cell.needs, part.bans | cell.bans)
             yield not joint.is_contradiction, not entails
@@ -214,12 +219,10 @@ ColumnMasks = ValueMasks | NumberMasks | WideMasks | TagMasks
 
 def column_masks(cells: Sequence[Cell], codes: Codes, domain: Domain) -> ColumnMasks:
     """Compile one column: row r holds `cells[codes[r]]`. Soft cells accept every value."""
+    if domain.kind in NUMERIC:
+        return _number_masks(cells, codes, domain)
     hard = [None if c.is_soft else c.accepts for c in cells]
-    if domain.kind == "tags":
-        return _tag_masks(hard, codes)
-    if domain.kind in ("bool", "enum", "text"):
-        return _value_masks(hard, codes, domain)
-    return _number_masks(hard, codes, domain)
+    return _tag_masks(hard, codes) if domain.kind == "tags" else _value_masks(hard, codes, domain)
 
 
 def _some_and_all(ints: list[int], held: Sequence[int]) -> tuple[int, int]:
@@ -255,12 +258,19 @@ def _flags(values: Sequence[bool]) -> NDArray[np.bool_]:
     return np.array(values, np.bool_)
 
 
-def _spread(pairs: Sequence[tuple[int, int]], codes: Codes) -> tuple[Pairs, Pairs]:
-    """(cell, mask number) pairs as (mask number, row) for every row that holds the cell."""
-    cell, mask = (np.array(pairs, np.int64).reshape(-1, 2)).T
-    order = np.argsort(codes, kind="stable")
-    starts = np.searchsorted(codes[order], cell, "left")
-    counts = np.searchsorted(codes[order], cell, "right") - starts
+def _spread_pairs(pairs: Sequence[tuple[int, int]], codes: Codes) -> tuple[Pairs, Pairs]:
+    """`_spread` of (cell, mask number) pairs."""
+    cell, mask = np.array(pairs, np.int64).reshape(-1, 2).T
+    return _spread(cell, mask, codes)
+
+
+def _spread(cell: Pairs, mask: Pairs, codes: Codes) -> tuple[Pairs, Pairs]:
+    """For each cell and the number of a mask: (mask number, row) for every row that holds the cell."""
+    short = codes.astype(np.uint16) if codes.max(initial=0) < 1 << 16 else codes  # these numpy sorts by their digits
+    order = np.argsort(short, kind="stable")
+    counts = np.bincount(codes, minlength=int(cell.max(initial=-1)) + 1)
+    starts = (np.cumsum(counts) - counts)[cell]
+    counts = counts[cell]
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     return np.repeat(mask, counts), order[np.repeat(starts, counts) + within]
 
@@ -279,7 +289,7 @@ def _value_masks(cells: Sequence[Accepted | None], codes: Codes, domain: Domain)
     class_of = {v: i for i, v in enumerate(values)}
     n_classes = len(values) + has_others
     pairs = [(i, class_of[v]) for i, c in enumerate(cells) if isinstance(c, ValueSet) for v in c.values if v in class_of]
-    masks = _scatter(*_spread(pairs, codes), n_classes + 1, len(codes))
+    masks = _scatter(*_spread_pairs(pairs, codes), n_classes + 1, len(codes))
     accepts_rest = _flags([c is None or (isinstance(c, ValueSet) and c.is_complement) for c in cells])
     masks ^= bitmask.pack(accepts_rest[codes])
     masks[-1] = _any_rows(cells, codes)
@@ -291,79 +301,63 @@ def _named(cells: Sequence[Accepted | None]) -> list[Value]:
     return list(dict.fromkeys(v for c in cells if isinstance(c, ValueSet) for v in sorted(c.values)))
 
 
-def _number_masks(cells: Sequence[Accepted | None], codes: Codes, domain: Domain) -> NumberMasks | WideMasks:
-    step = 1.0 if domain.kind == "int" else 0.0
-    owners, layers, lows, ends = _intervals(cells, step)
+def _number_masks(cells: Sequence[Cell], codes: Codes, domain: Domain) -> NumberMasks | WideMasks:
+    spans = spans_of(cells)
+    ends = _ends(spans.highs, 1.0 if domain.kind == "int" else 0.0)
     bottom = -180.0 if domain.kind == "angle" else -np.inf
     top = 180.0 if domain.kind == "angle" else np.inf
     has_end = ends <= top if top == np.inf else ends < top
     has_end &= ~np.isnan(ends)
-    bounds = np.unique(np.concatenate([lows[lows > bottom], ends[has_end]]))
-    first = np.searchsorted(bounds, lows, "right")
+    bounds = np.unique(np.concatenate([spans.lows[spans.lows > bottom], ends[has_end]]))
+    first = np.searchsorted(bounds, spans.lows, "right")
     stop = np.where(has_end, np.searchsorted(bounds, ends, "right"), len(bounds) + 1)
-    width = bitmask.n_words(len(codes))
-    if (len(bounds) + 2) * width * 8 <= FLAT_BYTES:
-        return _flat_masks(bounds, owners, first, stop, cells, codes)
-    return _wide_masks(bounds, owners, layers, first, stop, cells, codes)
+    is_flat = (len(bounds) + 2) * bitmask.n_words(len(codes)) * 8 <= FLAT_BYTES
+    return (_flat_masks if is_flat else _wide_masks)(bounds, spans, first, stop, codes)
 
 
-def _intervals(cells: Sequence[Accepted | None], step: float) -> tuple[Pairs, Pairs, NDArray[np.float64], NDArray[np.float64]]:
-    """Every interval of every cell: its cell, which of the cell's it is, its low end and the first number after it (NaN: none)."""
-    found = [
-        (i, layer, low, high) for i, c in enumerate(cells) if isinstance(c, NumberSet) for layer, (low, high) in enumerate(c.spans)
-    ]
-    owners, layers, lows, highs = np.array(found, np.float64).reshape(-1, 4).T
+def _ends(highs: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """The first number after each span; NaN where there is none."""
     with np.errstate(over="ignore"):  # the number after the largest double is inf, as it shall be
         ends = np.maximum(np.nextafter(highs, np.inf), highs + step)
     ends[np.isposinf(highs)] = np.nan
-    return owners.astype(np.int64), layers.astype(np.int64), lows, ends
+    return ends
 
 
-def _flat_masks(
-    bounds: NDArray[np.float64], owners: Pairs, first: Pairs, stop: Pairs, cells: Sequence[Accepted | None], codes: Codes
-) -> NumberMasks:
+def _flat_masks(bounds: NDArray[np.float64], spans: CellSpans, first: Pairs, stop: Pairs, codes: Codes) -> NumberMasks:
     n_classes = len(bounds) + 1
-    turns = np.concatenate([np.column_stack([owners, first]), np.column_stack([owners, stop])])
-    numbers, rows = _spread(turns[turns[:, 1] < n_classes].tolist(), codes)
-    masks = _scatter(numbers, rows, n_classes + 1, len(codes))
+    cells, turns = np.concatenate([spans.owners, spans.owners]), np.concatenate([first, stop])
+    inner = turns < n_classes
+    masks = _scatter(*_spread(cells[inner], turns[inner], codes), n_classes + 1, len(codes))
     np.bitwise_xor.accumulate(masks, axis=0, out=masks)
-    any_rows = _any_rows(cells, codes)
+    any_rows = bitmask.pack(spans.are_any[codes])
     masks |= any_rows
     masks[-1] = any_rows
     return NumberMasks(len(codes), bounds, masks)
 
 
-def _wide_masks(
-    bounds: NDArray[np.float64],
-    owners: Pairs,
-    layers: Pairs,
-    first: Pairs,
-    stop: Pairs,
-    cells: Sequence[Accepted | None],
-    codes: Codes,
-) -> WideMasks:
+def _wide_masks(bounds: NDArray[np.float64], spans: CellSpans, first: Pairs, stop: Pairs, codes: Codes) -> WideMasks:
     n_classes = len(bounds) + 1
     shift = (n_classes.bit_length() + 1) // 2
-    n_layers = int(layers.max(initial=0)) + 1
-    any_cells = np.flatnonzero(_flags([c is None for c in cells]))
+    any_cells = np.flatnonzero(spans.are_any)
     low_parts, high_parts = [], []
-    for layer in range(n_layers):
-        here = layers == layer
-        cell, start, end = owners[here], first[here], stop[here]
+    for layer in range(int(spans.layers.max(initial=0)) + 1):
+        here = spans.layers == layer
+        cell, start, end = spans.owners[here], first[here], stop[here]
         if layer == 0:
             cell = np.concatenate([cell, any_cells])
             start = np.concatenate([start, np.zeros(len(any_cells), np.int64)])
             end = np.concatenate([end, np.full(len(any_cells), n_classes)])
         low_parts.append(_digit_masks(cell, start, codes, n_classes, shift, is_end=False))
         high_parts.append(_digit_masks(cell, end, codes, n_classes, shift, is_end=True))
-    return WideMasks(len(codes), bounds, shift, np.stack(low_parts), np.stack(high_parts), _any_rows(cells, codes))
+    any_rows = bitmask.pack(spans.are_any[codes])
+    return WideMasks(len(codes), bounds, shift, np.stack(low_parts), np.stack(high_parts), any_rows)
 
 
 def _digit_masks(cell: Pairs, number: Pairs, codes: Codes, n_classes: int, shift: int, is_end: bool) -> Words:
     """Masks [2 G + F, W] of the rows whose number is <= k (or, for ends, > k), to be looked up by the two digits of k."""
     n_coarse, n_fine = (n_classes >> shift) + 1, 1 << shift
-    coarse, rows = _spread(np.column_stack([cell, number >> shift]).tolist(), codes)
-    fine, fine_rows = _spread(np.column_stack([cell, number & (n_fine - 1)]).tolist(), codes)
+    coarse, rows = _spread(cell, number >> shift, codes)
+    fine, fine_rows = _spread(cell, number & (n_fine - 1), codes)
     at = _scatter(coarse, rows, n_coarse, len(codes))
     upto = np.bitwise_or.accumulate(at, axis=0)
     fine_upto = np.bitwise_or.accumulate(_scatter(fine, fine_rows, n_fine, len(codes)), axis=0)
@@ -386,7 +380,7 @@ def _tag_masks(cells: Sequence[Accepted | None], codes: Codes) -> TagMasks:
     bans = [(i, 3 * slot_of[t] + 1) for i, c in plain for t in (c.needs if c.is_contradiction else c.bans)]
     fails = [(i, 3 * (len(tags) + n)) for n, (i, _) in enumerate(negated)]
     n_slots = len(tags) + len(negated)
-    masks = _scatter(*_spread(needs + bans + fails, codes), 3 * n_slots, len(codes))
+    masks = _scatter(*_spread_pairs(needs + bans + fails, codes), 3 * n_slots, len(codes))
     masks ^= bitmask.full(len(codes))
     masks[2::3] = _any_rows(cells, codes)
     return TagMasks(len(codes), tags, tuple(c for _, c in negated), masks)

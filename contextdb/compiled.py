@@ -24,17 +24,18 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
-from contextdb.cells import ANY, Cell, NumberSet, TagSet, ValueSet, parse_cell, reads
-from contextdb.classes import ColumnMasks, TagMasks, ValueMasks, WideMasks
+from contextdb.cells import ANY, Cell, parse_cell, reads
+from contextdb.classes import ColumnMasks
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
-from contextdb.errors import ContextError, Fault, Place
+from contextdb.errors import ContextError, Fault, Place, in_quotes
 from contextdb.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact
-from contextdb.intervals import EVERYTHING
 from contextdb.live import LiveContext, live_context
-from contextdb.lookup import SingleLookup, build_ask, single_lookup
+from contextdb.lookup import SingleLookup, build_ask, ruled_ask, single_lookup
+from contextdb.mask_bits import bits_of, nbytes
 from contextdb.matches import Answering, Matches, SetMatches
 from contextdb.stack import MaskStack
+from contextdb.when import WhenRules
 
 if TYPE_CHECKING:
     import polars as pl
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from contextdb.casting.roles import TableRoles
     from contextdb.explain import Explanation
     from contextdb.expressions import Derivation
+    from contextdb.nesting.ways import Step, Ways
     from contextdb.pick import Memory, Rng
     from contextdb.shapes import Policy
     from contextdb.table import Table
@@ -80,6 +82,10 @@ class CompiledTable:
     """How the conditions that are derived are computed; None where none is."""
     slots: tuple[TextColumn, ...] | None = None
     """The outputs of `SLOT_COLUMNS` that the table has; None where that is not known."""
+    when: WhenRules | None = None
+    """The rows' own rules; None where no row has one."""
+    ways: Ways | None = None
+    """The way of each row through tables inside tables; None for a table without."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -88,6 +94,7 @@ class CompiledTable:
     @classmethod
     def of(cls, table: Table) -> CompiledTable:
         """Compile a table whose cells can all be read; columns compiled before are taken as they are."""
+        when = WhenRules.of(table.when)
         return cls(
             name=table.name,
             assets=table.assets,
@@ -100,8 +107,10 @@ class CompiledTable:
             texts=tuple(c.texts for c in table.conditions),
             policy=table.settings.policy,
             fallback=table.settings.fallback,
-            derivation=table.schema.derivation_of(c.condition.name for c in table.conditions),
+            derivation=table.schema.derivation_of([*(c.condition.name for c in table.conditions), *(when.names if when else ())]),
             slots=tuple(c for c in table.columns if c.name in SLOT_COLUMNS and c.name in table.settings.outputs),
+            when=when,
+            ways=getattr(table, "ways", None),
         )
 
     @property
@@ -109,13 +118,31 @@ class CompiledTable:
         """How many rows the table has."""
         return len(self.assets)
 
+    @property
+    def leaves(self) -> Sequence[str]:
+        """The asset of each row, without the path that it has in a table inside the table."""
+        return self.assets if self.ways is None else self.ways.leaves
+
+    def way(self, row: int) -> tuple[Step, ...]:
+        """The rows of tables that a row comes from, outermost first, each with its file and line; for a table without tables inside
+        one step, the row itself."""
+        if self.ways is not None:
+            return self.ways.steps(row)
+        from contextdb.nesting.ways import Step
+
+        return (Step(self.name, row, self.assets[row], Place(row=row)),)
+
     @cached_property
     def asked(self) -> dict[str, Condition]:
-        """The conditions whose facts a caller gives: those of the table, and for derived ones those that they are computed from."""
-        if self.derivation is None:
-            return {c.name: c for c in self.conditions}
-        own = {c.name: c for c in self.conditions if c.name not in self.derivation.names}
-        return own | {c.name: c for c in self.derivation.inputs}
+        """The conditions whose facts a caller gives: those of the table and of its rules, and for derived ones those that they are
+        computed from."""
+        derived, inputs = (self.derivation.names, self.derivation.inputs) if self.derivation else ((), ())
+        return {c.name: c for c in (*self.conditions, *inputs, *self.ruled) if c.name not in derived}
+
+    @cached_property
+    def ruled(self) -> tuple[Condition, ...]:
+        """The conditions that rules name and that are no columns of the table."""
+        return tuple(c for c in self.when.conditions if c.name not in self.places) if self.when else ()
 
     @cached_property
     def enabled_bits(self) -> int:
@@ -205,7 +232,8 @@ class CompiledTable:
         return live
 
     def encode(self, context: Context, unknown: Unknown = "error") -> NDArray[np.int32]:
-        """The class of every fact, as codes for `query_codes`: int32 [n_slots], see `contextdb.stack`."""
+        """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.stack`. Rules have no codes."""
+        self.refuse_rules("codes do not keep the facts that its rules need")
         facts = self.read_context(context, unknown)
         local: list[tuple[int, ...] | None] = []
         for name, masks in zip(facts, self.masks, strict=True):
@@ -262,8 +290,10 @@ class CompiledTable:
         if soft is None or (fact is None and unknown == "any"):
             return np.zeros(self.n_rows)
         masks, row_penalties = soft
-        fails = ~bitmask.unpack(bitmask.from_int(_bits_of(masks, fact)[0], self.n_rows), self.n_rows)
-        return np.where(fails, row_penalties, 0.0)
+        n = len(row_penalties)  # in a table with tables inside, a row for each row of each depth
+        fails = ~bitmask.unpack(bitmask.from_int(bits_of(masks, fact)[0], n), n)
+        costs = np.where(fails, row_penalties, 0.0)
+        return costs if n == self.n_rows else costs.reshape(-1, self.n_rows).sum(axis=0)
 
     def with_penalties(self, matches: Matches, context: Context, unknown: Unknown = "error") -> Matches:
         """An answer that knows what the soft cells cost in its context, if the table has any."""
@@ -273,6 +303,10 @@ class CompiledTable:
         """What the distinct texts of condition number `at` mean, read once; Any for one that cannot be read, which no row holds."""
         if at not in self._cells_read:
             domain = self.conditions[at].domain
+            layers = None if self.ways is None else self.ways.layers[at]
+            if layers is not None:
+                self._cells_read[at] = layers.cells(domain)
+                return self._cells_read[at]
             self._cells_read[at] = tuple(parse_cell(t, domain) if reads(t, domain) else ANY for t in self.texts[at].texts)
         return self._cells_read[at]
 
@@ -301,7 +335,7 @@ class CompiledTable:
                 derived = (self.derivation if names is None else self.derivation.only(names)).compute(context)
         except ContextError as error:
             faults += error.faults
-        for condition in self.conditions if names is None else (self.conditions[self.places[n]] for n in names):
+        for condition in (*self.conditions, *self.ruled) if names is None else (self._condition_named(n) for n in names):
             name = condition.name
             try:
                 facts[name] = read_fact(derived.get(name) if name in derived else context.get(name), condition)
@@ -330,7 +364,7 @@ class CompiledTable:
 
     def condition_bits(self, at: int, fact: Fact, unknown: Unknown = "error") -> tuple[int, int]:
         """Rows whose cell accepts some, and rows whose cell accepts every, value of a fact in canonical form."""
-        return self._all_bits if fact is None and unknown == "any" else _bits_of(self.masks[at], fact)
+        return self._all_bits if fact is None and unknown == "any" else bits_of(self.masks[at], fact)
 
     def fact_bits(self, name: str, value: object, unknown: Unknown) -> tuple[int, int, bool]:
         """For one given fact: rows that accept some of it, rows that accept all of it, and whether it is missing."""
@@ -386,7 +420,7 @@ class CompiledTable:
     @cached_property
     def answering(self) -> Answering:
         """What the answers of this table share."""
-        return Answering(self.assets)
+        return Answering(self.assets, self.leaves)
 
     @cached_property
     def _all_bits(self) -> tuple[int, int]:
@@ -396,6 +430,8 @@ class CompiledTable:
     def _build_and_ask(self, context: Context) -> Matches:
         """The first question builds the function that answers all others."""
         plain = build_ask(list(zip(self.conditions, self.masks, strict=True)), self.enabled_bits, self.answering)
+        if self.when is not None:
+            plain = ruled_ask(plain, self.when, self.answering)
         if self.derivation is not None:
             plain = _composed(plain, self.derivation.complete)
         ask = (lambda context: self.with_penalties(plain(context), context)) if any(self.soft) else plain
@@ -409,33 +445,17 @@ class CompiledTable:
             one, all_ = self.condition_bits(at, facts[condition.name], unknown)
             some_bits &= one
             every &= all_
-        return some_bits, every
+        return (some_bits, every) if self.when is None else self.when.left_with_care(some_bits, every, facts, unknown)
+
+    def _condition_named(self, name: str) -> Condition:
+        known = self.conditions[self.places[name]] if name in self.places else self.asked.get(name)
+        return known or next(c for c in self.ruled if c.name == name)
+
+    def refuse_rules(self, why: str) -> None:
+        """Raise ContextError for a table with rules."""
+        if self.when is not None:
+            raise ContextError(Fault(f"the table {in_quotes(self.name)} has rules: {why}.", "query, query_many or live"))
 
 
 def _composed(ask: Callable[[Context], Matches], complete: Callable[[Context], Context]) -> Callable[[Context], Matches]:
     return lambda context: ask(complete(context))
-
-
-def nbytes(masks: ColumnMasks) -> int:
-    """Bytes that a column's masks take."""
-    if isinstance(masks, WideMasks):
-        return masks.low.nbytes + masks.high.nbytes + masks.any_mask.nbytes + masks.bounds.nbytes
-    return masks.masks.nbytes
-
-
-def _bits_of(masks: ColumnMasks, fact: Fact) -> tuple[int, int]:
-    if isinstance(fact, Cell):
-        return _every_value(masks) if fact.accepts is None else masks.set_bits(fact.accepts)
-    if isinstance(masks, WideMasks):
-        bits = masks.bits(masks.codes(fact)[0])  # type: ignore[arg-type]
-    else:
-        bits = (1 << masks.n_rows) - 1
-        for code in masks.codes(fact):  # type: ignore[arg-type]
-            bits &= masks.ints[code]
-    return bits, bits
-
-
-def _every_value(masks: ColumnMasks) -> tuple[int, int]:
-    if isinstance(masks, TagMasks):
-        return masks.set_bits(TagSet(frozenset()))
-    return masks.set_bits(ValueSet(frozenset(), True)) if isinstance(masks, ValueMasks) else masks.set_bits(NumberSet(EVERYTHING))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb.cells import reads
 from contextdb.columns import TextColumn
 from contextdb.domains import BOOL, NUMBER, TAGS, TEXT, Domain
+from contextdb.number_cells import are_plain
 
 READABLE_SHARE = 0.8
 """A type is inferred when at least this share of the rows that are not Any can be read as it; the rest are faults."""
@@ -40,10 +43,26 @@ class Condition:
 def infer_condition(column: TextColumn) -> Condition:
     """The condition of a column that nobody declared, from its cells: bool, number or tags where they read so, else text."""
     counts = np.bincount(column.codes, minlength=len(column.texts))
-    said = {t: int(n) for t, n in zip(column.texts, counts, strict=True) if t.strip().casefold() not in _ANY_WORDS}
+    flags = are_plain(column.texts)
+    if flags is not None and _is_number_column(column.texts, counts, flags):
+        return Condition(column.name, NUMBER, is_declared=False)
+    said = _said(column.texts, counts)
     domains = [BOOL, NUMBER, TAGS] if {t.strip() for t in said} - _DIGITS else [NUMBER]
     domain = next((d for d in domains if said and _mostly_reads(said, d)), TEXT)
     return Condition(column.name, domain, is_declared=False)
+
+
+def _said(texts: Sequence[str], counts: NDArray[np.int64]) -> dict[str, int]:
+    """How many rows say each text that is not Any."""
+    return {t: n for t, n in zip(texts, counts.tolist(), strict=True) if t.strip().casefold() not in _ANY_WORDS}
+
+
+def _is_number_column(texts: Sequence[str], counts: NDArray[np.int64], are_numbers: NDArray[np.bool_]) -> bool:
+    """Whether so many rows say plain numbers, which no bool does, that the column is one of numbers: tags are asked after those."""
+    rest = _said([texts[i] for i in np.flatnonzero(~are_numbers).tolist()], counts[~are_numbers])
+    n_others = sum(rest.values())
+    n_rows = int(counts[are_numbers].sum()) + n_others
+    return n_rows > n_others and n_others <= n_rows - READABLE_SHARE * n_rows
 
 
 def _mostly_reads(said: dict[str, int], domain: Domain) -> bool:

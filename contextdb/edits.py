@@ -23,6 +23,7 @@ from contextdb.schema import conditions_from_dict
 from contextdb.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
 from contextdb.source import name_faults
 from contextdb.table import Table
+from contextdb.when import check_rule
 
 Job = Literal["condition", "output", "enabled", "priority", "weight"]
 
@@ -89,6 +90,8 @@ def check_cell(table: Table, column: str, text: str) -> Fault | None:
             return check_text(one.condition, text)
     if column == settings.enabled and text.strip() and truth_of(text) is None:
         return Fault(f"cannot read {in_quotes(text)}.", '"True" or "False"', rule="unreadable-cell")
+    if column == settings.when and table.when is not None:
+        return check_rule(text, table.known_conditions) or unwritable(text)
     if column in (settings.priority, settings.weight) and text.strip():
         alone = Columns(((column, column),)).apply(table.with_rows_taken([]))
         faults = Cells({column: {0: text}}).apply(Rows(np.array([-1])).apply(alone)).faults

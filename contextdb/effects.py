@@ -15,11 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contextdb.covering import CoverageReport, coverage, format_percent
+from contextdb.covering.ruled import without_rules
 from contextdb.diff import Diff, diff
 from contextdb.effects_boxes import meet
 from contextdb.effects_space import Cells, Rows, Shared, shared_space
-from contextdb.errors import TableError
+from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.findings import Finding
+from contextdb.nesting.flat import FlatTable
+from contextdb.nesting.links import is_nested
+from contextdb.nesting.plain import as_plain
 from contextdb.table import Table
 
 WORK = 1_000_000
@@ -163,7 +167,11 @@ def effects(
     ExpressionError
         An assumption of the table cannot be read.
     """
+    if is_nested(before) or is_nested(after):
+        before, after, changes = _flat(before), _flat(after), None
     changes = changes if changes is not None else diff(before, after)
+    before, after = without_rules(before).table, without_rules(after).table
+    changes = replace(changes, before=before, after=after)
     space = shared_space(before, after)
     groups = _changed(changes, space)
     measure = Measure(space, work, samples, seed)
@@ -202,7 +210,8 @@ class MergeEffects:
 def merge_effects(ours: Table, theirs: Table, merged: Table, *, work: int = WORK, samples: int = SAMPLES) -> MergeEffects:
     """Gaps and findings of a merge that neither side had. Raises as `effects` does."""
     mine, yours = (effects(side, merged, work=work, samples=samples) for side in (ours, theirs))
-    measure = Measure(shared_space(ours, merged), work, samples, 0)
+    ours, theirs, merged = _flat(ours), _flat(theirs), _flat(merged)
+    measure = Measure(shared_space(without_rules(ours).table, without_rules(merged).table), work, samples, 0)
     both = [measure.common(one, other) for one in mine.opened for other in yours.opened]
     gaps = sorted({box.text: box for box in both if box is not None}.values(), key=lambda box: -box.share)
     kept = _keys(merged, (*yours.dead, *yours.overlaps))
@@ -211,6 +220,18 @@ def merge_effects(ours: Table, theirs: Table, merged: Table, *, work: int = WORK
 
 
 # ---- which rows changed
+
+
+def _flat(table: Table) -> Table:
+    """A table with the rows of its inner tables, by what they say together."""
+    flat = table.flat()
+    if not isinstance(flat, FlatTable):
+        return table
+    plain = as_plain(flat)
+    if plain is None:
+        found = f"tags of {in_quotes(table.name)} and of a table inside it are asked for as no single cell can say."
+        raise TableError(Fault(found, place=Place(str(table.path) if table.path else None)))
+    return plain
 
 
 def _changed(changes: Diff, space: Shared) -> dict[str, tuple[list[int], list[int]]]:

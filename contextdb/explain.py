@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,15 +20,20 @@ from contextdb import bitmask, intervals
 from contextdb.bitmask import Rows
 from contextdb.cell_words import NUMBER_TEXT
 from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, format_cell, format_number, parse_cell, reads
-from contextdb.classes import ColumnMasks, NumberMasks, WideMasks
+from contextdb.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
 from contextdb.conditions import Condition
 from contextdb.domains import Domain
 from contextdb.errors import plural
 from contextdb.facts import Context, Fact, Unknown, describe
+from contextdb.mask_bits import bits_of
 from contextdb.matches import Matches
+from contextdb.when import told_facts
+from contextdb.when.rules import values_of
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
+    from contextdb.nesting.ways import Step
+    from contextdb.when import WhenRules
 
 FEW_DIGITS = 12
 """A number of more characters than this is the work of rounding, not of a person: 29.990000000000002."""
@@ -39,7 +44,10 @@ ONE_BOUND = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """One cell that does not accept its fact."""
+    """One cell that does not accept its fact, or a rule that does not hold.
+
+    Of a rule `condition` is the column of rules, `fact` tells the facts that it names, and the mend is to have none.
+    """
 
     condition: str
     cell: str
@@ -47,9 +55,12 @@ class Failure:
     fact: str
     mend: str
     """The cell with which the row would match, as near to the present one as can be."""
+    step: Step | None = None
+    """Where tables stand in tables: the row of the table whose cell it is."""
 
     def __str__(self) -> str:
-        return f"{self.condition} is {self.fact}, the cell says {self.cell}"
+        where = "" if self.step is None else f" ({self.step})"
+        return f"{self.condition} is {self.fact}, the cell says {self.cell}{where}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,12 +107,15 @@ class Explanation:
     def row(self, row: int) -> RowExplanation:
         """Why this row is valid or not."""
         at = np.flatnonzero(self._fails[:, row]).tolist()
-        failures = tuple(self._failure(i, row) for i in at)
-        return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), failures)
+        failures = [failure for i in at for failure in self._failures(i, row)]
+        if self.breaks_rule[row]:
+            failures.append(self._rule_failure(row))
+        return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
 
     def asset(self, asset: str) -> list[RowExplanation]:
-        """Why the rows of this asset are valid or not."""
-        return [self.row(r) for r, name in enumerate(self.compiled.assets) if name == asset]
+        """Why the rows of this asset, told with its path or without, are valid or not."""
+        names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
+        return [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
         """The rows that are not valid but nearest to it: fewest failing cells, then least far off."""
@@ -119,8 +133,9 @@ class Explanation:
 
     @cached_property
     def n_failures(self) -> NDArray[np.int64]:
-        """How many cells of each row fail: int64 [n_rows]; a disabled row counts one more."""
-        return np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + ~self._enabled
+        """How many cells of each row fail: int64 [n_rows]; a rule counts as one, cells of one condition in tables inside each other
+        count as one, and a disabled row one more."""
+        return np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled
 
     @cached_property
     def order(self) -> Rows:
@@ -146,6 +161,29 @@ class Explanation:
             fails[at] = ~bitmask.unpack(bitmask.from_int(bits, compiled.n_rows), compiled.n_rows)
         return fails
 
+    @cached_property
+    def breaks_rule(self) -> NDArray[np.bool_]:
+        """Whether each row has a rule that does not hold: bool [n_rows]; an open one only where it is not ignored."""
+        when = self.compiled.when
+        return self._flags(0 if when is None else self._broken_rules(when))
+
+    def _broken_rules(self, when: WhenRules) -> int:
+        left, _ = when.left_with_care(when.rows, when.rows, self.facts, "any" if self._unknown == "any" else "never")
+        return when.rows & ~left
+
+    def _flags(self, bits: int) -> NDArray[np.bool_]:
+        return bitmask.unpack(bitmask.from_int(bits, self.compiled.n_rows), self.compiled.n_rows)
+
+    def _rule_failure(self, row: int) -> Failure:
+        assert self.compiled.when is not None
+        return self._told_rule(self.compiled.when, row, self.facts)
+
+    def _told_rule(self, when: WhenRules, row: int, facts: Mapping[str, Fact]) -> Failure:
+        rule = when.rules[int(when.of_row[row])].expression
+        is_open = rule.run(values_of(facts, rule.conditions)) is None
+        told = f"{'open' if is_open else 'false'} with {told_facts(rule, facts)}"
+        return Failure(when.name, when.texts[row], told, "Any")
+
     def _sorted(self, rows: Rows) -> Rows:
         return rows[np.lexsort((self._distances(rows), self.n_failures[rows]))]
 
@@ -153,31 +191,51 @@ class Explanation:
         """How far the failing facts are off, summed: float64 [len(rows)]; a number by its share of the domain, at most 1; others
         1."""
         far = np.zeros(len(rows))
-        for at, fact in enumerate(self.facts.values()):
-            fails = self._fails[at, rows]
+        for at, condition in enumerate(self.compiled.conditions):
+            fails, fact = self._fails[at, rows], self.facts[condition.name]
             if fails.any():
                 far[fails] += self._column_distances(at, fact, rows[fails]) if isinstance(fact, float) else 1.0
-        return far
+        return far + self.breaks_rule[rows]
 
     def _column_distances(self, at: int, fact: float, rows: Rows) -> NDArray[np.float64]:
         column, condition = self.compiled.texts[at], self.compiled.conditions[at]
         width = _width(condition, self.compiled.masks[at])
         codes, which = np.unique(column.codes[rows], return_inverse=True)
-        cells = [parse_cell(column.texts[c], condition.domain) for c in codes.tolist()]
+        is_single = self.compiled.ways is None  # of tables in tables no text need be one cell; all are read together
+        cells = [parse_cell(column.texts[c], condition.domain) if is_single else self.compiled.cells(at)[c] for c in codes.tolist()]
         return np.array([_distance(c.accepts, fact, width) for c in cells], np.float64)[which]
 
-    def _failure(self, at: int, row: int) -> Failure:
+    def _failures(self, at: int, row: int) -> Iterator[Failure]:
         condition = self.compiled.conditions[at]
-        text = self.compiled.texts[at][row]
         fact = self.facts[condition.name]
-        return Failure(
-            condition.name, text, _with_unit(describe_fact(fact, condition), condition), mended(text, fact, condition.domain)
-        )
+        yield from cell_failures(self.compiled, at, row, fact, _with_unit(describe_fact(fact, condition), condition))
 
 
 def explain(compiled: CompiledTable, context: Context, unknown: Unknown = "error") -> Explanation:
     """Explain every row of a table for one context; raises ContextError as `query` does."""
     return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown))
+
+
+def cell_failures(compiled: CompiledTable, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
+    """The cell of a row that does not accept a fact; where tables stand in tables, each cell that does not."""
+    condition = compiled.conditions[at]
+    layers = None if compiled.ways is None else compiled.ways.layers[at]
+    if compiled.ways is None or layers is None:
+        text = compiled.texts[at][row]
+        yield Failure(condition.name, text, told, mended(text, fact, condition.domain))
+        return
+    steps = compiled.ways.steps(row)
+    said = [(steps[depth], text) for depth, text in layers.said(row)]
+    failing = [(step, text) for step, text in said if not _lets_pass(text, fact, condition.domain)]
+    for step, text in failing:
+        yield Failure(condition.name, text, told, mended(text, fact, condition.domain), step)
+    if not failing:  # each holds some value of a set-valued fact, and no value is in all of them
+        yield Failure(condition.name, compiled.texts[at][row], told, "Any", steps[-1])
+
+
+def _lets_pass(text: str, fact: Fact, domain: Domain) -> bool:
+    """Whether a cell alone lets its row be valid."""
+    return bool(bits_of(column_masks([parse_cell(text, domain)], np.zeros(1, np.int32), domain), fact)[0])
 
 
 def describe_fact(fact: Fact, condition: Condition) -> str:

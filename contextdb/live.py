@@ -17,10 +17,14 @@ from typing import TYPE_CHECKING, Any
 from contextdb.facts import Unknown, no_condition, read_fact
 from contextdb.lookup import SingleLookup
 from contextdb.matches import Matches
+from contextdb.when.rules import Unusual
 
 if TYPE_CHECKING:
     from contextdb.casting.facts import Actors, Prefer
+    from contextdb.casting.live import LiveActors
     from contextdb.compiled import CompiledTable
+    from contextdb.expressions.scalar import Value
+    from contextdb.when import WhenRules
 
 MOST_MOVING = 8
 
@@ -61,7 +65,7 @@ class LiveContext:
         self._still = 0
         self._odd: dict[str, tuple[int, bool]] = {}
         """Facts that are missing or sets: the rows that accept all of it, and whether it is missing."""
-        self._cast: tuple[Actors, Prefer] | None = None
+        self._cast: LiveActors | None = None
         self._answer = Matches(0, self._answering)
         """The last answer: while the rows stay the same, so does the object."""
         for condition in compiled.conditions:
@@ -97,11 +101,15 @@ class LiveContext:
     def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
         """Offer actors for roles from now on, as `query` takes them; None takes them back. They are read when next asked.
 
-        The mappings are kept, not copied: what the game changes in them counts in the next question.
+        The mappings are kept, not copied: what the game changes in them counts in the next question. While they say the same, they
+        are not read again.
         """
-        self._cast = None if actors is None else (actors, prefer)
+        self._cast = None
         self._odd.pop(CAST, None)
         if actors is not None:
+            from contextdb.casting.live import LiveActors
+
+            self._cast = LiveActors(self._compiled, actors, prefer, self._unknown)
             self._odd[CAST] = (0, False)
 
     @property
@@ -119,7 +127,7 @@ class LiveContext:
         """
         if self._odd:
             if self._cast is not None:
-                return self._compiled.query(self.facts, self._unknown, *self._cast)
+                return self._cast.query(self.facts)
             self._read_unusual()
             self._refuse_missing()
         moving = self._moving
@@ -185,16 +193,20 @@ class SoftLiveContext(LiveContext):
         return answer if self._cast is not None else self._compiled.with_penalties(copy(answer), self.facts, self._unknown)
 
 
-class DerivedLiveContext(LiveContext):
-    """The same for a table with derived facts: they are computed anew when one that they need was set since the last question."""
+class AskingLiveContext(LiveContext):
+    """The same for a table with derived facts or rules, which asks for facts that are no columns.
 
-    __slots__ = ("_given", "_is_stale", "_others")
+    Derived facts are computed anew when one that they need was set since the last question.
+    """
+
+    __slots__ = ("_computed", "_given", "_is_stale", "_others")
 
     def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
-        assert compiled.derivation is not None
         super().__init__(compiled, unknown)
-        self._others = {c.name: c for c in compiled.derivation.inputs}
-        """The conditions that derived facts are computed from."""
+        self._others = {c.name: c for c in (*(compiled.derivation.inputs if compiled.derivation else ()), *compiled.ruled)}
+        """The conditions that derived facts are computed from, and those that only rules name."""
+        self._computed: dict[str, object] = dict.fromkeys(compiled.derivation.names if compiled.derivation else ())
+        """The derived facts, when they were last computed."""
         self._given: dict[str, object] = dict.fromkeys(compiled.asked)
         self._is_stale = True
 
@@ -215,16 +227,18 @@ class DerivedLiveContext(LiveContext):
         """One fact; a derived one is computed."""
         if name in self._given:
             return self._given[name]
+        if name not in self._computed:
+            self._refuse(name)
         self._compute()
-        return self._facts[name]
+        return self._computed[name]
 
     def __contains__(self, name: str) -> bool:
-        return name in (self._given.keys() | self._facts) and self[name] is not None
+        return (name in self._given or name in self._computed) and self[name] is not None
 
     def update(self, facts: Mapping[str, object]) -> None:
         """Set several facts; those that the table does not ask for are passed over, derived ones refused."""
         for name, value in facts.items():
-            if name in self._given or (name in self._lookups and value is not None):
+            if name in self._given or (name in self._computed and value is not None):
                 self[name] = value
 
     @property
@@ -238,12 +252,12 @@ class DerivedLiveContext(LiveContext):
         return super().matches()
 
     def _compute(self) -> None:
-        if self._is_stale:
-            assert self._compiled.derivation is not None
-            for name, value in self._compiled.derivation.compute(self._given).items():
+        if self._is_stale and self._compiled.derivation is not None:
+            self._computed.update(self._compiled.derivation.compute(self._given))
+            for name, value in self._computed.items():
                 if name in self._lookups and value != self._facts[name]:
                     super().__setitem__(name, value)
-            self._is_stale = False
+        self._is_stale = False
 
     def _refuse(self, name: str) -> None:
         derivation = self._compiled.derivation
@@ -252,15 +266,89 @@ class DerivedLiveContext(LiveContext):
         raise no_condition(name, self._given)
 
 
-class SoftDerivedLiveContext(SoftLiveContext, DerivedLiveContext):
+class RuledLiveContext(AskingLiveContext):
+    """The same for a table with rules: one is asked anew when a fact that it names has changed."""
+
+    __slots__ = ("_is_set", "_left", "_named", "_truths", "_values", "_when")
+
+    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+        assert compiled.when is not None
+        self._is_set = True
+        """Whether a fact that rules need was set since they were asked."""
+        super().__init__(compiled, unknown)
+        self._when: WhenRules = compiled.when
+        inputs = compiled.derivation.inputs if compiled.derivation is not None else ()
+        self._named = compiled.when.names.union(c.name for c in inputs)
+        self._values: dict[str, Value] = {}
+        """The facts that rules name, when rules were last asked."""
+        self._truths: dict[int, Value] = {}
+        """Of the rules that were asked with these facts, by their number, whether they hold."""
+        self._left = Matches(0, self._answering)
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        """Set one fact; a derived one is refused."""
+        super().__setitem__(name, value)
+        if name in self._named:
+            self._is_set = True
+
+    def matches(self) -> Matches:
+        """The valid rows for the facts as they are now."""
+        if self._odd:
+            return self._carefully()
+        answer = super().matches()
+        try:
+            return self._carefully() if self._odd else self._with_rules(answer)
+        except Unusual:
+            return self._carefully()
+
+    def _carefully(self) -> Matches:
+        """The answer where facts are missing or sets, or actors are offered."""
+        return self._compiled.query(self.facts, self._unknown) if self._cast is None else self._cast.query(self.facts)
+
+    def _with_rules(self, answer: Matches) -> Matches:
+        """Of the rows that the cells leave, those whose rule holds."""
+        if self._is_set:
+            self._read_facts()
+        left = answer.bits
+        for number in self._when.numbers(left):
+            if number not in self._truths:
+                self._truths[number] = self._when.rules[number].run(self._values)
+            if not self._truths[number]:
+                if self._truths[number] is None:
+                    raise Unusual
+                left &= ~self._when.rules[number].rows
+        if left == answer.bits:
+            return answer
+        if left != self._left.bits:
+            self._left = Matches(left, self._answering)
+        return self._left
+
+    def _read_facts(self) -> None:
+        values = self._when.usual_values({**self._given, **self._computed} if self._computed else self._given)
+        for name, value in values.items():
+            if self._values.get(name) != value:
+                for number in self._when.naming[name]:
+                    self._truths.pop(number, None)
+        self._values, self._is_set = values, False
+
+
+class SoftAskingLiveContext(SoftLiveContext, AskingLiveContext):
     """For a table with both."""
+
+    __slots__ = ()
+
+
+class SoftRuledLiveContext(SoftLiveContext, RuledLiveContext):
+    """For a table with soft cells and rules."""
 
     __slots__ = ()
 
 
 def live_context(compiled: CompiledTable, unknown: Unknown = "error") -> LiveContext:
     """A context of the kind that a table needs."""
-    is_soft, is_derived = any(compiled.soft), compiled.derivation is not None
-    if is_derived:
-        return SoftDerivedLiveContext(compiled, unknown) if is_soft else DerivedLiveContext(compiled, unknown)
+    is_soft = any(compiled.soft)
+    if compiled.when is not None:
+        return SoftRuledLiveContext(compiled, unknown) if is_soft else RuledLiveContext(compiled, unknown)
+    if compiled.derivation is not None:
+        return SoftAskingLiveContext(compiled, unknown) if is_soft else AskingLiveContext(compiled, unknown)
     return SoftLiveContext(compiled, unknown) if is_soft else LiveContext(compiled, unknown)

@@ -24,6 +24,7 @@ from contextdb.conditions import Condition
 from contextdb.facts import read_fact
 from contextdb.groups import groups_of
 from contextdb.matches import Answering, Matches
+from contextdb.when import WhenRules
 
 EXACT = 2.0**53
 """Below this every whole number is a double, so an int and a double compare as two doubles do."""
@@ -40,10 +41,11 @@ def ask(c, {names}):
 """
 
 Column = tuple[Condition, ColumnMasks]
+Ask = Callable[[Mapping[str, object]], Matches]
 SingleLookup = tuple[list[float] | None, Any]
 
 
-def build_ask(columns: Sequence[Column], enabled: int, answering: Answering) -> Callable[[Mapping[str, object]], Matches]:
+def build_ask(columns: Sequence[Column], enabled: int, answering: Answering) -> Ask:
     """A function from a context to its answer; raises whatever it raises when a fact is unusual."""
     n_rows = len(answering.assets)
     names: dict[str, Any] = {"bisect_right": bisect_right, "index": index, "ldexp": math.ldexp}
@@ -56,8 +58,20 @@ def build_ask(columns: Sequence[Column], enabled: int, answering: Answering) -> 
     # Every fact is looked up, also when no row is left: a missing one is an error whatever the others say.
     source = _ASK.format(names=", ".join(f"{n}={n}" for n in names), terms=" & ".join(values + numbers))
     exec(compile(source, "<contextdb lookup>", "exec"), names)
-    ask: Callable[[Mapping[str, object]], Matches] = names["ask"]
+    ask: Ask = names["ask"]
     return ask
+
+
+def ruled_ask(ask: Ask, when: WhenRules, answering: Answering) -> Ask:
+    """Ask, then take out the rows whose rule does not hold. The facts of rules are read also where no row is left: a missing one is
+    an error whatever the others say."""
+
+    def asked(context: Mapping[str, object]) -> Matches:
+        answer, values = ask(context), when.usual_values(context)
+        left = when.left(answer.bits, values) if answer.bits & when.rows else answer.bits
+        return answer if left == answer.bits else Matches(left, answering)
+
+    return asked
 
 
 def _value_terms(columns: Sequence[tuple[Condition, ValueMasks]], n_rows: int, names: dict[str, Any]) -> list[str]:

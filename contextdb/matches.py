@@ -19,12 +19,13 @@ FEW = 48
 
 
 class Answering:
-    """What the answers of one table share: its assets, and 0 … n_rows - 1 to cut row numbers from."""
+    """What the answers of one table share: its assets, with their paths and without, and 0 … n_rows - 1 to cut row numbers from."""
 
-    __slots__ = ("assets", "row_numbers")
+    __slots__ = ("assets", "leaves", "row_numbers")
 
-    def __init__(self, assets: Sequence[str]) -> None:
+    def __init__(self, assets: Sequence[str], leaves: Sequence[str] | None = None) -> None:
         self.assets = assets
+        self.leaves = assets if leaves is None else leaves
         self.row_numbers: Rows = np.arange(len(assets), dtype=np.int64)
         self.row_numbers.flags.writeable = False
 
@@ -37,7 +38,9 @@ class Matches:
     indices : int64 array
         Row numbers, ascending, from 0. Not to be written to.
     assets : list of str
-        The assets of those rows.
+        The assets of those rows; of a row in a table inside the table with its path, "hit_mid_air/dive/MidAir_Dive".
+    leaves : list of str
+        The assets without paths, as a motion database names them.
     mask : uint64 array, shape (W,)
         Bit r % 64 of word r // 64 is row r.
     always : uint64 array, shape (W,)
@@ -75,6 +78,12 @@ class Matches:
         return [assets[r] for r in self.indices.tolist()]
 
     @property
+    def leaves(self) -> list[str]:
+        """The assets of the valid rows, without the paths of tables inside tables."""
+        leaves = self._table.leaves
+        return [leaves[r] for r in self.indices.tolist()]
+
+    @property
     def mask(self) -> Words:
         """The rows as bits: uint64 [W]."""
         return bitmask.from_int(self.bits, self.n_rows)
@@ -91,8 +100,9 @@ class Matches:
 
     @property
     def table_assets(self) -> Sequence[str]:
-        """The assets of all rows of the table, valid or not; the same object in every answer of a compiled table."""
-        return self._table.assets
+        """The assets of all rows of the table, valid or not, without paths: the names of clips. The same object in every answer of
+        a compiled table."""
+        return self._table.leaves
 
     @property
     def has_penalties(self) -> bool:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb import files
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.nesting.links import Neighbours, inner_tables, is_nested, require_sound
 from contextdb.schema import EMPTY, Schema, read_schema
 from contextdb.table import Table, build_table
 
@@ -56,7 +58,10 @@ class Project:
         faults += twice_named(found)
         if faults:
             raise TableError(*faults)
-        return cls(folder, schema, tables)
+        project = cls(folder, schema, around_each_other(tables))
+        if strict:
+            project.require_sound()
+        return project
 
     def __getitem__(self, name: str) -> Table:
         """One table by its name; a name that is not there raises TableError and names the nearest."""
@@ -66,6 +71,27 @@ class Project:
             raise TableError(Fault(found, some(self.tables) or "none: the folder has no table", in_quotes(near) if near else ""))
         return self.tables[name]
 
+    def with_table(self, table: Table) -> Project:
+        """The project with one table in another version, for those too whose rows stand for it."""
+        return replace(self, tables=around_each_other({**self.tables, table.name: table}))
+
+    @property
+    def inner(self) -> set[str]:
+        """The names of the tables that rows of other tables stand for."""
+        return inner_tables(self.tables.values()) & set(self.tables)
+
+    def require_sound(self) -> None:
+        """Raise TableError with what is wrong with rows that stand for tables."""
+        faults: dict[Fault, None] = {}
+        for table in self.tables.values():
+            if is_nested(table):
+                try:
+                    require_sound(table, self.tables)
+                except ContextDBError as error:
+                    faults |= dict.fromkeys(error.faults)
+        if faults:
+            raise TableError(*faults)
+
     def compile(self) -> dict[str, CompiledTable]:
         """Every table compiled, by name."""
         return {name: table.compile() for name, table in self.tables.items()}
@@ -74,7 +100,55 @@ class Project:
 def load_table(path: Path, strict: bool = True) -> Table:
     """Read one table under the contextdb.toml beside it, or above it where that one declares the file."""
     folder, schema = schema_for(path)
-    return _read_table(path, schema, folder, strict)
+    around = Neighbours(_Folder(folder, schema))
+    table = _read_table(path, schema, folder, strict, around)
+    if strict and is_nested(table):
+        require_sound(table, around)
+    return table
+
+
+def neighbours(path: Path) -> Neighbours:
+    """The tables that the rows of a table file may stand for: those of its folder, each read when it is first asked for."""
+    return Neighbours(_Folder(*schema_for(path)))
+
+
+def around_each_other(tables: Mapping[str, Table], before: Mapping[str, Table] | None = None) -> dict[str, Table]:
+    """Tables that know of each other; what was worked out for them, or for their versions before, is kept."""
+    alone = {name: table if table.around is None else replace(table, around=None) for name, table in tables.items()}
+    was = {name: (before or {}).get(name, table).around for name, table in tables.items()}
+    lasts = {name: around.last if isinstance(around, Neighbours) else None for name, around in was.items()}
+    return {name: replace(table, around=Neighbours(alone, lasts[name])) for name, table in tables.items()}
+
+
+class _Folder(Mapping[str, Table]):
+    """The tables of a folder, each read when it is first asked for."""
+
+    def __init__(self, folder: Path, schema: Schema) -> None:
+        self._folder, self._schema = folder, schema
+        self._read: dict[str, Table] = {}
+        self._paths: dict[str, Path] | None = None
+
+    @property
+    def _files(self) -> dict[str, Path]:
+        if self._paths is None:
+            self._paths = {}
+            with suppress(OSError):  # a folder that cannot be listed has no other tables
+                self._paths |= table_files(self._folder, self._schema)
+        return self._paths
+
+    def __getitem__(self, name: str) -> Table:
+        if name not in self._read:
+            self._read[name] = _read_table(self._files[name], self._schema, self._folder, strict=False)
+        return self._read[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._files
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._files)
+
+    def __len__(self) -> int:
+        return len(self._files)
 
 
 def schema_for(path: Path) -> tuple[Path, Schema]:
@@ -149,10 +223,10 @@ def folder_of(path: Path) -> Path:
     raise FileError(Fault(found, f"a folder of tables, or its {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
 
 
-def _read_table(path: Path, schema: Schema, folder: Path, strict: bool) -> Table:
+def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: Mapping[str, Table] | None = None) -> Table:
     settings = schema.settings_for(_below(path, folder))
     source, columns = files.read_texts(path)
-    table = build_table(settings.name, columns, schema, settings, path, source)
+    table = replace(build_table(settings.name, columns, schema, settings, path, source), around=around)
     if strict:
         table.require_readable()
     return table

@@ -14,7 +14,7 @@ import numpy as np
 
 from contextdb.errors import Fault, Place, in_quotes, plural
 from contextdb.foreign import UTF8_BOM, line_of
-from contextdb.records import MOST_STRAYS, Positions, Records, Stray, as_field, fields_of, text_of
+from contextdb.records import MOST_STRAYS, Positions, Records, Stray, as_field, field_bounds, fields_of, text_of
 
 MOST_CHARACTERS = 65_536
 """The longest cell that is read; a longer one is a mistake, such as a whole file pasted into a cell."""
@@ -135,7 +135,10 @@ def _long_faults(raw: bytes, records: Records) -> Iterator[Found]:
     is_long = records.is_sound & (records.stops - records.starts > MOST_CHARACTERS)
     for record in np.flatnonzero(is_long)[:MOST_FAULTS].tolist():
         start, stop = int(records.starts[record]), int(records.stops[record])
-        for at, field in enumerate(fields_of(raw[start:stop], int(records.n_fields[record])), 1):
-            size = len(text_of(field)) if len(field) > MOST_CHARACTERS else 0
+        line = raw[start:stop]
+        firsts, lasts = field_bounds(line, np.array([len(line)]), int(records.n_fields[record]))
+        for at in np.flatnonzero(lasts[0] - firsts[0] > MOST_CHARACTERS).tolist():
+            size = len(text_of(line[firsts[0, at] : lasts[0, at]]))
             if size > MOST_CHARACTERS:
-                yield start, Fault(f"field {at:,} has {size:,} characters.", f"at most {MOST_CHARACTERS:,} characters in a cell")
+                found = f"field {at + 1:,} has {size:,} characters."
+                yield start, Fault(found, f"at most {MOST_CHARACTERS:,} characters in a cell")

@@ -57,6 +57,8 @@ class TableSettings:
     fallback: str | None = None
     policy: Policy = "collect"
     assume: tuple[str, ...] = ()
+    when: str | None = None
+    """The column of each row's own rule."""
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -303,7 +305,7 @@ def _bound_faults(path: Path, fitting: Section) -> Iterator[Found]:
 
 def _column_faults(path: Path, table: Section, conditions: Set[str]) -> Iterator[Found]:
     jobs: dict[str, str] = {}
-    columns = [(key, table[key]) for key in ("asset", "enabled", "priority", "weight") if key in table]
+    columns = [(key, table[key]) for key in ("asset", "enabled", "priority", "weight", "when") if key in table]
     for key, column in [*columns, *(("outputs", name) for name in table.get("outputs", ()))]:
         if column in jobs:
             found = f"{_header(path)} {key} and {jobs[column]} both name the column {in_quotes(column)}."

@@ -120,7 +120,7 @@ def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSett
 def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) -> Iterator[Fault]:
     """Why a table of these columns cannot have these settings: a column that is not there, has two jobs, or is a condition."""
     jobs: dict[str, str] = {}
-    named = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight")]
+    named = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
     for key, column in [*named, *(("outputs", name) for name in settings.outputs)]:
         if column is None:
             continue

@@ -199,6 +199,7 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
         "fallback": NAME,
         "policy": _one_of(POLICIES, "policy", POLICY_SYNONYMS),
         "assume": EXPRESSIONS,
+        "when": NAME,
     },
     "blueprints": {"conditions": NAMES},
     "features": None,

@@ -19,6 +19,10 @@ from contextdb.foreign import UTF8_BOM, line_of, require_text, seems_markup
 from contextdb.record_faults import record_faults
 from contextdb.records import CR, LF, Octets, Positions, Records, fields_of, find_records, line_ends, text_of
 
+MOST_NAME_FAULTS = 20
+FEW_TEXTS = 8
+"""A column of so many distinct texts is compared with each of them, which is faster than looking each row up."""
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
@@ -115,7 +119,15 @@ def read_csv(raw: bytes, file: str) -> tuple[Source, list[TextColumn]]:
 
 
 def name_faults(names: Sequence[str]) -> Iterator[Fault]:
-    """What is wrong with the names of the columns: one is empty, or stands twice."""
+    """What is wrong with the names of the columns: one is empty, or stands twice. The first few are told, and how many more."""
+    faults = list(_name_faults(names))
+    yield from faults[:MOST_NAME_FAULTS]
+    if len(faults) > MOST_NAME_FAULTS:
+        found = f"there are {len(faults) - MOST_NAME_FAULTS:,} more such column names."
+        yield Fault(found, "a name for each column, each name once")
+
+
+def _name_faults(names: Sequence[str]) -> Iterator[Fault]:
     first: dict[str, int] = {}
     for at, name in enumerate(names, 1):
         if not name.strip():
@@ -129,10 +141,22 @@ def name_faults(names: Sequence[str]) -> Iterator[Fault]:
 def text_columns(frame: pl.DataFrame, names: Sequence[str]) -> list[TextColumn]:
     """Columns of strings, null meaning empty, as their distinct texts in the order they first appear, and their codes."""
     numbers = [str(i) for i in range(frame.width)]  # polars would read a name such as "*" or "^a$" as a pattern
-    frame = frame.rename(dict(zip(frame.columns, numbers, strict=True))).select(pl.all().fill_null("")).rechunk()
+    frame = frame.rename(dict(zip(frame.columns, numbers, strict=True)))
+    if with_nulls := [column for column in numbers if frame[column].null_count()]:
+        frame = frame.with_columns(pl.col(with_nulls).fill_null(""))
     texts = [column[0] for column in frame.select(pl.all().unique(maintain_order=True).implode())]
-    codes = frame.select(pl.col(c).cast(pl.Enum(t)).to_physical().cast(pl.Int32) for c, t in zip(numbers, texts, strict=True))
+    codes = frame.select(_codes(c, t, frame.height).alias(c) for c, t in zip(numbers, texts, strict=True))
     return [TextColumn(n, tuple(t.to_list()), c.to_numpy()) for n, t, c in zip(names, texts, codes, strict=True)]
+
+
+def _codes(column: str, texts: pl.Series, n_rows: int) -> pl.Expr:
+    """The place of each row's text among the texts, found by the cheapest way."""
+    if len(texts) == n_rows:
+        return pl.int_range(n_rows, dtype=pl.Int32)
+    if len(texts) <= FEW_TEXTS:
+        places = ((pl.col(column) == text).cast(pl.Int32) * i for i, text in enumerate(texts))
+        return pl.sum_horizontal(places)
+    return pl.col(column).cast(pl.Enum(texts)).to_physical().cast(pl.Int32)
 
 
 def _columns(raw: bytes, names: Sequence[str], records: Records) -> list[TextColumn]:

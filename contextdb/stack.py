@@ -115,6 +115,15 @@ class MaskStack:
         is_plain_right = ((plain >= 0) & (plain < len(self.masks))).all()
         return bool(is_plain_right and ((classes >= -1) & (classes <= self.wide[:, 5])).all())
 
+    def masks_of(self, codes: Codes, enabled: Words) -> Words:
+        """The rows for each of many contexts' codes, int32 [N, n_codes], of those that are enabled: uint64 [N, W]."""
+        found = np.broadcast_to(enabled, (len(codes), len(enabled))).copy()
+        for j in range(self.n_plain):
+            found &= self.masks[codes[:, j]]
+        for i in range(len(self.wide)):
+            found &= self.wide_masks(i, codes[:, self.n_plain + i])
+        return found
+
     def wide_masks(self, i: int, classes: Codes) -> Words:
         """The masks of wide column i for many classes: int32 [N] to uint64 [N, W]."""
         _, first, n_layers, n_coarse, shift, n_classes = self.wide[i].tolist()

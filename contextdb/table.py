@@ -7,8 +7,7 @@ worked out for that column (its cells, its masks). Texts that cannot be read sta
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,69 +16,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cell_words import truth_of
-from contextdb.cells import ANY, Cell, parse_cell
-from contextdb.classes import ColumnMasks, column_masks
 from contextdb.columns import TextColumn
+from contextdb.condition_column import ConditionColumn
 from contextdb.conditions import Condition, infer_condition
-from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.errors import Fault, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.plain_columns import PlainColumns
 from contextdb.schema import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults
+from contextdb.when import WhenColumn
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
     from contextdb.files import AnySource
-
-MOST_MENDS = 20
-"""Texts of one column that get a mend when they cannot be read; looking for one is slow, and a column of the wrong type has
-thousands."""
-
-
-@dataclass(frozen=True, eq=False)
-class ConditionColumn:
-    """One condition's column: its texts, and the cell that each distinct text means."""
-
-    condition: Condition
-    texts: TextColumn
-    cells: tuple[Cell, ...]
-    """The cell of `texts.texts[i]`; Any for a text that cannot be read."""
-    faults: Mapping[int, Fault]
-    """Why `texts.texts[i]` cannot be read."""
-
-    @classmethod
-    def read(cls, texts: TextColumn, condition: Condition) -> ConditionColumn:
-        """Read every distinct text once."""
-        cells, faults = _read_cells(texts.texts, condition)
-        return cls(condition, texts, cells, faults)
-
-    def with_texts(self, texts: TextColumn) -> ConditionColumn:
-        """The column with other texts; those that it had already are not read again."""
-        known = len(self.texts.texts)
-        if texts.texts is self.texts.texts:
-            return ConditionColumn(self.condition, texts, self.cells, self.faults)
-        if texts.texts[:known] != self.texts.texts:
-            return ConditionColumn.read(texts, self.condition)
-        cells, faults = _read_cells(texts.texts[known:], self.condition)
-        more = {known + i: fault for i, fault in faults.items()}
-        return ConditionColumn(self.condition, texts, self.cells + cells, {**self.faults, **more})
-
-    def cell(self, row: int) -> Cell:
-        """What the row accepts."""
-        return self.cells[int(self.texts.codes[row])]
-
-    @cached_property
-    def masks(self) -> ColumnMasks:
-        """The column compiled; worked out once, and shared by every table that holds the column."""
-        return column_masks(self.cells, self.texts.codes, self.condition.domain)
-
-    @cached_property
-    def soft(self) -> tuple[ColumnMasks, NDArray[np.float64]] | None:
-        """Of soft cells: masks of the rows they match, and the penalty float64 [n_rows] where they do not; None when none is
-        soft."""
-        if not any(c.is_soft for c in self.cells):
-            return None
-        hard = [Cell(c.accepts) if c.is_soft else ANY for c in self.cells]
-        penalties = np.array([c.penalty or 0.0 for c in self.cells])
-        return column_masks(hard, self.texts.codes, self.condition.domain), penalties[self.texts.codes]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +44,8 @@ class Table:
     source: AnySource | None = None
     origin: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     """Which record of the source each row came from; -1 for a new row."""
+    around: Mapping[str, Table] | None = field(default=None, repr=False)
+    """The tables of its folder by name, for rows that stand for another table; None where they are not known."""
 
     @classmethod
     def from_columns(
@@ -177,8 +126,14 @@ class Table:
     @cached_property
     def faults(self) -> list[Fault]:
         """Every cell that cannot be read, in the order of rows."""
-        found = [(row, at, fault) for at, column in enumerate(self.conditions) for row, fault in _faulty_rows(column)]
+        found = [(row, at, fault) for at, column in enumerate(self.conditions) for row, fault in column.faulty_rows()]
         found += [(row, -1, fault) for row, fault in self._plain.faults]
+        if self.when is not None:
+            found += [(row, -1, fault.at(self.place(row, self.when.name))) for row, fault in self.when.faulty_rows()]
+        if self.around is not None:
+            from contextdb.nesting.links import nesting_faults
+
+            found += [(fault.place.row or 0, -1, fault) for fault in nesting_faults(self, self.around)]
         names = [c.condition.name for c in self.conditions]
         found.sort(key=lambda item: item[:2])
         return [f if at < 0 else f.at(self.place(row, names[at])) for row, at, f in found]
@@ -234,18 +189,36 @@ class Table:
         source = files.write_texts(target, self.columns, self.source, self.origin)
         return replace(self, path=target, source=source, origin=np.arange(self.n_rows))
 
-    def compile(self) -> CompiledTable:
+    def compile(self, tables: Mapping[str, Table] | None = None) -> CompiledTable:
         """Compile into masks. Columns that were compiled before, in this table or one it was edited from, are not compiled again.
+
+        Parameters
+        ----------
+        tables : mapping of str to Table, optional
+            The tables that rows `@name` stand for. Default: those of the table's folder.
 
         Raises
         ------
         TableError
-            Cells that cannot be read, all of them.
+            Cells that cannot be read, all of them; in tables inside the table too.
         """
         from contextdb.compiled import CompiledTable
 
         self.require_readable()
-        return CompiledTable.of(self)
+        return CompiledTable.of(self.flat(tables))
+
+    def flat(self, tables: Mapping[str, Table] | None = None) -> Table:
+        """The table with the rows of its inner tables in place of those that stand for them: the rows that a query answers with.
+        The table itself where no row stands for a table. `tables` and what is raised as in `compile`."""
+        from contextdb.nesting.links import is_nested
+
+        if not is_nested(self):
+            return self
+        return self._flat if tables is None else flat_table(self, tables)
+
+    @cached_property
+    def _flat(self) -> Table:
+        return flat_table(self, self.around)
 
     @property
     def enabled(self) -> NDArray[np.bool_]:
@@ -263,8 +236,20 @@ class Table:
         return self._plain.weights
 
     @cached_property
-    def _plain(self) -> _PlainColumns:
-        return _PlainColumns.read(self)
+    def when(self) -> WhenColumn | None:
+        """The rows' own rules; None without a `when` column."""
+        if self.settings.when is None:
+            return None
+        return WhenColumn.read(self.text_column(self.settings.when), self.known_conditions)
+
+    @property
+    def known_conditions(self) -> dict[str, Condition]:
+        """The conditions that rules may name: those of the table, and all that are declared."""
+        return {**self.schema.conditions, **{c.condition.name: c.condition for c in self.conditions}}
+
+    @cached_property
+    def _plain(self) -> PlainColumns:
+        return PlainColumns.read(self)
 
     def _no_row(self, row: int) -> Fault:
         accepted = f"rows 0 to {self.n_rows - 1}" if self.n_rows else "no row: the table is empty"
@@ -282,22 +267,18 @@ class Table:
         return replace(self, columns=tuple(columns), conditions=conditions, origin=origin)
 
 
-@dataclass(frozen=True, eq=False)
-class _PlainColumns:
-    """The columns that are not conditions but mean something: enabled, priority, weight."""
+def flat_table(table: Table, tables: Mapping[str, Table] | None) -> Table:
+    """A table with its inner tables' rows; raises TableError where no others are known."""
+    from contextdb.nesting.flat import flatten
+    from contextdb.nesting.links import inner_rows
 
-    enabled: NDArray[np.bool_]
-    priorities: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    faults: tuple[tuple[int, Fault], ...]
-
-    @classmethod
-    def read(cls, table: Table) -> _PlainColumns:
-        faults: list[tuple[int, Fault]] = []
-        enabled = _plain_column(table, table.settings.enabled, _enabled, True, '"True" or "False"', faults)
-        priorities = _plain_column(table, table.settings.priority, _priority, 0, "a whole number", faults)
-        weights = _plain_column(table, table.settings.weight, _weight, 1.0, "a number from 0 up", faults)
-        return cls(enabled.astype(np.bool_), priorities.astype(np.int64), weights.astype(np.float64), tuple(faults))
+    inner = inner_rows(table)
+    if tables is None and inner:
+        name, rows = next(iter(inner.items()))
+        found = f"{in_quotes('@' + name)} stands for a table, and no other tables are known."
+        fault = Fault(found, f'compile(tables={{"{name}": ...}}), or a table out of a folder', rule="no-such-table")
+        raise TableError(fault.at(table.place(rows[0], table.asset_column)))
+    return flatten(table, tables or {})
 
 
 def build_table(
@@ -345,25 +326,6 @@ def load(path: str | Path, strict: bool = True) -> Table:
     return load_table(Path(path), strict)
 
 
-def _read_cells(texts: Sequence[str], condition: Condition) -> tuple[tuple[Cell, ...], dict[int, Fault]]:
-    cells: list[Cell] = []
-    faults: dict[int, Fault] = {}
-    for i, text in enumerate(texts):
-        try:
-            cells.append(parse_cell(text, condition.domain, len(faults) < MOST_MENDS))
-        except CellError as error:
-            cells.append(ANY)
-            faults[i] = error.faults[0]
-    return tuple(cells), faults
-
-
-def _faulty_rows(column: ConditionColumn) -> Iterable[tuple[int, Fault]]:
-    if not column.faults:
-        return
-    for row in np.flatnonzero(np.isin(column.texts.codes, list(column.faults))).tolist():
-        yield row, column.faults[int(column.texts.codes[row])]
-
-
 def _no_such(what: str, name: str, known: list[str]) -> Fault:
     near = nearest(name, known)
     return Fault(
@@ -378,8 +340,8 @@ def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, pat
         Fault(f"the column name {in_quotes(n)} stands twice.", "each name once", place=place)
         for n in sorted({n for n in names if names.count(n) > 1})
     ]
-    wanted = {"asset": settings.asset, "enabled": settings.enabled, "priority": settings.priority, "weight": settings.weight}
-    for key, name in [*wanted.items(), *(("outputs", n) for n in settings.outputs)]:
+    wanted = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
+    for key, name in [*wanted, *(("outputs", n) for n in settings.outputs)]:
         if name is not None and name not in names:
             fault = _no_such("column", name, names)
             faults.append(replace(fault, found=f"{fault.found[:-1]}, which [tables.{settings.name}] names as {key}.", place=place))
@@ -389,44 +351,5 @@ def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, pat
 
 def _plain_names(columns: Sequence[TextColumn], settings: TableSettings) -> set[str]:
     asset = settings.asset or (columns[0].name if columns else None)
-    jobs = (asset, settings.enabled, settings.priority, settings.weight, *settings.outputs)
+    jobs = (asset, settings.enabled, settings.priority, settings.weight, settings.when, *settings.outputs)
     return {name for name in jobs if name is not None}
-
-
-def _plain_column(
-    table: Table,
-    name: str | None,
-    read: Callable[[str], float | None],
-    default: float,
-    accepted: str,
-    faults: list[tuple[int, Fault]],
-) -> NDArray[np.float64]:
-    """Read a column of plain values; an empty cell is the default."""
-    if name is None:
-        return np.full(table.n_rows, default)
-    column = table.text_column(name)
-    values = [default if not t.strip() else read(t.strip()) for t in column.texts]
-    for row in np.flatnonzero(np.array([v is None for v in values], np.bool_)[column.codes]).tolist() if values else ():
-        fault = Fault(f"cannot read {in_quotes(column[row])}.", accepted, place=table.place(row, name), rule="unreadable-cell")
-        faults.append((row, fault))
-    return np.array([default if v is None else v for v in values], np.float64)[column.codes]
-
-
-def _enabled(text: str) -> float | None:
-    return truth_of(text)
-
-
-def _priority(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if value.is_integer() and abs(value) < 2.0**53 else None
-
-
-def _weight(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if 0.0 <= value < math.inf else None

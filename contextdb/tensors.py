@@ -50,6 +50,8 @@ class FileKind:
         What another file is not: "one that contextdb compiled".
     accepted, mend : str
         For messages about a file that cannot be used.
+    also : tuple of int
+        Other versions that are read.
     """
 
     key: str
@@ -57,6 +59,7 @@ class FileKind:
     found: str
     accepted: str
     mend: str
+    also: tuple[int, ...] = ()
 
     def metadata(self, others: Mapping[str, str]) -> dict[str, str]:
         """The metadata of a file of this kind, and others."""
@@ -127,8 +130,9 @@ def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tupl
         start = 8 + int.from_bytes(mapped[:8], "little")
         header = json.loads(mapped[8:start])
         metadata = header.pop(_METADATA)
-        if metadata[kind.key] != str(kind.layout):
-            raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {kind.layout}.")
+        known = [str(layout) for layout in sorted((kind.layout, *kind.also))]
+        if metadata[kind.key] not in known:
+            raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {' or '.join(known)}.")
         return {name: _view(mapped, start, entry) for name, entry in header.items()}, metadata
 
 

@@ -210,3 +210,34 @@ def test_a_compiled_file_that_does_not_know_its_slots_is_not_asked_with_actors()
 
 def test_a_table_without_rows_casts_nobody():
     assert len(table_of([]).query({"is_wet": True}, actors={"Judge": [actor("a")]})) == 0
+
+
+def castings_of_many(row, actors):
+    """All castings of a row by the actors who fit each role, tried one by one: as `every_casting`, which tries the others too."""
+    mandatory, optional = (row.get(s, "").split() for s in SLOTS)
+    fits = {
+        r: [a for a in actors.get(r, []) if row[f"{r}.kind"] in ("Any", "") or a["kind"] in row[f"{r}.kind"].split()] for r in ROLES
+    }
+    needed = [r for r in ROLES if r in mandatory or (r not in optional and row[f"{r}.kind"] not in ("Any", ""))]
+    wanted = [r for r in ROLES if r in optional and r not in mandatory]
+    most, best = -1, []
+    for chosen in product(*(fits[r] for r in needed), *([*fits[r], None] for r in wanted)):
+        cast = [(r, a) for r, a in zip(needed + wanted, chosen, strict=True) if a is not None]
+        if len({a["id"] for _, a in cast}) == len(cast) and len(cast) >= most:
+            best = [*best, cast] if len(cast) == most else [cast]
+            most = len(cast)
+    return best
+
+
+@settings(max_examples=60, deadline=None)
+@given(moments(max_actors=22, max_rows=2))
+def test_with_two_teams_the_best_casting_is_that_of_trying_every_assignment(moment):
+    rows, context, actors = moment
+    matches = table_of(rows).query(context, actors=actors, prefer="distance")
+    for r, row in enumerate(rows):
+        found = castings_of_many(row, actors) if row["is_wet"] == "Any" or context["is_wet"] else []
+        assert (r in matches) == bool(found)
+        if found:
+            cast = matches.casting(r)
+            assert len(cast) == len(found[0])
+            assert sum(a["distance"] for a in cast.values()) == min(sum(a["distance"] for _, a in c) for c in found)

@@ -111,7 +111,7 @@ def test_a_command_that_is_like_none_is_refused_without_a_guess():
         (["check", ".", "--format", "jsn"], 'Did you mean "json"?'),
         (["check", ".", "--fail-on", "info"], 'there is no "info". Accepted: "error", "warning", "none".'),
         (["evaluate", "t"], "the following arguments are required: CONTEXTS"),
-        (["evaluate", "t", "c.csv", "--engine", "dusk"], 'there is no "dusk". Accepted: "local".'),
+        (["evaluate", "t", "c.csv", "--engine", "dusk"], 'there is no "dusk". Accepted: "local", "dask". Did you mean "dask"?'),
         (["compile", "t", "--outt", "x"], 'there is no option "--outt". Did you mean "--out"?'),
     ],
 )

@@ -5,6 +5,7 @@ Each document is one session, run from top to bottom beside a fresh copy of tabl
 - In a ```console block, lines that begin with `$ ` are commands (a `\\` at the end continues them) and the lines under each are its
   output, standard error included. Commands are `contextdb …`, `python …`, and `echo $?`, the last exit code.
 - A ```python block runs; what it prints stands in a ```text block right under it.
+- A block whose fence names a file, such as ```csv tackles/dives.csv, is that file from there on.
 
 What cannot be run (installing, make) stands in a ```sh block, or ```py for Python.
 
@@ -46,11 +47,13 @@ class Block:
     language: str
     first: int
     stop: int
+    file: str = ""
+    """The file that it is."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """A command or a piece of Python, and the lines first…stop of the document that show its output."""
+    """A command, a piece of Python or the text of a file, and the lines first…stop of the document that show its output."""
 
     source: str
     is_python: bool
@@ -58,6 +61,8 @@ class Step:
     stop: int
     fenced: bool = True
     """False where the document has no block yet that could show an output."""
+    file: str = ""
+    """The file that is written; nothing is shown for it."""
 
 
 @dataclass
@@ -70,7 +75,15 @@ class Session:
 
     def run(self, step: Step) -> str:
         """What the step prints."""
+        if step.file:
+            return self._write(step.file, step.source)
         return self._python(step.source) if step.is_python else self._command(shlex.split(step.source))
+
+    def _write(self, file: str, text: str) -> str:
+        path = self.folder / file
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text + "\n", encoding="utf-8")
+        return ""
 
     def _python(self, source: str) -> str:
         printed = io.StringIO()
@@ -101,14 +114,17 @@ def blocks(lines: list[str]) -> Iterator[Block]:
     """The fenced blocks of a document."""
     fences = [i for i, line in enumerate(lines) if line.startswith("```")]
     for opening, closing in zip(fences[::2], fences[1::2], strict=True):
-        yield Block(lines[opening][3:].strip(), opening + 1, closing)
+        language, _, file = lines[opening][3:].partition(" ")
+        yield Block(language.strip(), opening + 1, closing, file.strip())
 
 
 def steps(lines: list[str]) -> Iterator[Step]:
     """What a document runs, in order."""
     found = list(blocks(lines))
     for block, after in zip(found, [*found[1:], None], strict=False):
-        if block.language == "console":
+        if block.file:
+            yield Step("\n".join(lines[block.first : block.stop]), False, block.stop, block.stop, file=block.file)
+        elif block.language == "console":
             yield from commands(lines, block)
         elif block.language == "python":
             source = "\n".join(lines[block.first : block.stop])
@@ -148,6 +164,8 @@ def updated(lines: list[str]) -> list[str]:
         outputs = [(step, now.run(step)) for step in steps(lines)]
     result = list(lines)
     for step, output in reversed(outputs):
+        if step.file:
+            continue
         new = output.splitlines()
         if not step.fenced and new:
             new = ["", "```text", *new, "```"]
@@ -172,6 +190,13 @@ def test_an_update_writes_the_real_output_under_each_command():
     assert updated(["A page without commands."]) == ["A page without commands."]
 
 
+def test_a_block_that_names_a_file_is_that_file_from_there_on():
+    file = ["```csv game/moves.csv", "Asset,speed", "Jog,2..", "```"]
+    lines = [*file, "```console", "$ contextdb query game/moves.csv speed=3", "```"]
+    assert updated(lines)[:6] == [*file, *lines[4:6]]
+    assert updated(lines)[6] == "1 of 1 row valid in moves"
+
+
 def test_a_console_block_refuses_a_command_that_it_does_not_know():
     with pytest.raises(ValueError, match=re.escape("not rm: use a ```sh block")):
         updated(["```console", "$ rm -r tables", "```"])
@@ -194,7 +219,7 @@ def test_the_settings_that_the_editors_page_shows_are_taken(tmp_path: Path):
     path.write_text("\n".join(lines[block.first : block.stop]), encoding="utf-8")
     settings = read_settings(path, EditorApp.theme_names())
     assert settings.theme == LIGHT
-    assert settings.keys == {"duplicate": "ctrl+u", "sort": "alt+o,f10"}
+    assert settings.keys == {"duplicate": "ctrl+u", "sort": "alt+u,f10"}
 
 
 if __name__ == "__main__" and sys.argv[1:] == ["--update"]:

@@ -334,7 +334,7 @@ def test_details_are_worked_out_only_for_the_rows_that_are_asked_for():
     columns = {"Asset": [f"a{i}" for i in range(n_rows)], "x": texts}
     compiled = Table.from_columns(columns, {"x": {"type": "number"}}).compile()
     with (
-        mock.patch.object(Explanation, "_failure", autospec=True, side_effect=Explanation._failure) as told,
+        mock.patch.object(Explanation, "_failures", autospec=True, side_effect=Explanation._failures) as told,
         mock.patch("contextdb.explain.parse_cell", side_effect=parse_cell) as read,
     ):
         explanation = compiled.explain({"x": 20_000.0})

@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.columns import TextColumn
+from contextdb.condition_column import MOST_MENDS
 from contextdb.conditions import Condition
 from contextdb.domains import NUMBER
 from contextdb.errors import SchemaError, TableError
 from contextdb.schema import EMPTY, TableSettings
-from contextdb.table import MOST_MENDS, Table, build_table
+from contextdb.table import Table, build_table
 
 DECLARED = {"speed": {"type": "number"}, "state": {"type": "enum", "values": ["Ground", "Air"]}}
 TABLE = Table.from_columns(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.casting.assigning import Part
 from contextdb.casting.facts import Actors, Offer, Prefer
-from contextdb.casting.stage import CastMatches, Part, Stage, set_stage
-from contextdb.explain import Explanation, Failure, RowExplanation, describe_fact, mended
+from contextdb.casting.rules import CastRules
+from contextdb.casting.stage import CastMatches, Stage, set_stage
+from contextdb.explain import Explanation, Failure, RowExplanation, cell_failures, describe_fact
 from contextdb.facts import Context, Unknown
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
+    from contextdb.when import WhenRules
 
 
 class CastExplanation(Explanation):
@@ -39,11 +43,35 @@ class CastExplanation(Explanation):
         found = super().row(row)
         return RowExplanation(found.row, found.asset, found.is_enabled, (*found.failures, *self._role_failures(row)))
 
+    def _broken_rules(self, when: WhenRules) -> int:
+        """The rows whose rule does not hold: with plain facts, or for no casting though the needed roles can be filled."""
+        stage = replace(self.stage, unknown=self._lenient, rules=self._cast_rules)
+        left, _ = stage.left_by_rules(when.rows, when.rows)
+        cast = self._cast_rules.rows & ~stage.offered.bits if self._cast_rules is not None else 0
+        return when.rows & ~left & ~cast
+
+    @property
+    def _lenient(self) -> Unknown:
+        return "any" if self.stage.unknown == "any" else "never"
+
+    @cached_property
+    def _cast_rules(self) -> CastRules | None:
+        rules = self.stage.rules
+        return None if rules is None else replace(rules, unknown=self._lenient)
+
+    def _rule_failure(self, row: int) -> Failure:
+        when = self.compiled.when
+        assert when is not None
+        if self._cast_rules is not None and self._cast_rules.rows >> row & 1:
+            told = self._cast_rules.told(row, _most_filled(self.stage.parts(row)[0]))
+            return Failure(when.name, when.texts[row], f"false for every casting, such as {told}", "Any")
+        return self._told_rule(when, row, self.stage.rule_facts)
+
     @cached_property
     def n_failures(self) -> NDArray[np.int64]:
         """How many cells of each row fail: int64 [n_rows]; a disabled row counts one more."""
-        counts = np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + ~self._enabled
-        for row in bitmask.rows(bitmask.from_int(((1 << len(counts)) - 1) & ~self.stage.bits, len(counts))).tolist():
+        counts = np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled
+        for row in bitmask.rows(bitmask.from_int(((1 << len(counts)) - 1) & ~self.stage.offered.bits, len(counts))).tolist():
             counts[row] += len(list(self._role_failures(row)))
         return counts
 
@@ -61,7 +89,7 @@ class CastExplanation(Explanation):
             fails = self._fails[at, rows]
             if fails.any():
                 far[fails] += self._column_distances(at, fact, rows[fails]) if isinstance(fact, float) else 1.0
-        return far
+        return far + self.breaks_rule[rows]
 
     def _role_failures(self, row: int) -> Iterator[Failure]:
         needed, _ = self.stage.parts(row)
@@ -82,10 +110,8 @@ class CastExplanation(Explanation):
         for at, fact in offer.facts.items():
             bits, _ = self.compiled.condition_bits(at, fact, self.stage.unknown)
             if not bits >> row & 1:
-                condition = self.compiled.conditions[at]
-                text = self.compiled.texts[at][row]
-                told = f"{describe_fact(fact, condition)} of {offer.name}"
-                yield Failure(condition.name, text, told, mended(text, fact, condition.domain))
+                told = f"{describe_fact(fact, self.compiled.conditions[at])} of {offer.name}"
+                yield from cell_failures(self.compiled, at, row, fact, told)
 
 
 def _most_filled(parts: list[Part]) -> dict[str, Offer]:

@@ -32,6 +32,8 @@ class Offer:
     """Where among the actors of the role."""
     facts: Mapping[int, Fact]
     """For each condition of the role, by its number, the fact in canonical form."""
+    told: Mapping[str, object]
+    """What the actor tells, under the names of conditions."""
     some: int
     """The rows whose cells on the role accept the actor."""
     every: int
@@ -132,7 +134,7 @@ class _Reader:
             one, all_ = self.compiled.condition_bits(at, fact, self.unknown)
             some_bits &= one
             every &= all_
-        return Offer(actor, key, place, facts, some_bits, every, cost)
+        return Offer(actor, key, place, facts, _own_facts(role, actor), some_bits, every, cost)
 
     def _key(self, where: str, actor: Actor) -> object:
         own = actor.get("id")
@@ -170,7 +172,9 @@ class _Reader:
                 faults += error.faults
         if faults:
             raise ContextError(*faults)
-        if missing := [self.compiled.conditions[at].name for at, fact in facts.items() if fact is None]:
+        told = self.compiled.roles.told_to_rules(role, self.compiled)
+        lacking = [c.name for c in told if read_fact(given.get(c.name), c) is None]
+        if missing := [*(self.compiled.conditions[at].name for at, fact in facts.items() if fact is None), *lacking]:
             self._refuse_missing(role, missing, given, joint)
         return facts
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contextdb.batch import Contexts, common_length, facts_of
+from contextdb.batch_columns import Contexts, common_length, facts_of
 from contextdb.bitmask import Rows, Words
 from contextdb.casting.facts import Actors, Prefer
 from contextdb.casting.stage import CastMatches, query_with_actors

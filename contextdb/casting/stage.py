@@ -12,17 +12,18 @@ Source: Hall, "On representatives of subsets", J. London Math. Soc. 10, 1935.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from itertools import combinations
 from operator import or_
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.casting.assigning import Chosen, Holds, Part, best, every
 from contextdb.casting.facts import Actor, Actors, Offer, Prefer, read_offers
+from contextdb.casting.rules import CastRules
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
 from contextdb.facts import Context, Fact, Unknown, check_mode
 from contextdb.matches import SetMatches
@@ -64,7 +65,7 @@ class CastMatches(SetMatches):
     def cast(self, row: int) -> dict[str, Offer]:
         """The same as `casting`, each actor with where it was offered."""
         self._require_valid(row)
-        return dict(_first(*self._stage.parts(row)))
+        return dict(self._stage.cast(row))
 
     def castings(self, row: int) -> list[Casting]:
         """All castings of a valid row that fill as many optional roles as can be, best first."""
@@ -77,16 +78,13 @@ class CastMatches(SetMatches):
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """The actors of one moment against the roles of a table."""
+class Offered:
+    """Who is offered for the roles of a table, and the rows whose needed roles they can fill."""
 
-    compiled: CompiledTable
     roles: Roles
     offers: Mapping[str, tuple[Offer, ...]]
     """Who is offered for each role, without repeats."""
-    plain_facts: Mapping[int, Fact]
-    """The facts of the conditions that are no role's, by their number."""
-    unknown: Unknown
+    n_rows: int
 
     @cached_property
     def bits(self) -> int:
@@ -98,16 +96,60 @@ class Stage:
         """The same where an actor must fit with every value of its set-valued facts: rows that certainly match."""
         return self._castable([{o.key: o.every for o in self.offers[n]} for n in self.roles.names])
 
+    def _castable(self, fits: Sequence[Mapping[object, int]]) -> int:
+        """The rows in which every set of k needed roles is fitted by at least k actors together."""
+        all_rows = (1 << self.n_rows) - 1
+        required = [self.roles.required[n] for n in self.roles.names]
+        return all_rows & ~_lacking(fits, required, 0, {}, all_rows, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The actors of one moment against the roles of a table."""
+
+    compiled: CompiledTable
+    offered: Offered
+    plain_facts: Mapping[int, Fact]
+    """The facts of the conditions that are no role's, by their number."""
+    unknown: Unknown
+    rule_facts: Mapping[str, Fact]
+    """The facts of plain rules."""
+    rules: CastRules | None = None
+    """The rules that are decided for each casting; None where there are none."""
+
+    @property
+    def roles(self) -> Roles:
+        """What the table says of its roles."""
+        return self.offered.roles
+
+    @property
+    def offers(self) -> Mapping[str, tuple[Offer, ...]]:
+        """Who is offered for each role, without repeats."""
+        return self.offered.offers
+
     def matches(self, plain: Mapping[int, tuple[int, int]]) -> CastMatches:
-        """The valid rows, from those that may and those that always accept each plain fact."""
-        some_bits, every = self.compiled.enabled_bits & self.bits, self.compiled.enabled_bits & self.always
+        """The valid rows, from those that may and those that always accept each plain fact, or whose rule does."""
+        some_bits, all_bits = (self.compiled.enabled_bits & rows for rows in (self.offered.bits, self.offered.always))
         for some_rows, all_rows in plain.values():
             some_bits &= some_rows
-            every &= all_rows
-        found = CastMatches(some_bits, every, self)
+            all_bits &= all_rows
+        found = CastMatches(*self.left_by_rules(some_bits, all_bits), self)
         if any(self.compiled.soft):
             found.with_penalties(lambda: self.penalties(found))
         return found
+
+    def left_by_rules(self, some_rows: int, all_rows: int) -> tuple[int, int]:
+        """Of rows that may and that always match by their cells, those whose rule holds: with plain facts, or for some casting."""
+        when = self.compiled.when
+        if when is None:
+            return some_rows, all_rows
+        cast = self.rules.rows if self.rules is not None else 0
+        plain, plain_always = when.left_with_care(some_rows & ~cast, all_rows & ~cast, self.rule_facts, self.unknown)
+        if self.rules is None:
+            return plain, plain_always
+        given = self.offers, self.roles.required
+        some_cast = self.rules.left(some_rows & cast, *given, lambda offer: offer.some, 0)
+        return plain | some_cast, plain_always | self.rules.left(all_rows & some_cast, *given, lambda offer: offer.every, 1)
 
     def penalties(self, matches: CastMatches) -> NDArray[np.float64]:
         """What the soft cells of valid rows cost with the best casting of each: float64 [n_rows]. A role that is not cast costs
@@ -117,23 +159,25 @@ class Stage:
         for at, fact in self.plain_facts.items():
             costs += compiled.column_penalties(at, fact, self.unknown)
         for row in matches:
-            needed, wanted = self.parts(row)
-            for _, offer in _first(needed, wanted):
+            for _, offer in self.cast(row):
                 costs[row] += sum(compiled.column_penalties(at, f, self.unknown)[row] for at, f in offer.facts.items())
         return costs
 
     def best(self, row: int) -> Casting:
         """The best casting of a row that can be cast."""
-        needed, wanted = self.parts(row)
-        return _as_casting(_first(needed, wanted))
+        return _as_casting(self.cast(row))
+
+    def cast(self, row: int) -> Chosen:
+        """The same, as offers."""
+        return best(*self.parts(row), self._holds(row))
 
     def all(self, row: int) -> list[Casting]:
         """Every casting of a row with the most optional roles, best first."""
-        needed, wanted = self.parts(row)
-        most = len(_first(needed, wanted)) - len(needed)
-        found = [c for chosen in _subsets(wanted, most) for c in _assignments(needed + chosen)]
-        order = [name for name, _ in needed + wanted]
-        return [_as_casting(c) for c in sorted(found, key=lambda c: _key(c, order))]
+        return [_as_casting(c) for c in every(*self.parts(row), self._holds(row))]
+
+    def _holds(self, row: int) -> Holds | None:
+        rules = self.rules
+        return None if rules is None or not rules.rows >> row & 1 else lambda cast: rules.holds(row, cast)
 
     def parts(self, row: int) -> tuple[list[Part], list[Part]]:
         """The roles that a row needs and those that it may fill, each with the actors who fit, best first."""
@@ -145,16 +189,6 @@ class Stage:
             elif self.roles.optional[name] >> row & 1:
                 wanted.append((name, fitting))
         return needed, wanted
-
-    def _castable(self, fits: Sequence[Mapping[object, int]]) -> int:
-        """The rows in which every set of k needed roles is fitted by at least k actors together."""
-        all_rows = (1 << self.compiled.n_rows) - 1
-        required = [self.roles.required[n] for n in self.roles.names]
-        return all_rows & ~_lacking(fits, required, 0, {}, all_rows, 0)
-
-
-Part = tuple[str, list[Offer]]
-Chosen = list[tuple[str, Offer]]
 
 
 def _lacking(
@@ -186,47 +220,6 @@ def _at_least(k: int, masks: Mapping[object, int]) -> int:
     return counts[-1]
 
 
-def _first(needed: list[Part], wanted: list[Part]) -> Chosen:
-    """The best assignment that fills the needed roles and as many others as can be."""
-    order = [name for name, _ in needed + wanted]
-    for most in range(len(wanted), -1, -1):
-        found = [c for chosen in _subsets(wanted, most) if (c := _best(needed + chosen)) is not None]
-        if found:
-            return min(found, key=lambda c: _key(c, order))
-    return []
-
-
-def _best(parts: list[Part]) -> Chosen | None:
-    """The best assignment of all roles. Of each role only as many actors as there are roles can matter: one of its best is free."""
-    few = [(name, fitting[: len(parts)]) for name, fitting in parts]
-    order = [name for name, _ in parts]
-    return min(_assignments(few), key=lambda c: _key(c, order), default=None)
-
-
-def _assignments(parts: Sequence[Part], taken: frozenset[object] = frozenset()) -> Iterator[Chosen]:
-    """Every way to give each role one of its actors, none of them two."""
-    if not parts:
-        yield []
-        return
-    (name, fitting), rest = parts[0], parts[1:]
-    for offer in fitting:
-        if offer.key not in taken:
-            for others in _assignments(rest, taken | {offer.key}):
-                yield [(name, offer), *others]
-
-
-def _subsets(parts: Sequence[Part], size: int) -> Iterator[list[Part]]:
-    return (list(c) for c in combinations(parts, size))
-
-
-def _key(chosen: Chosen, order: Sequence[str]) -> tuple[int, float, tuple[int, ...]]:
-    """What castings are compared by: actors without a preference, the sum of costs, and the places at which they are offered."""
-    offers = dict(chosen)
-    costs = [offers[n].cost for n in order if n in offers]
-    places = tuple(offers[n].place if n in offers else 1 << 30 for n in order)
-    return sum(c[0] for c in costs), sum(c[1] for c in costs), places
-
-
 def _as_casting(chosen: Chosen) -> Casting:
     return {name: offer.actor for name, offer in chosen}
 
@@ -246,18 +239,34 @@ def query_with_actors(
 
 
 def set_stage(
-    compiled: CompiledTable, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
+    compiled: CompiledTable,
+    context: Context,
+    actors: Actors,
+    prefer: Prefer = None,
+    unknown: Unknown = "error",
+    offered: Offered | None = None,
 ) -> tuple[Stage, dict[int, tuple[int, int]]]:
-    """The actors of a moment against the roles, and for each condition that is no role's the rows that may and always accept."""
+    """The actors of a moment against the roles, and for each condition that is no role's the rows that may and always accept.
+
+    With `offered` the actors are those, and not read.
+    """
     check_mode(unknown)
-    roles = roles_of(compiled, context, actors)
+    roles = offered.roles if offered is not None else roles_of(compiled, context, actors)
     cast = {at for places in roles.conditions.values() for at in places}
     names = {at: c.name for at, c in enumerate(compiled.conditions) if at not in cast}
-    read = compiled.read_context(context, unknown, list(names.values()))
+    rules = CastRules.of(compiled, context, roles.names, unknown)
+    read = compiled.read_context(context, unknown, list(dict.fromkeys([*names.values(), *_ruled_names(compiled, roles)])))
     facts = {at: read[name] for at, name in names.items()}
     plain = {at: compiled.condition_bits(at, fact, unknown) for at, fact in facts.items()}
-    offers = read_offers(compiled, roles.conditions, context, actors, prefer, unknown)
-    return Stage(compiled, roles, offers, facts, unknown), plain
+    if offered is None:
+        offers = read_offers(compiled, roles.conditions, context, actors, prefer, unknown)
+        offered = Offered(roles, offers, compiled.n_rows)
+    return Stage(compiled, offered, facts, unknown, read, rules), plain
+
+
+def _ruled_names(compiled: CompiledTable, roles: Roles) -> list[str]:
+    """The facts that rules need and that no actor tells; those derived from what actors tell are computed for each casting."""
+    return [name for name, named in compiled.roles.needed_by_rules.items() if named.isdisjoint(roles.names)]
 
 
 def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles:
@@ -283,7 +292,8 @@ def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles
     mandatory, maybe = (slots.get(c, {}) for c in ("Mandatory_Slots", "Optional_Slots"))
     conditions = {n: members.get(n, ()) for n in names}
     optional = {n: maybe.get(n, 0) & ~mandatory.get(n, 0) for n in names}
-    required = {n: (mandatory.get(n, 0) | compiled.roles.constrained(conditions[n])) & ~optional[n] for n in names}
+    constrained = {n: compiled.roles.constrained(conditions[n]) | compiled.roles.ruled.get(n, 0) for n in names}
+    required = {n: (mandatory.get(n, 0) | constrained[n]) & ~optional[n] for n in names}
     return Roles(names, conditions, required, optional)
 
 

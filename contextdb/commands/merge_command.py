@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from contextdb.console import printable
@@ -30,7 +31,7 @@ from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
 from contextdb.exit_codes import ExitCode
 from contextdb.parquet import ParquetSource
-from contextdb.project import schema_for
+from contextdb.project import neighbours, schema_for
 from contextdb.schema import EMPTY, Schema, TableSettings
 from contextdb.table import Table
 
@@ -75,7 +76,8 @@ def _tell_meaning(found: Merge, path: Path) -> bool:
     from contextdb.effects import merge_effects
 
     try:
-        effects = merge_effects(found.ours, found.theirs, found.table)
+        around = neighbours(path)
+        effects = merge_effects(*(replace(table, around=around) for table in (found.ours, found.theirs, found.table)))
     except ContextDBError as error:
         print(printable(f"contextdb: the meaning of the merge was not looked at: {error.faults[0]}"), file=sys.stderr)
         return False

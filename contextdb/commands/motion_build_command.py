@@ -26,6 +26,7 @@ from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.stored import save_database
+from contextdb.nesting.flat import leaf_assets
 from contextdb.project import SCHEMA_FILE, Project
 
 HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed", "cached", "file")
@@ -91,7 +92,7 @@ class MotionProject:
             place = Place(str(project.folder / SCHEMA_FILE))
             accepted = 'a section such as [databases.jog] with features and clips = "clips/*.bvh"'
             raise ContextDBError(Fault("no motion database is declared.", accepted, place=place))
-        return cls(project.folder, config, {name: table.assets for name, table in project.tables.items()})
+        return cls(project.folder, config, {name: leaf_assets(table) for name, table in project.tables.items()})
 
     def targets(self, out: str | None, names: list[str] | None) -> dict[str, Path]:
         """Where the databases of some names, or all, are saved."""

@@ -172,7 +172,10 @@ def _json_fact(fact: Fact, name: str, compiled: CompiledTable) -> object:
 
 
 def _explained(row: RowExplanation) -> dict[str, object]:
-    failures = [{"condition": f.condition, "cell": f.cell, "fact": f.fact, "change_to": f.mend} for f in row.failures]
+    failures = [
+        {"condition": f.condition, "cell": f.cell, "fact": f.fact, "change_to": f.mend} | ({"in": str(f.step)} if f.step else {})
+        for f in row.failures
+    ]
     return {"row": row.row, "asset": row.asset, "enabled": row.is_enabled, "failures": failures}
 
 
@@ -213,24 +216,27 @@ def _cast(matches: CastMatches, row: int) -> str:
 
 def _nearest_lines(rows: list[RowExplanation], width: int) -> Iterator[str]:
     """The failing cells of some rows: a table where the terminal is wide enough for it, else a few lines a row."""
-    table = list(aligned([("row", "asset", "condition", "fact", "cell", "change to"), *_failures(rows)], right=(0,)))
+    header = ("row", "asset", "condition", "fact", "cell", "change to")
+    has_steps = any(f.step for row in rows for f in row.failures)
+    table = list(aligned([(*header, "in") if has_steps else header, *_failures(rows, has_steps)], right=(0,)))
     if max(map(width_of, table)) <= width:
         yield from table
         return
     digits = max(len(str(row.row)) for row in rows)
     for row in rows:
         yield printable(f"{row.row:>{digits}}  {row.asset}")
-        for name, fact, cell, mend in ((f.condition, f.fact, f.cell, f.mend) for f in row.failures):
-            yield printable(f"{' ' * digits}  {name} is {fact}")
-            yield printable(f'{" " * digits}    change "{cell}" to "{mend}"')
+        for f in row.failures:
+            yield printable(f"{' ' * digits}  {f.condition} is {f.fact}")
+            where = f" in {f.step}" if f.step else ""
+            yield printable(f'{" " * digits}    change "{f.cell}" to "{f.mend}"{where}')
         if not row.is_enabled:
             yield f"{' ' * digits}  the row is disabled"
 
 
-def _failures(rows: list[RowExplanation]) -> Iterator[tuple[str, ...]]:
+def _failures(rows: list[RowExplanation], has_steps: bool) -> Iterator[tuple[str, ...]]:
     for row in rows:
-        failures = [(f.condition, f.fact, f.cell, f.mend) for f in row.failures]
+        failures = [(f.condition, f.fact, f.cell, f.mend, str(f.step or "")) for f in row.failures]
         if not row.is_enabled:
-            failures.append(("(the row is disabled)", "", "", ""))
+            failures.append(("(the row is disabled)", "", "", "", ""))
         for i, failure in enumerate(failures):
-            yield (*((str(row.row), row.asset) if i == 0 else ("", "")), *failure)
+            yield (*((str(row.row), row.asset) if i == 0 else ("", "")), *failure[: 5 if has_steps else 4])

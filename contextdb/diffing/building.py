@@ -15,7 +15,7 @@ from contextdb.schema import Schema, TableSettings
 from contextdb.sections import condition_to_dict, differences, settings_to_dict
 from contextdb.table import Table
 
-JOBS = ("asset", "outputs", "enabled", "priority", "weight")
+JOBS = ("asset", "outputs", "enabled", "priority", "weight", "when")
 """What settings say of columns."""
 
 _EMPTY = TextColumn("", ("",), np.zeros(1, np.int32))

@@ -6,8 +6,10 @@ from collections.abc import Callable
 
 from contextdb.cell_words import truth_of
 from contextdb.cells import parse_cell
+from contextdb.condition_column import ConditionColumn
 from contextdb.errors import CellError
-from contextdb.table import ConditionColumn, Table
+from contextdb.table import Table
+from contextdb.when import has_no_rule
 
 Meaning = Callable[[str], object]
 """What a text means; None where nothing is known but the text itself."""
@@ -24,6 +26,8 @@ def meaning_of(table: Table, column: int) -> Meaning:
     if name in (settings.priority, settings.weight):
         empty = 0.0 if name == settings.priority else 1.0
         return lambda text: _number(text, empty)
+    if name == settings.when:
+        return lambda text: "" if has_no_rule(text) else text.strip()
     return lambda text: None
 
 

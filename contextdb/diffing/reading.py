@@ -45,6 +45,6 @@ def merged_bytes(merge: Merge) -> bytes:
 
 def _fitting(settings: TableSettings, columns: list[TextColumn]) -> TableSettings:
     names = {c.name for c in columns}
-    jobs: dict[str, Any] = {key: getattr(settings, key) for key in ("asset", "enabled", "priority", "weight")}
+    jobs: dict[str, Any] = {key: getattr(settings, key) for key in ("asset", "enabled", "priority", "weight", "when")}
     kept: dict[str, Any] = {key: name if name in names else None for key, name in jobs.items()}
     return replace(settings, **kept, outputs=tuple(name for name in settings.outputs if name in names))

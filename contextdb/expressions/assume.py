@@ -95,6 +95,22 @@ class Assumptions:
         return faults
 
 
+def constant_truth(expression: Expression) -> bool | None:
+    """The truth that a bool expression has in every context of the declared values and bounds; None where it has both, or where
+    boxes cannot tell."""
+    whole = [_domain_box({c.name: c for c in expression.conditions})]
+    for truth in (True, False):
+        boxes = expression.as_boxes(truth)
+        if boxes is None:
+            return None
+        try:
+            if not all_of([whole, _as_sets(boxes)]):
+                return not truth
+        except NoBoxes:
+            return None
+    return None
+
+
 def _contradiction(text: str, holds_alone: bool) -> Fault:
     if holds_alone:
         found = f"{in_quotes(text)} contradicts the assumptions before it: no context satisfies them all."
@@ -105,7 +121,11 @@ def _contradiction(text: str, holds_alone: bool) -> Fault:
 
 def _sets_of(expression: Expression) -> list[Sets] | None:
     boxes = expression.as_boxes(True)
-    return None if boxes is None else [{n: c.accepts for n, c in box.items() if c.accepts is not None} for box in boxes]
+    return None if boxes is None else _as_sets(boxes)
+
+
+def _as_sets(boxes: Sequence[Box]) -> list[Sets]:
+    return [{n: c.accepts for n, c in box.items() if c.accepts is not None} for box in boxes]
 
 
 def _domain_box(conditions: Mapping[str, Condition]) -> Sets:
@@ -156,11 +176,15 @@ def assumptions_of(table: Table) -> Assumptions:
     conditions = [column.condition for column in table.conditions]
     assumed = read_assumptions(table.settings.assume, conditions, table.schema.conditions)
     derived = [_definition(c, table.schema.conditions) for c in conditions if c.expr and c.domain.kind == "bool"]
-    return replace(assumed, derived=tuple(e for e in derived if e.as_boxes(False) is not None))
+    return replace(assumed, derived=tuple(e for e in derived if e is not None and e.as_boxes(False) is not None))
 
 
-def _definition(condition: Condition, declared: Mapping[str, Condition]) -> Expression:
-    return read_expression(f"{written_name(condition.name)} == ({condition.expr})", declared, _WANTS)
+def _definition(condition: Condition, declared: Mapping[str, Condition]) -> Expression | None:
+    """That a derived bool is what it is computed as; None where that is too long or too deep to be said."""
+    try:
+        return read_expression(f"{written_name(condition.name)} == ({condition.expr})", declared, _WANTS)
+    except ExpressionError:
+        return None
 
 
 def assumption_faults(assume: Sequence[str], conditions: Mapping[str, Condition]) -> Iterator[Fault]:

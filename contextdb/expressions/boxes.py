@@ -17,6 +17,7 @@ from contextdb.conditions import Condition
 from contextdb.domains import Domain, Kind
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
 from contextdb.expressions.scalar import runner
+from contextdb.facts import Fact
 
 MOST_BOXES = 4096
 """With more boxes than this, also on the way, an expression has none."""
@@ -43,6 +44,20 @@ def boxes_of(plan: Part, conditions: Mapping[str, Condition], truth: bool) -> li
     except NoBoxes:
         return None
     return [{name: Cell(accepts) for name, accepts in box.items()} for box in found]
+
+
+def meets(boxes: Iterable[Box], facts: Mapping[str, Fact]) -> bool:
+    """Whether some values of set-valued facts lie in one of the boxes, the others as they are; True where that cannot be told."""
+    return any(all(_meets(cell.accepts, facts[name]) for name, cell in box.items()) for box in boxes)
+
+
+def _meets(accepts: Accepted | None, fact: Fact) -> bool:
+    if not isinstance(fact, Cell):
+        return accepts is None or Cell(accepts).holds(fact)
+    own = fact.accepts
+    if accepts is None or own is None or (isinstance(own, TagSet) and own.is_complement):
+        return True
+    return not shared(accepts, own).is_empty
 
 
 class _Boxes:
@@ -180,13 +195,14 @@ def _intersection(a: Sets, b: Sets) -> Sets | None:
     """What two boxes share; None where that is nothing."""
     both = dict(a)
     for name, accepts in b.items():
-        both[name] = _shared(both[name], accepts) if name in both else accepts
+        both[name] = shared(both[name], accepts) if name in both else accepts
         if both[name].is_empty:
             return None
     return both
 
 
-def _shared(a: Accepted, b: Accepted) -> Accepted:
+def shared(a: Accepted, b: Accepted) -> Accepted:
+    """What two sets of one condition have in common; a set of tags must not be a complement."""
     if isinstance(a, NumberSet) and isinstance(b, NumberSet):
         spans = intervals.union((max(low, first), min(high, last)) for low, high in a.spans for first, last in b.spans)
         return NumberSet(spans, a.is_circular)
@@ -209,6 +225,6 @@ def _union(a: Accepted, b: Accepted) -> Accepted:
     assert isinstance(b, ValueSet)
     if not (a.is_complement or b.is_complement):
         return ValueSet(a.values | b.values)
-    rest = _shared(*(ValueSet(s.values, not s.is_complement) for s in (a, b)))
+    rest = shared(*(ValueSet(s.values, not s.is_complement) for s in (a, b)))
     assert isinstance(rest, ValueSet)
     return ValueSet(rest.values, not rest.is_complement)

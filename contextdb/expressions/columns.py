@@ -198,3 +198,8 @@ def is_missing_in(column: Column, row: int) -> bool:
     if isinstance(column, Coded):
         return bool(column.codes[row] < 0)
     return bool(column[row] == UNKNOWN) if column.dtype == np.int8 else bool(np.isnan(column[row]))
+
+
+def taken(column: Column, contexts: NDArray[np.int64]) -> Column:
+    """The values of some contexts."""
+    return Coded(column.codes[contexts], column.values) if isinstance(column, Coded) else column[contexts]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from itertools import pairwise
 
 from contextdb.expressions.faults import Refusal
@@ -12,6 +12,11 @@ from contextdb.expressions.tokens import RESERVED, Token, tokens_of, written_nam
 def names_in(text: str) -> tuple[str, ...]:
     """The names of facts in a text, in the order of their first mention; none in one that cannot be taken apart."""
     return tuple(dict.fromkeys(token.value for token in _names(text)))
+
+
+def unknown_in(text: str, known: Container[str]) -> tuple[str, int] | None:
+    """The first name of a fact that is not known, and the character from 0 where it stands."""
+    return next(((token.value, token.start) for token in _names(text) if token.value not in known), None)
 
 
 def with_names(text: str, new_names: Mapping[str, str]) -> str:

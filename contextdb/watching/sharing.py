@@ -13,10 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.columns import TextColumn
+from contextdb.condition_column import ConditionColumn
 from contextdb.conditions import Condition, infer_condition
 from contextdb.files import AnySource
+from contextdb.number_cells import NumberCells
 from contextdb.schema import Schema, TableSettings
-from contextdb.table import ConditionColumn, Table, build_table
+from contextdb.table import Table, build_table
 
 
 def table_like(
@@ -60,7 +62,9 @@ def _condition_column(texts: TextColumn, old: ConditionColumn | None, declared: 
 
 
 def _with_new_texts_read(texts: TextColumn, condition: Condition, old: ConditionColumn) -> ConditionColumn:
-    """A column of which only those texts are read that the older one did not have."""
+    """A column of which only those texts are read that the older one did not have. Many numbers are read again: it is faster."""
+    if isinstance(old.cells, NumberCells):
+        return ConditionColumn.read(texts, condition)
     known = dict(zip(old.texts.texts, zip(old.cells, map(old.faults.get, range(len(old.cells))), strict=True), strict=True))
     others = tuple(t for t in texts.texts if t not in known)
     read = ConditionColumn.read(TextColumn(texts.name, others, np.empty(0, np.int32)), condition)

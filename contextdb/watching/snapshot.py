@@ -13,8 +13,9 @@ from pathlib import Path
 from contextdb.compiled import CompiledTable
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError
+from contextdb.nesting.links import reached
 from contextdb.parquet import read_parquet
-from contextdb.project import SCHEMA_FILE, Project, twice_named
+from contextdb.project import SCHEMA_FILE, Project, around_each_other, twice_named
 from contextdb.schema import EMPTY, Schema, read_schema
 from contextdb.source import read_csv
 from contextdb.table import Table
@@ -35,9 +36,11 @@ class Snapshot:
     tables: Mapping[str, CompiledTable] = field(repr=False)
     """Every table compiled, by name."""
     changed: tuple[str, ...]
-    """The tables that are new or differ from the version before."""
+    """The tables that are new or differ from the version before, in a table inside them too."""
     digests: Digests = field(repr=False)
     """Of each file, as it was read."""
+    alone: Mapping[str, Table] = field(repr=False)
+    """The tables as their files have them, knowing nothing of each other."""
 
     def __getitem__(self, name: str) -> CompiledTable:
         """One compiled table; a name that is not there raises TableError and names the nearest."""
@@ -87,15 +90,17 @@ def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents
     faults += twice_named(found)
     if faults:
         raise TableError(*faults)
-    before = last.project.tables if last else {}
-    compiled = {n: last.tables[n] if last and before.get(n) is t else _compiled(t) for n, t in tables.items()}
-    changed = tuple(n for n, t in tables.items() if before.get(n) is not t)
-    return Snapshot(last.number + 1 if last else 1, Project(folder, schema, tables), compiled, changed, digests)
+    project = Project(folder, schema, around_each_other(tables, last.project.tables if last else {}))
+    project.require_sound()
+    before = last.alone if last else {}
+    changed = tuple(n for n, t in tables.items() if any(before.get(m) is not inner for m, inner in reached(t, tables).items()))
+    compiled = {n: last.tables[n] if last and n not in changed else _compiled(t) for n, t in project.tables.items()}
+    return Snapshot(last.number + 1 if last else 1, project, compiled, changed, digests, tables)
 
 
 def _table(path: Path, folder: Path, schema: Schema, contents: Contents, digests: Digests, last: Snapshot | None) -> Table:
     settings = schema.settings_for(path.relative_to(folder).as_posix())
-    old = last.project.tables.get(settings.name) if last else None
+    old = last.alone.get(settings.name) if last else None
     if path not in contents:
         read_bytes(path)  # raises FileError, which says why it cannot be read
         raise FileError(Fault("the file came while the folder was read.", mend="to save it again", place=Place(str(path))))

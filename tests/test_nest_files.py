@@ -1,0 +1,310 @@
+"""Tables inside tables in a folder: how their rows are named and picked, what is refused and where, and what a check finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from nested_files import AIR, write
+from running import run
+
+import contextdb as cdb
+from contextdb.check import check
+from contextdb.covering.check_rows import check_rows
+from contextdb.nesting.flat import flat_rows, leaf_assets
+from contextdb.nesting.links import inner_rows
+from contextdb.schema import TableSettings
+
+
+def rules(findings: list[cdb.Finding]) -> dict[str, list[int | None]]:
+    found: dict[str, list[int | None]] = {}
+    for finding in findings:
+        found.setdefault(finding.rule, []).append(finding.row)
+    return found
+
+
+# ---- names and places
+
+
+def test_a_row_inside_is_named_by_its_path_and_a_plain_row_by_its_asset(tmp_path: Path):
+    table = cdb.load(write(tmp_path) / "tackle.csv")
+    matches = table.compile().query(AIR)
+    assert matches.assets == ["tackle/dive/Left", "tackle/dive/Right", "Fall"]
+    assert matches.leaves == ["Left", "Right", "Fall"]
+    assert table.assets == ["Hit", "@dive", "Fall"]
+
+
+def test_a_row_knows_the_file_and_line_of_every_row_on_its_way(tmp_path: Path):
+    compiled = cdb.load(write(tmp_path) / "tackle.csv").compile()
+    steps = compiled.way(2)
+    assert [(s.table, s.row, s.asset) for s in steps] == [("tackle", 1, "@dive"), ("dive", 1, "Right")]
+    assert [str(s) for s in steps] == [f"{tmp_path / 'tackle.csv'}, line 3", f"{tmp_path / 'dive.csv'}, line 3"]
+
+
+def test_a_table_without_tables_inside_has_ways_of_one_step():
+    table = cdb.Table.from_columns({"Asset": ["a", "b"], "speed": ["1", "2"]})
+    assert table.flat() is table
+    compiled = table.compile()
+    assert [(s.table, s.row, s.asset) for s in compiled.way(1)] == [("table", 1, "b")]
+    assert compiled.leaves is compiled.assets
+
+
+def test_flat_rows_tell_where_the_rows_of_a_table_have_gone(tmp_path: Path):
+    table = cdb.load(write(tmp_path) / "tackle.csv")
+    assert [rows.tolist() for rows in flat_rows(table, table.flat())] == [[0], [1, 2, 3], [4]]
+    plain = cdb.load(tmp_path / "dive.csv")
+    assert [rows.tolist() for rows in flat_rows(plain, plain.flat())] == [[0], [1], [2]]
+    assert inner_rows(table) == {"dive": [1]}
+    assert leaf_assets(table) == ["Hit", "Left", "Right", "Slow", "Fall"]
+
+
+def test_tables_nest_to_any_depth_and_a_table_may_stand_in_several_places(tmp_path: Path):
+    write(tmp_path, low="Asset,speed\nRoll,..5\n", dive="Asset,Weight,speed\n@low,1,4..\nRight,1,Any\n@low,1,Any\n")
+    compiled = cdb.load(tmp_path / "tackle.csv").compile()
+    assert compiled.assets == ["Hit", "tackle/dive/low/Roll", "tackle/dive/Right", "tackle/dive/low/Roll", "Fall"]
+    assert compiled.query({"in_air": True, "speed": 3.5}).indices.tolist() == [2, 3, 4]
+
+
+def test_an_asset_whose_name_begins_with_the_mark_stands_in_quotes():
+    table = cdb.Table.from_columns({"Asset": ['"@home"', '"@say ""hi"""', '"plain"'], "speed": ["1", "1", "1"]})
+    assert table.compile().query({"speed": 1.0}).assets == ["@home", '@say "hi"', '"plain"']
+
+
+def test_an_explanation_names_the_cell_of_the_inner_and_of_the_outer_table(tmp_path: Path):
+    explained = cdb.load(write(tmp_path) / "tackle.csv").compile().explain({"in_air": True, "speed": 2.5})
+    failures = explained.row(2).failures
+    assert [(f.cell, f.mend, f.step and f.step.table) for f in failures] == [("3..", "2.5..", "tackle"), ("4..", "2.5..", "dive")]
+    assert f"the cell says 4.. ({tmp_path / 'dive.csv'}, line 3)" in str(failures[1])
+
+
+# ---- priorities, weights, disabled rows
+
+
+def nested(
+    outer: Mapping[str, list[str]], inner: Mapping[str, list[str]], /, **settings: Mapping[str, object]
+) -> cdb.CompiledTable:
+    jobs = {"enabled": "On", "priority": "P", "weight": "W"}
+    tables = {}
+    for name, columns in (("outer", outer), ("inner", inner)):
+        here = {job: column for job, column in jobs.items() if column in columns}
+        tables[name] = cdb.Table.from_columns(columns, None, TableSettings(name, **here, **settings.get(name, {})), name)
+    return tables["outer"].compile(tables)
+
+
+def test_a_disabled_outer_row_disables_the_rows_inside_and_a_disabled_inner_row_itself():
+    inner = {"Asset": ["a", "b"], "On": ["True", "False"]}
+    compiled = nested({"Asset": ["@inner", "@inner", "c"], "On": ["True", "False", "True"]}, inner)
+    assert compiled.query({}).indices.tolist() == [0, 4]
+
+
+def test_a_row_that_stands_for_a_table_is_one_candidate_by_its_own_weight():
+    inner = {"Asset": ["a", "b", "c", "d"], "W": ["1", "1", "1", "1"]}
+    compiled = nested({"Asset": ["@inner", "plain"], "W": ["1", "1"]}, inner)
+    counts = [compiled.pick({}, rng=seed) for seed in range(400)].count("plain")
+    assert 150 < counts < 250
+
+
+def test_priorities_inside_order_the_rows_inside_alone():
+    inner = {"Asset": ["a", "b"], "P": ["9", "1"]}
+    compiled = nested({"Asset": ["@inner", "plain"], "P": ["1", "2"]}, inner)
+    assert {compiled.pick({}, rng=seed) for seed in range(20)} == {"plain"}
+    compiled = nested({"Asset": ["@inner", "plain"], "P": ["2", "1"]}, inner)
+    assert {compiled.pick({}, rng=seed) for seed in range(20)} == {"outer/inner/a"}
+
+
+def test_a_table_inside_that_has_no_row_to_give_is_passed_over_whatever_its_fallback():
+    inner = {"Asset": ["a", "b"], "speed": ["1", "2"]}
+    settings = {"outer": {"policy": "first", "fallback": "still"}, "inner": {"policy": "first", "fallback": "inner fallback"}}
+    compiled = nested({"Asset": ["@inner", "last"], "speed": ["Any", "..3"]}, inner, **settings)
+    assert compiled.pick({"speed": 2.0}) == "outer/inner/b"
+    assert compiled.pick({"speed": 3.0}) == "last"
+    assert compiled.pick({"speed": 4.0}) == "still"
+
+
+def test_a_policy_of_one_row_counts_rows_of_its_own_table():
+    inner = {"Asset": ["a", "b"], "speed": ["1", "1"]}
+    settings = {"outer": {"policy": "unique"}}
+    compiled = nested({"Asset": ["@inner", "other"], "speed": ["..5", "5.."]}, inner, **settings)
+    assert compiled.pick({"speed": 1.0}, rng=0) in ("outer/inner/a", "outer/inner/b")
+    compiled = nested({"Asset": ["@inner", "other"], "speed": ["..5", "1.."]}, inner, **settings)
+    with pytest.raises(cdb.PolicyError, match='2 rows of "outer" are valid at once: "@inner", "other"'):
+        compiled.pick({"speed": 1.0})
+
+
+# ---- rules, slots, outputs
+
+
+def test_the_rules_of_both_rows_must_hold():
+    schema = {"speed": {"type": "number"}}
+    outer = {"Asset": ["@inner"], "speed": ["Any"], "If": ["speed < 5"]}
+    inner = {"Asset": ["a", "b"], "speed": ["Any", "Any"], "When": ["speed > 2", ""]}
+    tables = {"inner": cdb.Table.from_columns(inner, schema, TableSettings("inner", when="When"))}
+    compiled = cdb.Table.from_columns(outer, schema, TableSettings("outer", when="If")).compile(tables)
+    assert [compiled.query({"speed": s}).leaves for s in (1.0, 3.0, 6.0)] == [["b"], ["a", "b"], []]
+
+
+def test_a_role_that_the_outer_row_needs_is_not_made_optional_inside():
+    slots = ("Mandatory_Slots", "Optional_Slots")
+    schema = {"Defender.Tall": {"type": "bool"}, "Receiver.Fast": {"type": "bool"}}
+    inner = cdb.Table.from_columns(
+        {"Asset": ["a"], slots[0]: ["Receiver"], slots[1]: ["Defender"]}, schema, TableSettings("inner", outputs=slots)
+    )
+    outer = cdb.Table.from_columns({"Asset": ["@inner"], "Defender.Tall": ["True"]}, schema, TableSettings("outer"))
+    compiled = outer.compile({"inner": inner})
+    short, tall, runner = {"id": 1, "Tall": False}, {"id": 2, "Tall": True}, {"id": 3, "Fast": True}
+    assert not compiled.query({}, actors={"Defender": [short], "Receiver": [runner]})
+    assert not compiled.query({}, actors={"Defender": [tall], "Receiver": []})
+    matches = compiled.query({}, actors={"Defender": [short, tall], "Receiver": [runner]})
+    assert matches.casting(0) == {"Defender": tall, "Receiver": runner}
+
+
+def test_outputs_are_those_of_the_inner_row_else_of_the_outer_one():
+    inner = cdb.Table.from_columns({"Asset": ["a", "b"], "Clip": ["x", ""]}, None, TableSettings("inner", outputs=("Clip",)))
+    outer = cdb.Table.from_columns({"Asset": ["@inner", "c"], "Clip": ["y", "z"]}, None, TableSettings("outer", outputs=("Clip",)))
+    assert outer.flat({"inner": inner}).text_column("Clip").to_list() == ["x", "y", "z"]
+
+
+# ---- what is refused
+
+
+def test_a_missing_table_is_named_with_its_place_and_the_nearest(tmp_path: Path):
+    write(tmp_path, tackle="Asset,in_air,speed\n@dvie,True,Any\n")
+    with pytest.raises(cdb.TableError) as caught:
+        cdb.load(tmp_path / "tackle.csv")
+    [fault] = caught.value.faults
+    assert str(fault) == (
+        f'{tmp_path / "tackle.csv"}, line 2, column "Asset": there is no table "dvie" to stand here. '
+        'Accepted: "@dive". Did you mean "@dive"?'
+    )
+    assert fault.rule == "no-such-table"
+
+
+def test_a_mark_without_a_name_is_refused(tmp_path: Path):
+    write(tmp_path, tackle="Asset,in_air,speed\n@,True,Any\n")
+    with pytest.raises(cdb.TableError, match='after "@" the name of a table is missing'):
+        cdb.load(tmp_path / "tackle.csv")
+
+
+def test_a_table_that_stands_in_itself_is_refused_with_the_way_round(tmp_path: Path):
+    write(tmp_path, dive="Asset,Weight,speed\n@low,1,Any\n", low="Asset,speed\n@tackle,Any\n")
+    with pytest.raises(cdb.TableError, match="the table stands in itself: tackle > dive > low > tackle"):
+        cdb.load(tmp_path / "tackle.csv")
+    with pytest.raises(cdb.TableError, match="low > tackle > dive > low"):
+        cdb.Project.load(tmp_path)
+    table = cdb.load(tmp_path / "low.csv", strict=False)
+    assert [(f.rule, f.place.line) for f in table.faults] == [("cyclic-tables", 2)]
+
+
+def test_a_table_that_nests_a_cycle_is_refused_too(tmp_path: Path):
+    write(tmp_path, dive="Asset,Weight,speed\n@dive,1,Any\n")
+    with pytest.raises(cdb.TableError, match="dive > dive") as caught:
+        cdb.load(tmp_path / "tackle.csv")
+    assert [f.place.file for f in caught.value.faults] == [str(tmp_path / "dive.csv")]
+
+
+def test_cells_that_cannot_be_read_are_told_of_the_inner_file(tmp_path: Path):
+    write(tmp_path, dive="Asset,Weight,speed\nLeft,1,fast\nRight,many,1\n")
+    with pytest.raises(cdb.TableError) as caught:
+        cdb.load(tmp_path / "tackle.csv")
+    assert [(f.place.file, f.place.line) for f in caught.value.faults] == [
+        (str(tmp_path / "dive.csv"), 2),
+        (str(tmp_path / "dive.csv"), 3),
+    ]
+
+
+def test_an_inner_file_that_is_no_table_is_an_error_not_a_traceback(tmp_path: Path):
+    write(tmp_path, dive="")
+    (tmp_path / "dive.csv").write_bytes(b'Asset,speed\n"open,1\n')
+    with pytest.raises(cdb.ContextDBError, match=r"dive\.csv"):
+        cdb.load(tmp_path / "tackle.csv")
+
+
+def test_a_condition_of_unlike_types_is_refused_with_both_places(tmp_path: Path):
+    write(tmp_path, tackle="Asset,style\n@dive,fast slow\n", dive="Asset,Weight,style\nLeft,1,5\n")
+    with pytest.raises(cdb.TableError) as caught:
+        cdb.load(tmp_path / "tackle.csv").compile()
+    [fault] = caught.value.faults
+    assert str(fault).startswith(
+        f'{tmp_path / "dive.csv"}, column "style": the condition is of type number here and of type text in'
+    )
+    assert str(tmp_path / "tackle.csv") in str(fault)
+    assert "[conditions.style]" in fault.mend
+
+
+def test_a_guessed_type_of_a_column_that_says_any_alone_gives_way(tmp_path: Path):
+    write(tmp_path, tackle="Asset,style\n@dive,Any\n", dive="Asset,Weight,style\nLeft,1,5\n")
+    compiled = cdb.load(tmp_path / "tackle.csv").compile()
+    assert compiled.query({"style": 5.0}).leaves == ["Left"]
+
+
+def test_rows_that_multiply_without_end_are_refused_before_they_are_made():
+    tables = {"t0": cdb.Table.from_columns({"Asset": ["a"] * 10}, name="t0")}
+    for depth in range(1, 8):
+        tables[f"t{depth}"] = cdb.Table.from_columns({"Asset": [f"@t{depth - 1}"] * 10}, name=f"t{depth}")
+    with pytest.raises(cdb.TableError, match=r'the table "t7" has 100,000,000 rows\. Accepted: at most 1,000,000'):
+        tables["t7"].compile(tables)
+
+
+def test_a_table_that_knows_no_others_says_how_to_give_them():
+    table = cdb.Table.from_columns({"Asset": ["@dive"]})
+    with pytest.raises(
+        cdb.TableError, match=r'"@dive" stands for a table, and no other tables are known. Accepted: compile\(tables='
+    ):
+        table.compile()
+
+
+def test_tables_without_rows_may_stand_inside():
+    empty = cdb.Table.from_columns({"Asset": [], "speed": []})
+    compiled = cdb.Table.from_columns({"Asset": ["@empty", "a"]}).compile({"empty": empty})
+    assert compiled.query({}, unknown="any").assets == ["a"]
+    only = cdb.Table.from_columns({"Asset": ["@empty"]}).compile({"empty": empty})
+    assert not only.query({}, unknown="any")
+    assert only.pick({}, unknown="any") is None
+
+
+# ---- check
+
+
+def test_a_check_tells_of_missing_cyclic_and_broken_tables_once_each(tmp_path: Path):
+    write(tmp_path, tackle="Asset,in_air\n@gone,True\n@dive,True\n@tackle,True\n", dive="Asset,Weight,speed\nLeft,1,fast\n")
+    found = run("check", tmp_path, "--json").json["findings"]
+    told = [(f["rule"], f["table"], f["line"]) for f in found if f["level"] == "error"]
+    assert told == [("no-such-table", "tackle", 2), ("cyclic-tables", "tackle", 4), ("unreadable-cell", "dive", 2)]
+    write(tmp_path, dive="Asset,Weight,speed\nLeft,1,fast\n")
+    found = run("check", tmp_path, "--json").json["findings"]
+    told = [(f["rule"], f["table"], f["line"]) for f in found if f["level"] == "error"]
+    assert told == [("unusable-table", "tackle", 3), ("unreadable-cell", "dive", 2)]
+
+
+def test_findings_of_an_inner_table_are_told_of_it_and_not_of_the_outer_one_too(tmp_path: Path):
+    write(tmp_path, dive="Asset,Weight,speed\nLeft,1,..8\nRight,3,4..6\n")
+    outer, inner = cdb.Project.load(tmp_path)["tackle"], cdb.load(tmp_path / "dive.csv")
+    assert rules([*check(inner), *check_rows(inner)]) == {"subsumed-row": [1]}
+    assert rules([*check(outer), *check_rows(outer)]) == {"subsumed-row": [1]}, (
+        "that Left lies in Fall; of Right its own table tells"
+    )
+    [first] = check_rows(outer)
+    assert (first.asset, first.line, first.by) == ("tackle/dive/Left", 3, (2,))
+    assert f"The row stands in {tmp_path / 'dive.csv'}, line 2." in first.message
+
+
+def test_a_row_that_the_outer_row_shuts_out_is_told(tmp_path: Path):
+    outer = cdb.load(write(tmp_path) / "tackle.csv")
+    [finding] = [f for f in check(outer) if f.rule == "shut-out-row"]
+    assert (finding.level, finding.row, finding.asset) == ("info", 1, "tackle/dive/Slow")
+    assert 'speed must be "3.." and "..2", which share nothing' in finding.message
+
+
+def test_a_row_is_never_chosen_by_the_policy_of_the_table_where_ways_part(tmp_path: Path):
+    write(tmp_path, tackle="Asset,in_air,speed\nFirst,True,Any\n@dive,Any,3..\n")
+    found = cdb.coverage(cdb.load(tmp_path / "tackle.csv"))
+    assert "never-chosen" not in {f.rule for f in found.findings}
+    write(tmp_path, tackle="Asset,in_air,speed\nFirst,Any,Any\n@dive,Any,3..\n")
+    found = cdb.coverage(cdb.load(tmp_path / "tackle.csv"))
+    assert {f.asset for f in found.findings if f.rule == "never-chosen"} == {"tackle/dive/Left", "tackle/dive/Right"}
+
+
+def test_the_same_table_may_stand_in_two_rows_without_a_warning(tmp_path: Path):
+    write(tmp_path, tackle="Asset,in_air,speed\n@dive,True,3..\n@dive,False,..2\n")
+    assert "duplicate-asset" not in rules(check(cdb.load(tmp_path / "tackle.csv")))

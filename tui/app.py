@@ -31,13 +31,37 @@ WAIT_FOR_PART_S = 2.0
 """So long a key waits for a part of the screen that is still at work on the key before."""
 
 
+LOW = 14
+"""On a screen of fewer lines the tools and the details give way to the rows."""
+
+
 class EditorApp(App[None]):
     """The terminal editor."""
 
     TITLE = "contextdb"
     ENABLE_COMMAND_PALETTE = True
     COMMAND_PALETTE_BINDING: ClassVar[str] = "ctrl+p"
-    CSS: ClassVar[str] = "CommandPalette SearchIcon { display: none; }"
+    CSS: ClassVar[str] = """
+    CommandPalette SearchIcon { display: none; }
+    OptionList { min-width: 8; }
+    Button.-textual-compact {
+        width: auto; min-width: 0; padding: 0 1; margin: 0 1 0 0; background: $panel; text-style: bold;
+        &:focus, &:hover { background: $primary 40%; text-style: bold underline; }
+        &.-primary { background: $primary; }
+        &.-primary:focus, &.-primary:hover { background: $primary; text-style: bold underline; }
+    }
+    SheetBar Button.-textual-compact { background: $surface; }
+    Dialog OptionList, Dialog OptionList:focus { background: $surface; }
+    .-low {
+        & #tools, & StatusLine, & #coverage-bar { display: none; }
+        & #coverage-detail, & #problems-detail { max-height: 0; border-top: none; }
+        & #coverage-state, & #priorities-context { max-height: 1; }
+        & #coverage-sections, & #problems-levels { margin: 0; }
+        & #dialog { width: 100%; max-width: 100%; height: auto; max-height: 100%; padding: 0 1; }
+        & #dialog-body { overflow-y: auto; }
+    }
+    """
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (LOW, "-high")]  # noqa: RUF012 - Textual declares it so
 
     def __init__(self, workspace: Workspace, settings: EditorSettings | None = None, theme: str = "") -> None:
         super().__init__()
@@ -49,6 +73,8 @@ class EditorApp(App[None]):
         self.set_keymap(dict(self.settings.keys))
         self._ahead: deque[events.Event] = deque()
         """What was typed before the key before it has done all it does."""
+        self._outer: list[str] = []
+        """The tables whose rows were gone into, and not come back from."""
         self._settling: asyncio.Task[None] | None = None
 
     @staticmethod
@@ -113,7 +139,31 @@ class EditorApp(App[None]):
             return
         self._show_table(name, session)
 
+    def go_into(self, name: str, outer: str, facts: Mapping[str, str]) -> None:
+        """Show the table that a row of another stands for, at its first row that is valid for these facts."""
+        try:
+            sheet = self.workspace.session(name).sheet
+        except ContextDBError as error:
+            self._refused(str(error))
+            return
+        if facts:
+            sheet.query.load(facts)
+            valid = sheet.query.valid
+            if valid.any():
+                sheet.go_to(int(valid.argmax()))
+        self._outer.append(outer)
+        self.open_table(name)
+        self.main.came_from = outer
+
+    def go_back(self) -> bool:
+        """Show the table again from which this one was gone into; False where there is none."""
+        if not self._outer:
+            return False
+        self.open_table(self._outer.pop())
+        return True
+
     def _show_table(self, name: str, session: Session) -> None:
+        self.workspace.know_others(name)
         screen = MainScreen(self.workspace, name)
         if any(isinstance(one, MainScreen) for one in self.screen_stack):
             self.switch_screen(screen)

@@ -105,22 +105,43 @@ GRID: tuple[Command, ...] = (
     Command("copy", "ctrl+c", "Copy", "Copy the selected cells, also for Excel.", "Edit", "copy"),
     Command("cut", "ctrl+x", "Cut", "Copy the selected cells and empty them.", "Edit", "cut"),
     Command("paste", "ctrl+v", "Paste", "Paste cells; rows that are missing are added.", "Edit", "paste"),
-    Command("fill-down", "ctrl+d", "Fill down", "Copy the first selected row into the others.", "Edit", verb=Sheet.fill_down),
-    Command("fill-right", "ctrl+r", "Fill right", "Copy the first selected column into the others.", "Edit", verb=Sheet.fill_right),
-    Command("undo", "ctrl+z", "Undo", "Take back the last step.", "Edit", verb=Sheet.undo, in_footer=True),
-    Command("redo", "ctrl+y,ctrl+shift+z", "Redo", "Make the step again that was taken back.", "Edit", verb=Sheet.redo),
+    Command(
+        "fill-down", "ctrl+d", "Fill down", "Copy the first selected row into the others.", "Edit", verb=lambda s: s.fill_down()
+    ),
+    Command(
+        "fill-right",
+        "ctrl+r",
+        "Fill right",
+        "Copy the first selected column into the others.",
+        "Edit",
+        verb=lambda s: s.fill_right(),
+    ),
+    Command("undo", "ctrl+z", "Undo", "Take back the last step.", "Edit", verb=lambda s: s.undo(), in_footer=True),
+    Command("redo", "ctrl+y,ctrl+shift+z", "Redo", "Make the step again that was taken back.", "Edit", verb=lambda s: s.redo()),
     Command("insert-row", "insert,alt+a", "Insert row", "Insert as many rows above as are selected.", "Rows", "insert_rows(False)"),
     Command("insert-below", "ctrl+n", "Insert below", "Insert as many rows below as are selected.", "Rows", "insert_rows(True)"),
-    Command("duplicate", "ctrl+b", "Duplicate", "Copy the selected rows to below them.", "Rows", verb=Sheet.duplicate_rows),
-    Command("delete-rows", "ctrl+delete,ctrl+k", "Delete rows", "Delete the selected rows.", "Rows", verb=Sheet.delete_rows),
+    Command("duplicate", "ctrl+b", "Duplicate", "Copy the selected rows to below them.", "Rows", verb=lambda s: s.duplicate_rows()),
+    Command(
+        "delete-rows", "ctrl+delete,ctrl+k", "Delete rows", "Delete the selected rows.", "Rows", verb=lambda s: s.delete_rows()
+    ),
     Command("row-up", "alt+shift+up", "Move up", "Move the selected rows up.", "Rows", verb=_move_up),
     Command("row-down", "alt+shift+down", "Move down", "Move the selected rows down.", "Rows", verb=_move_down),
-    Command("enable", "ctrl+e", "Enable / disable", "Disable the rows, or enable them again.", "Rows", verb=Sheet.enable_rows),
-    Command("delete-columns", "alt+delete", "Delete columns", "Delete the selected columns.", "Columns", verb=Sheet.delete_columns),
+    Command(
+        "enable", "ctrl+e", "Enable / disable", "Disable the rows, or enable them again.", "Rows", verb=lambda s: s.enable_rows()
+    ),
+    Command(
+        "delete-columns",
+        "alt+delete",
+        "Delete columns",
+        "Delete the selected columns.",
+        "Columns",
+        verb=lambda s: s.delete_columns(),
+    ),
     Command("column-left", "alt+shift+left", "Move left", "Move the column left.", "Columns", verb=lambda s: s.move_column(-1)),
     Command("column-right", "alt+shift+right", "Move right", "Move the column right.", "Columns", verb=lambda s: s.move_column(1)),
     Command("sort", "alt+s", "Sort", "Show the rows sorted by this column: up, down, as in the file.", "View", "sort"),
     Command("test-row", "f6", "Test row", "Go to the test row, or back to the table.", "Test row", "test_row", in_footer=True),
+    Command("open-row", "alt+o", "Open the row", "Go into the table that the row stands for.", "Move", "open_row"),
     Command("leave", "escape", "Back", "Leave the test row; end a selection.", "Move", "leave", is_listed=False),
 )
 
@@ -143,6 +164,7 @@ _OF_SCREEN = (
     Command("save", "ctrl+s", "Save", "Write the table to its file.", "File", "save", in_footer=True),
     Command("save-as", "", "Save as", "Write the table to another file, and go on with that.", "File", "save_as"),
     Command("open", "ctrl+o", "Tables", "Go to another table of the folder.", "File", "tables"),
+    Command("back", "alt+b", "Back", "Leave a table that a row stands for, and go back to that row.", "File", "back"),
     Command("new-table", "", "New table", "Make a table, with the columns of a blueprint.", "File", "new_table"),
     Command("refresh", "f5", "Refresh", "Take in what changed on the disk, sort and filter anew.", "File", "refresh"),
     Command("import", "", "Import", "Bring rows in from Excel, CSV, Parquet or JSON.", "File", "import"),
@@ -153,6 +175,7 @@ _OF_SCREEN = (
     Command("contexts", "f9", "Contexts", "Load a saved or recorded context.", "Test row", "contexts", in_footer=True),
     Command("next-context", "f8", "Next context", "Load the next context of the file.", "Test row", "step(1)"),
     Command("previous-context", "f7", "Previous context", "Load the context before.", "Test row", "step(-1)"),
+    Command("actors", "alt+p", "Actors", "Who may play each role, for the test row.", "Test row", "actors"),
     Command("why", "f12", "Why", "Why this row is not valid, and which are nearest.", "Test row", "why", in_footer=True),
     Command("next-tab", "ctrl+pagedown,alt+right", "Next tab", "Go to the next tab.", "Tabs", "next_tab(1)"),
     Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the tab before.", "Tabs", "next_tab(-1)"),

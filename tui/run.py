@@ -30,7 +30,14 @@ def edit(path: str | None, theme: str | None = None) -> None:
         found = f"there is no theme {in_quotes(theme)}."
         raise SettingsError(Fault(found, ", ".join(themes), in_quotes(near) if near else ""))
     _require_readable(workspace)
+    _forget_exported_size()
     EditorApp(workspace, settings, theme or _theme_for(settings)).run()
+
+
+def _forget_exported_size() -> None:
+    """Go by the size that the terminal has: one that a shell exports stays as it was at first, and would hide every change."""
+    for name in ("COLUMNS", "LINES"):
+        os.environ.pop(name, None)
 
 
 def _require_readable(workspace: Workspace) -> None:

@@ -70,7 +70,8 @@ def table(**columns: list[str]) -> cdb.Table:
 
 
 async def settled(pilot: Pilot[None]) -> None:
-    """Wait until nothing runs and everything is shown."""
+    """Wait until nothing runs and everything is shown: the first pause lets a run begin."""
+    await pilot.pause()
     pilot.app.run_.join(WAIT_S)
     await pilot.pause()
     await pilot.pause()

@@ -40,9 +40,9 @@ def test_without_a_file_nothing_is_set(tmp_path):
 
 
 def test_a_theme_and_keys_are_taken(tmp_path):
-    found = read(tmp_path, '\ufefftheme = "nord"\n[keys]\nduplicate = "ctrl+u"\nsort = "alt+o, f11"\n')
+    found = read(tmp_path, '\ufefftheme = "nord"\n[keys]\nduplicate = "ctrl+u"\nsort = "alt+u, f11"\n')
     assert found.theme == "nord"
-    assert dict(found.keys) == {"duplicate": "ctrl+u", "sort": "alt+o, f11"}
+    assert dict(found.keys) == {"duplicate": "ctrl+u", "sort": "alt+u, f11"}
 
 
 @pytest.mark.parametrize("name", THEMES)

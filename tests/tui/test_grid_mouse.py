@@ -98,6 +98,45 @@ def test_a_drag_over_the_headers_makes_the_rows_before_come(path):
     assert with_editor(path, script) >= 4
 
 
+def test_a_drag_that_rests_at_an_edge_goes_on_selecting_until_the_button_is_let_go(path):
+    async def script(app, pilot):
+        grid = app.main.assets.grid
+        x, y = at(app, 12, 1)
+        await pilot.mouse_down(offset=(x, y))
+        await pilot.hover(offset=(x, grid.content_region.bottom))
+        before = block(app).bottom
+        for _ in range(4):
+            grid._pointer.pull_again()
+        rested = block(app).bottom
+        await pilot.mouse_up(offset=(x, grid.content_region.bottom))
+        let_go = block(app).bottom
+        grid._pointer.pull_again()
+        return rested - before >= 4, block(app).bottom == let_go, grid._pointer._timer
+
+    assert with_editor(path, script) == (True, True, None)
+
+
+def test_a_drag_past_the_right_edge_takes_in_the_columns_that_are_not_seen(tmp_path):
+    names = [f"condition_number_{i}" for i in range(12)]
+    file = tmp_path / "wide.csv"
+    file.write_text(",".join(["Asset", *names]) + "\n" + ",".join(["clip", *["True"] * 12]) + "\n")
+
+    async def script(app, pilot):
+        grid = app.main.assets.grid
+        start = at(app, 0, 1)
+        await pilot.mouse_down(offset=start)
+        await pilot.hover(offset=(grid.content_region.right - 1, start[1]))
+        for _ in range(20):
+            grid._pointer.pull_again()
+        reached, scrolled = block(app).right, grid.scroll_x > 0
+        await pilot.hover(offset=(0, start[1]))
+        for _ in range(20):
+            grid._pointer.pull_again()
+        return reached, scrolled, grid.scroll_x
+
+    assert with_editor(file, script) == (13, True, 0)
+
+
 def test_moving_the_mouse_without_a_button_selects_nothing(path):
     async def script(app, pilot):
         await drag(pilot, at(app, 1, 1), at(app, 2, 2))

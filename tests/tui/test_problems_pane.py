@@ -7,16 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from terminal import drive, screen_text
+from terminal import drive, press, screen_text, settled, with_editor
 from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
 import contextdb as cdb
+from contextdb.commands.check_command import check_path
 from tui.messages import GoToCell, Told
-from tui.model.problems import Problem, Problems
+from tui.model.problems import Problem, Problems, cell_findings, row_findings
 from tui.model.sheet import Sheet
 from tui.panes import problems
 from tui.panes.problems import ProblemsPane
+from tui.widgets.find_bar import FilterBar
 from tui.widgets.line_list import LineList
 
 TOML = """
@@ -176,7 +178,7 @@ def test_texts_that_look_like_markup_are_shown_as_they_are(table):
 
 
 def test_rows_that_cause_a_problem_are_named(table):
-    found = Problems.of(table, {})
+    found = Problems.of(cell_findings(table), {})
     [twin] = [p for p in found.items if p.rule == "duplicate-asset"]
     assert "(row 1)" in twin.text
 
@@ -191,8 +193,63 @@ def test_a_large_table_is_checked_beside_the_keys():
         await pilot.app.workers.wait_for_complete()
         await pilot.pause()
 
-    _, screen = shown(large, script=wait)
-    assert screen.splitlines()[0].strip() == "1,002 warnings."
+    app, screen = shown(large, script=wait)
+    n_found = len(cell_findings(large)) + len(row_findings(large))
+    assert screen.splitlines()[0].strip() == f"{n_found:,} warnings."
+    assert len(app.pane.lines) == n_found
+
+
+def test_the_tab_shows_what_the_command_check_finds(tmp_path):
+    """Needless rows and saved contexts that fail stand in it, as in the report that a build sees."""
+    (tmp_path / "contextdb.toml").write_text(TOML)
+    file = tmp_path / "a.csv"
+    file.write_text("Asset,speed,gait\nslow,0..5,Walk\nslower,0..2,Walk\nrun,0..99,Run\n")
+    (tmp_path / "a.cases.csv").write_text("Case,Expected,speed,gait\nat rest,run,0,Walk\n")
+    reported = check_path(str(file)).findings
+
+    app, _ = shown(cdb.load(file), "end", "home", "enter")
+    assert sorted((f.rule, f.message) for f in reported) == sorted((p.rule, p.message) for p in app.pane.lines)
+    assert {"case-failed", "subsumed-row", "beyond-domain"} <= {p.rule for p in app.pane.lines}
+    assert app.pane.lines[0].place == "contexts"
+    assert "F9" in app.told[0].text
+
+
+def test_the_filter_on_problems_leaves_the_rows_that_the_tab_names(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("Asset,up\nall,Any\nhigh,True\n")
+
+    async def script(app, pilot):
+        await press(pilot, "alt+5")
+        named = {problem.row for problem in app.main.query_one(ProblemsPane).lines if problem.row is not None}
+        await press(pilot, "alt+1")
+        app.main.assets.post_message(FilterBar.Wanted("", False, False, True))
+        await settled(pilot)
+        return named, app.main.session.sheet.view.rows.tolist()
+
+    assert with_editor(file, script) == ({1}, [1])
+
+
+def test_the_rows_of_a_larger_table_are_looked_at_beside_the_keys(table, monkeypatch):
+    monkeypatch.setattr(problems, "is_quick", lambda table: False)
+
+    async def wait(pilot: Pilot[None]) -> None:
+        await pilot.app.workers.wait_for_complete()
+        await pilot.pause()
+
+    app, screen = shown(table, script=wait)
+    assert app.pane.is_all
+    assert screen.splitlines()[0].strip() == "4 errors, 1 warning, 1 information."
+
+
+def test_while_the_rows_are_looked_at_that_is_said(table):
+    _, screen = shown(table, script=_half_known)
+    assert screen.splitlines()[0].strip() == "4 errors, 1 warning, 1 information. Looking at the rows …"
+
+
+async def _half_known(pilot: Pilot[None]) -> None:
+    pane = pilot.app.pane
+    pane.post_message(pane.Checked(pane.sheet.table, pane._found, False))
+    await pilot.pause()
 
 
 def test_a_hundred_thousand_problems_are_paged_without_building_their_lines(table, monkeypatch):
@@ -206,7 +263,8 @@ def test_a_hundred_thousand_problems_are_paged_without_building_their_lines(tabl
     monkeypatch.setattr(problems, "_line", line)
 
     async def page(pilot: Pilot[None]) -> None:
-        pilot.app.pane._fill(many)
+        pilot.app.pane.problems = many
+        pilot.app.pane._show_all()
         await pilot.press("pagedown", "end", "pageup", "home", "down", "end")
 
     _, screen = shown(table, script=page)

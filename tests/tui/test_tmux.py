@@ -47,6 +47,21 @@ class Terminal:
         command = f"env -u COLORTERM {' '.join(said)} {sys.executable} -m contextdb edit t.csv; echo exit code $?; cat"
         self.tmux("new-session", "-d", "-x", "80", "-y", "24", "-c", str(self.folder), command)
 
+    def resize(self, columns: int, rows: int) -> None:
+        self.tmux("resize-window", "-x", str(columns), "-y", str(rows))
+
+    def wait_for_foot(self, rows: int, *texts: str) -> list[str]:
+        """The lines of the screen, once it shows all of these and the keys stand in its last line."""
+        end = time.monotonic() + DEADLINE_S
+        while (
+            len(lines := (shown := self.screen).splitlines()) != rows
+            or "F2 Edit" not in lines[-1]
+            or any(t not in shown for t in texts)
+        ):
+            assert time.monotonic() < end, f"{texts} not on a screen of {rows} lines:\n{shown}"
+            time.sleep(0.02)
+        return lines
+
     def keys(self, *keys: str) -> None:
         self.tmux("send-keys", *keys)
 
@@ -121,3 +136,15 @@ def test_quitting_with_unsaved_edits_asks_and_saves(terminal):
     terminal.keys("s")
     terminal.wait("exit code 0")
     assert (terminal.folder / "t.csv").read_bytes() == RAW.replace(b"clip_00", b"first")
+
+
+def test_a_terminal_that_changes_its_size_while_the_editor_starts_and_later_is_filled_at_once(terminal):
+    terminal.start("screen-256color", COLUMNS="80", LINES="24")  # as a shell may export them
+    terminal.resize(200, 60)
+    terminal.wait_for_foot(60, "40 rows")
+    for columns, rows in ((20, 8), (200, 60), (20, 8), (90, 30)):
+        terminal.resize(columns, rows)
+        lines = terminal.wait_for_foot(rows, "cli", *(["40 rows"] if columns > 40 else []))
+        assert len(lines) == rows
+    terminal.keys("Down")
+    terminal.wait("row 2 · Asset")

@@ -240,8 +240,12 @@ class ContextList:
     def compiled(self) -> CompiledTable:
         """The table compiled; rows with cells that cannot be read are left out of what is valid."""
         if self._compiled is None:
-            self._compiled = CompiledTable.of(self.table)
-            self._readable = readable_rows(self.table)
+            try:
+                flat = self.table.flat()
+            except TableError:  # a table inside it cannot be used: said in Problems
+                flat = self.table
+            self._compiled = CompiledTable.of(flat)
+            self._readable = readable_rows(self.table) if flat is self.table else (1 << flat.n_rows) - 1
         return self._compiled
 
     def valid_assets(self, facts: Mapping[str, str]) -> list[str]:

@@ -148,7 +148,7 @@ def slice_text(slice_: Slice) -> str:
 
 def crowd_text(crowd: Crowd, table: Table) -> str:
     """Everything about a crowded place."""
-    named = [row_text(row, table.assets[row]) for row in crowd.rows[:MOST_ROWS_NAMED] if row < table.n_rows]
+    named = [row_text(row, table.assets[row]) for row in list(dict.fromkeys(crowd.rows))[:MOST_ROWS_NAMED] if row < table.n_rows]
     more = f" and {len(crowd.rows) - MOST_ROWS_NAMED} more" if len(crowd.rows) > MOST_ROWS_NAMED else ""
     share = f"{format_percent(crowd.share)} of the contexts" if crowd.share else "a very small part of the contexts"
     return f"{crowd.n_rows} rows at once in {share}: {', '.join(named)}{more}.\n{cells_text(crowd.cells)}"

@@ -12,13 +12,14 @@ Listeners are called from whichever thread made the change.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from threading import Event, Lock, Thread
 from typing import Literal
 
 from contextdb.covering import Cancelled, CoverageReport, PairTable, coverage, pairs
 from contextdb.covering.progress import Stops, Tell
 from contextdb.errors import ContextDBError, plural, shown
+from contextdb.nesting.flat import FlatTable
 from contextdb.table import Table
 
 State = Literal["none", "running", "done", "stale", "failed"]
@@ -44,7 +45,21 @@ def measured(table: Table, tell: Tell, should_stop: Stops) -> Result:
     """The coverage of a table and of its pairs of conditions, in the contexts that its assumptions leave."""
     report = coverage(table, max_gaps=MOST_GAPS, progress=lambda part, share: tell(part, share * PAIRS_AT), should_stop=should_stop)
     compared = pairs(table, progress=lambda part, share: tell(part, PAIRS_AT + share * (1.0 - PAIRS_AT)), should_stop=should_stop)
-    return Result(report, compared)
+    return Result(with_rows_of_file(report, table), compared)
+
+
+def with_rows_of_file(report: CoverageReport, table: Table) -> CoverageReport:
+    """A report whose rows are those of the table's file: where rows stand for other tables it counts the rows behind them."""
+    flat = table.flat()
+    if not isinstance(flat, FlatTable) or flat.expansion is None:
+        return report
+    own = flat.expansion.rows[0].tolist()
+    gaps = [replace(g, nearest=replace(g.nearest, row=own[g.nearest.row])) if g.nearest else g for g in report.gaps]
+    crowded = [replace(crowd, rows=tuple(own[row] for row in crowd.rows)) for crowd in report.crowded]
+    findings = [
+        replace(f, row=own[f.row] if f.row is not None else None, by=tuple(own[row] for row in f.by)) for f in report.findings
+    ]
+    return replace(report, gaps=tuple(gaps), crowded=tuple(crowded), findings=tuple(findings))
 
 
 @dataclass(eq=False)

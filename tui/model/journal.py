@@ -265,7 +265,8 @@ def _base_of(table: Table, digest: object) -> Table | None:
         is_csv = table.path.suffix.lower() == ".csv"
         source: AnySource
         source, columns = read_csv(raw, str(table.path)) if is_csv else read_parquet(raw, str(table.path))
-        return build_table(table.name, columns, table.schema, table.settings, table.path, source)
+        base = build_table(table.name, columns, table.schema, table.settings, table.path, source)
+        return replace(base, around=table.around)
     except ContextDBError:
         return None
 

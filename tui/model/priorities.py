@@ -108,7 +108,7 @@ class Priorities:
         if self.faults():
             return []
         own = [one for one in self.config.databases.values() if one.table == self.sheet.table.settings.name]
-        named = set(self.sheet.table.assets)
+        named = {asset for asset, _ in self.sheet.query.answers()}
         return [clip for clip in dict.fromkeys(clip for one in own for clip in self._clips_of(one)) if clip not in named]
 
     def faults(self) -> tuple[Fault, ...]:
@@ -171,13 +171,13 @@ class Priorities:
 
     def _asked(self, name: str) -> Answer | str:
         if name == self.sheet.table.settings.name:
-            return _answer(self.sheet.table, self.sheet.query)
+            return _answer(self.sheet.query)
         table = self._table(name)
         if isinstance(table, str):
             return table
         query = QueryRow(table)
         query.load(self.sheet.query.texts)
-        return _answer(table, query)
+        return _answer(query)
 
     def _table(self, name: str) -> Table | str:
         if name not in self._tables:
@@ -194,9 +194,9 @@ class Priorities:
             return f"the table {in_quotes(name)} cannot be read: {error.faults[0].found}"
 
 
-def _answer(table: Table, query: QueryRow) -> Answer:
-    valid = query.valid
-    return dict.fromkeys(table.assets), {asset for asset, is_valid in zip(table.assets, valid, strict=True) if is_valid}
+def _answer(query: QueryRow) -> Answer:
+    found = list(query.answers())
+    return dict.fromkeys(asset for asset, _ in found), {asset for asset, is_valid in found if is_valid}
 
 
 # ---- the rule in words

@@ -1,20 +1,27 @@
-"""What is wrong with the table that is shown: the findings of `check`, and the facts of the test row that cannot be read."""
+"""What is wrong with the table that is shown: what `contextdb check` finds, and the facts of the test row that cannot be read.
+
+The findings of cells are there at once. Those of whole rows and of saved contexts take longer: `row_findings` is for a thread.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from contextdb.cases import cases_path, check_cases, read_cases
 from contextdb.check import check
-from contextdb.errors import Fault, plural
+from contextdb.covering.check_rows import check_rows
+from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.report.rules import RULES
 from contextdb.table import Table
 from tui.model.coverage_lines import rows_text
+from tui.model.coverage_run import is_quick
 
 AT_ONCE = 200_000
 """Cells of a table that is checked in a fraction of a second."""
+OF_CASES = ("case-failed", "unreadable-case", "unknown-fact")
 WORDS: Mapping[Level, str] = {"error": "error", "warning": "warning", "info": "information"}
 
 
@@ -31,12 +38,16 @@ class Problem:
     is_of_test_row: bool = False
     by: tuple[int, ...] = ()
     """The rows that cause it."""
+    is_of_cases: bool = False
+    """It is about a saved context."""
 
     @property
     def place(self) -> str:
         """Where it is: the row number of the grid, from 1."""
         if self.is_of_test_row:
             return "test row"
+        if self.is_of_cases:
+            return "contexts"
         return "table" if self.row is None else str(self.row + 1)
 
     @property
@@ -57,10 +68,10 @@ class Problems:
     items: tuple[Problem, ...] = ()
 
     @classmethod
-    def of(cls, table: Table, facts: Mapping[str, Fault]) -> Problems:
-        """The problems of a table, and of the facts of the test row."""
+    def of(cls, findings: Sequence[Finding], facts: Mapping[str, Fault]) -> Problems:
+        """What was found, and the facts of the test row that cannot be read."""
         found = [Problem("error", fault.rule, fault.message, column=name, is_of_test_row=True) for name, fault in facts.items()]
-        found += [_problem(finding) for finding in check(table)]
+        found += [_problem(finding) for finding in findings]
         return cls(tuple(sorted(found, key=lambda p: LEVELS.index(p.level))))
 
     def of_level(self, level: Level | None) -> tuple[Problem, ...]:
@@ -80,10 +91,41 @@ class Problems:
         return f"{', '.join(said)}." if said else "Nothing is wrong with this table, as far as check can tell."
 
 
+def cell_findings(table: Table) -> list[Finding]:
+    """What `contextdb check` says of the cells and settings of a table."""
+    return check(table)
+
+
+def row_findings(table: Table) -> list[Finding]:
+    """What it says beside: rows that others make needless, that are dead or never chosen, and saved contexts that fail."""
+    try:
+        rows = check_rows(table)
+    except MemoryError:
+        rows = []
+    return [*rows, *_of_cases(table)]
+
+
+def findings_at_once(table: Table) -> list[Finding]:
+    """What can be found between two keys: all of it for a small table, what is wrong with cells for a larger one."""
+    return [*cell_findings(table), *(row_findings(table) if is_quick(table) else ())]
+
+
+def _of_cases(table: Table) -> list[Finding]:
+    if table.path is None:
+        return []
+    path = cases_path(table.path)
+    try:
+        return check_cases(table, read_cases(path), str(path))
+    except ContextDBError as error:
+        return [Finding.of(fault, "error", table.name) for fault in error.faults]
+
+
 def is_checked_at_once(table: Table) -> bool:
     """Whether a table is small enough to be checked between two keys."""
     return table.n_rows * len(table.columns) <= AT_ONCE
 
 
 def _problem(finding: Finding) -> Problem:
-    return Problem(finding.level, finding.rule, finding.message, finding.row, finding.asset or "", finding.column, by=finding.by)
+    is_of_cases = finding.row is None and finding.rule in OF_CASES
+    row, asset = finding.row, finding.asset or ""
+    return Problem(finding.level, finding.rule, finding.message, row, asset, finding.column, False, finding.by, is_of_cases)

@@ -7,7 +7,7 @@ into the sheet as one step, and `reload_schema` reads contextdb.toml anew. Unsav
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +31,7 @@ from tui.model.lock import Holder, Lock
 from tui.model.read_only import why_read_only
 from tui.model.schemas import under_schema, with_settings
 from tui.model.sheet import Done, Sheet
+from tui.model.teams import Teams
 from tui.model.watched import Seen, State, Watched, digest_of
 
 MERGE_NAME = "Merge changes on disk"
@@ -82,6 +83,8 @@ class Session:
         """Why unsaved edits could not be brought back, or not all of them."""
         self.saved_table = found.base if found and found.base else table
         """The table as it stands in the file: what edits are compared with when they are saved."""
+        self.teams: Teams | None = None
+        """The actors for the roles of the test row, once they were asked for."""
         self._history = found.history if found and found.n_edits else History(self.saved_table)
         self._watch_files()
         self.journal = Journal(self.path, self._digest, self._history if self.n_recovered else None)
@@ -172,6 +175,11 @@ class Session:
         self.saved_table = change(self.saved_table)
         self._history.renewed(change)
         self._schema_file = _watched(folder / SCHEMA_FILE)
+        self._show()
+
+    def know(self, around: Mapping[str, Table]) -> None:
+        """Know of other versions of the tables that rows stand for."""
+        self._history.renewed(lambda table: replace(table, around=around))
         self._show()
 
     def schema_written(self) -> None:

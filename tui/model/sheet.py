@@ -58,7 +58,13 @@ class Sheet(ShownTable):
 
     def check(self, text: str) -> Fault | None:
         """What would be wrong with a text in the cell of the cursor."""
-        return edits.check_cell(self.table, self.table.columns[self.selection.column].name, text)
+        return self.check_at(self.selection.column, text)
+
+    def check_at(self, column: int, text: str) -> Fault | None:
+        """What would be wrong with a text in a cell of a column."""
+        name = self.table.columns[column].name
+        is_asset = name == self.table.asset_column
+        return (self.inner_fault(text) if is_asset else None) or edits.check_cell(self.table, name, text)
 
     def type_text(self, text: str) -> Fault | None:
         """Put a text into the cell of the cursor, unless it cannot be read: then what is wrong is given and nothing changes."""

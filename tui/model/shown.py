@@ -14,10 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import edits
+from contextdb.columns import TextColumn
+from contextdb.condition_column import ConditionColumn
 from contextdb.errors import Fault
 from contextdb.findings import Finding
 from contextdb.history import History, Step, where_now
-from contextdb.table import ConditionColumn, Table
+from contextdb.nesting.links import nesting_faults
+from contextdb.nesting.names import inner_name
+from contextdb.schema import TableSettings
+from contextdb.table import Table
 from tui.model.query_row import QueryRow
 from tui.model.selection import Block, Selection, Shape
 from tui.model.views import Filter, Sort, View, shown_rows
@@ -29,12 +34,14 @@ class Header:
 
     name: str
     kind: str
-    """The type of a condition; "asset", "output", "enabled", "priority" or "weight" for the others."""
+    """The type of a condition; "asset", "output", "enabled", "priority", "weight" or "rule" for the others."""
     unit: str = ""
     leaves: int | None = None
     """How many rows the fact of the test row alone leaves."""
     fault: Fault | None = None
     """What is wrong with that fact."""
+    n_actors: int = 0
+    """How many actors are offered for its role, whose facts are asked instead."""
 
 
 class ShownTable:
@@ -49,6 +56,8 @@ class ShownTable:
         self.view = View.of(self.table)
         self.version = 0
         self._findings: NDArray[np.bool_] | None = None
+        self._inner_faults: tuple[object, dict[str, Fault | None]] = (None, {})
+        """The tables of the folder, and what is wrong with naming one in a row, by the text of the cell."""
 
     # ---- what is seen
 
@@ -96,7 +105,34 @@ class ShownTable:
         condition = self.condition(column)
         if condition is not None:
             return condition.faults.get(int(texts.codes[int(self.view.rows[row])]))
-        return edits.check_cell(self.table, texts.name, self.text(row, column))
+        return self.text_fault(column, self.text(row, column)) or edits.check_cell(self.table, texts.name, self.text(row, column))
+
+    def text_fault(self, column: int, text: str) -> Fault | None:
+        """What is wrong with a text of a column that is no condition: a row's own rule, a table that is to stand in a row."""
+        name, table = self.table.columns[column].name, self.table
+        if name == table.settings.when:
+            return edits.check_cell(table, name, text)
+        return self.inner_fault(text) if name == table.asset_column else None
+
+    def inner_fault(self, text: str) -> Fault | None:
+        """Why a table cannot stand in a row whose asset cell has this text."""
+        if inner_name(text) is None or self.table.around is None:
+            return None
+        if self._inner_faults[0] is not self.table.around:
+            self._inner_faults = self.table.around, {}
+        known = self._inner_faults[1]
+        if text not in known:
+            settings = TableSettings(self.table.name, asset=self.table.asset_column)
+            column = TextColumn.of(self.table.asset_column, [text])
+            probe = Table(self.table.name, settings, (column,), (), origin=np.array([-1]))
+            known[text] = next(iter(nesting_faults(probe, self.table.around, self.table.name)), None)
+        return known[text]
+
+    @property
+    def asset_at(self) -> int:
+        """The column that names the assets."""
+        name = self.table.asset_column
+        return next(at for at, column in enumerate(self.table.columns) if column.name == name)
 
     def condition(self, column: int) -> ConditionColumn | None:
         """The condition that a column is; None for one of another kind."""
@@ -109,9 +145,12 @@ class ShownTable:
         if found is not None:
             condition = found.condition
             leaves = self.query.leaves(name)
-            return Header(name, condition.domain.kind, condition.unit, leaves, self.query.faults.get(name))
+            role = self.query.role_of(name)
+            n_actors = len(self.query.actors[role]) if role is not None else 0
+            fault = self.query.faults.get(name) if role is None else None
+            return Header(name, condition.domain.kind, condition.unit, leaves, fault, n_actors)
         settings = self.table.settings
-        jobs = {settings.enabled: "enabled", settings.priority: "priority", settings.weight: "weight"}
+        jobs = {settings.enabled: "enabled", settings.priority: "priority", settings.weight: "weight", settings.when: "rule"}
         return Header(name, "asset" if name == self.table.asset_column else jobs.get(name, "output"))
 
     def failing(self, top: int, bottom: int) -> NDArray[np.bool_]:
@@ -120,7 +159,29 @@ class ShownTable:
         fails = np.zeros((len(rows), self.shape[1]), np.bool_)
         places = {c.name: at for at, c in enumerate(self.table.columns)}
         fails[:, [places[c.condition.name] for c in self.table.conditions]] = self.query.failing(rows)
+        if self.table.settings.when in places:
+            fails[:, places[self.table.settings.when]] = self.query.excluded_by_rule(rows)
         return fails
+
+    def notes(self, row: int) -> dict[int, str]:
+        """What stands at the right of cells of a row of the file, by column: who is cast, how much of a table inside is valid."""
+        found: dict[int, str] = {}
+        names = [c.name for c in self.table.columns]
+        if (inside := self.query.inside(row)) is not None:
+            found[names.index(self.table.asset_column)] = inside.text
+        for role, actor in self.query.casting(row).items():
+            at = next((at for at, name in enumerate(names) if name.startswith(f"{role}.")), None)
+            if at is not None:
+                found[at] = actor
+        return found
+
+    def said_of(self, row: int) -> str:
+        """Who is cast for a row of the file, or how much is valid of the table that it stands for."""
+        said = [f"{role}: {actor}" for role, actor in self.query.casting(row).items()]
+        if (inside := self.query.inside(row)) is not None:
+            fault = inside.fault.found.rstrip(".") if inside.fault is not None else ""
+            said.append(fault or f"▸ {inside.text}{'' if inside.n_valid is None else ' valid'}")
+        return " · ".join(said)
 
     def is_filled(self, row: int, column: int) -> bool:
         """Whether a cell holds a text."""

@@ -18,7 +18,8 @@ from contextdb.bitmask import Flags, Rows
 from contextdb.cells import NumberSet, TagSet, ValueSet
 from contextdb.changes import CameFrom
 from contextdb.columns import TextColumn
-from contextdb.table import ConditionColumn, Table
+from contextdb.condition_column import ConditionColumn
+from contextdb.table import Table
 
 _DIGITS = 20
 """Numbers inside texts are compared by value up to so many digits."""

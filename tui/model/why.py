@@ -1,7 +1,7 @@
 """Why rows are not valid in the test row's context: cell by cell, with the cell that would mend each.
 
 What is said of a row is what `contextdb query --explain` says, with two reasons more that an editor meets: cells that cannot be
-read, and rows that are disabled.
+read, and rows that are disabled. For a role with actors the fact is the actor who plays it, or the one whose fact is in the way.
 """
 
 from __future__ import annotations
@@ -10,10 +10,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from contextdb.condition_column import ConditionColumn
+from contextdb.edits import check_cell
 from contextdb.explain import describe_fact, mended
-from contextdb.table import ConditionColumn, Table
+from contextdb.table import Table
+from contextdb.when import has_no_rule
 from tui.model.query_row import QueryRow
 
+NEEDED = "(needed)"
+"""What stands for the cell of a role that is not filled."""
 State = Literal["fails", "unreadable", "disabled", "holds", "not asked"]
 
 
@@ -30,6 +35,9 @@ class CellWhy:
     state: State
     mend: str | None = None
     """The cell with which the row would pass; None where there is nothing to mend, or no telling."""
+
+    is_cast: bool = False
+    """The fact is the actor who plays the role of the condition."""
 
     @property
     def is_wrong(self) -> bool:
@@ -59,7 +67,8 @@ class RowWhy:
 def why_row(query: QueryRow, table: Table, row: int) -> RowWhy:
     """Every condition of one row: those that fail first, then in the order of the table; a disabled row's switch before all."""
     fails = query.failing([row])[0].tolist()
-    cells = [*_switch(table, row), *(_cell(query, c, row, wrong) for c, wrong in zip(table.conditions, fails, strict=True))]
+    cells = [*_switch(table, row), *_rule(query, table, row), *_behind(query, table, row), *_roles(query, row)]
+    cells += [_cell(query, c, row, wrong) for c, wrong in zip(table.conditions, fails, strict=True)]
     return RowWhy(row, table.text(row, table.asset_column), tuple(sorted(cells, key=lambda cell: not cell.is_wrong)))
 
 
@@ -71,6 +80,8 @@ def nearest_rows(query: QueryRow, table: Table, most: int = 20) -> list[RowWhy]:
 
 def _cell(query: QueryRow, column: ConditionColumn, row: int, fails: bool) -> CellWhy:
     condition, text, code = column.condition, column.texts[row], int(column.texts.codes[row])
+    if query.role_of(condition.name) is not None:
+        return _cast_cell(query, column, row)
     fact = query.facts.get(condition.name)
     unit = f" {condition.unit}" if condition.unit and fact is not None else ""
     said = "" if fact is None else describe_fact(fact, condition) + unit
@@ -81,6 +92,44 @@ def _cell(query: QueryRow, column: ConditionColumn, row: int, fails: bool) -> Ce
     if not fails:
         return CellWhy(row, condition.name, text, said, "holds")
     return CellWhy(row, condition.name, text, said, "fails", mended(text, fact, condition.domain))
+
+
+def _cast_cell(query: QueryRow, column: ConditionColumn, row: int) -> CellWhy:
+    """A cell on a role with actors."""
+    name, text = column.condition.name, column.texts[row]
+    if int(column.texts.codes[row]) in column.faults:
+        return CellWhy(row, name, text, "", "unreadable")
+    failure = next((f for f in query.failures(row) if f.condition == name), None)
+    if failure is not None:
+        return CellWhy(row, name, text, failure.fact, "fails", failure.mend)
+    actor = query.casting(row).get(query.role_of(name) or "")
+    if actor is None:
+        return CellWhy(row, name, text, "", "not asked")
+    return CellWhy(row, name, text, actor, "holds", is_cast=True)
+
+
+def _roles(query: QueryRow, row: int) -> Iterator[CellWhy]:
+    """The roles that nobody is left for."""
+    for failure in query.failures(row):
+        if failure.cell == NEEDED:
+            yield CellWhy(row, failure.condition, failure.cell, failure.fact, "fails")
+
+
+def _rule(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:
+    """The row's own rule."""
+    name = table.settings.when
+    if name is not None and table.when is not None and not has_no_rule(text := table.text(row, name)):
+        is_unread = check_cell(table, name, text) is not None
+        fails: State = "fails" if query.excluded_by_rule([row])[0] else "holds"
+        yield CellWhy(row, name, text, "", "unreadable" if is_unread else fails if not query.is_empty else "not asked")
+
+
+def _behind(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:
+    """The table that the row stands for."""
+    if (inside := query.inside(row)) is not None:
+        is_wrong = inside.fault is not None or inside.n_valid == 0
+        state: State = "fails" if is_wrong else "not asked" if inside.n_valid is None else "holds"
+        yield CellWhy(row, table.asset_column, table.text(row, table.asset_column), f"{inside.text}", state)
 
 
 def _switch(table: Table, row: int) -> Iterator[CellWhy]:

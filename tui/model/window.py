@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from contextdb.cells import Cell
-from contextdb.columns import TextColumn
-from contextdb.table import ConditionColumn
+from contextdb.condition_column import ConditionColumn
 from tui.model.shown import ShownTable
 
 Kind = Literal["text", "any", "failing", "fault"]
@@ -44,6 +43,7 @@ class Window:
         self._failing = sheet.failing(top, top + n_rows) if is_asked else None
         enabled = sheet.table.enabled[rows]
         self.rows = [WindowRow(r + 1, e, v) for r, e, v in zip(rows.tolist(), enabled.tolist(), valid.tolist(), strict=True)]
+        self._notes = [sheet.notes(row) for row in rows.tolist()] if sheet.query.has_notes else []
         self._columns: dict[int, list[tuple[str, Kind]]] = {}
 
     def holds(self, row: int) -> bool:
@@ -60,22 +60,26 @@ class Window:
             self._columns[column] = self._read(column)
         return self._columns[column][row - self.top]
 
+    def note(self, row: int, column: int) -> str | None:
+        """What stands at the right of a cell."""
+        return self._notes[row - self.top].get(column) if self._notes else None
+
     def _read(self, column: int) -> list[tuple[str, Kind]]:
         texts = self._sheet.table.columns[column]
         condition = self._sheet.condition(column)
         codes = texts.codes[self._rows].tolist()
-        kinds = {code: _kind(texts, condition, code) for code in set(codes)}
+        kinds = {code: self._kind(column, condition, code) for code in set(codes)}
         found = [(texts.texts[code], kinds[code]) for code in codes]
-        if self._failing is None or condition is None:
+        if self._failing is None or (condition is None and texts.name != self._sheet.table.settings.when):
             return found
         fails = self._failing[:, column].tolist()
         return [(text, "failing") if f and kind != "fault" else (text, kind) for (text, kind), f in zip(found, fails, strict=True)]
 
-
-def _kind(texts: TextColumn, condition: ConditionColumn | None, code: int) -> Kind:
-    if condition is None:
-        return "text"
-    if code in condition.faults:
-        return "fault"
-    cell: Cell = condition.cells[code]
-    return "any" if cell.is_any else "text"
+    def _kind(self, column: int, condition: ConditionColumn | None, code: int) -> Kind:
+        if condition is None:
+            text = self._sheet.table.columns[column].texts[code]
+            return "fault" if self._sheet.text_fault(column, text) is not None else "text"
+        if code in condition.faults:
+            return "fault"
+        cell: Cell = condition.cells[code]
+        return "any" if cell.is_any else "text"

@@ -2,13 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, FileError, Place
+from contextdb.nesting.links import Neighbours
 from contextdb.places import table_path
 from contextdb.project import read_folder_schema, schema_for, table_files
+from contextdb.table import Table
 from tui.model.session import Session
+
+
+class OpenTables(Mapping[str, Table]):
+    """The tables of a folder, those that are open as they are edited."""
+
+    def __init__(self, base: Mapping[str, Table], edited: Mapping[str, Table]) -> None:
+        self.base, self.edited = base, edited
+
+    def __getitem__(self, name: str) -> Table:
+        return self.edited[name] if name in self.edited else self.base[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.edited or name in self.base
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**dict.fromkeys(self.base), **self.edited})
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
 
 FOLDERS = (Path("tables"), Path())
 
@@ -41,6 +64,16 @@ class Workspace:
         if name not in self.sessions:
             self.sessions[name] = Session(self.files[name])
         return self.sessions[name]
+
+    def know_others(self, name: str) -> None:
+        """Let a table whose rows stand for others know of those as they are being edited."""
+        session = self.sessions[name]
+        table = session.sheet.table
+        if table.around is None or not session.sheet.query.is_nested:
+            return
+        edited = {other: one.sheet.table for other, one in self.sessions.items() if other != name}
+        if edited:
+            session.know(Neighbours(OpenTables(_of_disk(table.around), edited), getattr(table.around, "last", None)))
 
     def reopen(self, name: str, takes_over: bool = False) -> Session:
         """Let go of a table and open it anew; errors as of `Session`."""
@@ -86,6 +119,12 @@ class Workspace:
         name = file.stem if file.stem not in self.files else file.name
         self.files = {name: file, **self.files}
         return name
+
+
+def _of_disk(tables: Mapping[str, Table]) -> Mapping[str, Table]:
+    """The tables as they were read from the disk."""
+    inner = tables.tables if isinstance(tables, Neighbours) else tables
+    return inner.base if isinstance(inner, OpenTables) else tables
 
 
 def _found(path: str | Path | None) -> Path:

@@ -12,14 +12,14 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.geometry import Size
 
-from contextdb.check import check
 from contextdb.columns import TextColumn
-from contextdb.edits import check_cell
 from contextdb.errors import ContextDBError, ContextError, Fault, TableError, plural
 from contextdb.facts import read_fact_text
+from contextdb.nesting.names import MARK
 from tui.clipboard import Clipboard
 from tui.messages import Edited, Told
 from tui.model.find import PatternError, Search
+from tui.model.problems import findings_at_once
 from tui.model.sheet import Done, Sheet
 from tui.model.views import Filter, Sort
 from tui.panes.pane import Pane
@@ -120,7 +120,8 @@ class AssetsPane(Pane):
             self.query_one(CellLine).show(f"test row · {name}", self.grid.cell_text(), _short(fault), about)
         elif len(sheet.view):
             place = f"row {sheet.row_number(row)} · {name}"
-            self.query_one(CellLine).show(place, sheet.text(row, column), _short(sheet.fault(row, column)), about)
+            said = sheet.said_of(int(sheet.view.rows[row])) or about
+            self.query_one(CellLine).show(place, sheet.text(row, column), _short(sheet.fault(row, column)), said)
         else:
             self.query_one(CellLine).show(name, "", "", about)
 
@@ -138,7 +139,7 @@ class AssetsPane(Pane):
             found.condition if found is not None else None,
             self.sheet.header(column).kind,
             event.text,
-            check=self._check_fact if self._edited.is_fact else lambda text: check_cell(self.sheet.table, texts.name, text),
+            check=self._check_fact if self._edited.is_fact else lambda text: self.sheet.check_at(column, text),
             known=self._known(texts),
             is_fact=self._edited.is_fact,
             is_typing=event.is_typing,
@@ -151,7 +152,11 @@ class AssetsPane(Pane):
     def _known(self, texts: TextColumn) -> list[str]:
         """What a cell may be completed to: an asset first to the clips that no row names yet."""
         known = _by_frequency(texts)
-        if texts.name != self.sheet.table.asset_column or not self.sheet.table.schema.motion.get("databases"):
+        table = self.sheet.table
+        if texts.name != table.asset_column:
+            return known
+        known += [f"{MARK}{name}" for name in table.around or () if name != table.name and f"{MARK}{name}" not in known]
+        if not table.schema.motion.get("databases"):
             return known
         from tui.model.priorities import Priorities
 
@@ -229,18 +234,24 @@ class AssetsPane(Pane):
         self.show()
 
     def action_clear_context(self) -> None:
-        """Ask for nothing."""
+        """Ask for nothing, of nobody."""
+        self.sheet.query.offer({})
         self.set_context({}, "")
 
     def set_context(self, facts: dict[str, str], name: str) -> None:
         """Make these the facts of the test row."""
         self.sheet.query.load(facts)
         self.sheet.version += 1
-        if self.sheet.filter.is_valid:
-            self.sheet.refresh()
+        self.refresh_valid()
         self.grid.test_name = name
         self.show()
         self.grid.post_message(Grid.Moved())
+
+    def refresh_valid(self) -> None:
+        """Filter anew where only valid rows are shown, and make room for what stands beside cells."""
+        if self.sheet.filter.is_valid:
+            self.sheet.refresh()
+        self.grid.refit()
 
     # ---- clipboard
 
@@ -328,7 +339,7 @@ class AssetsPane(Pane):
     def _filter(self, event: FilterBar.Wanted) -> None:
         event.stop()
         if event.has_findings:
-            self.sheet.set_findings(check(self.sheet.table))
+            self.sheet.set_findings(findings_at_once(self.sheet.table))
         name = self.sheet.table.columns[self.sheet.selection.column].name
         columns = ((name, event.text),) if event.in_column and event.text else ()
         text = "" if event.in_column else event.text

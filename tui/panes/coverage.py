@@ -275,7 +275,11 @@ class CoveragePane(Pane):
 
     def _fill_gap(self, cells: Mapping[str, str]) -> None:
         gone = cells.keys() - {c.condition.name for c in self.sheet.table.conditions}
-        if gone:
+        if gone and self.sheet.query.is_nested:
+            self.post_message(
+                Told(f"{in_quotes(min(gone))} is a condition of a table inside: a row for the gap belongs there.", "warning")
+            )
+        elif gone:
             self.post_message(Told(f"{in_quotes(min(gone))} is no condition any more. R works the coverage out anew.", "warning"))
         else:
             self.post_message(FillGap(dict(cells)))

@@ -21,12 +21,12 @@ from textual.widgets import Input, Select, Static
 from textual.widgets.selection_list import Selection
 
 from contextdb import edits
+from contextdb.condition_column import ConditionColumn
 from contextdb.domains import KINDS
 from contextdb.edits import Edit
 from contextdb.errors import ContextDBError
 from contextdb.sections import has_place
 from contextdb.shapes import POLICIES
-from contextdb.table import ConditionColumn
 from tui.messages import Edited
 from tui.model.condition_form import KIND_WORDS, ConditionForm, plain
 from tui.model.options import JOBS, OPTIONS, POLICY_WORDS, columns_for, with_expression

@@ -65,7 +65,6 @@ class PrioritiesPane(Pane):
         & #priorities-empty { height: auto; padding: 0 1; }
         & #priorities-foot { height: auto; dock: bottom; padding: 0 1; background: $surface; }
         & #priorities-tools { height: 1; }
-        & #priorities-tools Button { margin: 0 1 0 0; min-width: 0; width: auto; padding: 0 1; background: $panel; }
         & #priorities-entry { height: auto; display: none; }
         & #priorities-entry.-open { display: block; }
         & #priorities-entry Horizontal { height: 1; }

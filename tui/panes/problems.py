@@ -1,8 +1,11 @@
-"""The Problems tab: what `check` finds in the table as it is, and what is wrong with the test row. Enter goes to the cell."""
+"""The Problems tab: what `contextdb check` finds in the table as it is, and what is wrong with the test row.
+
+Enter goes to the cell. What is wrong with cells is there at once, what is wrong with rows a little later.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,10 +18,11 @@ from textual.message import Message
 from textual.widgets import Static
 
 from contextdb.errors import Fault
-from contextdb.findings import LEVELS, Level
+from contextdb.findings import LEVELS, Finding, Level
 from contextdb.table import Table
 from tui.messages import GoToCell, Told
-from tui.model.problems import WORDS, Problem, Problems, is_checked_at_once
+from tui.model.coverage_run import is_quick
+from tui.model.problems import WORDS, Problem, Problems, cell_findings, is_checked_at_once, row_findings
 from tui.model.sheet import Sheet
 from tui.panes.pane import Pane
 from tui.widgets.choice_line import ChoiceLine
@@ -56,10 +60,11 @@ class ProblemsPane(Pane):
 
     @dataclass
     class Checked(Message):
-        """A table was checked on another thread."""
+        """So much is known of a table; sent from another thread."""
 
         table: Table
-        found: Problems
+        found: list[Finding]
+        is_all: bool
 
     def __init__(self, sheet: Sheet, *, id: str | None = None) -> None:  # noqa: A002
         super().__init__(id=id)
@@ -68,6 +73,10 @@ class ProblemsPane(Pane):
         self.level: Level | None = None
         self._of: tuple[Table, dict[str, Fault]] | None = None
         """The table and the faults of the test row that the problems are of."""
+        self._found: list[Finding] = []
+        """What is known of that table."""
+        self.is_all = False
+        """Whether its rows were looked at too."""
 
     def compose(self) -> ComposeResult:
         """The parts."""
@@ -87,25 +96,42 @@ class ProblemsPane(Pane):
         table, facts = self.sheet.table, dict(self.sheet.query.faults)
         if self._of is not None and self._of[0] is table and self._of[1] == facts:
             return
+        is_same = self._of is not None and self._of[0] is table
         self._of = table, facts
+        if is_same:  # only the test row is another one
+            self._fill()
+            return
+        self._found, self.is_all = [], False
         if is_checked_at_once(table):
-            self._fill(Problems.of(table, facts))
-        else:
-            self.query_one("#problems-summary", Static).update("Checking …")
-            self.run_worker(lambda: self._check(table, facts), thread=True, exclusive=True, group="check")
+            self._found = cell_findings(table)
+        if is_quick(table):
+            self._found, self.is_all = [*self._found, *row_findings(table)], True
+        self._fill()
+        if not self.is_all:
+            self.run_worker(lambda: self._check(table, list(self._found)), thread=True, exclusive=True, group="check")
 
-    def _check(self, table: Table, facts: Mapping[str, Fault]) -> None:
-        self.post_message(self.Checked(table, Problems.of(table, facts)))
+    def _check(self, table: Table, found: list[Finding]) -> None:
+        if not is_checked_at_once(table):
+            found = cell_findings(table)
+            self.post_message(self.Checked(table, found, False))
+        self.post_message(self.Checked(table, [*found, *row_findings(table)], True))
 
     @on(Checked)
     def _checked(self, event: Checked) -> None:
         event.stop()
         if self._of is not None and event.table is self._of[0]:
-            self._fill(event.found)
+            self._found, self.is_all = event.found, event.is_all
+            self._fill()
 
-    def _fill(self, problems: Problems) -> None:
-        self.problems = problems
-        self.query_one("#problems-summary", Static).update(problems.summary)
+    def _fill(self) -> None:
+        assert self._of is not None
+        self.problems = Problems.of(self._found, self._of[1])
+        self._show_all()
+
+    def _show_all(self) -> None:
+        said = [self.problems.summary] if self.is_all or self.problems.items else []
+        said += [] if self.is_all else ["Looking at the rows …" if self._found else "Checking …"]
+        self.query_one("#problems-summary", Static).update(" ".join(said))
         self._show_lines(keep=True)
 
     def _show_lines(self, keep: bool = False) -> None:
@@ -163,6 +189,8 @@ class ProblemsPane(Pane):
             self.post_message(GoToCell(problem.row, problem.column))
         elif problem.is_of_test_row:
             self.post_message(Told(f'Mend the fact "{problem.column}" in the test row, at the foot of the grid.'))
+        elif problem.is_of_cases:
+            self.post_message(Told("That is about a saved context: F9 lists them."))
         else:
             self.post_message(Told("That is about the whole table, not about a cell."))
 

@@ -47,7 +47,6 @@ class AddColumn(Dialog[Insertion]):
         & #column-list > .option-list--option-highlighted { background: $primary 30%; color: $text; text-style: bold; }
         & #column-form { height: auto; }
         & #column-buttons { height: 1; margin: 1 0 0 0; }
-        & #column-buttons Button { min-width: 0; width: auto; padding: 0 2; margin: 0 1 0 0; }
         & Field .field--label { width: 13; }
         & Field .field--wrong { padding: 0 0 0 13; }
     }

@@ -65,7 +65,6 @@ class Blueprints(Dialog[BlueprintAnswer]):
         & #blueprint-list > .option-list--option-highlighted { background: $primary 30%; color: $text; text-style: bold; }
         & #blueprint-detail { height: auto; margin: 1 0; color: $text-muted; }
         & #blueprint-buttons { height: 1; margin: 1 0 0 0; }
-        & #blueprint-buttons Button { min-width: 0; width: auto; padding: 0 2; margin: 0 1 0 0; }
     }
     """
 

@@ -31,6 +31,7 @@ CELLS = (
 MARKS = (
     ("●", "the row is valid for the test row's context"),
     ("×", "this cell does not accept its fact"),
+    ("▸", "the row stands for another table: Alt+O goes into it"),
     ("!", "this cell cannot be read"),
     ("–", "the row is disabled"),
 )

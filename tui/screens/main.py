@@ -15,13 +15,12 @@ from textual.screen import Screen
 from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
-from contextdb.edits import Edit, set_cells
-from contextdb.errors import ContextDBError, plural
+from contextdb.edits import Edit
+from contextdb.errors import ContextDBError, in_quotes, plural
 from contextdb.table import Table
 from tui.clipboard import Clipboard
 from tui.commands import ASSETS, BY_ID, SCREEN, bindings
 from tui.messages import Edited, FillGap, GoToCell, SetContext, Told
-from tui.model.context_list import ContextList
 from tui.model.coverage_run import CoverageRun
 from tui.model.new_table import make_table, name_fault
 from tui.model.session import Session
@@ -33,7 +32,7 @@ from tui.panes.pane import Pane
 from tui.panes.priorities import PrioritiesPane
 from tui.panes.problems import ProblemsPane
 from tui.screens.ask import AskDialog, ChooseDialog
-from tui.screens.dialog import Dialog
+from tui.screens.asking import TestRow
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
 from tui.screens.steps import StepsDialog
 from tui.widgets.bar import Bar, Item, StatusLine
@@ -43,9 +42,7 @@ from tui.widgets.key_line import KeyLine
 if TYPE_CHECKING:
     from tui.app import EditorApp
     from tui.model.importing import Import
-    from tui.screens.contexts import Loaded
     from tui.screens.export_table import Export
-    from tui.screens.nearest import CellAnswer
 
 Chosen = TypeVar("Chosen")
 
@@ -84,8 +81,9 @@ class MainScreen(Screen[None]):
         self.table_name = name
         self.session: Session = workspace.session(name)
         self.coverage = CoverageRun()
-        self.contexts: ContextList | None = None
-        """The contexts that F7 and F8 step through."""
+        self.test_row = TestRow(self)
+        self.came_from = ""
+        """The table from a row of which this one was gone into."""
         self._said = ("", "information")
         self.care = DiskCare(self, self.session, self.say, self.show)
         self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
@@ -123,8 +121,7 @@ class MainScreen(Screen[None]):
         """Show the table, and everything said of it, as it is now."""
         table = self.session.sheet.table
         self.coverage.follow(table)
-        if self.contexts is not None:
-            self.contexts.show(table)
+        self.test_row.follow(table)
         self.assets.show()
         self._show_bars()
         if self.tab != "assets":
@@ -238,6 +235,23 @@ class MainScreen(Screen[None]):
 
         self.app.push_screen(ChooseDialog("Tables", lines, names.index(self.table_name)), chosen)
 
+    @on(Grid.OpenWanted)
+    def _open_row(self, event: Grid.OpenWanted) -> None:
+        """Go into the table that a row stands for, with the facts of the test row."""
+        query = self.session.sheet.query
+        inside = query.inside(event.row)
+        if inside is None:
+            self.say("This row stands for no other table: @ and the name of one in the asset cell makes it do so.")
+        elif inside.table not in self.workspace.files:
+            self.say(f"There is no table {in_quotes(inside.table)} to go into.", "error")
+        else:
+            self.app.go_into(inside.table, self.table_name, {} if query.is_empty else dict(query.texts))
+
+    def action_back(self) -> None:
+        """Go back to the row that stands for this table."""
+        if not self.app.go_back():
+            self.say("No row was opened: Alt+O goes into the table that a row stands for.")
+
     def action_new_table(self) -> None:
         """Ask for a name and a blueprint, and make a table."""
         workspace = self.workspace
@@ -257,7 +271,7 @@ class MainScreen(Screen[None]):
         def chosen(at: int | None) -> None:
             if at is not None:
                 conditions = [(), *blueprints.values()][at]
-                self._try(lambda: self._make_table(name.strip(), conditions))
+                self.try_to(lambda: self._make_table(name.strip(), conditions))
 
         self.app.push_screen(ChooseDialog("With the columns of a blueprint", lines), chosen)
 
@@ -272,7 +286,7 @@ class MainScreen(Screen[None]):
         if editor is not None and editor.fault is not None:
             self.say("Finish the cell first: Enter takes it, Esc leaves it as it was.", "warning")
             return
-        self._try(lambda: self.care.save(then=self._saved))
+        self.try_to(lambda: self.care.save(then=self._saved))
 
     def _saved(self) -> None:
         n_unreadable = len(self.session.sheet.table.faults)
@@ -287,7 +301,7 @@ class MainScreen(Screen[None]):
         def named(name: str | None) -> None:
             if name is not None:
                 suffix = self.session.path.suffix
-                self._try(lambda: workspace.save_as(self.table_name, name.strip(), suffix))
+                self.try_to(lambda: workspace.save_as(self.table_name, name.strip(), suffix))
                 if name.strip() in workspace.files:
                     self.app.open_table(name.strip())
 
@@ -310,7 +324,7 @@ class MainScreen(Screen[None]):
 
         def chosen(answer: Export | None) -> None:
             if answer is not None:
-                self._try(lambda: self._export(answer))
+                self.try_to(lambda: self._export(answer))
 
         self.app.push_screen(ExportDialog(self.session.sheet.table, self.workspace.folder), chosen)
 
@@ -336,7 +350,7 @@ class MainScreen(Screen[None]):
 
     def _answered(self, answer: Answer | None) -> None:
         if answer is not None:
-            self._try(lambda: self.apply(answer.edit(self.session.sheet.table)))
+            self.try_to(lambda: self.apply(answer.edit(self.session.sheet.table)))
 
     def apply(self, edit: Edit, notes: Sequence[str] = ()) -> None:
         """Make an edit, show it and say what was done; what cannot be done is said."""
@@ -345,63 +359,30 @@ class MainScreen(Screen[None]):
             done = self.session.sheet.apply(edit)
             self._edited(Edited(replace(done, warnings=(*done.warnings, *notes))))
 
-        self._try(made)
+        self.try_to(made)
 
     # ---- the test row
 
     def action_contexts(self) -> None:
         """Look through saved or recorded contexts."""
-        from tui.screens.contexts import ContextsDialog
-
-        def loaded(answer: Loaded | None) -> None:
-            if answer is not None:
-                self.contexts = answer.contexts
-                self._load_context()
-
-        sheet = self.session.sheet
-        self._try(lambda: self._push(ContextsDialog(sheet.table, sheet.query.texts, self.contexts), loaded))
+        self.try_to(self.test_row.contexts)
 
     def action_step(self, by: int) -> None:
-        """Load the next context, or the one before; of the saved ones where none were looked at yet."""
-        self._try(lambda: self._step(by))
+        """Load the next context, or the one before."""
+        self.try_to(lambda: self.test_row.step(by))
 
-    def _step(self, by: int) -> None:
-        if self.contexts is None:
-            self.contexts = ContextList.beside(self.session.sheet.table)
-        if self.contexts.next() if by > 0 else self.contexts.previous():
-            self._load_context()
-        else:
-            self.say("There is no other context. F9 opens a file of them, and saves the test row as one.")
-
-    def _load_context(self) -> None:
-        if self.contexts is not None:
-            self._set_context(SetContext(self.contexts.texts, self.contexts.title))
+    def action_actors(self) -> None:
+        """Say who may play each role."""
+        self.try_to(self.test_row.actors)
 
     def action_why(self) -> None:
         """Why the row of the cursor is not valid, and which rows are nearest."""
-        from tui.screens.nearest import NearestDialog
-
-        sheet = self.session.sheet
-        if sheet.query.is_empty:
-            self.say("The test row asks for nothing yet: F6 goes there, F9 loads a context.")
-            return
-        row = int(sheet.view.rows[sheet.cursor[0]]) if len(sheet.view) else None
-        self._push(NearestDialog(sheet.query, sheet.table, row), self._why_answered)
-
-    def _why_answered(self, answer: CellAnswer | None) -> None:
-        if answer is None:
-            return
-        self._go_to_cell(GoToCell(answer.row, answer.column))
-        if answer.text is not None:
-            self.apply(set_cells(self.session.sheet.table, [(answer.row, answer.column, answer.text)]))
-
-    def _push(self, dialog: Dialog[Chosen], then: Callable[[Chosen | None], None]) -> None:
-        self.app.push_screen(dialog, then)
+        self.test_row.why()
 
     def action_refresh(self) -> None:
         """Take in what changed on the disk; sort and filter anew."""
         self.say("Refreshed.")
-        self._try(self.workspace.look_again)
+        self.try_to(self.workspace.look_again)
         self.care.look()
         self.assets.refresh_view()
         self.show()
@@ -412,11 +393,15 @@ class MainScreen(Screen[None]):
             self.say(f"{plural(session.n_recovered, 'unsaved edit')} brought back from the last time.", "warning")
         elif session.problem is not None:
             self.say(str(session.problem), "warning")
+        elif self.came_from:
+            self.say(f"The table that a row of {self.came_from} stands for. Alt+B goes back.")
+            self.assets.grid.test_name = self.came_from if not session.sheet.query.is_empty else ""
         elif why := session.why_read_only:
             self.say(f"This table can be read, not saved: {why}.", "warning")
         self._show_bars()
 
-    def _try(self, verb: Callable[[], None]) -> None:
+    def try_to(self, verb: Callable[[], None]) -> None:
+        """Do something; what cannot be done is said."""
         try:
             verb()
         except ContextDBError as error:
@@ -425,7 +410,8 @@ class MainScreen(Screen[None]):
     # ---- what panes ask for
 
     @on(GoToCell)
-    def _go_to_cell(self, event: GoToCell) -> None:
+    def go_to_cell(self, event: GoToCell) -> None:
+        """Show a cell in the grid."""
         self._switch_to("assets")
         self.assets.go_to(event.row, event.column)
 
@@ -437,7 +423,8 @@ class MainScreen(Screen[None]):
         self.say("A new row fills the gap: name its asset.")
 
     @on(SetContext)
-    def _set_context(self, event: SetContext) -> None:
+    def set_context(self, event: SetContext) -> None:
+        """Make these the facts of the test row."""
         self._switch_to("assets")
         self.assets.set_context(dict(event.facts), event.name)
 

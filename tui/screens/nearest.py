@@ -13,9 +13,10 @@ from textual.content import Content
 from textual.widgets import Static
 
 from contextdb.errors import plural
+from contextdb.nesting.names import inner_name
 from contextdb.table import Table
 from tui.model.query_row import QueryRow
-from tui.model.why import CellWhy, RowWhy, State, nearest_rows, why_row
+from tui.model.why import NEEDED, CellWhy, RowWhy, State, nearest_rows, why_row
 from tui.screens.dialog import Dialog
 from tui.widgets.choice_line import ChoiceLine
 from tui.widgets.line_list import LineList, ListCell, ListColumn
@@ -182,16 +183,27 @@ def row_state(why: RowWhy) -> str:
     """A row in a sentence."""
     row = f"Row {why.row + 1:,}, {why.asset}"
     if why.is_valid:
-        return f"✓ {row}: valid"
+        cast = ", ".join(dict.fromkeys(f"{c.column.partition('.')[0]} is {c.fact}" for c in why.cells if c.is_cast))
+        return f"✓ {row}: valid{'; ' if cast else ''}{cast}"
     return f"✗ {row}: not valid, {plural(why.n_wrong, 'cell')} {'keeps' if why.n_wrong == 1 else 'keep'} it from that"
 
 
 def cell_state(cell: CellWhy) -> str:
     """A cell in a sentence."""
     text = f'"{cell.cell}"' if cell.cell else "Any"
+    if cell.is_cast:
+        return f"{cell.column.partition('.')[0]} is played by {cell.fact}; the cell says {text} and accepts it."
+    if cell.cell == NEEDED:
+        return f"{cell.column} is {cell.fact}."
+    if inner_name(cell.cell) is not None:
+        n_valid = f"{cell.fact} valid" if " of " in cell.fact else cell.fact
+        return f"The row stands for the table {inner_name(cell.cell)}: {n_valid}. Alt+O in the grid goes into it."
+    if cell.state == "fails" and not cell.fact:
+        return f"The row's own rule says {text}, and that does not hold."
     match cell.state:
         case "fails":
-            return f'{cell.column} is {cell.fact}; the cell says {text}.\n"{cell.mend}" would accept it too.'
+            mend = f'\n"{cell.mend}" would accept it too.' if cell.mend is not None else ""
+            return f"{cell.column} is {cell.fact}; the cell says {text}.{mend}"
         case "unreadable":
             return f"{cell.column}: the cell {text} cannot be read, so the row is never valid."
         case "disabled":

@@ -186,12 +186,18 @@ class CellEditor(Widget):
             return "Enter this one · Space tick several" if is_one else "Enter take · Space tick · Esc leave"
         if self.is_list_open:
             return "Enter this one · Esc leave"
-        if self._offer.word is not None and self._offer.rows:
+        if self._completes:
             return f"Ctrl+T {cut(str(self._offer.rows[0]), 20).rstrip()} · F4 list"
         if self.is_numeric:
             arrows = "Alt+↑ ↓ more, less" if self.is_typing else "↑ ↓ more, less"
             return f"{arrows} · F4 other form" if self._form() else arrows
         return "F4 list · Esc leave" if self._chooser.has_list else "Esc leave"
+
+    @property
+    def _completes(self) -> bool:
+        """Whether the first row of the list is what the word, or a name, may become."""
+        is_name = self.condition is None and not self.is_list_open and self.kind in ("asset", "output")
+        return bool(self._offer.rows) and (self._offer.word is not None or is_name)
 
     def _highlight(self) -> int | None:
         rows, now = self._offer.rows, self._choices.highlight
@@ -251,7 +257,7 @@ class CellEditor(Widget):
             "nudge": self.is_numeric,
             "tick": is_open and self._chooser.has_ticks and self._offer.word is None,
             "sign": is_open and self.kind == "tags" and not self.is_fact and self._offer.word is None,
-            "take": bool(self._mend or self._meaning.fault or (self._offer.word and self._offer.rows)),
+            "take": bool(self._mend or self._meaning.fault or self._completes),
         }
         return can.get(action, True)
 
@@ -432,7 +438,7 @@ class CellEditor(Widget):
 
     def action_take(self) -> None:
         """Take the mend of a bad text, or the first value that the word may be."""
-        if not self._mend and self._offer.word is not None and self._offer.rows:
+        if not self._mend and self._completes:
             self._pick(self._offer.rows[0])
         elif not self._mend and self._meaning.fault is not None:
             self.refuse(self._check(self.text) or self._meaning.fault)

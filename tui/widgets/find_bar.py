@@ -22,7 +22,6 @@ CSS = """
     & Static {{ width: auto; padding: 0 1; color: $foreground 75%; }}
     & Input {{ width: 1fr; min-width: 10; }}
     & Checkbox {{ width: auto; margin: 0 1; background: transparent; }}
-    & Button {{ width: auto; min-width: 4; margin: 0 1; }}
 }}
 """
 

@@ -10,71 +10,25 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rich.style import Style
 from textual import events
 from textual.binding import BindingType
-from textual.geometry import Region, Size
+from textual.geometry import Region
 from textual.message import Message
-from textual.reactive import reactive
-from textual.scroll_view import ScrollView
-from textual.strip import Strip
 
 from contextdb.errors import ContextDBError
 from tui.commands import BY_ID, GRID, JUMPS, bindings
 from tui.messages import Edited, Told
-from tui.model.layout import COMPACT, WIDEST, Layout, fitted_width, layout
 from tui.model.selection import Selection
 from tui.model.sheet import Done, Sheet
 from tui.model.views import Sort
-from tui.widgets.grid_paint import N_HEADERS, Look, Painter
+from tui.widgets.grid_view import GridView
 from tui.widgets.pointer import Pointer
 
-GROUNDS = (
-    "row", "row-valid", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test", "selected", "cursor",
-    "cursor-away",
-)  # fmt: skip
-MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
 
-
-class Grid(ScrollView, can_focus=True):
+class Grid(GridView, can_focus=True):
     """A spreadsheet."""
 
-    ALLOW_SELECT = False
     BINDINGS: ClassVar[list[BindingType]] = bindings(GRID)
-    COMPONENT_CLASSES: ClassVar[set[str]] = {f"grid--{name}" for name in (*GROUNDS, *MEANT)}
-
-    DEFAULT_CSS = """
-    Grid {
-        background: $surface; color: $foreground; scrollbar-size-vertical: 1; scrollbar-size-horizontal: 1;
-        scrollbar-background: $panel; scrollbar-color: $foreground 25%; scrollbar-corner-color: $panel;
-        scrollbar-background-hover: $panel; scrollbar-background-active: $panel;
-        .grid--row { background: $surface; }
-        .grid--row-valid { background: $success 18%; }
-        .grid--frozen { background: $surface; }
-        .grid--header { background: $panel; }
-        .grid--header-kind { background: $panel; }
-        .grid--header-leaves { background: $panel; text-style: underline; }
-        .grid--header-chosen { background: $primary 40%; }
-        .grid--gutter { background: $panel; }
-        .grid--test { background: $boost; text-style: bold; }
-        .grid--selected { background: $primary 35%; }
-        .grid--cursor { background: $block-cursor-background; color: $block-cursor-foreground; text-style: bold; }
-        .grid--cursor-away { background: $primary 50%; text-style: bold; }
-        .grid--text { color: $foreground; }
-        .grid--any { color: $foreground 45%; }
-        .grid--muted { color: $foreground 55%; }
-        .grid--name { color: $foreground; text-style: bold; }
-        .grid--failing { color: $text-warning; }
-        .grid--fault { color: $text-error; text-style: bold underline; }
-        .grid--disabled { color: $foreground 40%; text-style: strike; }
-        .grid--valid { color: $text-success; text-style: bold; }
-        .grid--line { color: $foreground 18%; }
-        .grid--on-cursor { color: $block-cursor-foreground; text-style: bold; }
-    }
-    """
-
-    is_in_test_row = reactive(False)
-    """Whether the cursor is in the test row."""
 
     @dataclass
     class EditWanted(Message):
@@ -95,6 +49,13 @@ class Grid(ScrollView, can_focus=True):
         """A fact of the test row was changed."""
 
     @dataclass
+    class OpenWanted(Message):
+        """Go into the table that a row stands for."""
+
+        row: int
+        """The row of the file, from 0."""
+
+    @dataclass
     class CopyWanted(Message):
         """Put a text on the clipboard."""
 
@@ -107,135 +68,16 @@ class Grid(ScrollView, can_focus=True):
         """Paste what the clipboard holds."""
 
     def __init__(self, sheet: Sheet) -> None:
-        super().__init__()
-        self.sheet = sheet
+        super().__init__(sheet)
         self.test_name = ""
         """Where the context of the test row comes from."""
-        self._painter = Painter(sheet, self._style)
-        self._styles: dict[tuple[str, str], Style] = {}
-        self._widths: dict[str, int] = {}
         self._pointer = Pointer(self)
-        self._layout: Layout | None = None
-        self._laid_out = sheet.table
-        """The table that the layout is of: a step may have made another one before the screen is told."""
-        self._said_shape = (-1, -1)
 
     def post_message(self, message: Message) -> bool:
         """Post a message as the grid's own, also when the pane has it do so: Textual ends a message at the parent that made it."""
         return super().post_message(message.set_sender(self) if isinstance(message, TOLD) else message)
 
-    # ---- what is shown
-
-    def open(self, sheet: Sheet) -> None:
-        """Show another table."""
-        self.sheet = sheet
-        self._painter = Painter(sheet, self._style)
-        self._widths.clear()
-        self.is_in_test_row = False
-        self.changed()
-
-    def changed(self) -> None:
-        """Show the sheet as it is now, after an edit, a filter or another fact."""
-        self._painter.changed()
-        self._layout = None
-        self._fit()
-        self.show_cursor()
-        self.refresh()
-
-    def autofit(self) -> None:
-        """Make each column as wide as its texts and its name."""
-        for at, column in enumerate(self.sheet.table.columns):
-            self._widths[column.name] = self._fitted(at, WIDEST)
-        self.changed()
-
-    def set_width(self, column: int, width: int | None) -> None:
-        """Make a column so wide; None: as wide as its texts."""
-        self._widths[self.sheet.table.columns[column].name] = self._fitted(column, WIDEST) if width is None else width
-        self.changed()
-
-    @property
-    def window(self) -> Size:
-        """The cells there are to paint on."""
-        return self.scrollable_content_region.size
-
-    @property
-    def grid_layout(self) -> Layout:
-        """Where the columns stand."""
-        if self._layout is None or self._layout.width != self.window.width or self._laid_out is not self.sheet.table:
-            self._laid_out = self.sheet.table
-            names = [c.name for c in self.sheet.table.columns]
-            widths = [self._width(at, name) for at, name in enumerate(names)]
-            n_frozen = names.index(self.sheet.table.asset_column) + 1
-            self._layout = layout(widths, n_frozen if n_frozen <= 3 else 0, self.sheet.table.n_rows, self.window.width)
-        return self._layout
-
-    @property
-    def look(self) -> Look:
-        """Where the grid stands at present."""
-        x, y = self.scroll_offset
-        return Look(self.grid_layout, self.window.height, x, y, self.is_in_test_row, self.has_focus)
-
-    def cell_region(self) -> Region:
-        """Where the cell of the cursor stands on the screen, without its mark."""
-        look, (row, column) = self.look, self.sheet.cursor
-        y = look.height - 1 if self.is_in_test_row else N_HEADERS + row - look.top
-        x = look.layout.place(column, look.left)
-        return Region(self.content_region.x + x + 1, self.content_region.y + y, look.layout.widths[column] - 1, 1)
-
-    def render_line(self, y: int) -> Strip:
-        return self._painter.line(y, self.look)
-
-    def notify_style_update(self) -> None:
-        self._styles.clear()
-        super().notify_style_update()
-
-    def _width(self, at: int, name: str) -> int:
-        if name not in self._widths:
-            self._widths[name] = self._fitted(at, WIDEST if name == self.sheet.table.asset_column else COMPACT)
-        return self._widths[name]
-
-    def _fitted(self, at: int, widest: int) -> int:
-        header = self.sheet.header(at)
-        kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
-        return fitted_width(self.sheet.table.columns[at], [header.name + " ↕", kind], widest)
-
-    def _style(self, ground: str, meant: str) -> Style:
-        if (ground, meant) not in self._styles:
-            under = self.get_component_rich_style(f"grid--{ground}")
-            over = self.get_component_rich_style(f"grid--{meant}")
-            plain = Style(bgcolor=under.bgcolor, bold=under.bold, underline=under.underline)
-            said = Style(color=over.color, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
-            self._styles[ground, meant] = plain + said
-        return self._styles[ground, meant]
-
-    def _fit(self) -> None:
-        rows, total = len(self.sheet.view), self.grid_layout.extent
-        if self._said_shape != (rows, total):
-            self._said_shape = (rows, total)
-            self.virtual_size = Size(total, rows + N_HEADERS + 1)
-
-    def on_resize(self) -> None:
-        self._layout = None
-        self._fit()
-        self.show_cursor()
-
-    def on_focus(self) -> None:
-        self.refresh()
-
-    def on_blur(self) -> None:
-        self.refresh()
-
     # ---- moving
-
-    def show_cursor(self) -> None:
-        """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again."""
-        if not self.size:
-            return
-        look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else self.sheet.cursor
-        top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
-        left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
-        if (top, left) != (look.top, look.left):
-            self.scroll_to(left, top, animate=False, force=True, immediate=True)
 
     def moving(self, move: Callable[[], None]) -> None:
         """Make a move and paint the lines that it touches."""
@@ -244,9 +86,9 @@ class Grid(ScrollView, can_focus=True):
         self.show_cursor()
         after, look = self.sheet.block, self.look
         if (before.left, before.right) != (after.left, after.right):
-            self.refresh(Region(0, 0, look.layout.width, N_HEADERS))
+            self.refresh(Region(0, 0, look.layout.width, look.n_headers))
         top, bottom = min(before.top, after.top), max(before.bottom, after.bottom)
-        self.refresh(Region(0, N_HEADERS + top - look.top, look.layout.width, bottom - top + 1))
+        self.refresh(Region(0, look.n_headers + top - look.top, look.layout.width, bottom - top + 1))
         self.post_message(self.Moved())
 
     def _select(self, change: Callable[[Selection], Selection]) -> None:
@@ -259,7 +101,7 @@ class Grid(ScrollView, can_focus=True):
                 self.is_in_test_row = False
             return
         is_last = self.sheet.selection.row >= len(self.sheet.view) - 1
-        if down > 0 and is_last and not extend:
+        if down > 0 and is_last and not extend and self.has_test_row:
             self.is_in_test_row = True
             return
         self.moving(lambda: self.sheet.move(down, right, extend and not self.is_in_test_row))
@@ -301,7 +143,7 @@ class Grid(ScrollView, can_focus=True):
 
     def action_test_row(self) -> None:
         """To the test row and back."""
-        self.is_in_test_row = not self.is_in_test_row
+        self.is_in_test_row = self.has_test_row and not self.is_in_test_row
 
     def action_leave(self) -> None:
         """Out of the test row, or back to one cell."""
@@ -368,6 +210,11 @@ class Grid(ScrollView, can_focus=True):
         else:
             self.show_cursor()
             self.post_message(self.EditWanted(text, is_typing, opens_list))
+
+    def action_open_row(self) -> None:
+        """Go into the table that the row of the cursor stands for."""
+        if len(self.sheet.view):
+            self.post_message(self.OpenWanted(self.sheet.row_number(self.sheet.cursor[0]) - 1))
 
     def action_clear(self) -> None:
         if self.is_in_test_row:

@@ -1,4 +1,4 @@
-"""Paint the lines of a grid: three lines of headers, the rows on the screen, and the test row at the foot.
+"""Paint the lines of a grid: three lines of headers (one in a low window), the rows on the screen, and the test row at the foot.
 
 Only what is seen is read and painted, so that a line costs the same in a table of ten rows and of a hundred thousand.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from rich.cells import cell_len
 from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
@@ -19,10 +20,21 @@ from tui.model.shown import Header, ShownTable
 from tui.model.window import MARKS, Window
 
 N_HEADERS = 3
+LOWEST = 8
+"""In a window of fewer lines only the names of the columns stand over the rows."""
 UP, DOWN, UNSORTED = "▲", "▼", "↕"
+OPENS = "▸"
+"""Stands before the asset cell of a row that stands for another table."""
+LEAST_BESIDE = 6
+"""So much of a text stays where something stands at its right."""
 
 StyleOf = Callable[[str, str], Style]
 """The style of a ground and of what stands on it: `style("cursor", "text")`."""
+
+
+def n_headers(height: int) -> int:
+    """How many lines stand over the rows in a window so high."""
+    return N_HEADERS if height >= LOWEST else 1
 
 
 @dataclass(frozen=True)
@@ -37,11 +49,22 @@ class Look:
     """The first row of the view that is seen."""
     is_in_test_row: bool
     has_focus: bool
+    has_test_row: bool = True
+
+    @property
+    def foot(self) -> int:
+        """The line of the test row; past the last one where there is none."""
+        return self.height - 1 if self.has_test_row else self.height
+
+    @property
+    def n_headers(self) -> int:
+        """How many lines stand over the rows."""
+        return n_headers(self.height)
 
     @property
     def n_body(self) -> int:
         """How many lines there are for rows."""
-        return max(self.height - N_HEADERS - 1, 0)
+        return max(self.foot - self.n_headers, 0)
 
 
 class Painter:
@@ -64,11 +87,11 @@ class Painter:
         """Line `y` of the window."""
         if self._read[0] is not self.sheet.table or self._read[1] is not self.sheet.view:
             self.changed()  # painted between a step and word of it
-        if y < N_HEADERS:
+        if y < look.n_headers:
             return self._header_line(y, look)
-        if y == look.height - 1:
+        if y == look.foot:
             return self._test_line(look)
-        row = look.top + y - N_HEADERS
+        row = look.top + y - look.n_headers
         if row >= len(self.sheet.view):
             return self._empty_line(row, look)
         return self._body_line(row, look)
@@ -106,6 +129,7 @@ class Painter:
             yield Segment("!" + cut("cannot be read", width - 1), self.style(ground, "fault"))
             return
         text = "" if header.leaves is None else f"leaves {header.leaves:,}"
+        text = plural(header.n_actors, "actor") if header.n_actors else text
         yield Segment(" " + cut(text, width - 1), self.style(ground, "muted"))
 
     def _header(self, column: int) -> Header:
@@ -118,6 +142,7 @@ class Painter:
     def _body_line(self, row: int, look: Look) -> Strip:
         window = self._window_at(row, look)
         seen, block, ground = window.row(row), self._block(look), self._ground(row, window)
+        asset = self.sheet.asset_at
         cursor = None if look.is_in_test_row or self.sheet.cursor[0] != row else self.sheet.cursor[1]
 
         def cell(column: int) -> Iterator[Segment]:
@@ -128,7 +153,14 @@ class Painter:
                 under, meant = ("cursor", "on-cursor") if look.has_focus else ("cursor-away", "name")
             elif block is not None and block.holds(row, column):
                 under = "selected"
-            yield Segment(MARKS[kind] + cut(text, look.layout.widths[column] - 1), self.style(under, meant))
+            note, width = window.note(row, column), look.layout.widths[column] - 1
+            mark = OPENS if note is not None and column == asset and kind == "text" else MARKS[kind]
+            room = width - cell_len(note) - 1 if note else width
+            if note and room >= min(cell_len(text), LEAST_BESIDE):
+                yield Segment(mark + cut(text, room), self.style(under, meant))
+                yield Segment(f" {note}", self.style(under, meant if column == cursor else "valid" if seen.is_valid else "muted"))
+            else:
+                yield Segment(mark + cut(text, width), self.style(under, meant))
 
         mark = "●" if seen.is_valid else " " if seen.is_enabled else "–"
         number = f"{seen.number:>{look.layout.gutter - 3}} {mark} "
@@ -160,9 +192,8 @@ class Painter:
     # ---- the test row
 
     def _test_line(self, look: Look) -> Strip:
-        query, names = self.sheet.query, [c.name for c in self.sheet.table.columns]
+        query, names, asset = self.sheet.query, [c.name for c in self.sheet.table.columns], self.sheet.asset_at
         has_fact = {c.condition.name for c in self.sheet.table.conditions}
-        asset = names.index(self.sheet.table.asset_column)
 
         def cell(column: int) -> Iterator[Segment]:
             width, name = look.layout.widths[column], names[column]
@@ -172,9 +203,10 @@ class Painter:
             if column == asset:
                 yield Segment(" " + cut(self._said(), width - 1), self.style(ground, "on-cursor" if is_lit else "name"))
                 return
-            text = query.texts.get(name, "") if name in has_fact else ""
-            meant = "fault" if name in query.faults else "text"
-            mark = "!" if name in query.faults else " "
+            role = query.role_of(name)
+            text = (query.texts.get(name, "") if role is None else "cast") if name in has_fact else ""
+            is_wrong = name in query.faults and role is None
+            meant, mark = ("fault", "!") if is_wrong else ("muted" if role is not None else "text", " ")
             yield Segment(mark + cut(text, width - 1), self.style(ground, "on-cursor" if is_lit else meant))
 
         gutter = "?".rjust(look.layout.gutter - 3) + "   "

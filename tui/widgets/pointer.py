@@ -5,15 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from textual import events
+from textual.timer import Timer
 
 from tui.model.layout import NARROWEST
 from tui.model.selection import Selection
-from tui.widgets.grid_paint import N_HEADERS, Look
+from tui.widgets.grid_paint import Look
 
 if TYPE_CHECKING:
     from tui.widgets.grid import Grid
 
 Dragged = Literal["cells", "rows", "columns", "width"]
+PULL_EVERY_S = 0.06
+"""So often a drag that rests at an edge takes in one more row or column."""
 
 
 class Pointer:
@@ -24,20 +27,26 @@ class Pointer:
         self._dragged: Dragged | None = None
         self._column = 0
         """The column whose width is dragged."""
+        self._at = (0, 0)
+        """Where the mouse is while it drags."""
+        self._timer: Timer | None = None
 
     def press(self, event: events.MouseDown) -> None:
         """The button goes down: go there, select, or begin to drag."""
         grid, look = self.grid, self.grid.look
         grid.focus()
         row, column = self._place_at(event.x, event.y)
-        if event.y < N_HEADERS:
+        if event.y < look.n_headers:
             self._press_header(event, column, look)
-        elif event.y == look.height - 1:
+        elif event.y == look.foot:
             grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0], column))
             grid.is_in_test_row = True
         elif self._is_cell_line(event.y, look):
             grid.is_in_test_row = False
             grid.moving(lambda: grid.sheet.go(row, column, event.shift))
+            if self._is_opener(event.x, row, column, look):
+                grid.action_open_row()
+                return
             if event.x < look.layout.gutter:
                 grid.action_select_rows()
             self._begin("rows" if event.x < look.layout.gutter else "cells")
@@ -48,23 +57,40 @@ class Pointer:
         if self._dragged == "width":
             grid.set_width(self._column, max(NARROWEST, event.x - look.layout.place(self._column, look.left)))
         elif self._dragged is not None:
-            row, column = self._place_at(event.x, event.y)
-            if event.y >= look.height - 1:  # past the foot or the head: the rows come after the mouse
-                row = min(row + 1, len(grid.sheet.view) - 1)
-            elif event.y < N_HEADERS:
-                row = max(look.top - 1, 0)
-            grid.moving(lambda: self._drag_to(row, column, grid.sheet.selection.kind))
+            self._at = (event.x, event.y)
+            self.pull()
+            self._pull_on(self._edge() != (0, 0))
+
+    def pull(self) -> None:
+        """Select up to where the mouse is; past an edge the rows and columns come after it, one at a time."""
+        grid, look = self.grid, self.grid.look
+        (x, y), (down, right) = self._at, self._edge()
+        row, column = self._place_at(x, y)
+        if down:
+            row = look.top + look.n_body if down > 0 else look.top - 1
+        if right:
+            column = grid.sheet.selection.far[1] + right
+        row, column = max(0, min(row, len(grid.sheet.view) - 1)), max(0, min(column, grid.sheet.shape[1] - 1))
+        grid.moving(lambda: self._drag_to(row, column, grid.sheet.selection.kind))
+
+    def pull_again(self) -> None:
+        """The mouse rests past an edge; one that was let go elsewhere pulls no more."""
+        if self._edge() != (0, 0) and self.grid.app.mouse_captured is self.grid:
+            self.pull()
+        else:
+            self._pull_on(False)
 
     def release(self) -> None:
         """The button goes up."""
         self._dragged = None
+        self._pull_on(False)
         self.grid.release_mouse()
 
     def click_twice(self, event: events.Click) -> None:
         """A double click: edit the cell, or fit the column left of a line."""
         look = self.grid.look
         separator = look.layout.separator_at(event.x, look.left)
-        if event.y < N_HEADERS and separator is not None:
+        if event.y < look.n_headers and separator is not None:
             self.grid.set_width(separator, None)
         elif event.x >= look.layout.gutter and self._is_cell_line(event.y, look):
             self.grid.action_edit()
@@ -88,6 +114,23 @@ class Pointer:
         self._dragged = what
         self.grid.capture_mouse()
 
+    def _edge(self) -> tuple[int, int]:
+        """At which edges of the cells the mouse is: down 1, up -1; right 1, left -1. At the right it cannot leave the screen."""
+        (x, y), look = self._at, self.grid.look
+        down = 0 if self._dragged == "columns" else (y >= look.foot) - (y < look.n_headers)
+        first = look.layout.gutter + (look.layout.frozen if look.left else 0)
+        is_frozen = self.grid.sheet.selection.far[1] < look.layout.n_frozen
+        right = 0 if self._dragged == "rows" else (x >= look.layout.width - 1) - (x < first and look.left > 0 and not is_frozen)
+        return down, right
+
+    def _pull_on(self, is_on: bool) -> None:
+        """Go on pulling while the mouse rests past an edge, or stop."""
+        if is_on and self._timer is None:
+            self._timer = self.grid.set_interval(PULL_EVERY_S, self.pull_again)
+        elif not is_on and self._timer is not None:
+            self._timer.stop()
+            self._timer = None
+
     def _drag_to(self, row: int, column: int, kind: str) -> None:
         sheet = self.grid.sheet
         sheet.go(row, column, True)
@@ -98,9 +141,15 @@ class Pointer:
 
     def _place_at(self, x: int, y: int) -> tuple[int, int]:
         look = self.grid.look
-        row = look.top + y - N_HEADERS
+        row = look.top + y - look.n_headers
         return max(0, min(row, len(self.grid.sheet.view) - 1)), look.layout.column_at(x, look.left)
+
+    def _is_opener(self, x: int, row: int, column: int, look: Look) -> bool:
+        """Whether the mark before a row that stands for another table is at a place."""
+        sheet = self.grid.sheet
+        is_mark = column == sheet.asset_at and x == look.layout.place(column, look.left)
+        return is_mark and len(sheet.view) > 0 and sheet.query.inside(sheet.row_number(row) - 1) is not None
 
     def _is_cell_line(self, y: int, look: Look) -> bool:
         """Whether cells stand on a line of the window: those of a row, or of the test row."""
-        return y == look.height - 1 or (y >= N_HEADERS and look.top + y - N_HEADERS < len(self.grid.sheet.view))
+        return y == look.foot or (y >= look.n_headers and look.top + y - look.n_headers < len(self.grid.sheet.view))

@@ -1,0 +1,236 @@
+"""Actors for the test row: for each role of a table a team, as a small sheet of one row an actor and one column a fact.
+
+A fact is written as in the test row: a value or a set of values; an empty one is not asked about. Actors of one name in two teams
+are one actor, who plays one role at most. Teams are kept in `NAME.actors.json` beside the table, {role: [actor]}: what
+`CompiledTable.query` takes as its actors. An edge: this reads and writes that file.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from contextdb.conditions import Condition
+from contextdb.disk import read_bytes, write_atomic
+from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes
+from contextdb.facts import Fact, read_fact_text
+from contextdb.recordings import fact_text
+from contextdb.schema import TableSettings
+from contextdb.table import Table
+from tui.model.sheet import Done, Sheet
+from tui.model.shown import Header
+
+NAME = "Actor"
+SUFFIX = ".actors.json"
+FIXED = "The facts of a role are columns of the table, and stay as they are here."
+
+
+def roles_of(table: Table) -> dict[str, list[Condition]]:
+    """The roles of a table, each with the conditions that belong to it: those named `Role.fact`."""
+    found: dict[str, list[Condition]] = {}
+    for column in table.conditions:
+        role, dot, fact = column.condition.name.partition(".")
+        if role and dot and fact:
+            found.setdefault(role, []).append(column.condition)
+    return found
+
+
+class TeamSheet(Sheet):
+    """The actors of one role, being edited. There is always an empty row to write the next one in."""
+
+    def __init__(self, role: str, conditions: Sequence[Condition], rows: Sequence[Mapping[str, str]] = ()) -> None:
+        """`rows` are actors as texts, by `NAME` and by the names of the facts."""
+        self.role = role
+        self.facts = {c.name.removeprefix(f"{role}."): c for c in conditions}
+        names = (NAME, *self.facts)
+        texts = {name: [*(row.get(name, "") for row in rows), ""] for name in names}
+        settings = TableSettings(role, asset=NAME, outputs=tuple(self.facts))
+        super().__init__(Table.from_columns(texts, settings=settings, name=role))
+        self._room: set[int] = set()
+        """The steps that only added an empty row: they are taken back with the one before."""
+
+    def of_column(self, column: int) -> Condition | None:
+        """The condition that a column holds facts of."""
+        return self.facts.get(self.table.columns[column].name)
+
+    def header(self, column: int) -> Header:
+        """What stands over a column."""
+        found = self.of_column(column)
+        return Header(NAME, "name") if found is None else Header(super().header(column).name, found.domain.kind, found.unit)
+
+    def check(self, text: str) -> Fault | None:
+        """What would be wrong with a text in the cell of the cursor."""
+        return self.fault_of(self.selection.column, text) or super().check(text)
+
+    def fault_of(self, column: int, text: str) -> Fault | None:
+        """Why a text of a column cannot be read."""
+        found = self.of_column(column)
+        if found is None or not text.strip():
+            return None
+        try:
+            read_fact_text(text, found)
+        except ContextError as error:
+            return error.faults[0]
+        return None
+
+    def with_room(self) -> Done:
+        """Add an empty row where the last one is none."""
+        last = self.table.n_rows - 1
+        if last >= 0 and not any(c[last].strip() for c in self.table.columns):
+            return Done()
+        selection = self.selection
+        self.go(max(last, 0), 0)
+        done = self.insert_rows(below=True)
+        self.select(lambda _, shape: selection.within(shape))
+        self._room = {step for step in self._room if step < self.history.position} | {self.history.position}
+        return done
+
+    def undo(self) -> Done:
+        """Take back the last step that a person made."""
+        if self.history.position in self._room:
+            super().undo()
+        return super().undo()
+
+    def delete_columns(self) -> Done:
+        """Nothing: the facts are those of the role."""
+        return Done(notes=(FIXED,))
+
+    def enable_rows(self, is_enabled: bool | None = None) -> Done:
+        """Nothing: whoever is not to be offered is deleted."""
+        return Done(notes=("Delete the row of an actor who is not to be offered.",))
+
+    def move_column(self, right: int) -> Done:
+        """Nothing, too."""
+        return Done(notes=(FIXED,))
+
+    @property
+    def texts(self) -> list[dict[str, str]]:
+        """The actors as texts, without empty rows."""
+        rows = [{c.name: c[row] for c in self.table.columns if c[row].strip()} for row in range(self.table.n_rows)]
+        return [row for row in rows if row]
+
+    @property
+    def faults(self) -> list[str]:
+        """What is wrong with facts and names, each with its actor."""
+        seen: set[str] = set()
+        found = []
+        for at, row in enumerate(self.texts):
+            who = row.get(NAME) or f"actor {at + 1}"
+            for column, one in enumerate(self.table.columns):
+                if fault := self.fault_of(column, row.get(one.name, "")):
+                    found.append(f"{who}, {one.name}: {fault.message}")
+            if NAME in row and row[NAME] in seen:
+                found.append(f"{who} stands twice among the actors for {self.role}.")
+            seen.add(row.get(NAME, ""))
+        return found
+
+    def actors(self) -> list[dict[str, object]]:
+        """The actors as they are offered: with a name, an id where they were given a name, and the facts that can be read."""
+        found: list[dict[str, object]] = []
+        taken: set[str] = set()
+        for at, row in enumerate(self.texts):
+            name = row.get(NAME, "")
+            if name and name in taken:
+                continue
+            taken.add(name)
+            actor: dict[str, object] = {"id": name or f"{self.role} {at + 1}", "name": name or f"{self.role} {at + 1}"}
+            for fact, condition in self.facts.items():
+                if (value := _read(row.get(fact, ""), condition)) is not None:
+                    actor[condition.name] = value
+            found.append(actor)
+        return found
+
+
+class Teams:
+    """The teams of a table's roles."""
+
+    def __init__(self, table: Table, kept: Mapping[str, Sequence[Mapping[str, str]]] | None = None) -> None:
+        """`kept` are the actors of each role, as texts."""
+        kept = kept or {}
+        self.sheets = {role: TeamSheet(role, found, kept.get(role, ())) for role, found in roles_of(table).items()}
+
+    @classmethod
+    def beside(cls, table: Table) -> Teams:
+        """The teams of the file beside a table; empty ones where there is none.
+
+        Raises
+        ------
+        FileError
+            The file cannot be read.
+        """
+        path = teams_path(table)
+        return cls(table, _texts_in(path, roles_of(table)) if path is not None and path.exists() else None)
+
+    def of(self, table: Table) -> Teams:
+        """The same actors for a table whose columns may have changed."""
+        same = {role: [c.name for c in found] for role, found in roles_of(table).items()}
+        if same == {role: [c.name for c in sheet.facts.values()] for role, sheet in self.sheets.items()}:
+            return self
+        return Teams(table, {role: sheet.texts for role, sheet in self.sheets.items()})
+
+    @property
+    def offered(self) -> dict[str, list[dict[str, object]]]:
+        """The actors of each role that has some."""
+        return {role: actors for role, sheet in self.sheets.items() if (actors := sheet.actors())}
+
+    @property
+    def faults(self) -> list[str]:
+        """What is wrong with the actors."""
+        return [fault for sheet in self.sheets.values() for fault in sheet.faults]
+
+    def save(self, path: Path) -> None:
+        """Write the file of the teams; raises FileError where the disk refuses."""
+        teams = {role: [_as_json(row, sheet) for row in sheet.texts] for role, sheet in self.sheets.items() if sheet.texts}
+        write_atomic(path, (json.dumps(teams, ensure_ascii=False, indent=2) + "\n").encode())
+
+
+def teams_path(table: Table) -> Path | None:
+    """The file of a table's teams; None for a table without a file."""
+    return None if table.path is None else table.path.with_name(table.path.stem + SUFFIX)
+
+
+def _read(text: str, condition: Condition) -> Fact:
+    try:
+        return read_fact_text(text, condition)
+    except ContextError:
+        return None
+
+
+def _as_json(row: Mapping[str, str], sheet: TeamSheet) -> dict[str, object]:
+    """An actor as a program would write him: plain values where his facts are plain, else their text."""
+    said: dict[str, object] = {"name": row[NAME], "id": row[NAME]} if NAME in row else {}
+    for fact, condition in sheet.facts.items():
+        if fact in row:
+            value = _read(row[fact], condition)
+            is_plain = isinstance(value, (bool, int, float, str)) and condition.domain.kind != "tags"
+            said[fact] = value if is_plain else row[fact]
+    return said
+
+
+def _texts_in(path: Path, roles: Mapping[str, Sequence[Condition]]) -> dict[str, list[dict[str, str]]]:
+    try:
+        teams = json.loads(read_bytes(path))
+        if not (isinstance(teams, dict) and all(isinstance(team, list) for team in teams.values())):
+            raise ValueError("it is not a mapping of roles to lists of actors")
+        return {role: [_texts_of(actor, role, roles[role]) for actor in team] for role, team in teams.items() if role in roles}
+    except ValueError as error:
+        found = f"its actors cannot be read: {in_quotes(str(error))}."
+        raise FileError(Fault(found, '{"Defender": [{"name": …}]}', place=Place(str(path)))) from None
+
+
+def _texts_of(actor: object, role: str, conditions: Sequence[Condition]) -> dict[str, str]:
+    if not isinstance(actor, dict):
+        raise ValueError("an actor is not a mapping of facts")
+    name = actor.get("name", actor.get("id"))
+    said = {NAME: str(name)} if name is not None else {}
+    for condition in conditions:
+        fact = condition.name.removeprefix(f"{role}.")
+        value = actor.get(fact, actor.get(condition.name))
+        if value is not None:
+            said[fact] = value if isinstance(value, str) else _text_of(value, condition)
+    return said
+
+
+def _text_of(value: object, condition: Condition) -> str:
+    return fact_text(float(value) if isinstance(value, int) and not isinstance(value, bool) else value, condition)

@@ -1,0 +1,106 @@
+"""What is done with the test row: contexts to load and step through, actors for the roles, and why a row is not valid."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from contextdb.edits import set_cells
+from contextdb.table import Table
+from tui.messages import GoToCell, SetContext
+from tui.model.context_list import ContextList
+from tui.model.teams import Teams, roles_of
+
+if TYPE_CHECKING:
+    from tui.screens.contexts import Loaded
+    from tui.screens.main import MainScreen
+    from tui.screens.nearest import CellAnswer
+
+
+class TestRow:
+    """The test row of one screen."""
+
+    def __init__(self, screen: MainScreen) -> None:
+        self.screen, self.session = screen, screen.session
+        self.list: ContextList | None = None
+        """The contexts that F7 and F8 step through."""
+
+    def follow(self, table: Table) -> None:
+        """Stand on the table as it is now."""
+        if self.list is not None:
+            self.list.show(table)
+        teams, query = self.session.teams, self.session.sheet.query
+        if teams is not None and query.actors and teams.of(table) is not teams:
+            query.offer(self._teams().offered)
+
+    # ---- contexts
+
+    def contexts(self) -> None:
+        """Look through saved or recorded contexts."""
+        from tui.screens.contexts import ContextsDialog
+
+        def loaded(answer: Loaded | None) -> None:
+            if answer is not None:
+                self.list = answer.contexts
+                self._load()
+
+        sheet = self.session.sheet
+        self.screen.app.push_screen(ContextsDialog(sheet.table, sheet.query.texts, self.list), loaded)
+
+    def step(self, by: int) -> None:
+        """Load the next context, or the one before; of the saved ones where none were looked at yet."""
+        if self.list is None:
+            self.list = ContextList.beside(self.session.sheet.table)
+        if self.list.next() if by > 0 else self.list.previous():
+            self._load()
+        else:
+            self.screen.say("There is no other context. F9 opens a file of them, and saves the test row as one.")
+
+    def _load(self) -> None:
+        if self.list is not None:
+            self.screen.set_context(SetContext(self.list.texts, self.list.title))
+
+    # ---- actors
+
+    def actors(self) -> None:
+        """Say who may play each role."""
+        from tui.screens.actors import ActorsDialog
+
+        sheet = self.session.sheet
+        if not roles_of(sheet.table):
+            self.screen.say("This table has no roles: a condition of one is named like Defender.DepthChart.")
+            return
+
+        def decided(teams: Teams | None) -> None:
+            if teams is not None:
+                sheet.query.offer(teams.offered)
+                sheet.version += 1
+                self.screen.assets.refresh_valid()
+                self.screen.show()
+
+        self.screen.app.push_screen(ActorsDialog(sheet.table, self._teams(), self.screen.clipboard), decided)
+
+    def _teams(self) -> Teams:
+        """The actors for the table as it is; at first those of the file beside it."""
+        table, teams = self.session.sheet.table, self.session.teams
+        self.session.teams = Teams.beside(table) if teams is None else teams.of(table)
+        return self.session.teams
+
+    # ---- why
+
+    def why(self) -> None:
+        """Why the row of the cursor is not valid, and which rows are nearest."""
+        from tui.screens.nearest import NearestDialog
+
+        sheet = self.session.sheet
+        if sheet.query.is_empty:
+            self.screen.say("The test row asks for nothing yet: F6 goes there, F9 loads a context.")
+            return
+        row = int(sheet.view.rows[sheet.cursor[0]]) if len(sheet.view) else None
+        self.screen.app.push_screen(NearestDialog(sheet.query, sheet.table, row), self._answered)
+
+    def _answered(self, answer: CellAnswer | None) -> None:
+        if answer is None:
+            return
+        self.screen.go_to_cell(GoToCell(answer.row, answer.column))
+        if answer.text is not None:
+            self.screen.apply(set_cells(self.session.sheet.table, [(answer.row, answer.column, answer.text)]))

@@ -1,0 +1,205 @@
+"""A sheet painted in a window of the terminal: where its columns stand, how it is styled and scrolled. It takes no keys.
+
+Only what is seen is read and painted: see `tui.widgets.grid_paint`.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.cells import cell_len
+from rich.style import Style
+from textual.geometry import Region, Size
+from textual.reactive import reactive
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
+
+from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout
+from tui.model.sheet import Sheet
+from tui.widgets.grid_paint import Look, Painter, n_headers
+
+GROUNDS = (
+    "row", "row-valid", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test", "selected", "cursor",
+    "cursor-away",
+)  # fmt: skip
+MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
+
+
+class GridView(ScrollView):
+    """A sheet as it is seen."""
+
+    ALLOW_SELECT = False
+    COMPONENT_CLASSES: ClassVar[set[str]] = {f"grid--{name}" for name in (*GROUNDS, *MEANT)}
+
+    DEFAULT_CSS = """
+    GridView {
+        background: $surface; color: $foreground; scrollbar-size-vertical: 1; scrollbar-size-horizontal: 1;
+        scrollbar-background: $panel; scrollbar-color: $foreground 25%; scrollbar-corner-color: $panel;
+        scrollbar-background-hover: $panel; scrollbar-background-active: $panel;
+        .grid--row { background: $surface; }
+        .grid--row-valid { background: $success 18%; }
+        .grid--frozen { background: $surface; }
+        .grid--header { background: $panel; }
+        .grid--header-kind { background: $panel; }
+        .grid--header-leaves { background: $panel; text-style: underline; }
+        .grid--header-chosen { background: $primary 40%; }
+        .grid--gutter { background: $panel; }
+        .grid--test { background: $boost; text-style: bold; }
+        .grid--selected { background: $primary 35%; }
+        .grid--cursor { background: $block-cursor-background; color: $block-cursor-foreground; text-style: bold; }
+        .grid--cursor-away { background: $primary 50%; text-style: bold; }
+        .grid--text { color: $foreground; }
+        .grid--any { color: $foreground 45%; }
+        .grid--muted { color: $foreground 55%; }
+        .grid--name { color: $foreground; text-style: bold; }
+        .grid--failing { color: $text-warning; }
+        .grid--fault { color: $text-error; text-style: bold underline; }
+        .grid--disabled { color: $foreground 40%; text-style: strike; }
+        .grid--valid { color: $text-success; text-style: bold; }
+        .grid--line { color: $foreground 18%; }
+        .grid--on-cursor { color: $block-cursor-foreground; text-style: bold; }
+    }
+    """
+
+    has_test_row: ClassVar[bool] = True
+    is_in_test_row = reactive(False)
+    """Whether the cursor is in the test row."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        super().__init__()
+        self.sheet = sheet
+        self._painter = Painter(sheet, self._style)
+        self._styles: dict[tuple[str, str], Style] = {}
+        self._widths: dict[str, int] = {}
+        self._layout: Layout | None = None
+        self._laid_out = sheet.table
+        """The table that the layout is of: a step may have made another one before the screen is told."""
+        self._said_shape = (-1, -1)
+
+    def open(self, sheet: Sheet) -> None:
+        """Show another table."""
+        self.sheet = sheet
+        self._painter = Painter(sheet, self._style)
+        self._widths.clear()
+        self.is_in_test_row = False
+        self.changed()
+
+    def changed(self) -> None:
+        """Show the sheet as it is now, after an edit, a filter or another fact."""
+        self._painter.changed()
+        self._layout = None
+        self._fit()
+        self.show_cursor()
+        self.refresh()
+
+    def refit(self) -> None:
+        """Make room where something new stands beside cells; no column becomes narrower."""
+        for at, column in enumerate(self.sheet.table.columns):
+            if column.name in self._widths:
+                self._widths[column.name] = max(self._widths[column.name], min(self._beside(at), WIDEST))
+
+    def autofit(self) -> None:
+        """Make each column as wide as its texts and its name."""
+        for at, column in enumerate(self.sheet.table.columns):
+            self._widths[column.name] = self._fitted(at, WIDEST)
+        self.changed()
+
+    def set_width(self, column: int, width: int | None) -> None:
+        """Make a column so wide; None: as wide as its texts."""
+        self._widths[self.sheet.table.columns[column].name] = self._fitted(column, WIDEST) if width is None else width
+        self.changed()
+
+    @property
+    def window(self) -> Size:
+        """The cells there are to paint on."""
+        return self.scrollable_content_region.size
+
+    @property
+    def grid_layout(self) -> Layout:
+        """Where the columns stand."""
+        if self._layout is None or self._layout.width != self.window.width or self._laid_out is not self.sheet.table:
+            self._laid_out = self.sheet.table
+            names = [c.name for c in self.sheet.table.columns]
+            widths = [self._width(at, name) for at, name in enumerate(names)]
+            n_frozen = names.index(self.sheet.table.asset_column) + 1
+            self._layout = layout(widths, n_frozen if n_frozen <= 3 else 0, self.sheet.table.n_rows, self.window.width)
+        return self._layout
+
+    @property
+    def look(self) -> Look:
+        """Where the grid stands at present."""
+        x, y = self.scroll_offset
+        return Look(self.grid_layout, self.window.height, x, y, self.is_in_test_row, self.has_focus, self.has_test_row)
+
+    def cell_region(self) -> Region:
+        """Where the cell of the cursor stands on the screen, without its mark."""
+        look, (row, column) = self.look, self.sheet.cursor
+        y = look.foot if self.is_in_test_row else look.n_headers + row - look.top
+        x = look.layout.place(column, look.left)
+        return Region(self.content_region.x + x + 1, self.content_region.y + y, look.layout.widths[column] - 1, 1)
+
+    def render_line(self, y: int) -> Strip:
+        return self._painter.line(y, self.look)
+
+    def notify_style_update(self) -> None:
+        self._styles.clear()
+        super().notify_style_update()
+
+    def _width(self, at: int, name: str) -> int:
+        if name not in self._widths:
+            self._widths[name] = self._fitted(at, WIDEST if name == self.sheet.table.asset_column else COMPACT)
+        return self._widths[name]
+
+    def _fitted(self, at: int, widest: int) -> int:
+        header = self.sheet.header(at)
+        kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
+        fitted = fitted_width(self.sheet.table.columns[at], [header.name + " ↕", kind], widest)
+        return min(max(fitted, self._beside(at)), WIDEST)
+
+    def _beside(self, at: int) -> int:
+        """How wide a column must be for what stands at the right of its cells: the actors of a role, the rows of inner tables."""
+        query, column = self.sheet.query, self.sheet.table.columns[at]
+        role = query.role_of(column.name)
+        is_opener = query.is_nested and at == self.sheet.asset_at
+        if role is None and not is_opener:
+            return 0
+        longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0)
+        if role is None:
+            return longest + len(" 000 of 000 rows") + 1
+        return longest + max(cell_len(str(actor.get("name", ""))) for actor in query.actors[role]) + 3
+
+    def _style(self, ground: str, meant: str) -> Style:
+        if (ground, meant) not in self._styles:
+            under = self.get_component_rich_style(f"grid--{ground}")
+            over = self.get_component_rich_style(f"grid--{meant}")
+            plain = Style(bgcolor=under.bgcolor, bold=under.bold, underline=under.underline)
+            said = Style(color=over.color, bold=over.bold or None, underline=over.underline or None, strike=over.strike or None)
+            self._styles[ground, meant] = plain + said
+        return self._styles[ground, meant]
+
+    def _fit(self) -> None:
+        rows, total = len(self.sheet.view), self.grid_layout.extent
+        if self._said_shape != (rows, total):
+            self._said_shape = (rows, total)
+            self.virtual_size = Size(total, rows + n_headers(self.window.height) + self.has_test_row)
+
+    def on_resize(self) -> None:
+        self._layout = None
+        self._fit()
+        self.show_cursor()
+
+    def on_focus(self) -> None:
+        self.refresh()
+
+    def on_blur(self) -> None:
+        self.refresh()
+
+    def show_cursor(self) -> None:
+        """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again."""
+        if not self.size:
+            return
+        look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else self.sheet.cursor
+        top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
+        left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
+        if (top, left) != (look.top, look.left):
+            self.scroll_to(left, top, animate=False, force=True, immediate=True)

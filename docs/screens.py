@@ -59,6 +59,7 @@ _BESIDE = Slip(
     '\nMidAir_Tackle_Dive_High_Right_D1_v1,False,False,"-20.0000',
     '\nMidAir_Tackle_Dive_High_Right_D1_v1,False,False,"-25',
 )
+_INSIDE = Slip("tables/hit_mid_air.csv", "\nMidAir_Weak_Tackle_Dive_High_Left_D1_v1,", "\n@contested_catch,")
 _SCENES = {
     "sheet": Scene(
         "The editor: a table under its header, with the test row at its foot. Two rows are valid for it; in the others the cells "
@@ -110,6 +111,20 @@ _SCENES = {
         "Why a row is not valid: each condition with its fact, its cell, and the cell that would accept the fact too.",
         "hit_mid_air",
         ("f8", "down", "f12"),
+    ),
+    "actors": Scene(
+        "Actors for the role Defender, one a row: two who may be cast.",
+        "contested_catch",
+        (
+            *("alt+p", *typed("Ivy"), "tab", *typed("CB"), "tab", "t", "tab", "tab", "tab", "t", "enter"),
+            *(*typed("Bo"), "tab", *typed("LB"), "tab", "t", "enter", "home"),
+        ),
+    ),
+    "inside": Scene(
+        "A row that stands for another table: how many of that table's rows are valid for the test row.",
+        "hit_mid_air",
+        ("f8", "down", "down"),
+        before=(_INSIDE,),
     ),
     "options": Scene(
         "The settings of a table, and the condition of the column that the cursor was in.",

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from contextdb import bitmask
-from contextdb.cells import Accepted, Cell, format_cell
+from contextdb.cells import Accepted, Cell, TagSet, format_cell
 from contextdb.columns import TextColumn
 from contextdb.condition_column import ConditionColumn
 from contextdb.conditions import Condition
@@ -22,6 +22,7 @@ from contextdb.expressions import constant_truth
 from contextdb.expressions.boxes import Box, shared
 from contextdb.expressions.tokens import written_name, written_text
 from contextdb.findings import Finding
+from contextdb.nesting.flat import FlatTable
 from contextdb.table import Table
 from contextdb.when import Rule, WhenRules
 
@@ -50,7 +51,9 @@ class RuledTable:
             return report
         gaps = tuple(replace(gap, cells=self.cells(gap.cells), nearest=self._nearest(gap.nearest)) for gap in report.gaps)
         crowded = tuple(replace(crowd, cells=self.cells(crowd.cells)) for crowd in report.crowded)
-        return replace(report, gaps=gaps, crowded=crowded, findings=tuple(self.findings(report.findings)))
+        n_conditions = report.n_conditions - len(self.rules) - len(self.others)
+        findings = tuple(self.findings(report.findings))
+        return replace(report, gaps=gaps, crowded=crowded, findings=findings, n_conditions=n_conditions)
 
     def findings(self, findings: Iterable[Finding]) -> Iterator[Finding]:
         """Findings of rows; a row that is dead and has a rule may be so by its rule."""
@@ -124,13 +127,15 @@ class _Folder:
         self.columns[condition.name] = self._column(condition, ["True" if r in held else "Any" for r in range(self.table.n_rows)])
 
     def _fold(self, box: Box, rows: list[int]) -> bool:
-        """Narrow the cells of some rows to a box; False, and nothing is done, where one would hold nothing."""
+        """Narrow the cells of some rows to a box; False, and nothing is done, where one would hold nothing or cannot say it."""
         changed: dict[str, ConditionColumn] = {}
         for name, cell in box.items():
             column = self.columns[name]
             texts = column.texts.to_list()
             for code in {int(column.texts.codes[row]) for row in rows}:
                 old = column.cells[code]
+                if isinstance(old.accepts, TagSet) and old.accepts.is_complement:
+                    return False
                 accepts = _common(None if old.is_soft else old.accepts, cell.accepts)
                 if accepts is None or accepts.is_empty:
                     return False
@@ -158,7 +163,9 @@ class _Folder:
         plain = [c for c in table.columns if c.name not in self.columns]
         known = {**table.schema.conditions, **{c.condition.name: c.condition for c in table.conditions}, **self.new}
         enabled = table.settings.enabled
-        if self.never:
+        if isinstance(table, FlatTable):
+            table = replace(table, switched_off=self.never)
+        elif self.never:
             on = table.enabled & ~bitmask.unpack(bitmask.from_int(self.never, table.n_rows), table.n_rows)
             enabled = self._name("enabled")
             plain.append(TextColumn.of(enabled, map(str, on.tolist())))

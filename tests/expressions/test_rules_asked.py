@@ -183,3 +183,12 @@ def test_the_table_that_coverage_measures_is_valid_where_the_one_with_rules_is(c
     compiled = without.table.compile()
     for facts in moments:
         assert asked(compiled, facts, "never") == case.answer(facts, "never")
+
+
+def test_a_rule_on_tags_beside_a_cell_of_all_but_some_tags_is_measured_as_both():
+    columns = {"Asset": ["a", "b"], "tags": ["not Any", "not +InAir +Stun"], "When": ['"InAir" in tags', '"InAir" in tags']}
+    schema = {"tags": {"type": "tags", "values": ["InAir", "Stun"]}}
+    table = cdb.Table.from_columns(columns, schema, TableSettings("table", when="When"))
+    compiled = without_rules(table).table.compile()
+    asked_tags = [set(), {"InAir"}, {"Stun"}, {"InAir", "Stun"}]
+    assert [asked(compiled, {"tags": tags}, "never") for tags in asked_tags] == [[], [1], [], []]

@@ -23,6 +23,7 @@ and for a table with tables inside, D the depth, T the number of tables (`contex
     ways.TTT.FIELD         priorities, row_weights and lines of table number TTT
     CCC.layers             int32 [D, R]          which text each depth says
     CCC.said               uint8                 JSON list of those texts
+    when.layers, when.said                       the same for the rows' own rules
 
 The metadata hold `contextdb` (the version of this layout), `about` (JSON: name, policy, fallback, conditions and the kind of each
 column; where facts are derived also the conditions that they are computed from; where rows have rules also their column and the

@@ -9,6 +9,7 @@ NUMBER_TEXT = r"[+-]?(?:inf|(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)
 
 _NAME = re.compile(r"[\w.:/\-]+")
 _RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)
+_SLOT = re.compile(r'"((?:[^"]|"")*)"|[^\s,;|"]+')
 _TRUTH = {"true": True, "t": True, "yes": True, "1": True, "false": False, "f": False, "no": False, "0": False}
 
 
@@ -31,3 +32,8 @@ def quoted(text: str) -> str:
 def truth_of(text: str) -> bool | None:
     """True or False as people write it, or None."""
     return _TRUTH.get(text.strip().casefold())
+
+
+def slot_words(text: str) -> list[str]:
+    """The words of one cell of slots: apart by spaces, commas, semicolons or bars; a name with spaces in double quotes."""
+    return [m[1].replace('""', '"') if m[1] is not None else m[0] for m in _SLOT.finditer(text)]

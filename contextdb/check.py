@@ -49,9 +49,13 @@ def capped(findings: Iterable[Finding]) -> Iterator[Finding]:
         yield replace(finding, message=f"{finding.message} ({counts[kind] - MOST_ROWS:,} rows like this one are not listed.)")
 
 
-def _where(table: Table, row: int) -> str:
-    line = table.place(row).line
-    return f"row {row}" if line is None else f"line {line}"
+def where(table: Table, row: int, other: int) -> str:
+    """Where a row stands, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
+    place = table.place(row)
+    if place.line is None:
+        return f"row {row}"
+    is_inside = table.path is not None and {place.file, table.place(other).file} != {str(table.path)}
+    return f"line {place.line} of {place.file}" if is_inside else f"line {place.line}"
 
 
 def _whole_table(table: Table) -> Iterator[Finding]:
@@ -148,7 +152,7 @@ def _assets(table: Table) -> Iterator[Finding]:
                 yield _at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
         elif len(rows) > 1 and inner_name(asset) is None:
             for row in rows[1:]:
-                message = f"the asset {in_quotes(asset)} stands in {_where(table, rows[0])} too."
+                message = f"the asset {in_quotes(asset)} stands in {where(table, rows[0], row)} too."
                 yield _at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
 
 
@@ -163,7 +167,7 @@ def _identical(table: Table) -> Iterator[Finding]:
     origin = first[group.reshape(-1)]
     for row in np.flatnonzero(origin != np.arange(table.n_rows)).tolist():
         other = int(origin[row])
-        message = f"every condition is the same as in {_where(table, other)} ({in_quotes(table.assets[other])})."
+        message = f"every condition is the same as in {where(table, other, row)} ({in_quotes(table.assets[other])})."
         yield _at(table, row, "identical-rows", "warning", message, None, (other,))
 
 

@@ -181,6 +181,8 @@ class CompiledTable:
             from contextdb.casting.stage import query_with_actors
 
             return query_with_actors(self, context, actors, prefer, unknown)
+        if unknown != "error":
+            check_mode(unknown)
         try:
             return self._ask(context)
         except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
@@ -448,8 +450,10 @@ class CompiledTable:
         return (some_bits, every) if self.when is None else self.when.left_with_care(some_bits, every, facts, unknown)
 
     def _condition_named(self, name: str) -> Condition:
-        known = self.conditions[self.places[name]] if name in self.places else self.asked.get(name)
-        return known or next(c for c in self.ruled if c.name == name)
+        if name in self.places:
+            return self.conditions[self.places[name]]
+        derived = self.derivation.conditions if self.derivation else ()
+        return next(c for c in (*self.ruled, *derived) if c.name == name)
 
     def refuse_rules(self, why: str) -> None:
         """Raise ContextError for a table with rules."""

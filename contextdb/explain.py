@@ -21,17 +21,19 @@ from contextdb.bitmask import Rows
 from contextdb.cell_words import NUMBER_TEXT
 from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, format_cell, format_number, parse_cell, reads
 from contextdb.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
+from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
 from contextdb.domains import Domain
 from contextdb.errors import plural
 from contextdb.facts import Context, Fact, Unknown, describe
 from contextdb.mask_bits import bits_of
 from contextdb.matches import Matches
-from contextdb.when import told_facts
-from contextdb.when.rules import values_of
+from contextdb.when import WhenColumn, has_no_rule, told_facts
+from contextdb.when.rules import Rule, values_of
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
+    from contextdb.expressions import Expression
     from contextdb.nesting.ways import Step
     from contextdb.when import WhenRules
 
@@ -109,7 +111,7 @@ class Explanation:
         at = np.flatnonzero(self._fails[:, row]).tolist()
         failures = [failure for i in at for failure in self._failures(i, row)]
         if self.breaks_rule[row]:
-            failures.append(self._rule_failure(row))
+            failures += self._rule_failures(row)
         return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
 
     def asset(self, asset: str) -> list[RowExplanation]:
@@ -174,15 +176,13 @@ class Explanation:
     def _flags(self, bits: int) -> NDArray[np.bool_]:
         return bitmask.unpack(bitmask.from_int(bits, self.compiled.n_rows), self.compiled.n_rows)
 
-    def _rule_failure(self, row: int) -> Failure:
-        assert self.compiled.when is not None
-        return self._told_rule(self.compiled.when, row, self.facts)
+    @property
+    def _lenient(self) -> Unknown:
+        return "any" if self._unknown == "any" else "never"
 
-    def _told_rule(self, when: WhenRules, row: int, facts: Mapping[str, Fact]) -> Failure:
-        rule = when.rules[int(when.of_row[row])].expression
-        is_open = rule.run(values_of(facts, rule.conditions)) is None
-        told = f"{'open' if is_open else 'false'} with {told_facts(rule, facts)}"
-        return Failure(when.name, when.texts[row], told, "Any")
+    def _rule_failures(self, row: int) -> Iterator[Failure]:
+        for is_open, part in rules_that_fail(self.compiled, row, self.facts, self._lenient):
+            yield part.failure(f"{'open' if is_open else 'false'} with {told_facts(part.rule, self.facts)}")
 
     def _sorted(self, rows: Rows) -> Rows:
         return rows[np.lexsort((self._distances(rows), self.n_failures[rows]))]
@@ -216,6 +216,46 @@ def explain(compiled: CompiledTable, context: Context, unknown: Unknown = "error
     return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown))
 
 
+@dataclass(frozen=True, slots=True)
+class RulePart:
+    """A row's own rule; where tables stand in tables, that of one row of the way."""
+
+    column: str
+    text: str
+    rule: Expression
+    step: Step | None = None
+
+    def failure(self, fact: str) -> Failure:
+        """That it does not hold, with what is told of its facts."""
+        return Failure(self.column, self.text, fact, "Any", self.step)
+
+
+def rules_that_fail(
+    compiled: CompiledTable, row: int, facts: Mapping[str, Fact], unknown: Unknown
+) -> Iterator[tuple[bool, RulePart]]:
+    """The rules of a row that do not hold with some facts, and whether each is open; all of them where only together they do
+    not."""
+    parts = _rule_parts(compiled, row)
+    truths = [Rule(p.rule, 0).truths(values_of(facts, p.rule.conditions), facts)[0] for p in parts]
+    failing = [truth is False or (truth is None and unknown == "never") for truth in truths]
+    for truth, part, fails in zip(truths, parts, failing, strict=True):
+        if fails or not any(failing):
+            yield truth is None, part
+
+
+def _rule_parts(compiled: CompiledTable, row: int) -> list[RulePart]:
+    when, ways = compiled.when, compiled.ways
+    assert when is not None
+    whole = when.rules[int(when.of_row[row])].expression
+    if ways is None or ways.rules is None:
+        return [RulePart(when.name, when.texts[row], whole)]
+    steps = ways.steps(row)
+    said = [(steps[depth], text) for depth, text in ways.rules.said(row) if not has_no_rule(text)]
+    read = WhenColumn.read(TextColumn.of("", [text for _, text in said]), {c.name: c for c in whole.conditions})
+    rules = (read.rule(at) for at in range(len(said)))
+    return [RulePart(s.when or when.name, t, rule, s) for (s, t), rule in zip(said, rules, strict=True) if rule is not None]
+
+
 def cell_failures(compiled: CompiledTable, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
     """The cell of a row that does not accept a fact; where tables stand in tables, each cell that does not."""
     condition = compiled.conditions[at]
@@ -227,10 +267,8 @@ def cell_failures(compiled: CompiledTable, at: int, row: int, fact: Fact, told: 
     steps = compiled.ways.steps(row)
     said = [(steps[depth], text) for depth, text in layers.said(row)]
     failing = [(step, text) for step, text in said if not _lets_pass(text, fact, condition.domain)]
-    for step, text in failing:
+    for step, text in failing or said[1:]:  # where each holds some value of a set-valued fact, all but one must hold the set
         yield Failure(condition.name, text, told, mended(text, fact, condition.domain), step)
-    if not failing:  # each holds some value of a set-valued fact, and no value is in all of them
-        yield Failure(condition.name, compiled.texts[at][row], told, "Any", steps[-1])
 
 
 def _lets_pass(text: str, fact: Fact, domain: Domain) -> bool:

@@ -95,6 +95,17 @@ def test_a_set_of_values_of_an_actor_may_match_or_always_match():
     assert matches.always.tolist() == [2]
 
 
+def test_a_fact_of_another_role_is_not_taken_for_a_slip():
+    schema = {"Receiver.stance": {"type": "bool"}, "Defender.stances": {"type": "number"}}
+    columns = {"Asset Name": ["one"], "Receiver.stance": ["True"], "Defender.stances": ["Any"]}
+    actor = {"id": 1, "stance": True}
+    compiled = compiled_table(columns, schema)
+    matches = compiled.query({}, unknown="any", actors={"Receiver": [actor], "Defender": [actor]})
+    assert matches.casting(0) == {"Receiver": actor}
+    with pytest.raises(cdb.ContextError, match=r'Did you mean "Defender\.stances"'):
+        compiled.query({}, unknown="any", actors={"Defender": [{"id": 2, "stancess": 1.0}]})
+
+
 def test_the_command_line_casts_numbered_actors(tmp_path, monkeypatch, capsys):
     (tmp_path / "plays.csv").write_text("Asset Name,down,Defender.speed\none,1,3..\ntwo,Any,..5\n", encoding="utf-8")
     (tmp_path / "contextdb.toml").write_text('[conditions."Defender.speed"]\ntype = "number"\n', encoding="utf-8")
@@ -117,3 +128,26 @@ def test_a_derived_role_whose_inputs_stand_in_the_context_is_not_cast():
     compiled = compiled_table({"Asset Name": ["one"], "Defender.ground": ["5.."], "Receiver.speed": ["2.."]}, schema)
     matches = compiled.query({"Defender.speed": 8.0}, actors={"Receiver": [FAST]})
     assert matches.casting(0) == {"Receiver": FAST}
+
+
+@pytest.mark.parametrize("rule", ["is_open", "Receiver.speed > space", "Receiver.lead > 1"])
+def test_a_rule_over_facts_that_are_computed_from_computed_ones_is_asked_with_actors(rule: str):
+    schema = SCHEMA | {
+        "width": {"type": "number"},
+        "space": {"type": "number", "expr": "width - 2"},
+        "is_open": {"type": "bool", "expr": "space > 1 or is_wet"},
+        "is_wet": {"type": "bool"},
+        "Receiver.lead": {"type": "number", "expr": "Receiver.speed - space"},
+    }
+    columns = {"Asset Name": ["one"], "Receiver.speed": ["2.."], "When": [rule]}
+    compiled = cdb.Table.from_columns(columns, schema, TableSettings(name="table", when="When")).compile()
+    actors = {"Receiver": [FAST]}
+    wide, narrow = {"width": 2.0 if "lead" in rule else 4.0, "is_wet": False}, {"width": 99.0, "is_wet": False}
+    assert compiled.query(wide, actors=actors)
+    assert bool(compiled.query(narrow, actors=actors)) == (rule == "is_open")
+    if rule == "is_open":  # it is decided without the width
+        assert compiled.query({"is_wet": True}, actors=actors)
+        assert compiled.query({"is_wet": True, "Receiver.speed": 5.0})
+    else:
+        with pytest.raises(cdb.ContextError, match='"width"'):
+            compiled.query({"is_wet": True}, actors=actors)

@@ -378,12 +378,17 @@ def test_a_wrong_fact_is_told_even_where_missing_ones_are_no_error():
     assert '"Goin_Up" is not a declared value' in said_of({"state": "Goin_Up", "speed": ...}, "any")
 
 
-def test_an_unknown_treatment_of_missing_facts_is_told_when_it_is_needed():
+def test_an_unknown_treatment_of_missing_facts_is_told():
     assert said_of({"speed": ...}, "nevr") == (
         'there is no treatment "nevr" of missing facts. Accepted: "error", "any", "never". Did you mean "never"?'
     )
     with pytest.raises(ContextError, match='there is no treatment "nevr"'):
         compiled(DECLARED).live(COMPLETE, unknown="nevr")
+
+
+def test_a_misspelt_treatment_is_refused_even_where_no_fact_is_missing():
+    with pytest.raises(ContextError, match='Did you mean "never"'):
+        compiled(DECLARED).query(COMPLETE, unknown="nevr")
 
 
 def test_facts_that_no_condition_asks_for_are_passed_over():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -292,3 +293,50 @@ def test_the_report_is_the_same_to_the_byte_on_one_core_and_on_four(here: Path):
         reports.append(subprocess.run(command, env=os.environ | threads, stdout=subprocess.PIPE, check=True).stdout)
     assert json.loads(reports[0])["tables"][0]["telemetry"]["rows"] == 400
     assert reports[0] == reports[1]
+
+
+@pytest.fixture
+def ruled(tmp_path: Path) -> Path:
+    """A table of two conditions and rules, one of which no box of cells can tell."""
+    conditions = '[conditions.speed]\ntype = "number"\nmin = 0\nmax = 10\n[conditions.air]\ntype = "bool"\n'
+    more = '[conditions.gait]\ntype = "enum"\nvalues = ["Walk", "Run"]\n[tables.jog]\nwhen = "When"\n'
+    (tmp_path / "contextdb.toml").write_text(conditions + more)
+    rows = 'Asset,speed,air,When\nfar,6..,Any,"air or gait == ""Run"""\n' + "fast,3..5,False,not air or speed < 2\nslow,..1,True,\n"
+    (tmp_path / "jog.csv").write_text(rows)
+    return tmp_path / "jog.csv"
+
+
+def test_rules_of_rows_count_in_every_share_and_are_no_conditions_themselves(ruled: Path):
+    document = run("coverage", ruled, "--json").json["tables"][0]
+    assert document["conditions"] == 2 == run("check", ruled, "--json").json["tables"][0]["conditions"]
+    named = {name for pair in document["pairs"] for name in pair["cells"]}
+    assert named == {"speed", "air", "gait"}
+    said = run("coverage", ruled).out
+    assert "3 rows, 2 conditions" in said
+
+
+def test_a_gap_is_told_with_the_rule_of_the_nearest_row(ruled: Path):
+    gaps = run("coverage", ruled, "--json").json["tables"][0]["gaps"]["items"]
+    gap = next(g for g in gaps if "When" in g["cells"])
+    rule = ['air or gait == "Run"', "not air or speed < 2", "Any"][gap["nearest"]["row"]]
+    table = run("coverage", ruled, "--gap", gap["id"]).out.split("the gap\n")[1]
+    assert re.search(rf"^  When +{re.escape(rule)}  +{re.escape(gap['cells']['When'])}$", table, re.MULTILINE)
+
+
+def test_where_gaps_name_rules_the_list_says_that_it_is_by_volume(ruled: Path):
+    recorded = ruled.with_name("recorded.csv")
+    recorded.write_text("speed,air,gait\n2,False,Walk\n2,False,Walk\n9,False,Walk\n2,True,Walk\n")
+    found = run("coverage", ruled, "--telemetry", str(recorded))
+    gaps = run("coverage", ruled, "--telemetry", str(recorded), "--json").json["tables"][0]["gaps"]["items"]
+    moments = [gap["telemetry"] or 0.0 for gap in gaps]
+    assert moments != sorted(moments, reverse=True)
+    assert "; the largest first\n" in found.out
+
+
+def test_gaps_that_name_rules_which_were_written_anew_are_not_surely_new(ruled: Path):
+    baseline = str(ruled.with_name("before.json"))
+    assert run("coverage", ruled, "--format", "json", "-o", baseline).code == 0
+    ruled.write_text(ruled.read_text().replace("air or gait", "(air) or gait"))
+    change = run("coverage", ruled, "--baseline", baseline, "--json").json["tables"][0]["baseline"]
+    assert (change["drop"], change["complete"]) == (0.0, False)
+    assert "some may have been there" in " ".join(run("coverage", ruled, "--baseline", baseline).out.split())

@@ -198,6 +198,16 @@ def test_a_gap_that_neither_side_had_is_told_and_is_refused_only_when_strict(her
     assert run("merge", *put(base=base, **sides), "--strict").code == 1
 
 
+def test_a_meaning_that_cannot_be_looked_at_is_told_of_the_named_file_not_of_gits_own(here):
+    base = "Asset,speed\nwalk,0..5\nrun,5..9\n"
+    theirs = base.replace("run", "@elsewhere")
+    Path("moves.csv").write_text(base)
+    result = run("merge", *put(base=base, ours=base.replace("0..5", "1..5"), theirs=theirs), "--path", "moves.csv")
+    assert result.code == 0
+    assert "was not looked at: moves.csv, line 3, column" in result.err
+    assert "ours.csv" not in result.err
+
+
 def test_an_overlap_that_neither_side_had_is_told_where_the_policy_is_unique(here):
     (here / "contextdb.toml").write_text(PAIR.replace("POLICY", "unique"), encoding="utf-8")
     base = "A,speed\nslow,0..4\nfast,6..10\n"

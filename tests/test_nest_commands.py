@@ -16,6 +16,17 @@ from contextdb.nesting.flat import FlatTable
 # ---- commands
 
 
+def test_a_diff_of_a_row_that_stands_for_another_table_tells_what_that_does(tmp_path: Path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    write(tmp_path / "a", low="Asset,speed\nLow,..1\n")
+    write(tmp_path / "b", tackle=TACKLE.replace("@dive", "@low"), low="Asset,speed\nLow,..1\n")
+    found = run("diff", tmp_path / "a" / "tackle.csv", tmp_path / "b" / "tackle.csv", "--json").json
+    assert [(row["before"], row["after"]) for row in found["rows"]["renamed"]] == [("@dive", "@low")]
+    changed = {reach["asset"]: (reach["before"] > 0, reach["after"] > 0) for reach in found["effects"]["assets"]}
+    assert changed["tackle/dive/Left"] == (True, False)
+
+
 def test_a_folder_measures_an_inner_table_once_where_it_stands(tmp_path: Path):
     write(tmp_path)
     document = run("coverage", tmp_path, "--json").json
@@ -51,6 +62,29 @@ def test_a_diff_names_the_row_by_what_its_cell_says_and_measures_what_it_holds(t
     found = run("diff", tmp_path / "a" / "tackle.csv", tmp_path / "b" / "tackle.csv", "--json").json
     assert [c["asset"] for c in found["cells"]] == ["@dive"]
     assert {a["asset"] for a in found["effects"]["assets"]} == {"tackle/dive/Left", "tackle/dive/Right"}
+
+
+def test_coverage_says_in_which_file_a_row_of_an_inner_table_stands(tmp_path: Path):
+    dive = "Asset,Weight,speed\nLeft,1,..8\nTwin,1,..8\nSlow,1,4..6\n"
+    write(tmp_path, tackle="Asset,in_air,speed\nHit,False,..2\n@dive,True,3..\n", dive=dive)
+    said = run("coverage", tmp_path / "tackle.csv").out
+    assert "line 3 tackle/dive/Twin in dive.csv" in said
+    assert "nearest: line 2 Hit" in said
+    assert "Hit in" not in said
+    told = run("coverage", tmp_path / "tackle.csv", "--explain", "tackle/dive/Twin").out
+    assert told.startswith("line 3 tackle/dive/Twin in dive.csv of tackle (row 2)\n")
+    findings = run("coverage", tmp_path / "tackle.csv", "--json").json["tables"][0]["findings"]
+    assert f"line 2 of {tmp_path / 'dive.csv'} (" in next(f["message"] for f in findings if f["rule"] == "identical-rows")
+
+
+def test_rows_inside_a_row_whose_rule_never_holds_cover_nothing(tmp_path: Path):
+    tackle = "Asset,in_air,speed,When\nHit,False,Any,\n@dive,True,Any,in_air and speed > 10\n"
+    write(tmp_path, tackle=tackle)
+    toml = tmp_path / "contextdb.toml"
+    toml.write_text(toml.read_text().replace("[tables.tackle]", '[tables.tackle]\nwhen = "When"'))
+    table = run("coverage", tmp_path, "--json").json["tables"][0]
+    assert (table["covered"]["value"], table["hits"]) == (0.5, [0.5, 0.0, 0.0, 0.0])
+    assert [gap["cells"] for gap in table["gaps"]["items"]] == [{"in_air": "True"}]
 
 
 # ---- edits, watch, motion

@@ -144,6 +144,68 @@ def test_the_rules_of_both_rows_must_hold():
     assert [compiled.query({"speed": s}).leaves for s in (1.0, 3.0, 6.0)] == [["b"], ["a", "b"], []]
 
 
+@pytest.fixture(params=["in memory", "from its file"])
+def ruled(request, tmp_path: Path):
+    """A table with rules of its own inside one with rules, as it was compiled and as its artefact has it."""
+    schema = {"speed": {"type": "number"}, "Defender.x": {"type": "number"}, "Receiver.x": {"type": "number"}}
+    outer = {"Asset": ["@inner"], "If": ["speed < 5"]}
+    inner = {"Asset": ["a", "b"], "When": ["Defender.x < Receiver.x", ""]}
+    tables = {"inner": cdb.Table.from_columns(inner, schema, TableSettings("inner", when="When"), name="inner")}
+    compiled = cdb.Table.from_columns(outer, schema, TableSettings("outer", when="If"), name="outer").compile(tables)
+    compiled.save(tmp_path / "outer.safetensors")
+    return compiled if request.param == "in memory" else cdb.CompiledTable.open(tmp_path / "outer.safetensors")
+
+
+def failing_rules(explanation, row):
+    return [(f.condition, f.cell, f.fact, f.step.table) for f in explanation.row(row).failures]
+
+
+def test_rules_that_only_together_are_too_long_are_told_as_such():
+    schema, rule = {"speed": {"type": "number"}}, " or ".join(["speed > 1"] * 300)
+    tables = {"inner": cdb.Table.from_columns({"Asset": ["a"], "When": [rule]}, schema, TableSettings("inner", when="When"))}
+    outer = cdb.Table.from_columns({"Asset": ["@inner"], "When": [rule]}, schema, TableSettings("outer", when="When"))
+    with pytest.raises(cdb.TableError, match="rules of this row and of those that stand for its table, taken together"):
+        outer.compile(tables)
+
+
+def test_each_rule_that_does_not_hold_is_told_with_the_row_whose_rule_it_is(ruled):
+    near = {"Defender.x": 1.0, "Receiver.x": 2.0}
+    outside = ("If", "speed < 5", "false with speed = 9", "outer")
+    inside = ("When", "Defender.x < Receiver.x", "false with Defender.x = 3, Receiver.x = 2", "inner")
+    assert failing_rules(ruled.explain({"speed": 9.0} | near), 0) == [outside]
+    assert failing_rules(ruled.explain({"speed": 9.0} | near), 1) == [outside]
+    far = near | {"Defender.x": 3.0}
+    assert failing_rules(ruled.explain({"speed": 1.0} | far), 0) == [inside]
+    assert failing_rules(ruled.explain({"speed": 9.0} | far), 0) == [outside, inside]
+    is_open = ("When", "Defender.x < Receiver.x", "open with Defender.x = (missing), Receiver.x = (missing)", "inner")
+    assert failing_rules(ruled.explain({"speed": 9.0}, unknown="never"), 0) == [outside, is_open]
+    assert failing_rules(ruled.explain({"speed": 9.0}, unknown="any"), 0) == [outside]
+
+
+def test_a_rule_that_no_casting_meets_is_told_with_the_row_whose_rule_it_is(ruled):
+    actors = {"Defender": [{"x": 3.0}], "Receiver": [{"x": 2.0}]}
+    told = "false for every casting, such as "
+    inside = ("When", "Defender.x < Receiver.x", f"{told}Defender.x = 3, Receiver.x = 2", "inner")
+    assert failing_rules(ruled.explain({"speed": 1.0}, actors=actors), 0) == [inside]
+    assert failing_rules(ruled.explain({"speed": 9.0}, actors=actors), 0) == [
+        ("If", "speed < 5", f"{told}speed = 9", "outer"),
+        inside,
+    ]
+    assert failing_rules(ruled.explain({"speed": 9.0}, actors=actors), 1) == [("If", "speed < 5", "false with speed = 9", "outer")]
+
+
+def test_a_rule_that_is_false_for_every_value_of_a_set_is_told_as_false(ruled):
+    facts = {"speed": cdb.cell("6..9"), "Defender.x": 1.0, "Receiver.x": 2.0}
+    assert failing_rules(ruled.explain(facts), 1) == [("If", "speed < 5", "false with speed = 6..9", "outer")]
+
+
+def test_where_cells_of_a_way_each_take_a_part_of_a_set_the_inner_ones_are_to_be_changed():
+    outer, inner = {"Asset": ["@inner"], "speed": ["2.."]}, {"Asset": ["a"], "speed": ["..1"]}
+    compiled = nested(outer, inner)
+    [failure] = compiled.explain({"speed": cdb.cell("1..5")}).row(0).failures
+    assert (failure.cell, failure.mend, failure.step.table) == ("..1", "..5", "inner")
+
+
 def test_a_role_that_the_outer_row_needs_is_not_made_optional_inside():
     slots = ("Mandatory_Slots", "Optional_Slots")
     schema = {"Defender.Tall": {"type": "bool"}, "Receiver.Fast": {"type": "bool"}}
@@ -157,6 +219,19 @@ def test_a_role_that_the_outer_row_needs_is_not_made_optional_inside():
     assert not compiled.query({}, actors={"Defender": [tall], "Receiver": []})
     matches = compiled.query({}, actors={"Defender": [short, tall], "Receiver": [runner]})
     assert matches.casting(0) == {"Defender": tall, "Receiver": runner}
+
+
+@pytest.mark.parametrize("rule", ["Defender.Tall", "is_marked"])
+@pytest.mark.parametrize("slots", ["Defender", "Receiver,Defender", '"Defender" Embed'])
+def test_a_role_that_the_rule_of_an_inner_row_needs_is_not_made_optional_by_the_outer_row(rule: str, slots: str):
+    schema = {"Defender.Tall": {"type": "bool"}, "is_marked": {"type": "bool", "expr": "Defender.Tall"}}
+    inner = cdb.Table.from_columns({"Asset": ["a"], "When": [rule]}, schema, TableSettings("inner", when="When"))
+    settings = TableSettings("outer", outputs=("Optional_Slots",))
+    outer = cdb.Table.from_columns({"Asset": ["@inner"], "Optional_Slots": [slots]}, schema, settings)
+    compiled = outer.compile({"inner": inner})
+    assert not compiled.query({}, actors={"Defender": []})
+    assert not compiled.query({}, actors={"Defender": [{"id": 1, "Tall": False}]})
+    assert compiled.query({}, actors={"Defender": [{"id": 2, "Tall": True}]})
 
 
 def test_outputs_are_those_of_the_inner_row_else_of_the_outer_one():

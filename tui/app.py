@@ -97,6 +97,8 @@ class EditorApp(App[None]):
 
     async def _take(self, event: events.Event) -> None:
         is_typed = isinstance(event, (events.Key, events.Paste)) and not event.is_forwarded
+        if isinstance(event, events.Key) and event.key.startswith("alt+"):
+            event.character = None  # terminals send Esc and the letter, of which the letter would be typed into the cell
         await super().on_event(event)
         if is_typed and self._settling is None:
             self._settling = asyncio.create_task(self._settle())

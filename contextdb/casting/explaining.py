@@ -15,8 +15,9 @@ from contextdb.casting.assigning import Part
 from contextdb.casting.facts import Actors, Offer, Prefer
 from contextdb.casting.rules import CastRules
 from contextdb.casting.stage import CastMatches, Stage, set_stage
-from contextdb.explain import Explanation, Failure, RowExplanation, cell_failures, describe_fact
+from contextdb.explain import Explanation, Failure, RowExplanation, cell_failures, describe_fact, rules_that_fail
 from contextdb.facts import Context, Unknown
+from contextdb.when import told_facts
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
@@ -59,13 +60,15 @@ class CastExplanation(Explanation):
         rules = self.stage.rules
         return None if rules is None else replace(rules, unknown=self._lenient)
 
-    def _rule_failure(self, row: int) -> Failure:
-        when = self.compiled.when
-        assert when is not None
-        if self._cast_rules is not None and self._cast_rules.rows >> row & 1:
-            told = self._cast_rules.told(row, _most_filled(self.stage.parts(row)[0]))
-            return Failure(when.name, when.texts[row], f"false for every casting, such as {told}", "Any")
-        return self._told_rule(when, row, self.stage.rule_facts)
+    def _rule_failures(self, row: int) -> Iterator[Failure]:
+        rules = self._cast_rules
+        if rules is None or not rules.rows >> row & 1:
+            for is_open, part in rules_that_fail(self.compiled, row, self.stage.rule_facts, self._lenient):
+                yield part.failure(f"{'open' if is_open else 'false'} with {told_facts(part.rule, self.stage.rule_facts)}")
+            return
+        facts = rules.facts(row, _most_filled(self.stage.parts(row)[0]))
+        for _, part in rules_that_fail(self.compiled, row, facts, self._lenient):
+            yield part.failure(f"false for every casting, such as {told_facts(part.rule, facts)}")
 
     @cached_property
     def n_failures(self) -> NDArray[np.int64]:

@@ -182,7 +182,8 @@ class _Reader:
         derivation = self.compiled.derivation
         names = derivation.names if derivation is not None else frozenset()
         plain = [n for n in missing if n not in names]
-        extra = [n for n in given if n not in self.compiled.asked and n not in (f"{role}.id", f"{role}.name")]
+        of_some_role = {name.partition(".")[2] for name in self.compiled.asked}  # one actor may be offered for several roles
+        extra = [n for n in given if n.removeprefix(f"{role}.") not in of_some_role | {"id", "name"}]
         if slip := misspelt(plain, extra):
             raise slip
         if self.unknown == "error":

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING
 
 from contextdb import bitmask
+from contextdb.cell_words import slot_words
 
 if TYPE_CHECKING:
     from contextdb.columns import TextColumn
     from contextdb.compiled import CompiledTable
     from contextdb.conditions import Condition
-
-_WORDS = re.compile(r'"((?:[^"]|"")*)"|[^\s,;|"]+')
 
 
 class TableRoles:
@@ -77,8 +75,3 @@ def _slot_rows(column: TextColumn) -> dict[str, int]:
         for word in slot_words(text):
             found[word] = found.get(word, 0) | rows
     return found
-
-
-def slot_words(text: str) -> list[str]:
-    """The words of one cell of slots: apart by spaces, commas, semicolons or bars; a name with spaces in double quotes."""
-    return [m[1].replace('""', '"') if m[1] is not None else m[0] for m in _WORDS.finditer(text)]

@@ -18,7 +18,7 @@ from contextdb import bitmask
 from contextdb.casting.assigning import assignments
 from contextdb.casting.facts import Offer
 from contextdb.facts import Context, Fact, Unknown, read_fact
-from contextdb.when.rules import no_value, told_facts, values_of
+from contextdb.when.rules import no_value, values_of
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
@@ -61,10 +61,9 @@ class CastRules:
         number = int(self.when.of_row[row])
         return number not in self.roles or self._truths(number, cast)[0]
 
-    def told(self, row: int, cast: Cast) -> str:
-        """The facts of a row's rule with these actors."""
-        number = int(self.when.of_row[row])
-        return told_facts(self.when.rules[number].expression, self._facts(number, cast))
+    def facts(self, row: int, cast: Cast) -> dict[str, Fact]:
+        """The facts of a row's rule with these actors, in canonical form."""
+        return self._facts(int(self.when.of_row[row]), cast)
 
     def left(
         self, rows: int, offers: Mapping[str, Sequence[Offer]], required: Mapping[str, int], fits: Callable[[Offer], int], at: int

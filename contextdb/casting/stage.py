@@ -265,8 +265,17 @@ def set_stage(
 
 
 def _ruled_names(compiled: CompiledTable, roles: Roles) -> list[str]:
-    """The facts that rules need and that no actor tells; those derived from what actors tell are computed for each casting."""
-    return [name for name, named in compiled.roles.needed_by_rules.items() if named.isdisjoint(roles.names)]
+    """The facts that rules need and that no actor tells; of one derived from what actors tell, those that it is computed from."""
+    steps = compiled.derivation.steps if compiled.derivation is not None else ()
+    inputs = {step.condition.name: step.expression.names for step in steps}
+    waiting = [*compiled.when.names] if compiled.when is not None else []
+    found: dict[str, None] = {}
+    for name in waiting:
+        if compiled.roles.needed_by_rules[name].isdisjoint(roles.names):
+            found[name] = None
+        else:
+            waiting += [n for n in inputs.get(name, ()) if n not in waiting]
+    return list(found)
 
 
 def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles:

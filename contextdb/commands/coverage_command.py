@@ -31,6 +31,7 @@ from contextdb.nesting.flat import FlatTable
 from contextdb.places import table_path
 from contextdb.project import SCHEMA_FILE, Project, load_table
 from contextdb.report import coverage_formats
+from contextdb.report.results import as_path
 
 if TYPE_CHECKING:
     from contextdb.covering.baseline import Earlier
@@ -165,7 +166,17 @@ def measure(arguments: argparse.Namespace, table: Table) -> Measured:
         seen = coverage_telemetry.observed(arguments, table, report.gaps)
         compared = pairs(table, seed=arguments.seed, samples=min(arguments.samples, PAIR_SAMPLES))
     lines = tuple(table.place(row).line for row in range(table.n_rows))
-    return Measured(report, str(table.path) if table.path else None, tuple(table.assets), lines, compared, telemetry=seen)
+    file = str(table.path) if table.path else None
+    return Measured(report, file, tuple(table.assets), lines, compared, telemetry=seen, inside=_inside(table))
+
+
+def _inside(table: Table) -> dict[int, str]:
+    """For the rows that stand in other files than the table their files, from the table's folder."""
+    if table.path is None or not isinstance(table, FlatTable):
+        return {}
+    files = {row: table.place(row).file for row in range(table.n_rows)}
+    own, folder = str(table.path), table.path.parent
+    return {row: as_path(os.path.relpath(file, folder)) for row, file in files.items() if file is not None and file != own}
 
 
 @contextmanager

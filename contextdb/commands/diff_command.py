@@ -18,6 +18,7 @@ from contextdb.console import output, wants_colour
 from contextdb.diff import Diff, diff
 from contextdb.errors import ContextDBError, Fault
 from contextdb.exit_codes import ExitCode
+from contextdb.nesting.names import inner_name
 from contextdb.places import table_path
 from contextdb.project import load_table
 from contextdb.report.render_json import as_json
@@ -52,7 +53,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 def _may_matter(found: Diff) -> bool:
     """Whether more changed than how things are written and where they stand."""
     is_other_rows = found.rows_added or found.rows_removed or found.columns_added or found.columns_removed or found.columns_renamed
-    return bool(is_other_rows or found.n_changed)
+    names_tables = any(inner_name(text) is not None for row in found.rows_renamed for text in (row.before, row.after))
+    return bool(is_other_rows or found.n_changed or names_tables)
 
 
 def _effects(found: Diff) -> Effects | Fault:

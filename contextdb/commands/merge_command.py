@@ -77,7 +77,8 @@ def _tell_meaning(found: Merge, path: Path) -> bool:
 
     try:
         around = neighbours(path)
-        effects = merge_effects(*(replace(table, around=around) for table in (found.ours, found.theirs, found.table)))
+        sides = (found.ours, found.theirs, found.table)
+        effects = merge_effects(*(replace(table, around=around, path=path) for table in sides))
     except ContextDBError as error:
         print(printable(f"contextdb: the meaning of the merge was not looked at: {error.faults[0]}"), file=sys.stderr)
         return False

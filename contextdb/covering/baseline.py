@@ -72,7 +72,8 @@ class Change:
     dead: tuple[Finding, ...]
     """Rows that became dead, or are never chosen any more."""
     is_complete: bool
-    """Whether both reports list all their gaps; else a gap that was too small for the earlier list may seem new."""
+    """Whether both reports list all their gaps; else a gap that was too small for the earlier list may seem new, as may one that
+    names a rule which was written anew."""
 
     def to_json(self) -> dict[str, object]:
         """As plain data."""
@@ -139,7 +140,13 @@ def compared(ready: Opened, report: CoverageReport, earlier: Earlier) -> Change:
     ids_now, ids_before = {gap.id for gap in report.gaps}, {gap.id for gap in earlier.gaps}
     opened = (g for g, box in zip(report.gaps, now_boxes, strict=True) if g.id not in ids_before and not _is_in(box, held_before))
     closed = (g for g, box in zip(earlier.gaps, before_boxes, strict=True) if g.id not in ids_now and _is_closed(box, rows))
-    is_complete = report.gaps_complete and earlier.is_complete
+    listed = (
+        *zip((g.id for g in report.gaps), now_boxes, strict=True),
+        *zip((g.id for g in earlier.gaps), before_boxes, strict=True),
+    )
+    has_rules = ready.ruled is not None and ready.ruled.column is not None
+    is_told = not has_rules or all(box is not None for gap_id, box in listed if gap_id not in ids_now & ids_before)
+    is_complete = report.gaps_complete and earlier.is_complete and is_told
     dead = tuple(_newly_dead(report.findings, earlier.dead))
     return Change(earlier.lower, earlier.lower - report.lower, tuple(opened), tuple(closed), dead, is_complete)
 

@@ -4,6 +4,7 @@
     bad-assumption   an assumption that cannot be read
     always-any       a condition whose every cell is Any
     unused-condition a declared condition that no table uses
+    undecided-rows   rows that would have taken more work
 
 The others are those of `contextdb.covering.judge`. Shares are not worked out: that is what coverage is for.
 """
@@ -18,7 +19,7 @@ from contextdb.check import capped
 from contextdb.covering.assumed import opened
 from contextdb.covering.engine import finding_steps
 from contextdb.covering.judge import Judge
-from contextdb.errors import ContextDBError
+from contextdb.errors import ContextDBError, plural
 from contextdb.expressions import ExpressionError, assumptions_of, names_in
 from contextdb.findings import Finding
 from contextdb.nesting.flat import FlatTable
@@ -34,8 +35,8 @@ WORK = 4_000_000
 def check_rows(table: Table, work: int = WORK) -> list[Finding]:
     """What is wrong with the rows of a table that can be read, those of the whole table first; nothing where cells cannot be read.
 
-    The same table and work give the same findings. Rows that could not be decided within the work have none; of a rule
-    that many rows break the first are named, and how many more there are.
+    The same table and work give the same findings. Rows that could not be decided within the work have none, and one
+    finding counts them; of a rule that many rows break the first are named, and how many more there are.
     """
     if table.faults:
         return []
@@ -58,8 +59,19 @@ def _judged(table: Table, work: int) -> list[Finding]:
         return []
     judge = Judge(ready.space, ready.compiled, ready.table, finding_steps(work, len(ready.space.boxes)), drawer=ready.drawer)
     found = [finding for finding in judge.findings() if finding.rule != "identical-rows"]
+    undecided = judge.unsure - {finding.row for finding in found}
+    found = [*found, *([_undecided(table, len(undecided), ready.compiled.n_rows)] if undecided else [])]
     found = found if ready.ruled is None else list(ready.ruled.findings(found))
     return list(own_findings(ready.table, found)) if isinstance(ready.table, FlatTable) else found
+
+
+def _undecided(table: Table, n_undecided: int, n_rows: int) -> Finding:
+    file = str(table.path) if table.path else None
+    message = (
+        f"{n_undecided:,} of {plural(n_rows, 'row')} could not be decided within the work of a check, so others may make them "
+        "needless. To decide more: contextdb coverage, and its --work."
+    )
+    return Finding("undecided-rows", "info", message, table.name, file)
 
 
 def _always_any(table: Table) -> Iterator[Finding]:

@@ -150,15 +150,17 @@ class Drawer:
             codes[:, numbers[0]] = np.clip(np.searchsorted(lows, values, "right") - 1, 0, len(lows) - 1)
             return np.asarray(known, np.bool_)
         listed = column if isinstance(column, list) else column.to_list()
+        if domain.kind == "tags":
+            listed = [None if value is None else frozenset(value) for value in listed]
         for f in numbers:
-            codes[:, f] = [0 if value is None else _class_of(self.space.factors[f], value) for value in listed]
+            classes = {value: 0 if value is None else _class_of(self.space.factors[f], value) for value in set(listed)}
+            codes[:, f] = [classes[value] for value in listed]
         return np.array([value is not None for value in listed], np.bool_)
 
 
 def _class_of(factor: Factor, value: Any) -> int:
     if isinstance(factor, TagFactor):
-        tags = frozenset(value)
-        return factor.answers.index(sum(1 << i for i, named in enumerate(factor.tags) if covers(named, tags)))
+        return factor.answers.index(sum(1 << i for i, named in enumerate(factor.tags) if covers(named, value)))
     assert isinstance(factor, ValueFactor)
     return factor.values.index(value) if value in factor.values else len(factor.values)
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.check import check
+from contextdb.check import check, where
 from contextdb.compiled import CompiledTable
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
@@ -53,6 +53,10 @@ class Judge:
     """Tells which contexts can happen, where boxes cannot."""
     is_complete: bool = True
     """False when the steps ended before an answer."""
+    unsure: set[int] = field(default_factory=set)
+    """The rows of which some question had no answer."""
+    _asked_of: int | None = None
+    """The box that questions are about."""
     _held: dict[tuple[int, int], int] = field(default_factory=dict)
     _met: dict[tuple[int, int], int] = field(default_factory=dict)
 
@@ -90,6 +94,7 @@ class Judge:
         told = {f.row for f in self._identical}
         for i, box in enumerate(self.space.boxes):
             self.progress.at(i / len(self.space.boxes))
+            self._asked_of = i
             equal = self._equal[box]
             if self.space.impossible and not self._is_possible(box):
                 yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions rule out.")
@@ -97,20 +102,23 @@ class Judge:
             first = (equal & -equal).bit_length() - 1
             if first != i:
                 if self.space.rows[i] not in told:
-                    yield self._at(i, "equal-row", "warning", f"is valid in just the contexts of {self._named(first)}.", 1 << first)
+                    yield self._at(
+                        i, "equal-row", "warning", f"is valid in just the contexts of {self._named(first, i)}.", 1 << first
+                    )
                 continue
             yield from self._contained(i, box, equal)
 
     def _contained(self, i: int, box: Box, equal: int) -> Iterator[Finding]:
         other = self._first_holder(i, box, equal)
         if other is not None:
-            yield self._at(i, "subsumed-row", "warning", f"wherever it is valid, {self._named(other)} is valid too.", 1 << other)
+            yield self._at(i, "subsumed-row", "warning", f"wherever it is valid, {self._named(other, i)} is valid too.", 1 << other)
             return
         others = self._meeting(box) & ~equal
         if others & ~self._impossible and self._covered(box, others):
             causes = self._thinned(box, others) & ~self._impossible
-            message = f"wherever it is valid, one of {plural(causes.bit_count(), 'other row')} is valid too."
-            yield self._at(i, "redundant-row", "info", message, causes)
+            is_one = causes.bit_count() == 1
+            by = self._named(causes.bit_length() - 1, i) if is_one else f"one of {plural(causes.bit_count(), 'other row')}"
+            yield self._at(i, "redundant-row", "info", f"wherever it is valid, {by} is valid too.", causes)
 
     def _policy(self) -> Iterator[Finding]:
         ways = self.compiled.ways
@@ -120,6 +128,7 @@ class Judge:
         if not policies.isdisjoint(("first", "priority")):
             for i, box in enumerate(self.space.boxes):
                 self.progress.check()
+                self._asked_of = i
                 before = self._before(i) & self._meeting(box)
                 if before and self._covered(box, before | self._impossible) and self._is_possible(box):
                     why = "stands above it" if self.compiled.policy == "first" else "has a higher priority"
@@ -152,6 +161,7 @@ class Judge:
     def _overlapping(self) -> Iterator[Finding]:
         for i, box in enumerate(self.space.boxes):
             self.progress.check()
+            self._asked_of = i
             others, joint = 0, None
             for j in _bits(self._meeting(box) & ((1 << i) - 1)):
                 if self.compiled.ways and not self.compiled.ways.forbids_both(self.space.rows[i], self.space.rows[j]):
@@ -162,7 +172,7 @@ class Judge:
                     joint = joint or (j, shared)
             if joint:
                 cells = ", ".join(f"{name}: {cell}" for name, cell in self.space.cells(joint[1]).items()) or "every context"
-                message = f'the policy is "unique", and {self._named(joint[0])} can be valid at the same time: {cells}.'
+                message = f'the policy is "unique", and {self._named(joint[0], i)} can be valid at the same time: {cells}.'
                 yield self._at(i, "policy-overlap", "error", message, others)
 
     def _is_possible(self, box: Box) -> bool:
@@ -181,9 +191,16 @@ class Judge:
         try:
             answer = self.boxes.outside(by, box, steps) is None
         except OutOfSteps:
-            self.is_complete, answer = False, False
+            answer = False
+            self._leave_open()
         self.steps -= allowed - steps.left
         return answer
+
+    def _leave_open(self) -> None:
+        """Take down that a question has no answer."""
+        self.is_complete = False
+        if self._asked_of is not None:
+            self.unsure.add(self.space.rows[self._asked_of])
 
     @cached_property
     def _questions(self) -> Questions | None:
@@ -195,7 +212,8 @@ class Judge:
         self.progress.check()
         step = STEP + int(STEP_A_BOX * len(questions.boxes))
         is_held, is_certain, done = questions.are_held(box, by, allowed * step) if by and allowed else (False, not by, 0)
-        self.is_complete &= is_certain
+        if not is_certain:
+            self._leave_open()
         self.steps -= min(allowed, 1 + done // step)
         return is_held
 
@@ -236,10 +254,10 @@ class Judge:
         assert self._questions is not None
         return self._questions.holders(len(self.space.boxes))
 
-    def _named(self, i: int) -> str:
+    def _named(self, i: int, of: int) -> str:
         row = self.space.rows[i]
-        line = None if self.table is None else self.table.place(row).line
-        return f"{f'row {row}' if line is None else f'line {line}'} ({in_quotes(self.compiled.assets[row])})"
+        told = f"row {row}" if self.table is None else where(self.table, row, self.space.rows[of])
+        return f"{told} ({in_quotes(self.compiled.assets[row])})"
 
     def _at(self, i: int, rule: str, level: Level, message: str, by: int = 0) -> Finding:
         row = self.space.rows[i]

@@ -163,13 +163,16 @@ def pairs(
     """Work out the coverage of pairs of conditions.
 
     Exact where the contexts that cells tell apart are few enough to go through; else out of random contexts. That no row accepts
-    two parts is certain in either case. The arguments, and what is raised, are those of `coverage`.
+    two parts is certain in either case. Rows' own rules count, and stand in no pair themselves. The arguments, and what is raised,
+    are those of `coverage`.
     """
     require_counts(samples=samples, seed=seed)
     watcher = Progress(progress, should_stop).within("Comparing conditions", 0.0, 1.0)
     found = opened(table, impossible, weights, assume, watcher)
     space = found.space
-    parts = [parts_of(space, at) for at in range(len(space.conditions))]
+    rules = () if found.ruled is None else found.ruled.rules
+    shown = [at for at, condition in enumerate(space.conditions) if condition.name not in rules]
+    parts = [parts_of(space, at) for at in shown]
     sides = [sides for own in parts for _, sides in own]
     sampler = Sampler(space, watcher, found.drawer)
     every = sampler.every_context()
@@ -185,13 +188,13 @@ def pairs(
         method="exact" if is_exact else "estimate",
         seed=int(seed),
         n_samples=0 if is_exact else tally.n_contexts,
-        conditions=tuple(c.name for c in space.conditions),
+        conditions=tuple(space.conditions[at].name for at in shown),
         parts=tuple(tuple(text for text, _ in own) for own in parts),
         shares=tally.inside / tally.total if tally.total else tally.inside,
         covered=tally.valid / tally.total if tally.total else tally.valid,
         counts=np.zeros_like(tally.inside, np.int64) if is_exact else np.rint(tally.inside).astype(np.int64),
         meeting=_rows_in_both(space, sides, None, watcher),
-        naming=_rows_in_both(space, sides, [at for at, own in enumerate(parts) for _ in own], watcher),
+        naming=_rows_in_both(space, sides, [at for at, own in zip(shown, parts, strict=True) for _ in own], watcher),
     )
 
 

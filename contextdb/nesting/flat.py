@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contextdb import bitmask
 from contextdb.columns import TextColumn
 from contextdb.condition_column import ConditionColumn
 from contextdb.conditions import Condition
@@ -38,6 +39,8 @@ class FlatTable(Table):
     expansion: Expansion = NO_ROWS
     leaves: tuple[str, ...] = ()
     """The asset of each row without its path."""
+    switched_off: int = 0
+    """Rows that are not enabled whatever their tables say, as bits."""
 
     @cached_property
     def ways(self) -> Ways:
@@ -52,7 +55,9 @@ class FlatTable(Table):
 
     @cached_property
     def _plain(self) -> PlainColumns:
-        return _plain(self.expansion)
+        plain = _plain(self.expansion)
+        off = bitmask.unpack(bitmask.from_int(self.switched_off, self.n_rows), self.n_rows)
+        return replace(plain, enabled=plain.enabled & ~off)
 
     def place(self, row: int, column: str | None = None) -> Place:
         """Where the innermost row of a way stands; with a column, the innermost that has it."""
@@ -116,11 +121,16 @@ def flatten(table: Table, tables: Mapping[str, Table]) -> FlatTable:
         expansion=expansion,
         leaves=leaves,
     )
-    if flat.when is not None and (unread := [f.at(flat.place(row)) for row, f in flat.when.faulty_rows()]):
+    if flat.when is not None and (unread := [_together(f).at(flat.place(row)) for row, f in flat.when.faulty_rows()]):
         raise TableError(*unread)
     if isinstance(tables, Neighbours):
         tables.last = flat
     return flat
+
+
+def _together(fault: Fault) -> Fault:
+    """A fault of the rules of a way, each of which can be read alone."""
+    return replace(fault, found=f"the rules of this row and of those that stand for its table, taken together: {fault.found}")
 
 
 def _expansion(tables: Mapping[str, Table], last: FlatTable | None) -> Expansion:

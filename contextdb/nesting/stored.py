@@ -24,13 +24,20 @@ def ways_to_tensors(ways: Ways) -> Tensors:
             continue
         tensors[f"{at:03d}.layers"] = layers.codes
         tensors[f"{at:03d}.said"] = texts_to_array(list(layers.texts))
+    if ways.rules is not None:
+        tensors |= {"when.layers": ways.rules.codes, "when.said": texts_to_array(list(ways.rules.texts))}
     return tensors
 
 
 def ways_to_json(ways: Ways) -> list[dict[str, object]]:
     """What of each table is no array. Of its path only the file's name is kept: the folder is that of one machine."""
     files = [None if t.file is None else t.file.replace("\\", "/").rpartition("/")[2] for t in ways.tables]
-    return [{"name": t.name, "file": file, "policy": t.policy} for t, file in zip(ways.tables, files, strict=True)]
+    told: list[dict[str, object]] = []
+    for table, file in zip(ways.tables, files, strict=True):
+        told.append({"name": table.name, "file": file, "policy": table.policy})
+        if table.when is not None:
+            told[-1]["when"] = table.when
+    return told
 
 
 def ways_from(about: list[dict[str, Any]], tensors: Tensors, n_conditions: int) -> Ways:
@@ -38,11 +45,10 @@ def ways_from(about: list[dict[str, Any]], tensors: Tensors, n_conditions: int) 
     tables = []
     for at, table in enumerate(about):
         priorities, weights, lines = (tensors[f"ways.{at:03d}.{part}"] for part in ("priorities", "row_weights", "lines"))
-        tables.append(WayTable(table["name"], table["file"], table["policy"], priorities, weights, lines))
-    layers = (_layers(tensors, f"{at:03d}") for at in range(n_conditions))
-    return Ways(
-        tuple(tables), tensors["ways.numbers"], tensors["ways.rows"], texts_from_array(tensors["ways.leaves"]), tuple(layers)
-    )
+        tables.append(WayTable(table["name"], table["file"], table["policy"], priorities, weights, lines, None, table.get("when")))
+    layers = tuple(_layers(tensors, f"{at:03d}") for at in range(n_conditions))
+    leaves = texts_from_array(tensors["ways.leaves"])
+    return Ways(tuple(tables), tensors["ways.numbers"], tensors["ways.rows"], leaves, layers, _layers(tensors, "when"))
 
 
 def _layers(tensors: Tensors, prefix: str) -> Layers | None:

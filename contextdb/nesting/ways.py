@@ -35,6 +35,8 @@ class Step:
     row: int
     asset: str
     place: Place
+    when: str | None = None
+    """The table's column of rules."""
 
     def __str__(self) -> str:
         return str(self.place) if self.place.file else f'{self.place} of the table "{self.table}"'
@@ -53,12 +55,14 @@ class WayTable:
     lines: NDArray[np.int64] | None = None
     """The line of each row in its file, from 1, -1 where it has none: [R]. None where `table` tells it."""
     table: Table | None = None
+    when: str | None = None
+    """Its column of rules."""
 
     @classmethod
     def of(cls, name: str, table: Table) -> WayTable:
         """What is kept of a table."""
         file = str(table.path) if table.path else None
-        return cls(name, file, table.settings.policy, table.priorities, table.row_weights, None, table)
+        return cls(name, file, table.settings.policy, table.priorities, table.row_weights, None, table, table.settings.when)
 
     def place(self, row: int) -> Place:
         """Where a row stands."""
@@ -87,12 +91,16 @@ class Ways:
     """The asset of each row without its path."""
     layers: tuple[Layers | None, ...]
     """For each condition what the tables of the ways say; None for one that none of them has, but a rule."""
+    rules: Layers | None = None
+    """The same for the rows' own rules."""
 
     @classmethod
     def of(cls, expansion: Expansion, leaves: Sequence[str], layers: Sequence[Layers | None]) -> Ways:
         """The ways of a flat table."""
         tables = tuple(map(WayTable.of, expansion.names, expansion.tables))
-        return cls(tables, expansion.numbers, expansion.rows, leaves, tuple(layers))
+        whens = [(n, t.when.texts) for n, t in enumerate(expansion.tables) if t.when is not None and any(t.when.rules)]
+        rules = Layers.of(expansion, whens) if whens else None
+        return cls(tables, expansion.numbers, expansion.rows, leaves, tuple(layers), rules)
 
     def steps(self, row: int) -> tuple[Step, ...]:
         """The rows of a way, outermost first."""
@@ -146,4 +154,4 @@ class Ways:
 
     def _step(self, number: int, row: int, asset: str) -> Step:
         table = self.tables[number]
-        return Step(table.name, row, asset, table.place(row))
+        return Step(table.name, row, asset, table.place(row), table.when)

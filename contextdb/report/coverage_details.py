@@ -35,6 +35,7 @@ def _gap_lines(measured: Measured, gap: Gap, table: Table, width: int) -> Iterat
         yield from wrapped(printable(nearest_sentence(measured, gap)), width)
         names = [c.condition.name for c in table.conditions if c.condition.name in gap.cells]
         row = gap.nearest.row
+        names += [name for name in (table.settings.when,) if name is not None and name in gap.cells]
         rows = [(name, table.text(row, name) or "Any", gap.cells[name]) for name in names]
         yield ""
         yield from aligned([("condition", "its cell", "the gap"), *rows], indent="  ")

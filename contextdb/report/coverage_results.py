@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
@@ -52,6 +52,8 @@ class Measured:
     change: Change | None = None
     telemetry: Observed | None = None
     gates: tuple[Gate, ...] = ()
+    inside: Mapping[int, str] = field(default_factory=dict)
+    """For the rows of inner tables that stand in other files: the file, from the folder of the table."""
 
     @property
     def summary(self) -> TableSummary:
@@ -59,9 +61,10 @@ class Measured:
         return TableSummary(self.report.table, self.file, self.report.n_rows, self.report.n_conditions)
 
     def named(self, row: int) -> str:
-        """A row as people find it: its line, else its number, and its asset."""
+        """A row as people find it: its line, else its number, and its asset; of an inner table's row also the file."""
         line = self.lines[row]
-        return f"{f'row {row}' if line is None else f'line {line}'} {self.assets[row]}".rstrip()
+        file = f" in {self.inside[row]}" if row in self.inside else ""
+        return f"{f'row {row}' if line is None else f'line {line}'} {self.assets[row]}".rstrip() + file
 
     @property
     def seen_elsewhere(self) -> tuple[SeenGap, ...]:

@@ -46,7 +46,9 @@ def gaps_sentence(report: CoverageReport) -> str:
             return "No gap: every context has a valid row"
         return "No gap was found; that there is none is not proved"
     listed = "all of them" if report.gaps_complete else "there are more"
-    order = "those of most recorded moments first" if has_moments(report) else "the largest first"
+    moments = [gap.telemetry or 0.0 for gap in report.gaps]
+    is_by_moments = has_moments(report) and moments == sorted(moments, reverse=True)  # not where rules are part of the gaps
+    order = "those of most recorded moments first" if is_by_moments else "the largest first"
     return f"Contexts without a valid row: {plural(len(report.gaps), 'gap')}, {listed}; {order}"
 
 
@@ -99,7 +101,7 @@ def change_sentence(measured: Measured, change: Change) -> str:
     at_least = "" if measured.report.method == "exact" else "at least "
     now, before = told_apart(measured.report.lower, change.before)
     share = f"covered {at_least}{now}, before {before}" if change.drop else f"covered {at_least}{now}, as before"
-    sure = "" if change.is_complete else "; the lists are not complete, so some may have been there"
+    sure = "" if change.is_complete else "; not all gaps could be compared, so some may have been there"
     return f"{share}; {plural(len(change.opened), 'new gap')}, {len(change.closed):,} closed{sure}"
 
 

@@ -187,6 +187,11 @@ RULES: dict[str, Rule] = {
         "A rule is false in every context of the declared values and bounds, so its row never matches.",
         "Correct the rule, or widen `min`, `max` or `values` of its conditions. To switch a row off, use an `enabled` column.",
     ),
+    "undecided-rows": Rule(
+        "info",
+        "Some rows were not compared with all others, because that would have taken longer than a check may.",
+        "Nothing need be done; `contextdb coverage` compares with ten times the work, and with more by `--work`.",
+    ),
     "unused-condition": Rule(
         "info",
         "A condition is declared, and no table of the folder uses it.",

@@ -91,3 +91,25 @@ def test_of_a_rule_that_many_rows_break_the_first_are_named_and_how_many_more(mo
     found = [f for f in check_rows(table) if f.rule == "subsumed-row"]
     assert [f.row for f in found] == [1, 2, 3, 4]
     assert "(5 rows like this one are not listed.)" in found[-1].message
+
+
+def test_a_row_that_one_row_alone_makes_redundant_names_it(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text(f'{TOML}\n[tables.jog]\nwhen = "When"\n', encoding="utf-8")
+    rows = "Asset,speed,tired,When\nwide,Any,Any,tired or speed > 5\nin it,6..8,True,\n"
+    (tmp_path / "jog.csv").write_text(rows, encoding="utf-8")
+    told = [f.message for f in check_rows(cdb.load(tmp_path / "jog.csv")) if f.rule == "redundant-row"]
+    assert told == ['wherever it is valid, line 2 ("wide") is valid too.']
+
+
+def test_rows_that_the_work_does_not_decide_are_counted_in_one_finding_that_fails_nothing():
+    rng = random.Random(3)
+    names = [f"c{i}" for i in range(8)]
+    columns = {"Asset": [f"a{i}" for i in range(60)]}
+    columns |= {name: [rng.choice(["True", "False", "Any"]) for _ in range(60)] for name in names}
+    table = cdb.Table.from_columns(columns, {name: {"type": "bool"} for name in names})
+    found = check_rows(table, work=1)
+    assert [(f.rule, f.level, f.row) for f in found if f.rule == "undecided-rows"] == [("undecided-rows", "info", None)]
+    told = next(f.message for f in found if f.rule == "undecided-rows")
+    assert "of 60 rows" in told
+    assert "--work" in told
+    assert "undecided-rows" not in {f.rule for f in check_rows(table)}

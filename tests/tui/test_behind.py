@@ -163,3 +163,15 @@ def test_the_assets_behind_a_row_are_answered_in_its_place():
     assert list(query.answers()) == [("plain", False), ("low", False), ("high", True)]
     query.set("air", "False")
     assert [is_valid for _, is_valid in query.answers()] == [False, False, False]
+
+
+def test_rows_behind_rows_behind_a_row_are_counted_in_a_table_that_is_opened_alone(tmp_path):
+    (tmp_path / "outer.csv").write_text("Asset,speed\n@inner,Any\n")
+    (tmp_path / "inner.csv").write_text("Asset,speed\nroll,..3\n@deep,Any\n")
+    (tmp_path / "deep.csv").write_text("Asset,speed\na,1\nb,2\nc,7\n")
+    query = QueryRow(cdb.load(tmp_path / "outer.csv"))
+    query.load({"speed": "2"})
+    assert query.n_behind == (4, 2)
+    assert query.inside(0).text == "2 of 4 rows"
+    query.load({"speed": "7"})
+    assert query.n_behind == (4, 1)

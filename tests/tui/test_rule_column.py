@@ -69,3 +69,36 @@ def test_why_tells_the_rule_that_does_not_hold(path):
     screen = with_editor(path, script, (100, 24))
     assert "1 cell keeps it from that" in screen
     assert 'The row\'s own rule says "speed > 3"' in screen
+
+
+def test_a_rule_about_a_fact_that_no_column_asks_for_is_open_until_a_context_gives_it(path):
+    path.with_name("contextdb.toml").write_text(TOML + '[conditions.gait]\ntype = "enum"\nvalues = ["Walk", "Run"]\n')
+    path.write_text('Asset,speed,Rule\nrun,0..9,"gait == ""Run"""\nwalk,0..9,gait != \'Run\'\n')
+
+    async def script(app, pilot):
+        query = app.main.session.sheet.query
+        answers = [query.valid.tolist()]
+        for texts in ({"gait": "Run"}, {"gait": "Walk", "speed": "3"}, {"gait": "Swim"}, {}):
+            query.load(texts)
+            answers.append(query.valid.tolist())
+        query.load({"gait": "Run", "speed": "3"})
+        return answers, [row.asset for row in query.nearest()], screen_text(app)
+
+    answers, nearest, screen = with_editor(path, script)
+    assert answers == [[True, True], [True, False], [False, True], [True, True], [True, True]]
+    assert nearest == ["walk"]
+    assert "gait" in screen
+
+
+def test_a_rule_about_a_role_with_actors_leaves_the_row_to_them(path):
+    path.with_name("contextdb.toml").write_text(TOML + '[conditions."Defender.near"]\ntype = "bool"\n')
+    path.write_text("Asset,speed,Rule\nrun,0..9,Defender.near\nwalk,0..9,\n")
+
+    async def script(app, pilot):
+        query = app.main.session.sheet.query
+        query.offer({"Defender": [{"id": "Ivy", "near": False}]})
+        far = query.valid.tolist()
+        query.offer({"Defender": [{"id": "Ivy", "near": True}]})
+        return far, query.valid.tolist()
+
+    assert with_editor(path, script) == ([False, True], [True, True])

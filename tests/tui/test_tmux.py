@@ -148,3 +148,10 @@ def test_a_terminal_that_changes_its_size_while_the_editor_starts_and_later_is_f
         assert len(lines) == rows
     terminal.keys("Down")
     terminal.wait("row 2 · Asset")
+
+
+def test_alt_with_a_letter_is_a_command_and_types_nothing(terminal):
+    terminal.start("xterm-256color")
+    terminal.wait("clip_00", "F2 Edit")
+    terminal.keys("M-z")
+    assert "Enter Take" not in terminal.wait("the table as it was opened")

@@ -7,7 +7,7 @@ a cell that cannot be read takes away its own row only. Tables that come back to
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from contextdb.errors import ContextDBError, Fault, plural
@@ -84,7 +84,9 @@ class Behind:
 
     def _ask(self, table: Table, name: str, ask: Callable[[Table], Counted]) -> Inside:
         try:
-            asked = self._asked[name] = ask((table.around or {})[name])
+            inner = (table.around or {})[name]
+            inner = inner if inner.around is not None else replace(inner, around=table.around)
+            asked = self._asked[name] = ask(inner)
             n_rows, n_valid = asked.n_behind
         except ContextDBError as error:
             return Inside(name, fault=error.faults[0])

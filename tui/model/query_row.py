@@ -24,6 +24,7 @@ from contextdb.cells import Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled import CompiledTable
 from contextdb.condition_column import ConditionColumn
+from contextdb.conditions import Condition
 from contextdb.errors import ContextError, Fault
 from contextdb.explain import Explanation, Failure, RowExplanation
 from contextdb.facts import Fact, read_fact_text
@@ -81,6 +82,7 @@ class QueryRow:
     def set(self, condition: str, text: str) -> Fault | None:
         """Write one fact; an empty text leaves it out. Gives what is wrong with it."""
         self.texts[condition] = text
+        self._changed()
         if condition in self._columns:
             self._answer(condition)
         return self.faults.get(condition)
@@ -175,11 +177,23 @@ class QueryRow:
             rules = self._rules_of(column)
             self._rules_left = everything
             if column is not None and rules is not None:
-                facts = {name: fact for name, fact in self.facts.items() if self.role_of(name) is None}
+                facts = self._facts_of(rules)
                 unreadable = np.isin(column.texts.codes, list(column.faults))
                 left = rules.left_with_care(everything, everything, facts, "any")[0]
                 self._rules_left = left & ~bitmask.to_int(bitmask.pack(unreadable))
         return self._rules_left
+
+    def _facts_of(self, rules: WhenRules) -> dict[str, Fact]:
+        """The facts that rules name, also those that no column asks for; None where one is not given, or is the actors'."""
+        return {c.name: None if self.role_of(c.name) is not None else self._fact(c) for c in rules.conditions}
+
+    def _fact(self, condition: Condition) -> Fact:
+        if condition.name in self._columns:
+            return self.facts.get(condition.name)
+        try:
+            return read_fact_text(self.texts.get(condition.name, ""), condition)
+        except ContextError:
+            return None
 
     def _rules_of(self, column: WhenColumn | None) -> WhenRules | None:
         """The rules compiled; those of a column that is the same as before are not compiled again."""
@@ -267,7 +281,9 @@ class QueryRow:
 
     def _explained(self) -> Explanation:
         compiled = replace(CompiledTable.of(self._table), derivation=None)  # here a derived fact is given like any other
-        return compiled.explain({name: fact for name, fact in self.facts.items() if fact is not None}, unknown="any")
+        rules = self._rules_of(self._table.when)
+        facts = {**({} if rules is None else self._facts_of(rules)), **self.facts}
+        return compiled.explain({name: fact for name, fact in facts.items() if fact is not None}, unknown="any")
 
     def _changed(self) -> None:
         """Something else is asked, or of another table."""

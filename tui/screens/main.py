@@ -394,7 +394,7 @@ class MainScreen(Screen[None]):
         elif session.problem is not None:
             self.say(str(session.problem), "warning")
         elif self.came_from:
-            self.say(f"The table that a row of {self.came_from} stands for. Alt+B goes back.")
+            self.say(f"The table that a row of {self.came_from} stands for. Alt+Up goes back.")
             self.assets.grid.test_name = self.came_from if not session.sheet.query.is_empty else ""
         elif why := session.why_read_only:
             self.say(f"This table can be read, not saved: {why}.", "warning")

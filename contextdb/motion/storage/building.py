@@ -74,7 +74,8 @@ def build(
     folder : path
         That of contextdb.toml, where the paths of the settings begin.
     assets : mapping of str to collection of str, optional
-        For a table's name the assets in it: a database of that table holds the clips of these alone. Default: all clips.
+        For a table's name the assets in it (`CompiledTable.leaves`: without paths): a database of that table holds the clips of
+        these alone. Default: all clips.
     progress : function of (done, total, clip name), optional
     names : collection of str, optional
         Which databases to give. Default: all.

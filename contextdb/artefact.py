@@ -70,6 +70,7 @@ def save(compiled: CompiledTable, path: Path) -> None:
         "priorities": compiled.priorities,
         "row_weights": compiled.row_weights,
         "assets": texts_to_array(list(compiled.assets)),
+        "declared": texts_to_array(sorted(compiled.declared)),
     }
     kinds = []
     for at, (masks, soft, texts) in enumerate(zip(compiled.masks, compiled.soft, compiled.texts, strict=True)):
@@ -147,6 +148,7 @@ def _table(about: dict[str, Any], tensors: Tensors) -> CompiledTable:
         slots=_slots(about, tensors),
         when=_when(about, conditions, tensors),
         ways=ways_from(about["ways"], tensors, len(conditions)) if "ways" in about else None,
+        declared=frozenset(texts_from_array(tensors["declared"]) if "declared" in tensors else ()),
     )
 
 

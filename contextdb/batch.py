@@ -226,7 +226,7 @@ def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "
         columns = compiled.derivation.complete_frame(columns, n_contexts)
     absent = [n for n in compiled.asked if n not in columns]
     extra = [n for n in columns if n not in compiled.asked and n not in compiled.places] if absent else []
-    if absent and (error := misspelt(absent, extra)) is not None:
+    if absent and (error := misspelt(absent, [n for n in extra if n not in compiled.declared])) is not None:
         raise error
     needed = {*compiled.places, *(c.name for c in compiled.ruled)}
     if unknown == "error" and (plain := [n for n in absent if n in needed]):

@@ -86,6 +86,8 @@ class CompiledTable:
     """The rows' own rules; None where no row has one."""
     ways: Ways | None = None
     """The way of each row through tables inside tables; None for a table without."""
+    declared: frozenset[str] = frozenset()
+    """Conditions that the project declares: facts of these names are of other tables, and no slips."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -111,6 +113,7 @@ class CompiledTable:
             slots=tuple(c for c in table.columns if c.name in SLOT_COLUMNS and c.name in table.settings.outputs),
             when=when,
             ways=getattr(table, "ways", None),
+            declared=frozenset(table.schema.conditions),
         )
 
     @property
@@ -357,7 +360,7 @@ class CompiledTable:
             if derivation is not None and name in derivation.names:
                 plain += [n for n in derivation.lacking(name, context) if n not in plain]
         extra = [name for name in context if name not in self.asked]
-        if slip := misspelt(plain, extra):
+        if slip := misspelt(plain, [name for name in extra if name not in self.declared]):
             raise slip
         if unknown == "error" and derivation is not None and not plain:
             raise derivation.no_value(missing[0], context)

@@ -18,6 +18,7 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
+import contextdb as cdb
 from contextdb import batch, bitmask, kernels
 from contextdb.classes import FLAT_BYTES, NumberMasks, WideMasks
 from contextdb.compiled import CompiledTable
@@ -443,3 +444,19 @@ def test_wrong_codes_are_refused(engine, flat_bytes, change, message):
         assert table.query_codes(codes).assets == ["A0"]
         with pytest.raises(ContextError, match=message):
             table.query_codes(change(codes))
+
+
+@pytest.mark.parametrize("unknown", ["any", "never"])
+def test_a_declared_fact_of_another_table_is_no_slip_for_a_missing_one(unknown, tmp_path):
+    schema = {name: {"type": "bool"} for name in ("Defender.Catching", "Defender.CatchingAnim")}
+    table = cdb.Table.from_columns({"Asset": ["a"], "Defender.Catching": ["True"]}, schema).compile()
+    table.save(tmp_path / "table.safetensors")
+    facts = {"Defender.CatchingAnim": True}
+    for asked in (table, cdb.CompiledTable.open(tmp_path / "table.safetensors")):
+        rows = [0] if unknown == "any" else []
+        assert list(asked.query(facts, unknown)) == rows
+        assert asked.query_many({name: [value] for name, value in facts.items()}, unknown).counts.tolist() == [len(rows)]
+        actors = {"Defender": [{"CatchingAnim": True}]}
+        assert list(asked.query({}, unknown, actors=actors)) == rows
+        with pytest.raises(ContextError, match=r'Did you mean "Defender\.Catching"'):
+            asked.query({"Defender.Catchin": True}, unknown)

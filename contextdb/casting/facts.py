@@ -184,7 +184,8 @@ class _Reader:
         plain = [n for n in missing if n not in names]
         of_some_role = {name.partition(".")[2] for name in self.compiled.asked}  # one actor may be offered for several roles
         extra = [n for n in given if n.removeprefix(f"{role}.") not in of_some_role | {"id", "name"}]
-        if slip := misspelt(plain, extra):
+        declared = self.compiled.declared
+        if slip := misspelt(plain, [n for n in extra if n not in declared and f"{role}.{n}" not in declared]):
             raise slip
         if self.unknown == "error":
             if plain or derivation is None:

@@ -134,6 +134,7 @@ def uncovered(part, depth, n_listed, weights, salts, table, scratch, known, stat
 
 @njit(**options)
 def count_bits(words, n_words):
+    """How many bits are set."""
     n = 0
     for w in range(n_words):
         n += n_bits(words[w])

@@ -180,7 +180,7 @@ class ShownTable:
         said = [f"{role}: {actor}" for role, actor in self.query.casting(row).items()]
         if (inside := self.query.inside(row)) is not None:
             fault = inside.fault.found.rstrip(".") if inside.fault is not None else ""
-            said.append(fault or f"▸ {inside.text}{'' if inside.n_valid is None else ' valid'}")
+            said.append(fault or f"▸ {inside.text}{'' if inside.n_valid is None else ' valid'} · Alt+O goes in")
         return " · ".join(said)
 
     def is_filled(self, row: int, column: int) -> bool:

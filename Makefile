@@ -20,7 +20,7 @@ INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
 .DEFAULT_GOAL := help
 # A set-up that failed half-way is done again from its start.
 .DELETE_ON_ERROR:
-.PHONY: help demo test check format docs bench clean
+.PHONY: help demo test check format docs bench fuzz clean
 
 help:
 	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
@@ -28,6 +28,7 @@ help:
 	@$(info make check    formatting, lint, types and import contracts)
 	@$(info make format   format the code and mend what lint can mend)
 	@$(info make docs     run the commands of README.md and docs/ and write down what they print now)
+	@$(info make fuzz     damage files at random for SECONDS=60 and read them; SEED=1 tries the same ones again)
 	@$(info make bench    measure against other engines)
 	@$(info make clean    remove what was made, .venv too)
 	@cd .
@@ -52,6 +53,9 @@ docs: $(VENV)/.dev
 	$(PY) tests/test_docs.py --update
 	$(PY) docs/keys.py
 	$(PY) docs/pictures.py
+
+fuzz: $(VENV)/.dev
+	$(PY) tests/fuzz.py --seconds $(or $(SECONDS),60) $(if $(SEED),--seed $(SEED))
 
 bench: $(VENV)/.bench
 	$(PY) benchmarks/query.py

@@ -255,11 +255,18 @@ def _condition_to_json(condition: Condition) -> dict[str, object]:
         "description": condition.description,
         "expr": condition.expr,
         "is_declared": condition.is_declared,
-    }
+    } | ({} if condition.mirror is None else {"mirror": condition.mirror})
 
 
 def _condition_from_json(about: dict[str, Any]) -> Condition:
     low, high = about["bounds"]
     values = None if about["values"] is None else tuple(about["values"])
     domain = Domain(about["type"], values, -math.inf if low is None else low, math.inf if high is None else high)
-    return Condition(about["name"], domain, about["unit"], about["description"], about["expr"], about["is_declared"])
+    return Condition(
+        about["name"], domain, about["unit"], about["description"], about["expr"], about["is_declared"], _mirror(about)
+    )
+
+
+def _mirror(about: dict[str, Any]) -> Any:
+    mirror = about.get("mirror")
+    return tuple((left, right) for left, right in mirror) if isinstance(mirror, list) else mirror

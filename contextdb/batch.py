@@ -9,29 +9,45 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.batch_columns import Codes, Contexts, common_length, facts_of, plain_numbers, plain_values, wrapped
-from contextdb.bitmask import Rows, Words
+from contextdb.arguments import require_place
+from contextdb.batch_columns import (
+    Codes,
+    Contexts,
+    common_length,
+    facts_of,
+    kept_columns,
+    listed,
+    mirrored_columns,
+    plain_numbers,
+    plain_values,
+    wrapped,
+)
+from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells import Cell
 from contextdb.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.facts import Unknown, check_mode, missing_error, misspelt, read_fact
 from contextdb.matches import Matches
+from contextdb.mirroring import in_mirror
+from contextdb.unchanging import Unchanging
 from contextdb.when import ManyRules
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
+
+Answer = TypeVar("Answer", bound=Matches)
 
 NUMPY_BLOCK = 2048
 RULED_WORDS = 1 << 21
@@ -64,6 +80,18 @@ class Numbers:
 
 
 @dataclass(frozen=True, eq=False)
+class KeptFacts:
+    """The facts of many contexts as they were given, which the caller cannot change any more."""
+
+    columns: Mapping[str, Any]
+    unknown: Unknown
+
+    def of_context(self, context: int) -> dict[str, object]:
+        """The facts of one context."""
+        return {name: column[context] for name, column in self.columns.items()}
+
+
+@dataclass(frozen=True, eq=False)
 class Values:
     """The facts that are no numbers, as classes int32 [value slots, N], -1 where missing.
 
@@ -76,9 +104,32 @@ class Values:
     absent: NDArray[np.int64]
 
 
+class Answers(Sequence[Answer]):
+    """The answers of many contexts: what answers with actors and without have in common."""
+
+    __slots__ = ()
+
+    @overload
+    def __getitem__(self, context: int) -> Answer: ...
+
+    @overload
+    def __getitem__(self, context: slice) -> list[Answer]: ...
+
+    def __getitem__(self, context: int | slice) -> Answer | list[Answer]:
+        """The answer of one context, as `query` gives it, or those of a slice; NoSuchPlace, an IndexError too, where none is."""
+        if isinstance(context, slice):
+            return [self._answer(i) for i in range(*context.indices(len(self)))]
+        return self._answer(require_place(context, len(self), "context"))
+
+    @abstractmethod
+    def _answer(self, context: int) -> Answer:
+        """The answer of a context by its number, from 0."""
+
+
 @dataclass(frozen=True, eq=False)
-class ManyMatches:
-    """The valid rows of many contexts. What is asked for is worked out then, and kept."""
+class ManyMatches(Unchanging, Answers[Matches]):
+    """The valid rows of many contexts: a sequence of `Matches`. What is asked for is worked out then, and kept; arrays are
+    read-only."""
 
     compiled: CompiledTable
     n_contexts: int
@@ -86,6 +137,22 @@ class ManyMatches:
     numbers: Numbers
     rules: ManyRules | None = None
     """The rows' own rules, with their facts; None for a table without."""
+    kept: KeptFacts | None = None
+    """The facts that soft cells cost with, and that are asked in a mirror; None for a table that needs them for neither."""
+
+    @property
+    def mirrored(self) -> ManyMatches:
+        """The valid rows of the same contexts as a mirror shows them; see `Matches.mirrored`. The same object where no fact of the
+        table changes in a mirror."""
+        return self._mirrored if self.compiled.mirroring else self
+
+    @cached_property
+    def _mirrored(self) -> ManyMatches:
+        assert self.kept is not None
+        try:
+            return query_many(self.compiled, mirrored_columns(self.kept.columns, self.compiled.mirroring), self.kept.unknown)
+        except ContextError as error:
+            raise in_mirror(error) from None
 
     @property
     def counts(self) -> Rows:
@@ -101,7 +168,7 @@ class ManyMatches:
     def codes(self) -> Codes:
         """The codes of every context, as `CompiledTable.encode` gives them for one: int32 [N, P]."""
         self.compiled.refuse_rules("codes do not keep the facts that they need")
-        return self._codes
+        return read_only(self._codes.view())
 
     @cached_property
     def _codes(self) -> Codes:
@@ -118,7 +185,7 @@ class ManyMatches:
     @cached_property
     def mask(self) -> Words:
         """The rows of each context as bits: uint64 [N, W]."""
-        return self._masks(0, self.n_contexts)
+        return read_only(self._masks(0, self.n_contexts))
 
     def lists(self) -> list[Rows]:
         """The row numbers of each context: a list of int64 arrays."""
@@ -126,11 +193,30 @@ class ManyMatches:
         for start in range(0, self.n_contexts, NUMPY_BLOCK):
             flags = bitmask.unpack(self._masks(start, start + NUMPY_BLOCK), self.compiled.n_rows)
             contexts, rows = np.nonzero(flags)
-            found += np.split(rows, np.searchsorted(contexts, np.arange(1, len(flags))))
+            found += np.split(read_only(rows), np.searchsorted(contexts, np.arange(1, len(flags))))
         return found
 
     def __len__(self) -> int:
         return self.n_contexts
+
+    def __iter__(self) -> Iterator[Matches]:
+        for start in range(0, self.n_contexts, NUMPY_BLOCK):
+            for context, mask in enumerate(self._masks(start, start + NUMPY_BLOCK), start):
+                yield self._matches(context, mask)
+
+    def _answer(self, context: int) -> Matches:
+        mask = self.__dict__["mask"][context] if "mask" in self.__dict__ else self._masks(context, context + 1)[0]
+        return self._matches(context, mask)
+
+    def _matches(self, context: int, mask: Words) -> Matches:
+        matches, kept = self.compiled.matches(bitmask.to_int(mask)), self.kept
+        if kept is None:
+            return matches
+        if self.compiled.mirroring:
+            matches.with_mirrored(lambda: self.mirrored[context])
+        if self.compiled.is_soft:
+            matches.with_penalties(lambda: self.compiled.penalties(kept.of_context(context), kept.unknown))
+        return matches
 
     @property
     def _work(self) -> int:
@@ -147,7 +233,7 @@ class ManyMatches:
             masks = self._masks(start, start + block)
             counts[start : start + len(masks)] = bitmask.count(masks)
             hits += np.bincount(bitmask.places(masks)[1], minlength=self.compiled.n_rows)
-        return counts, hits
+        return read_only(counts), read_only(hits)
 
     def _with_kernels(self, kernels: ModuleType) -> tuple[Rows, Rows]:
         stack, numbers = self.compiled.stack, self.numbers
@@ -168,7 +254,7 @@ class ManyMatches:
         else:
             with ThreadPoolExecutor(n_threads) as pool:
                 list(pool.map(part, range(n_threads)))
-        return counts, hits.sum(axis=0)[: self.compiled.n_rows]
+        return read_only(counts), read_only(hits.sum(axis=0)[: self.compiled.n_rows])
 
     def _masks(self, start: int, stop: int) -> Words:
         """The rows of some contexts as bits, by their cells and their rules."""
@@ -207,6 +293,8 @@ def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
         told = f"shape {given.shape}" if given.dtype.kind in "iu" else f"type {given.dtype}"
         raise ContextError(Fault(f"the codes have {told}.", f"({stack.n_codes},), as encode gives them"))
     given = np.clip(given, -2, 2**31 - 1).astype(np.int32) if given.dtype != np.int32 else np.ascontiguousarray(given)
+    if not given.flags.writeable:
+        given = given.copy()  # for arrays that are read-only the kernels would be compiled once more
     mask = np.empty(len(compiled.enabled), np.uint64)
     if kernels := load_kernels():
         is_right = kernels.query(stack.masks, given, stack.n_plain, stack.wide, compiled.enabled, mask)
@@ -220,7 +308,7 @@ def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
 def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "error") -> ManyMatches:
     """Encode the columns of many contexts; see `CompiledTable.query_many`."""
     check_mode(unknown)
-    columns = facts_of(contexts)
+    columns = given = facts_of(contexts)
     n_contexts = common_length(columns)
     if compiled.derivation is not None:
         columns = compiled.derivation.complete_frame(columns, n_contexts)
@@ -231,7 +319,8 @@ def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "
     needed = {*compiled.places, *(c.name for c in compiled.ruled)}
     if unknown == "error" and (plain := [n for n in absent if n in needed]):
         raise missing_error(plain, extra)
-    return _Encoder(compiled, n_contexts, unknown).encode(columns)
+    many = _Encoder(compiled, n_contexts, unknown).encode(columns)
+    return many if not compiled.is_bound else replace(many, kept=KeptFacts(kept_columns(given, compiled.asked), unknown))
 
 
 class _Encoder:
@@ -328,12 +417,9 @@ class _Encoder:
     def _read_each(self, at: int, given: Any) -> list[Any]:
         """Every fact in canonical form; each distinct one is read once."""
         condition = self.compiled.conditions[at]
-        listed = (
-            given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
-        )
         known: dict[object, Any] = {}
         facts = []
-        for row, value in enumerate(listed):
+        for row, value in enumerate(listed(given)):
             key = (type(value), tuple(value)) if isinstance(value, (list, set, tuple)) else (type(value), value)
             try:
                 if key not in known:
@@ -342,7 +428,8 @@ class _Encoder:
                 raise _in_context(error, row, condition.name, value) from None
             if isinstance(known[key], Cell):
                 place = Place(row=row, column=condition.name)
-                raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context", place=place))
+                mend = "to ask for these contexts one by one: query(facts)"
+                raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context", mend, place))
             facts.append(known[key])
         return facts
 

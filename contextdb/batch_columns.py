@@ -10,7 +10,11 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.classes import ValueMasks
+from contextdb.conditions import Condition
+from contextdb.domains import NUMERIC
 from contextdb.errors import ContextError, Fault, Place
+from contextdb.facts import read_fact
+from contextdb.mirroring import kept_fact, mirrored_fact
 
 Contexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
 Codes = NDArray[np.int32]
@@ -60,6 +64,38 @@ def wrapped(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
         return degrees
     rest = np.fmod(degrees, 360.0)
     return np.where(rest >= 180.0, rest - 360.0, np.where(rest < -180.0, rest + 360.0, rest))
+
+
+def listed(given: Any) -> list[Any]:
+    """A column as a list of Python's own values."""
+    return given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
+
+
+def kept_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condition]) -> dict[str, Any]:
+    """The columns of some conditions as they are now, whatever the caller writes into them later."""
+    return {name: _kept(given, conditions[name].domain.kind) for name, given in columns.items() if name in conditions}
+
+
+def _kept(given: Any, kind: str) -> Any:
+    if isinstance(given, np.ndarray):
+        return given.copy()
+    if isinstance(given, (list, tuple)) and kind == "tags":  # of which each fact is a set
+        return [kept_fact(fact) for fact in given]
+    return list(given) if isinstance(given, list) else given
+
+
+def mirrored_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condition]) -> dict[str, Any]:
+    """Columns of facts that can be read, those of `conditions` as a mirror shows them."""
+    return {name: mirrored_column(given, conditions[name]) if name in conditions else given for name, given in columns.items()}
+
+
+def mirrored_column(given: Any, condition: Condition) -> Any:
+    """One column of facts as a mirror shows them."""
+    kind = condition.domain.kind
+    numbers = plain_numbers(given, kind) if kind in NUMERIC else None
+    if numbers is not None:
+        return 0.0 - numbers
+    return [mirrored_fact(read_fact(value, condition), condition) for value in listed(given)]
 
 
 def plain_values(given: Any, masks: ValueMasks) -> Codes | None:

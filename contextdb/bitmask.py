@@ -6,12 +6,15 @@ last row are 0, always. As a Python integer, row r is bit r.
 
 from __future__ import annotations
 
+from typing import Any, TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 Words = NDArray[np.uint64]
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.int64]
+Array = TypeVar("Array", bound=NDArray[Any])
 
 
 def n_words(n_rows: int) -> int:
@@ -63,9 +66,9 @@ def to_int(words: Words) -> int:
 
 
 def from_int(bits: int, n_rows: int) -> Words:
-    """One mask from a Python integer whose bits are all below `n_rows`."""
+    """One mask from a Python integer whose bits are all below `n_rows`; read-only."""
     octets = bits.to_bytes(n_words(n_rows) * 8, "little")
-    return np.frombuffer(octets, "<u8").astype(np.uint64)
+    return read_only(np.frombuffer(octets, "<u8").astype(np.uint64, copy=False))
 
 
 def places(masks: Words) -> tuple[Rows, Rows]:
@@ -77,3 +80,9 @@ def places(masks: Words) -> tuple[Rows, Rows]:
     octets = masks[at, word].astype("<u8").view(np.uint8).reshape(-1, 8)
     pair, bit = np.nonzero(np.unpackbits(octets, axis=1, bitorder="little"))
     return at[pair], 64 * word[pair] + bit
+
+
+def read_only(array: Array) -> Array:
+    """The array, which nobody can write to any more."""
+    array.flags.writeable = False
+    return array

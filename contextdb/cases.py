@@ -14,7 +14,7 @@ An edge: it reads and writes the file of cases.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,17 +24,20 @@ from contextdb.cell_words import quoted
 from contextdb.cells import TagSet, ValueSet, parse_cell
 from contextdb.columns import TextColumn
 from contextdb.compiled import CompiledTable
+from contextdb.disk import CASES_SUFFIX, write_atomic
 from contextdb.domains import TAGS, TEXT
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, nearest, some
 from contextdb.facts import Fact, no_condition, read_fact_text
-from contextdb.files import AnySource, read_texts, write_texts
+from contextdb.files import AnySource, new_source, read_texts
 from contextdb.findings import Finding
-from contextdb.project import CASES_SUFFIX
+from contextdb.rewrite import Origin
 from contextdb.table import Table
 
 NAME, EXPECTED, NOTE, NONE = "Case", "Expected", "Note", "(none)"
 WORDS = (NAME, EXPECTED, NOTE)
 """Columns that are no facts."""
+
+Columns = Sequence[TextColumn]
 
 
 @dataclass(frozen=True)
@@ -133,16 +136,18 @@ def keep_case(path: Path, case: Case) -> None:
         found = f"a condition of the name {in_quotes(taken[0])} cannot be kept: a file of cases has such a column itself."
         raise TableError(Fault(found, "another name of the condition", place=Place(str(path))))
     empty = [TextColumn.of(NAME, ()), TextColumn.of(EXPECTED, ())]
-    source, columns = _read(path) if os.path.exists(path) else (None, empty)
-    row, n_rows = _row_of(case, source, columns), columns[0].n_rows
     said = {NAME: case.name, EXPECTED: case.expected, **case.facts} | ({NOTE: case.note} if case.note else {})
-    known = {c.name for c in columns}
-    columns = columns + [TextColumn.of(name, [""] * n_rows) for name in said if name not in known]
-    if row is None:
-        columns = [c.with_inserted(n_rows, [said.get(c.name, "")]) for c in columns]
-    else:
-        columns = [c.with_text(row, said.get(c.name, "")) for c in columns]
-    write_texts(path, columns, source, np.append(np.arange(n_rows), -1)[: columns[0].n_rows])
+
+    def kept(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
+        columns = columns or empty
+        row, n_rows = _row_of(case, source, columns), columns[0].n_rows
+        known = {c.name for c in columns}
+        columns = [*columns, *(TextColumn.of(name, [""] * n_rows) for name in said if name not in known)]
+        if row is not None:
+            return [c.with_text(row, said.get(c.name, "")) for c in columns], np.arange(n_rows)
+        return [c.with_inserted(n_rows, [said.get(c.name, "")]) for c in columns], np.append(np.arange(n_rows), -1)
+
+    _rewrite(path, kept)
 
 
 def rename_case(path: Path, case: Case, name: str) -> None:
@@ -153,11 +158,14 @@ def rename_case(path: Path, case: Case, name: str) -> None:
     TableError, FileError
         There is no such case, another one has that name, or the file cannot be read or written.
     """
-    source, columns, row = _find(path, case)
-    if name != case.name and name in _names(columns):
-        raise TableError(Fault(f"there is a case {in_quotes(name)} already.", "another name", place=Place(str(path))))
-    columns = [c.with_text(row, name) if c.name == NAME else c for c in columns]
-    write_texts(path, columns, source, np.arange(columns[0].n_rows))
+
+    def renamed(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
+        row = _find(path, case, source, columns)
+        if name != case.name and name in _names(columns):
+            raise TableError(Fault(f"there is a case {in_quotes(name)} already.", "another name", place=Place(str(path))))
+        return [c.with_text(row, name) if c.name == NAME else c for c in columns], np.arange(columns[0].n_rows)
+
+    _rewrite(path, renamed, must_exist=True)
 
 
 def delete_case(path: Path, case: Case) -> None:
@@ -168,9 +176,22 @@ def delete_case(path: Path, case: Case) -> None:
     TableError, FileError
         There is no such case, or the file cannot be read or written.
     """
-    source, columns, row = _find(path, case)
-    rest = np.delete(np.arange(columns[0].n_rows), row)
-    write_texts(path, [c.with_rows_taken(rest) for c in columns], source, rest)
+
+    def without(source: AnySource | None, columns: Columns) -> tuple[Columns, Origin]:
+        rest = np.delete(np.arange(columns[0].n_rows), _find(path, case, source, columns))
+        return [c.with_rows_taken(rest) for c in columns], rest
+
+    _rewrite(path, without, must_exist=True)
+
+
+def _rewrite(path: Path, change: Callable[[AnySource | None, Columns], tuple[Columns, Origin]], must_exist: bool = False) -> None:
+    """Write a file of cases as `change` makes it; once more where somebody else wrote it in this moment."""
+    is_written = False
+    while not is_written:
+        source, columns = _read(path) if must_exist or os.path.exists(path) else (None, [])
+        now, origin = change(source, columns)
+        was = None if source is None else source.raw
+        is_written = write_atomic(path, new_source(path, now, source, origin).raw, was)
 
 
 def _read(path: Path) -> tuple[AnySource, list[TextColumn]]:
@@ -197,14 +218,13 @@ def _row_of(case: Case, source: AnySource | None, columns: Sequence[TextColumn])
     return next(iter(at_line + rows), None)
 
 
-def _find(path: Path, case: Case) -> tuple[AnySource, list[TextColumn], int]:
-    source, columns = _read(path)
+def _find(path: Path, case: Case, source: AnySource | None, columns: Columns) -> int:
     row = _row_of(case, source, columns)
     if row is None:
         near = nearest(case.name, _names(columns))
         found = f"there is no case {in_quotes(case.name)} any more."
         raise TableError(Fault(found, "a case of the file", in_quotes(near) if near else "", Place(str(path))))
-    return source, columns, row
+    return row
 
 
 # ---- what comes out

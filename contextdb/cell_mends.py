@@ -16,6 +16,9 @@ from contextdb.errors import nearest
 CLOSE = 0.85
 """From this likeness on a cell of several words is taken for one value that lacks its quotes."""
 
+MOST_WORDS = 24
+"""The words of a longer cell are not compared with the declared values."""
+
 _Mends = tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]
 
 
@@ -37,7 +40,7 @@ _NUMBER_MENDS: _Mends = (
     (r"\b(?:or|OR)\b|/|\|\|", "|"),
     (r"!=\s*|<>\s*|≠\s*", "not "),
     (r"°|\b(?:deg|degrees|m/s|m|s|cm|km/h)\b", ""),
-    (rf"({NUMBER_TEXT})\s*(?:-|to|:)\s*({NUMBER_TEXT})", r"\1..\2"),
+    (rf"(?<!\d)({NUMBER_TEXT})\s*(?:-|to|:)\s*({NUMBER_TEXT})", r"\1..\2"),
     (r"^\*$|^(?i:all|every|none|null|n/a)$", "Any"),
     (r"[\[\](){}\"']", ""),
 )
@@ -82,7 +85,8 @@ def _word_mends(text: str, domain: Domain) -> Iterator[str]:
     if whole is not None and is_close and len(signed) > 1:
         yield negation + _sign(body, domain) + quoted(whole)
     yield negation + " ".join(sign + quoted(word) for sign, word in signed)
-    yield negation + " ".join(sign + quoted(nearest(word, known) or word) for sign, word in signed)
+    if len(signed) <= MOST_WORDS:
+        yield negation + " ".join(sign + quoted(nearest(word, known) or word) for sign, word in signed)
     if whole is not None:
         yield negation + _sign(body, domain) + quoted(whole)
     if body.strip('"'):

@@ -7,6 +7,9 @@ from functools import lru_cache
 
 NUMBER_TEXT = r"[+-]?(?:inf|(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)?)"
 
+ANY_WORDS = frozenset(("", "-", "any"))
+"""What a cell that accepts every value says, in any case."""
+
 _NAME = re.compile(r"[\w.:/\-]+")
 _RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)
 _SLOT = re.compile(r'"((?:[^"]|"")*)"|[^\s,;|"]+')

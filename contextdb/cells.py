@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from contextdb import intervals
@@ -91,13 +91,13 @@ class TagSet:
 
     def holds(self, tags: frozenset[str]) -> bool:
         """Whether a set of tags is among them."""
-        has = all(covers(need, tags) for need in self.needs) and not any(covers(ban, tags) for ban in self.bans)
-        return has is not self.is_complement
+        covered = covered_by(tags)
+        return (self.needs <= covered and self.bans.isdisjoint(covered)) is not self.is_complement
 
     @property
     def is_contradiction(self) -> bool:
         """Whether a needed tag stands under a banned one, so that no set of tags can have all `needs` and no `bans`."""
-        return any(covers(ban, self.needs) for ban in self.bans)
+        return not self.bans.isdisjoint(covered_by(self.needs))
 
     @property
     def is_empty(self) -> bool:
@@ -141,6 +141,20 @@ ANY = Cell()
 def covers(tag: str, tags: frozenset[str]) -> bool:
     """Whether a set of tags has `tag`, itself or through a tag under it: Move covers Move.Run."""
     return tag in tags or any(t.startswith(tag + ".") for t in tags)
+
+
+def covered_by(tags: Iterable[str]) -> frozenset[str]:
+    """Every tag that a set of tags has: its own, and those above them."""
+    return frozenset(above for tag in tags for above in tags_above(tag))
+
+
+def tags_above(tag: str) -> Iterator[str]:
+    """A tag and those above it: Move.Run and Move."""
+    yield tag
+    at = tag.rfind(".")
+    while at > 0:
+        yield tag[:at]
+        at = tag.rfind(".", 0, at)
 
 
 def parse_cell(text: str, domain: Domain, wants_mend: bool = True) -> Cell:
@@ -447,4 +461,4 @@ def _format_span(low: float, high: float) -> str:
 def _is_rung_after(value: float, step: Callable[[float], float]) -> bool:
     """Whether a double is best told as the open end at its neighbour: 4.999999999999999 is just below 5."""
     near = step(value)
-    return math.isfinite(value) and math.isfinite(near) and (near == 0.0 or len(repr(near)) + 8 < len(repr(value)))
+    return math.isfinite(value) and math.isfinite(near) and (near == 0.0 or len(repr(near)) + 4 <= len(repr(value)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -13,13 +14,15 @@ from contextdb import bitmask
 from contextdb.cells import Cell, NumberSet, format_number
 from contextdb.condition_column import ConditionColumn
 from contextdb.domains import Domain
-from contextdb.errors import in_quotes, nearest
+from contextdb.errors import in_quotes, nearest, row_name
 from contextdb.expressions import constant_truth
 from contextdb.findings import Finding, Level
+from contextdb.mirror_findings import check_mirroring
 from contextdb.nesting.names import inner_name
 from contextdb.nesting_findings import check_nesting
 from contextdb.source import Source
 from contextdb.table import Table
+from contextdb.variety import gathered, lets_choose
 from contextdb.when import WhenRules
 
 LINE_ENDS = {"\n": "LF", "\r\n": "CRLF", "\r": "CR"}
@@ -29,7 +32,7 @@ MOST_ROWS = 1000
 
 def check(table: Table) -> list[Finding]:
     """Every finding of a table, in the order of its rows, those of the whole table first."""
-    rules = (_whole_table, _unreadable, _cells, _constant_rules, _assets, _identical, check_nesting)
+    rules = (_whole_table, _unreadable, _cells, _constant_rules, _assets, _identical, check_nesting, check_mirroring)
     found = capped(finding for rule in rules for finding in rule(table))
     return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
 
@@ -53,7 +56,7 @@ def where(table: Table, row: int, other: int) -> str:
     """Where a row stands, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
     place = table.place(row)
     if place.line is None:
-        return f"row {row}"
+        return row_name(row)
     is_inside = table.path is not None and {place.file, table.place(other).file} != {str(table.path)}
     return f"line {place.line} of {place.file}" if is_inside else f"line {place.line}"
 
@@ -157,7 +160,17 @@ def _assets(table: Table) -> Iterator[Finding]:
 
 
 def _identical(table: Table) -> Iterator[Finding]:
-    """Rows whose every condition accepts the same values, whatever way it is written. A disabled row is like no other."""
+    found = list(identical_rows(table))
+    if lets_choose([table.settings.policy]):
+        found = gathered(found, table.assets, lambda row: _at(table, row, "variety", "info", "", None), partial(named, table))
+    yield from found
+
+
+def identical_rows(table: Table) -> Iterator[Finding]:
+    """Rows whose every condition accepts the same values, whatever way it is written. A disabled row is like no other.
+
+    Each is caused by the first such row of the same asset, or else by the first of all.
+    """
     if table.n_rows < 2 or not (table.conditions or table.when):
         return
     disabled = np.where(table.enabled, -1, np.arange(table.n_rows))
@@ -165,10 +178,18 @@ def _identical(table: Table) -> Iterator[Finding]:
     meanings = [disabled, *rules, *(_meanings(column) for column in table.conditions)]
     _, first, group = np.unique(np.stack(meanings, axis=1), axis=0, return_index=True, return_inverse=True)
     origin = first[group.reshape(-1)]
-    for row in np.flatnonzero(origin != np.arange(table.n_rows)).tolist():
-        other = int(origin[row])
-        message = f"every condition is the same as in {where(table, other, row)} ({in_quotes(table.assets[other])})."
-        yield _at(table, row, "identical-rows", "warning", message, None, (other,))
+    first_of: dict[tuple[int, str], int] = {}
+    for row, start in enumerate(origin.tolist()):
+        same = first_of.setdefault((start, table.assets[row]), row)
+        other = start if same == row else same
+        if other != row:
+            message = f"every condition is the same as in {named(table, other, row)}."
+            yield _at(table, row, "identical-rows", "warning", message, None, (other,))
+
+
+def named(table: Table, other: int, row: int) -> str:
+    """A row by its place and its asset, in a sentence about another."""
+    return f"{where(table, other, row)} ({in_quotes(table.assets[other])})"
 
 
 def _meanings(column: ConditionColumn) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

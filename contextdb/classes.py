@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
-from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers
+from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covered_by, tags_above
 from contextdb.columns import Codes
 from contextdb.domains import NUMERIC, Domain
 from contextdb.nesting_cells import TagMeet
@@ -183,7 +183,8 @@ class TagMasks:
         n_slots = len(self.tags) + len(self.negated)
         if fact is None:
             return tuple(range(2, 3 * n_slots, 3))
-        answers = [covers(tag, fact) for tag in self.tags] + [cell.holds(fact) for cell in self.negated]
+        has = covered_by(fact)
+        answers = [tag in has for tag in self.tags] + [cell.holds(fact) for cell in self.negated]
         return tuple(3 * slot + answer for slot, answer in enumerate(answers))
 
     def set_bits(self, accepts: Accepted) -> tuple[int, int]:
@@ -202,14 +203,14 @@ class TagMasks:
 
     def _possible(self, part: TagSet) -> Iterable[tuple[bool, bool]]:
         """For each slot, whether some fact of the part answers no, and whether one answers yes."""
+        needed = covered_by(part.needs)
         for tag in self.tags:
-            is_needed, is_banned = covers(tag, part.needs), _is_banned(tag, part)
-            yield not is_needed, not is_banned
+            yield tag not in needed, not _is_banned(tag, part)
         for cell in self.negated:
             if isinstance(cell, TagMeet):
                 yield not cell.holds_all_of(part), cell.meets(part)
                 continue
-            entails = all(covers(t, part.needs) for t in cell.needs) and all(_is_banned(t, part) for t in cell.bans)
+            entails = cell.needs <= needed and all(_is_banned(t, part) for t in cell.bans)
             joint = TagSet(part.needs | cell.needs, part.bans | cell.bans)
             yield not joint.is_contradiction, not entails
 
@@ -238,7 +239,7 @@ def _classes_in(accepts: NumberSet, bounds: list[float]) -> list[int]:
 
 def _is_banned(tag: str, part: TagSet) -> bool:
     """Whether no fact of the part can have the tag: the tag, or one above it, is banned."""
-    return any(tag == ban or tag.startswith(ban + ".") for ban in part.bans)
+    return any(above in part.bans for above in tags_above(tag))
 
 
 def _conjunctions(accepts: TagSet) -> list[TagSet]:

@@ -6,8 +6,10 @@ A module that has `COMMANDS` instead of `run` is a group: the next word says whi
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import textwrap
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -17,6 +19,7 @@ from typing import IO, Any, NoReturn
 from contextdb.console import drop_output, printable
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
 from contextdb.exit_codes import ExitCode
+from contextdb.together import UnfinishedWarning
 
 COMMANDS = {
     "edit": "the terminal editor",
@@ -30,26 +33,39 @@ COMMANDS = {
     "import": "bring in a table from another program: CSV, Excel, JSON, DMN, Unreal",
     "export": "write a table for another program",
     "compile": "write the binary artefact for the game",
+    "verify": "whether files are as contextdb wrote them",
     "motion": "motion databases: build, search, select, run, replay",
     "demo": "the whole way on the sample tables",
 }
+
+
+_PLAIN = "\0--\0"
+"""Before each argument behind "--": no argument of a process begins so, and argparse takes it for no option in any version."""
 
 
 class Parser(argparse.ArgumentParser):
     """An argument parser whose errors name the nearest thing that would have been right."""
 
     def parse(self, given: Sequence[str]) -> argparse.Namespace:
-        """The arguments; options may stand anywhere between the others."""
-        arguments, rest = self.parse_known_intermixed_args(given)
+        """The arguments; options may stand anywhere between the others, but none behind "--"."""
+        at = given.index("--") if "--" in given else len(given)
+        for text in given[:at]:
+            if text.startswith("-") and text not in self._option_string_actions and os.path.isfile(text):
+                fault = Fault(f"{in_quotes(text)} is a file, and looks like an option.", mend=in_quotes(os.path.join(".", text)))
+                self.error(fault.message)
+        arguments, rest = self.parse_known_intermixed_args([*given[:at], *(_PLAIN + text for text in given[at + 1 :])])
         for action in self._get_positional_actions():
             if action.nargs is None and not isinstance(getattr(arguments, action.dest), str):  # what "--" makes of none
                 self.error(f"the following arguments are required: {action.metavar}")
         for text in rest:
             if not text.startswith("-"):
-                self.error(f"{in_quotes(text)} is one argument too many.")
+                self.error(f"{in_quotes(text.removeprefix(_PLAIN))} is one argument too many.")
             near = nearest(text.partition("=")[0], self._option_string_actions)
             self.error(Fault(f"there is no option {in_quotes(text)}.", mend=in_quotes(near) if near else "").message)
         return arguments
+
+    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
+        return super()._get_values(action, [text.removeprefix(_PLAIN) for text in arg_strings])
 
     def print_help(self, file: IO[str] | None = None) -> None:  # type: ignore[override]
         """Print the help; where argparse would keep quiet about output that cannot be written, this does not."""
@@ -118,6 +134,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; gives the exit code. Errors of contextdb go to standard error, each fault on its line."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     _use_utf8()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", UnfinishedWarning)
+        code = _main(given)
+    for warning in told:
+        if issubclass(warning.category, UnfinishedWarning):
+            print(printable(f"contextdb: {warning.message}"), file=sys.stderr)
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    return code
+
+
+def _main(given: Sequence[str]) -> int:
     try:
         code = _run(Group((), COMMANDS), given)
         sys.stdout.flush()

@@ -23,18 +23,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.bitmask import Words
+from contextdb.arguments import require_path, require_row
+from contextdb.bitmask import Words, read_only
 from contextdb.cells import ANY, Cell, parse_cell, reads
 from contextdb.classes import ColumnMasks
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
 from contextdb.errors import ContextError, Fault, Place, in_quotes
-from contextdb.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact
+from contextdb.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
 from contextdb.live import LiveContext, live_context
-from contextdb.lookup import SingleLookup, build_ask, ruled_ask, single_lookup
+from contextdb.lookup import Ask, SingleLookup, build_ask, ruled_ask, single_lookup
 from contextdb.mask_bits import bits_of, nbytes
 from contextdb.matches import Answering, Matches, SetMatches
+from contextdb.mirroring import changed_in_mirror, in_mirror, kept_facts, mirrored_facts
 from contextdb.stack import MaskStack
+from contextdb.unchanging import Unchanging
+from contextdb.versions import version_of
 from contextdb.when import WhenRules
 
 if TYPE_CHECKING:
@@ -60,8 +64,11 @@ SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
-class CompiledTable:
-    """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`."""
+class CompiledTable(Unchanging):
+    """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`.
+
+    It can be pickled at any time. What was pickled answers the same; only which assets were picked last (`pick`) is not pickled.
+    """
 
     name: str
     assets: Sequence[str]
@@ -92,6 +99,8 @@ class CompiledTable:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_ask", self._build_and_ask)  # a plain attribute: the way of every query
+        read_only(self.priorities)
+        read_only(self.row_weights)
 
     @classmethod
     def of(cls, table: Table) -> CompiledTable:
@@ -129,6 +138,7 @@ class CompiledTable:
     def way(self, row: int) -> tuple[Step, ...]:
         """The rows of tables that a row comes from, outermost first, each with its file and line; for a table without tables inside
         one step, the row itself."""
+        row = require_row(row, self.n_rows)
         if self.ways is not None:
             return self.ways.steps(row)
         from contextdb.nesting.ways import Step
@@ -187,9 +197,11 @@ class CompiledTable:
         if unknown != "error":
             check_mode(unknown)
         try:
-            return self._ask(context)
+            found = self._ask(context)
+            return found if unknown == "error" or not self.mirroring else found.with_mirrored(self.keeping(unknown)(context))
         except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
-            return self.with_penalties(self.matches(*self._bits_carefully(context, unknown)), context, unknown)
+            found = self.matches(*self._bits_carefully(context, unknown))
+            return self.bound(found, kept_facts(context), unknown) if self.is_bound else found
 
     @overload
     def query_many(self, contexts: ManyContexts, unknown: Unknown = "error") -> ManyMatches: ...
@@ -233,8 +245,23 @@ class CompiledTable:
         """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`."""
         check_mode(unknown)
         live = live_context(self, unknown)
-        live.update(facts or {})
+        live.update({} if facts is None else facts)
         return live
+
+    def prepare(self, casting: bool = False, batches: bool = False) -> None:
+        """Do now, while the game loads, what is otherwise done when the table is first asked; answers stay the same.
+
+        Parameters
+        ----------
+        casting : bool
+            Also what the first question with actors does.
+        batches : bool
+            Also what the first batches do, small and large: numba is loaded, where it is installed, and the kernels are compiled or
+            read from its cache, which takes about a second.
+        """
+        from contextdb.preparing import prepare
+
+        prepare(self, casting, batches)
 
     def encode(self, context: Context, unknown: Unknown = "error") -> NDArray[np.int32]:
         """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.stack`. Rules have no codes."""
@@ -253,6 +280,11 @@ class CompiledTable:
         from contextdb.batch import query_codes
 
         return query_codes(self, codes)
+
+    @property
+    def policies(self) -> frozenset[str]:
+        """The policies of the table and of those that stand in it."""
+        return frozenset((self.policy,) if self.ways is None else (table.policy for table in self.ways.tables))
 
     def explain(
         self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
@@ -300,9 +332,42 @@ class CompiledTable:
         costs = np.where(fails, row_penalties, 0.0)
         return costs if n == self.n_rows else costs.reshape(-1, self.n_rows).sum(axis=0)
 
-    def with_penalties(self, matches: Matches, context: Context, unknown: Unknown = "error") -> Matches:
-        """An answer that knows what the soft cells cost in its context, if the table has any."""
-        return matches.with_penalties(partial(self.penalties, dict(context), unknown)) if any(self.soft) else matches
+    @cached_property
+    def mirroring(self) -> dict[str, Condition]:
+        """The conditions of `asked` whose facts change in a mirror."""
+        return changed_in_mirror(self.asked.values())
+
+    def query_mirrored(self, context: Context, unknown: Unknown = "error") -> Matches:
+        """The answer to a context as a mirror shows it. What is derived is computed from mirrored facts."""
+        try:
+            return self.query(mirrored_facts(context, self.mirroring), unknown)
+        except ContextError as error:
+            raise in_mirror(error) from None
+
+    def bound(self, matches: Matches, context: Context, unknown: Unknown = "error") -> Matches:
+        """An answer that knows what else hangs on the facts of its moment: what soft cells cost, and the answer in a mirror."""
+        if self.mirroring:
+            matches.with_mirrored(self.keeping(unknown)(context))
+        return matches.with_penalties(partial(self.penalties, self.keep(context), unknown)) if self.is_soft else matches
+
+    def keeping(self, unknown: Unknown) -> Callable[[Context], dict[str, object] | Callable[[], Matches]]:
+        """What makes of a context that an answer was asked with what `Matches.with_mirrored` takes."""
+        return self.keep if unknown == "error" else lambda context: partial(self.query_mirrored, self.keep(context), unknown)
+
+    @cached_property
+    def keep(self) -> Callable[[Context], dict[str, object]]:
+        """What copies a context, so that it stays as it is now."""
+        return kept_facts if any(c.domain.kind == "tags" for c in self.asked.values()) else dict
+
+    @cached_property
+    def is_soft(self) -> bool:
+        """Whether the table has soft cells."""
+        return any(self.soft)
+
+    @cached_property
+    def is_bound(self) -> bool:
+        """Whether answers must keep the facts that they were asked with."""
+        return self.is_soft or bool(self.mirroring)
 
     def cells(self, at: int) -> tuple[Cell, ...]:
         """What the distinct texts of condition number `at` mean, read once; Any for one that cannot be read, which no row holds."""
@@ -330,8 +395,7 @@ class CompiledTable:
         """The fact of every condition, or of those named, in canonical form, None where it is missing; raises ContextError as
         `query` does."""
         check_mode(unknown)
-        if not isinstance(context, Mapping):
-            raise ContextError(Fault(f"a context is a mapping of facts, not {type(context).__name__}.", "a dict"))
+        require_context(context)
         facts: dict[str, Fact] = {}
         faults: list[Fault] = []
         derived: Mapping[str, object] = {}
@@ -406,26 +470,53 @@ class CompiledTable:
         """Write the artefact for the game: .safetensors, atomic."""
         from contextdb.artefact import save
 
-        save(self, Path(path))
+        save(self, require_path(path))
 
     @classmethod
     def open(cls, path: str | Path) -> CompiledTable:
         """Open an artefact by memory map. A truncated, altered or foreign file is refused with ArtefactError."""
         from contextdb.artefact import open_artefact
 
-        return open_artefact(Path(path))
+        return open_artefact(require_path(path))
 
     @cached_property
     def memory(self) -> Memory:
         """Which asset each random generator picked last."""
         from contextdb.pick import Memory
 
-        return Memory()
+        memory: Memory = self.__dict__.setdefault("memory", Memory())  # one, whichever thread comes first
+        return memory
+
+    def remember_as(self, older: CompiledTable) -> None:
+        """Go on with what an older version of this table remembers of picks: no asset is repeated for a reload."""
+        self.__dict__["memory"] = older.memory
+
+    @property
+    def version(self) -> str:
+        """A digest of what the table says: the same for two that say the same, wherever they were compiled."""
+        return self.answering.version
 
     @cached_property
     def answering(self) -> Answering:
         """What the answers of this table share."""
-        return Answering(self.assets, self.leaves)
+        ask_mirrored = self.query_mirrored if self.mirroring else None
+        own = Answering(self.assets, self.leaves, self.name, partial(version_of, self._said), ask_mirrored)
+        answering: Answering = self.__dict__.setdefault("answering", own)  # one, whichever thread comes first
+        return answering
+
+    @property
+    def _said(self) -> tuple[object, ...]:
+        """All that an answer, and what is picked from it, hangs on."""
+        conditions = [(c.name, c.domain, c.expr, c.mirror) for c in (*self.conditions, *self.ruled)]
+        derived = [(step.condition.name, step.expression.text) for step in self.derivation.steps] if self.derivation else []
+        ways = [] if self.ways is None else [self.ways.numbers, self.ways.rows]
+        inner = () if self.ways is None else self.ways.tables
+        return (
+            (self.name, self.policy, self.fallback, list(self.assets), conditions, derived),
+            *(self.enabled, self.priorities, self.row_weights, *self.texts, *(self.slots or ())),
+            *((self.when.texts,) if self.when is not None else ()),
+            *(*ways, *(part for t in inner for part in ((t.name, t.policy), t.priorities, t.row_weights))),
+        )
 
     @cached_property
     def _all_bits(self) -> tuple[int, int]:
@@ -434,14 +525,20 @@ class CompiledTable:
 
     def _build_and_ask(self, context: Context) -> Matches:
         """The first question builds the function that answers all others."""
-        plain = build_ask(list(zip(self.conditions, self.masks, strict=True)), self.enabled_bits, self.answering)
+        is_plain = self.is_bound and not (self.is_soft or self.when or self.derivation)
+        columns = list(zip(self.conditions, self.masks, strict=True))
+        ask = build_ask(columns, self.enabled_bits, self.answering, self.keep if is_plain else None)
         if self.when is not None:
-            plain = ruled_ask(plain, self.when, self.answering)
+            ask = ruled_ask(ask, self.when, self.answering)
         if self.derivation is not None:
-            plain = _composed(plain, self.derivation.complete)
-        ask = (lambda context: self.with_penalties(plain(context), context)) if any(self.soft) else plain
+            ask = _composed(ask, self.derivation.complete)
+        if self.is_bound and not is_plain:
+            ask = self._binding(ask)
         object.__setattr__(self, "_ask", ask)
         return ask(context)
+
+    def _binding(self, ask: Ask) -> Ask:
+        return lambda context: self.bound(ask(context), context)
 
     def _bits_carefully(self, context: Context, unknown: Unknown) -> tuple[int, int]:
         facts = self.read_context(context, unknown)

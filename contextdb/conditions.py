@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cell_words import ANY_WORDS
 from contextdb.cells import reads
 from contextdb.columns import TextColumn
 from contextdb.domains import BOOL, NUMBER, TAGS, TEXT, Domain
 from contextdb.number_cells import are_plain
 
+Swaps = tuple[tuple[str, str], ...]
+"""Pairs of values or tags that change places in a mirror."""
+
+Mirror = Literal["negate", "none"] | Swaps
+
 READABLE_SHARE = 0.8
 """A type is inferred when at least this share of the rows that are not Any can be read as it; the rest are faults."""
 
-_ANY_WORDS = frozenset(("", "-", "any"))
+
 _DIGITS = frozenset(("0", "1"))
 
 
@@ -32,6 +39,8 @@ class Condition:
     """For a derived fact: how it is computed from others."""
     is_declared: bool = True
     """False where the type was inferred from the cells."""
+    mirror: Mirror | None = None
+    """How its facts change in a mirror; None where that is not declared. See `contextdb.mirroring`."""
 
     @property
     def role(self) -> str | None:
@@ -54,7 +63,7 @@ def infer_condition(column: TextColumn) -> Condition:
 
 def _said(texts: Sequence[str], counts: NDArray[np.int64]) -> dict[str, int]:
     """How many rows say each text that is not Any."""
-    return {t: n for t, n in zip(texts, counts.tolist(), strict=True) if t.strip().casefold() not in _ANY_WORDS}
+    return {t: n for t, n in zip(texts, counts.tolist(), strict=True) if t.strip().casefold() not in ANY_WORDS}
 
 
 def _is_number_column(texts: Sequence[str], counts: NDArray[np.int64], are_numbers: NDArray[np.bool_]) -> bool:

@@ -17,9 +17,9 @@ from contextdb.compiled import CompiledTable
 from contextdb.conditions import Condition
 from contextdb.disk import path_in_quotes
 from contextdb.domains import NUMERIC
-from contextdb.errors import ContextError, Fault, FileError, Place, TableError, in_quotes, nearest
+from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes, nearest
 from contextdb.facts import Unknown, read_fact_text
-from contextdb.files import AnySource, read_texts
+from contextdb.files import AnySource, read_texts, scanned_parquet
 
 ONE = "one value of its type in each context"
 
@@ -129,16 +129,12 @@ def fact_type(condition: Condition) -> pl.DataType:
 
 
 def _read_parquet(path: Path, compiled: CompiledTable) -> pl.DataFrame:
-    try:
-        scan = pl.scan_parquet(path, glob=False)
+    with scanned_parquet(path) as scan:
         names = scan.collect_schema().names()
         n_rows = scan.select(pl.len()).collect().item()
         known = known_conditions(compiled)
         asked = [n for n in names if n in known]
         facts = scan.select(by_name(asked)).collect().get_columns() if asked else []
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
-        read_texts(path)  # says what is wrong with the file
-        raise TableError(Fault(f"cannot read the file: {error}.", "a whole Parquet file", place=Place(str(path)))) from None
     return pl.DataFrame([*facts, *(without_facts(n, n_rows) for n in names if n not in known)])
 
 

@@ -2,22 +2,37 @@
 
 A save writes a temporary file beside the old one, has the system put it on the disk, and renames it. So at any moment, killed or
 out of power, the file is wholly the old one or wholly the new one. What the system refuses is a `FileError` that says what to do.
+
+Saves into one folder take turns for the moment in which they look at the old file and replace it (`contextdb.folder_lock`), so that
+no save writes over another one that it has not seen. Whoever has the turn deletes what killed saves left there.
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import secrets
 import stat
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from contextdb.errors import Fault, FileError, Place, in_quotes, nearest
+from contextdb.folder_lock import claim, folder_turn, sweep_in_turn, temporary_name
 
 TABLE_SUFFIXES = (".csv", ".parquet")
+CASES_SUFFIX = ".cases.csv"
+"""What the file of a table's saved contexts ends in: no table itself."""
+ACTORS_SUFFIX = ".actors.json"
+"""What the file of the actors for a table's roles ends in."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_BINARY = getattr(os, "O_BINARY", 0)
+
+Data = bytes | Iterable[bytes]
+
+Was = bytes | Literal["any"] | None
+"""What a file must still hold when it is replaced; None: it must not be there."""
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -38,10 +53,30 @@ def read_bytes(path: str | Path) -> bytes:
         return file.read_bytes()
 
 
-def write_atomic(path: str | Path, data: bytes | Iterable[bytes]) -> None:
+def names_a_table(name: str) -> bool:
+    """Whether a file of this name in a folder of tables is a table: no saved contexts, and nothing hidden, as macOS and editors put
+    beside a file."""
+    folded = name.lower()
+    return folded.endswith(TABLE_SUFFIXES) and not folded.endswith(CASES_SUFFIX) and not folded.startswith(".")
+
+
+def write_atomic(path: str | Path, data: Data, was: Was = "any", syncs: bool = True) -> bool:
     """Replace a file's bytes, given whole or in pieces, in one step, or make the file.
 
-    A link stays a link, and the file it leads to is replaced; mode and, where that is permitted, owner stay.
+    A link stays a link, and the file it leads to is replaced; mode and, where that is permitted, owner stay. A pipe, a terminal or
+    another device is written into.
+
+    Parameters
+    ----------
+    was : bytes or None, optional
+        Only if the file holds these bytes; None: only if it is not there. Default: whatever is there.
+    syncs : bool
+        False does not wait until the bytes are on the disk: for what can be computed again.
+
+    Returns
+    -------
+    bool
+        Whether the file was written: False where it is not as `was` says.
 
     Raises
     ------
@@ -50,20 +85,84 @@ def write_atomic(path: str | Path, data: bytes | Iterable[bytes]) -> None:
         stays.
     """
     file = Path(path)
-    with _refused(file, lambda error, at: _why_unwritten(error, at, len(data) if isinstance(data, bytes) else None)):
-        target = Path(os.path.realpath(file))
-        old = target.stat() if target.exists() else None
-        if old is not None:
-            _require_writable(file, old)
-        temporary = target.with_name(f".contextdb-{secrets.token_hex(8)}.tmp")
-        try:
-            _write_new(temporary, data, old)
-            os.replace(temporary, target)
-        except BaseException:  # also when the user interrupts
-            with suppress(OSError):
-                temporary.unlink()
-            raise
-        _sync_folder(target.parent)
+    if is_stream(file):
+        _write_into(file, data)
+        return True
+    with refused_writing(file, data), staged(file, data, syncs) as new, folder_turn(new.target.parent) as folder:
+        if not is_still(new.target, was):
+            return False
+        new.replace()
+        sync_folder(folder)
+        return True
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a path is that of a pipe, a terminal or another device that takes bytes one after another."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISCHR(mode) or stat.S_ISFIFO(mode)
+
+
+def is_still(file: Path, was: Was) -> bool:
+    """Whether a file holds what it is said to hold. Whoever asks has the turn of its folder."""
+    if was == "any":
+        return True
+    try:
+        return file.read_bytes() == was
+    except FileNotFoundError:
+        return was is None
+
+
+@dataclass
+class Staged:
+    """New bytes of a file, in a temporary file beside it that this process holds."""
+
+    target: Path
+    temporary: Path
+    handle: int
+
+    def close(self) -> None:
+        """Let go of the temporary file, before it takes its name: for whoever has the turn of the folder."""
+        if self.handle >= 0:
+            handle, self.handle = self.handle, -1
+            os.close(handle)
+
+    def replace(self) -> None:
+        """Take the name, for whoever has the turn of the folder."""
+        self.close()
+        os.replace(self.temporary, self.target)
+
+
+@contextmanager
+def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = None) -> Iterator[Staged]:
+    """New bytes beside a file, or in another folder, not yet under its name; gone at the end where they did not take it.
+
+    Raises
+    ------
+    OSError, FileError
+        The file may not be replaced, or the disk refuses.
+    """
+    target = Path(os.path.realpath(file))
+    old = target.stat() if target.exists() else None
+    if old is not None:
+        _require_writable(file, old)
+    place = target.parent if folder is None else folder
+    temporary = place / temporary_name()
+    with folder_turn(place):  # so that nobody sees the file before it is held
+        if syncs:  # a cache is swept by whoever prunes it: its folder may be long
+            sweep_in_turn(place)
+        new = Staged(target, temporary, os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY, 0o666))
+        claim(new.handle)
+    try:
+        _fill(new, data, old, syncs)
+        yield new
+    finally:  # also when the user interrupts
+        with suppress(OSError):
+            new.close()
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def make_folder(folder: Path) -> None:
@@ -92,36 +191,52 @@ def _require_writable(file: Path, old: os.stat_result) -> None:
         raise FileError(Fault("the file is marked read-only.", "a file that may be written", mend, Place(str(file))))
 
 
-def _write_new(temporary: Path, data: bytes | Iterable[bytes], old: os.stat_result | None) -> None:
-    """Write a file that is not there yet and have the system put it on the disk."""
-    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+def _fill(new: Staged, data: Data, old: os.stat_result | None, syncs: bool) -> None:
+    """Write a temporary file and have the system put it on the disk."""
+    if old is not None:
+        with suppress(OSError, AttributeError):  # only root may give a file away; Windows has no chown
+            os.chown(new.temporary, old.st_uid, old.st_gid)
+        os.chmod(new.temporary, stat.S_IMODE(old.st_mode))
+    _write_all(new.handle, data)
+    if syncs:
+        os.fsync(new.handle)
+
+
+def _write_all(handle: int, data: Data) -> None:
+    for piece in [data] if isinstance(data, bytes) else data:
+        rest = memoryview(piece)
+        while rest:
+            rest = rest[os.write(handle, rest) :]
+
+
+def _write_into(file: Path, data: Data) -> None:
     try:
-        if old is not None:
-            with suppress(OSError, AttributeError):  # only root may give a file away; Windows has no chown
-                os.chown(temporary, old.st_uid, old.st_gid)
-            os.chmod(temporary, stat.S_IMODE(old.st_mode))
-        for piece in [data] if isinstance(data, bytes) else data:
-            rest = memoryview(piece)
-            while rest:
-                rest = rest[os.write(handle, rest) :]
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Have the system put the new name on the disk too, where it can; the file is whole either way."""
-    if os.name == "nt":
-        return
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
+        handle = os.open(file, os.O_WRONLY | _BINARY)
         try:
-            os.fsync(handle)
+            _write_all(handle, data)
         finally:
             os.close(handle)
+    except BrokenPipeError:  # a reader that has seen enough, as `head`
+        raise
+    except OSError as error:
+        found = f"it cannot be written into: {error.strerror}."
+        raise FileError(Fault(found, "a file, or a pipe that is read", place=Place(str(file)))) from None
+
+
+def sync_folder(folder: int | None) -> None:
+    """Have the system put a new name on the disk too, where it can; the file is whole either way."""
+    if folder is not None:
+        with suppress(OSError):
+            os.fsync(folder)
 
 
 # ---- what the system refuses
+
+
+def refused_writing(file: Path, data: Data) -> AbstractContextManager[None]:
+    """Turn what the system refuses into a `FileError` that names the file."""
+    size = len(data) if isinstance(data, bytes) else None
+    return _refused(file, lambda error, at: _why_unwritten(error, at, size))
 
 
 @contextmanager
@@ -135,7 +250,7 @@ def _refused(file: Path, why: Callable[[OSError, Path], Fault]) -> Iterator[None
 
 
 def _is_folder(folder: Path) -> Fault:
-    tables = sorted(p for p in folder.iterdir() if p.suffix.lower() in TABLE_SUFFIXES)
+    tables = sorted(p for p in folder.iterdir() if names_a_table(p.name))
     return Fault("this is a folder.", "one file", path_in_quotes(tables[0]) if tables else "", Place(str(folder)))
 
 
@@ -185,7 +300,7 @@ def _why_unwritten(error: OSError, file: Path, size: int | None) -> Fault:
     if isinstance(error, PermissionError):
         busy = ", or another program has the file open" if os.name == "nt" else ""
         return Fault(f"the folder {folder} may not be written in{busy}.{kept}", mend="to save elsewhere", place=place)
-    return Fault(f"the file cannot be written: {error.strerror}.{kept}", mend="to save elsewhere", place=place)
+    return Fault(f"the file cannot be written: {error.strerror or error}.{kept}", mend="to save elsewhere", place=place)
 
 
 def path_in_quotes(path: str | Path) -> str:

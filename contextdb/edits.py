@@ -18,7 +18,7 @@ from contextdb.cells import parse_cell
 from contextdb.changes import CameFrom, Cells, Change, Columns, Rows, Sections, change_from_json
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
-from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
+from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, plural, row_name, shown
 from contextdb.schema import conditions_from_dict
 from contextdb.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
 from contextdb.source import name_faults
@@ -259,7 +259,7 @@ def move_column(table: Table, column: str, to: int) -> Edit:
 def rename_column(table: Table, column: str, name: str, keep_declared: bool = True) -> Edit:
     """Give a column another name. What contextdb.toml declares of it holds for the new name, unless that is declared itself.
 
-    `keep_declared`: the old name stays declared too, for others that use it: see `contextdb.schema_file.users_of`.
+    `keep_declared`: the old name stays declared too, for others that use it: see `contextdb.renaming.uses_of`.
     """
     table.text_column(column)
     layout = tuple((name if old == column else new, old) for new, old in _layout(table))
@@ -393,7 +393,7 @@ def _named(table: Table, rows: CameFrom) -> str:
     if len(rows) != 1:
         return plural(len(rows), "row")
     asset = table.text(int(rows[0]), table.asset_column)
-    return shown(asset) if asset.strip() else f"row {int(rows[0]) + 1}"
+    return shown(asset) if asset.strip() else row_name(int(rows[0]))
 
 
 def _free_name(wanted: str, table: Table) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, format_cell, parse_cell
 from contextdb.conditions import Condition
+from contextdb.plain_ends import cuts_of, plain
 
 
 def meet(one: Mapping[str, str], other: Mapping[str, str], conditions: Mapping[str, Condition]) -> dict[str, str] | None:
@@ -20,7 +21,7 @@ def meet(one: Mapping[str, str], other: Mapping[str, str], conditions: Mapping[s
         both = mine if yours is None else yours if mine is None else _both(mine, yours)
         if both is not None and both.is_empty:
             return None
-        found[name] = format_cell(Cell(both), domain)
+        found[name] = format_cell(Cell(both and plain(both, cuts_of(mine, yours))), domain)
     return found
 
 

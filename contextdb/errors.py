@@ -7,8 +7,11 @@ order. All faults of a file travel together in one error.
     ├── CellError       a cell whose text is not in the grammar
     ├── SchemaError     contextdb.toml says something that cannot be meant
     ├── TableError      a table file that cannot be read, or rows that cannot be compiled
+    │   └── NoSuchTable     a name that no table has; a KeyError too
     ├── FileError       the disk says no: missing, not permitted, full, changed under us
-    ├── ContextError    facts that a table cannot be asked with
+    ├── ContextError    facts that a table cannot be asked with, or an argument that cannot be meant
+    │   ├── NoSuchFact      a fact that is not there; a KeyError too
+    │   └── NoSuchPlace     a row, or a place in an answer, that is not there; an IndexError too
     ├── PolicyError     a table breaks the promise of its own policy
     ├── ArtefactError   a compiled file that is truncated, altered or from another version
     └── MotionError     clips, features and searches
@@ -25,9 +28,14 @@ from dataclasses import dataclass, replace
 SHOWN_CHARACTERS = 60
 
 
+def row_name(row: int) -> str:
+    """A row (from 0, as Python counts) in a text that people read: "row 1" is the first, as in the editor."""
+    return f"row {row + 1}"
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a fault stands: a file with a line (from 1), or a table's row (from 0) and column."""
+    """Where a fault stands: a file with a line (from 1), or a table's row (from 0, from 1 in the text of it) and column."""
 
     file: str | None = None
     line: int | None = None
@@ -39,7 +47,7 @@ class Place:
         if self.line is not None:
             parts.append(f"line {self.line}")
         elif self.row is not None:
-            parts.append(f"row {self.row}")
+            parts.append(row_name(self.row))
         if self.column is not None:
             parts.append(f'column "{shown(self.column)}"')
         return ", ".join(parts)
@@ -84,6 +92,9 @@ class ContextDBError(Exception):
         self.faults: tuple[Fault, ...] = tuple(Fault(f) if isinstance(f, str) else f for f in faults)
         super().__init__("\n".join(str(f) for f in self.faults))
 
+    def __str__(self) -> str:
+        return "\n".join(str(f) for f in self.faults)  # a KeyError would show its repr
+
     def __reduce__(self) -> tuple[type[ContextDBError], tuple[Fault, ...]]:
         return type(self), self.faults
 
@@ -100,12 +111,24 @@ class TableError(ContextDBError):
     """A table file that cannot be read, or rows that cannot be compiled."""
 
 
+class NoSuchTable(TableError, KeyError):
+    """A name that no table of a project has."""
+
+
 class FileError(ContextDBError):
     """The file system refuses: a file is missing, not permitted, or the disk is full."""
 
 
 class ContextError(ContextDBError):
     """Facts that a table cannot be asked with: missing, unknown, of the wrong type, or outside the domain."""
+
+
+class NoSuchFact(ContextError, KeyError):
+    """A fact that a live context does not have: no condition is about it, or it is not set."""
+
+
+class NoSuchPlace(ContextError, IndexError):
+    """A row that a table does not have, or a place that an answer does not have."""
 
 
 class PolicyError(ContextDBError):

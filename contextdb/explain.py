@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask, intervals
+from contextdb.arguments import require_place, require_row, require_text, require_whole
 from contextdb.bitmask import Rows
 from contextdb.cell_words import NUMBER_TEXT
 from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, format_cell, format_number, parse_cell, reads
@@ -24,7 +25,7 @@ from contextdb.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
 from contextdb.domains import Domain
-from contextdb.errors import plural
+from contextdb.errors import ContextError, Fault, in_quotes, nearest, plural, some
 from contextdb.facts import Context, Fact, Unknown, describe
 from contextdb.mask_bits import bits_of
 from contextdb.matches import Matches
@@ -104,10 +105,11 @@ class Explanation:
         return (self.row(r) for r in self.order.tolist())
 
     def __getitem__(self, place: int) -> RowExplanation:
-        return self.row(int(self.order[place]))
+        return self.row(int(self.order[require_place(place, len(self), "place")]))
 
     def row(self, row: int) -> RowExplanation:
-        """Why this row is valid or not."""
+        """Why this row is valid or not; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        row = require_row(row, len(self))
         at = np.flatnonzero(self._fails[:, row]).tolist()
         failures = [failure for i in at for failure in self._failures(i, row)]
         if self.breaks_rule[row]:
@@ -115,12 +117,21 @@ class Explanation:
         return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
 
     def asset(self, asset: str) -> list[RowExplanation]:
-        """Why the rows of this asset, told with its path or without, are valid or not."""
+        """Why the rows of this asset, told with its path or without, are valid or not; ContextError names the nearest asset when no
+        row has it."""
+        require_text(asset, "asset")
         names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
-        return [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
+        found = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
+        if not found:
+            known = dict.fromkeys((*self.compiled.assets, *self.compiled.leaves))
+            near = nearest(asset, known)
+            told = f"the table {in_quotes(self.compiled.name)} has no asset {in_quotes(asset)}."
+            raise ContextError(Fault(told, some(known) or "none: the table has no rows", in_quotes(near) if near else ""))
+        return found
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
         """The rows that are not valid but nearest to it: fewest failing cells, then least far off."""
+        most = require_whole(most, "most")
         rows = np.flatnonzero(self.n_failures)
         if most <= 0:
             return []
@@ -134,16 +145,28 @@ class Explanation:
         return [int(r) for r in bitmask.rows(self.matches.always)]
 
     @cached_property
+    def undecided(self) -> int:
+        """The valid rows that only may be so, as bits: they match for some values of set-valued facts only, or their rule is open
+        for want of a fact."""
+        always = bitmask.to_int(self.matches.always)
+        return self.matches.bits & ~self._decided(always)
+
+    def _decided(self, always: int) -> int:
+        """Of rows whose cells match for every value those whose rule does too, and is not open."""
+        when = self.compiled.when
+        return always if when is None else when.left_with_care(always, always, self.facts, "never")[1]
+
+    @cached_property
     def n_failures(self) -> NDArray[np.int64]:
         """How many cells of each row fail: int64 [n_rows]; a rule counts as one, cells of one condition in tables inside each other
         count as one, and a disabled row one more."""
-        return np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled
+        return bitmask.read_only(np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled)
 
     @cached_property
     def order(self) -> Rows:
         """Row numbers, valid ones first, then by failing cells, how far the facts are off, and place in the file: int64
         [n_rows]."""
-        return self._sorted(np.arange(self.compiled.n_rows))
+        return bitmask.read_only(self._sorted(np.arange(self.compiled.n_rows)))
 
     def __str__(self) -> str:
         lines = [f"{len(self.matches)} of {plural(self.compiled.n_rows, 'row')} valid"]
@@ -174,7 +197,7 @@ class Explanation:
         return when.rows & ~left
 
     def _flags(self, bits: int) -> NDArray[np.bool_]:
-        return bitmask.unpack(bitmask.from_int(bits, self.compiled.n_rows), self.compiled.n_rows)
+        return bitmask.read_only(bitmask.unpack(bitmask.from_int(bits, self.compiled.n_rows), self.compiled.n_rows))
 
     @property
     def _lenient(self) -> Unknown:

@@ -17,16 +17,18 @@ from typing import Literal
 
 import numpy as np
 
+from contextdb.arguments import require_text
 from contextdb.cell_words import truth_of
 from contextdb.cells import Cell, NumberSet, TagSet, ValueSet, covers, format_number, parse_cell, parse_tags
 from contextdb.conditions import Condition
 from contextdb.domains import NUMERIC, wrap_angle
-from contextdb.errors import CellError, ContextError, Fault, Place, in_quotes, nearest, plural, shown, some
+from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, in_quotes, nearest, plural, shown, some
 
 Unknown = Literal["error", "any", "never"]
 Fact = bool | float | str | frozenset[str] | Cell | None
 Context = Mapping[str, object]
 
+NAMES = "the names of the table's conditions"
 UNKNOWN_MODES = ("error", "any", "never")
 _EXPECTED = {
     "bool": "True or False",
@@ -48,23 +50,46 @@ class FactSet:
 
 def cell(text: str) -> FactSet:
     """A fact that may be any of a set of values, written as a cell: `query({"heading": cell("0 ± 90")})`."""
-    return FactSet(text)
+    return FactSet(require_text(text, "text"))
 
 
 def check_mode(unknown: str) -> None:
     """Raise ContextError unless `unknown` is a treatment of missing facts."""
-    if unknown not in UNKNOWN_MODES:
+    if not isinstance(unknown, str) or unknown not in UNKNOWN_MODES:
         near = nearest(str(unknown), UNKNOWN_MODES)
         found = f"there is no treatment {in_quotes(str(unknown))} of missing facts."
         raise ContextError(Fault(found, some(UNKNOWN_MODES), in_quotes(near) if near else ""))
 
 
-def no_condition(name: str, known: Iterable[str]) -> ContextError:
+def no_condition(name: str, known: Iterable[str]) -> NoSuchFact:
     """The error for a fact that no condition of the table is about."""
-    near = nearest(name, known)
-    return ContextError(
-        Fault(f"there is no condition {in_quotes(name)}.", some(known), in_quotes(near) if near else "", rule="unknown-fact")
-    )
+    near = nearest(str(name), known)
+    found = f"there is no condition {in_quotes(str(name))}."
+    return NoSuchFact(Fault(found, some(known), in_quotes(near) if near else "", rule="unknown-fact"))
+
+
+def require_context(context: object) -> None:
+    """Raise ContextError for what is no mapping."""
+    if not isinstance(context, Mapping):
+        raise ContextError(Fault(f"a context is a mapping of facts, not {type(context).__name__}.", "a dict"))
+
+
+def require_names(context: Iterable[object]) -> None:
+    """Raise ContextError for keys that are no texts."""
+    for name in context:
+        if not isinstance(name, str):
+            found = f"a context has the key {in_quotes(_text_of(name))}, of type {type(name).__name__}."
+            raise ContextError(Fault(found, "the names of facts, as texts"))
+
+
+def as_context(facts: object) -> Mapping[str, object]:
+    """Facts given as a mapping or as pairs."""
+    if not isinstance(facts, Mapping):
+        try:
+            facts = dict(facts)  # type: ignore[call-overload]
+        except (TypeError, ValueError):
+            require_context(facts)
+    return facts  # type: ignore[return-value]
 
 
 def read_fact(value: object, condition: Condition) -> Fact:
@@ -118,7 +143,7 @@ def missing_error(missing: list[str], given: Iterable[str]) -> ContextError:
     extra = list(given)
     faults = []
     for name in missing[:1]:
-        near = nearest(name, extra)
+        near = nearest(name, (n for n in extra if isinstance(n, str)))
         rest = f" ({plural(len(missing), 'fact')} missing: {some(missing)})" if len(missing) > 1 else ""
         found = f"the fact {in_quotes(name)} is missing{rest}."
         hint = f"{in_quotes(name)} for {in_quotes(near)}" if near else ""
@@ -128,12 +153,19 @@ def missing_error(missing: list[str], given: Iterable[str]) -> ContextError:
 
 def misspelt(missing: list[str], extra: Iterable[str]) -> ContextError | None:
     """An error when a given name that no condition has is very likely a missing fact misspelt."""
-    for name in extra:
+    for name in (n for n in extra if isinstance(n, str)):
         near = nearest(name, missing)
         if near is not None and _is_slip(name, near):
             found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is missing."
-            return ContextError(Fault(found, "the names of the table's conditions", in_quotes(near), rule="unknown-fact"))
+            return ContextError(Fault(found, NAMES, in_quotes(near), rule="unknown-fact"))
     return None
+
+
+def alike(name: str, known: Iterable[str]) -> tuple[str, ...]:
+    """The known names of which a given one is very likely a misspelling, the nearest first."""
+    found = [n for n in known if _is_slip(name, n)]
+    near = nearest(name, found)
+    return tuple(sorted(found, key=lambda n: n != near))
 
 
 def _is_slip(name: str, near: str) -> bool:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes, write_atomic
-from contextdb.errors import Fault, FileError, Place, in_quotes, nearest
+from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest
 from contextdb.parquet import ParquetSource, read_parquet, rewritten_parquet
+from contextdb.parquet_frame import DamagedFrame, require_whole_file
 from contextdb.rewrite import Origin, rewritten
 from contextdb.source import Source, read_csv
 
@@ -41,6 +44,39 @@ def read_texts(path: str | Path) -> tuple[AnySource, list[TextColumn]]:
     return read_parquet(raw, str(path)) if _suffix(path) == ".parquet" else read_csv(raw, str(path))
 
 
+@contextmanager
+def scanned_parquet(path: Path) -> Iterator[pl.LazyFrame]:
+    """Scan a Parquet file of contexts, whose frame is checked first.
+
+    Raises
+    ------
+    TableError, FileError
+        The file is missing, no Parquet or damaged, found now or while the scan is collected inside the `with`.
+    """
+    try:
+        require_whole_file(path)
+        yield pl.scan_parquet(path, glob=False, low_memory=True)
+    except (DamagedFrame, pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+        read_texts(path)  # says what is wrong with the file
+        raise TableError(Fault(f"cannot read the file: {error}.", "a whole Parquet file", place=Place(str(path)))) from None
+
+
+def new_source(
+    path: str | Path,
+    columns: Sequence[TextColumn],
+    source: AnySource | None,
+    origin: Origin,
+    field_of: Sequence[int] | None = None,
+) -> AnySource:
+    """What a file becomes, before it is written: its bytes are `raw`. The parameters and errors are those of `write_texts`."""
+    fresh = np.full(len(origin), -1)
+    if _suffix(path) == ".csv":
+        return rewritten(columns, source, origin, field_of) if isinstance(source, Source) else rewritten(columns, None, fresh)
+    if isinstance(source, ParquetSource):
+        return rewritten_parquet(columns, source, origin, field_of)
+    return rewritten_parquet(columns, None, fresh)
+
+
 def write_texts(
     path: str | Path,
     columns: Sequence[TextColumn],
@@ -64,14 +100,7 @@ def write_texts(
     TableError
         A text or a name that such a file cannot hold.
     """
-    new: AnySource
-    fresh = np.full(len(origin), -1)
-    if _suffix(path) == ".csv":
-        new = rewritten(columns, source, origin, field_of) if isinstance(source, Source) else rewritten(columns, None, fresh)
-    elif isinstance(source, ParquetSource):
-        new = rewritten_parquet(columns, source, origin, field_of)
-    else:
-        new = rewritten_parquet(columns, None, fresh)
+    new = new_source(path, columns, source, origin, field_of)
     write_atomic(path, new.raw)
     return new
 

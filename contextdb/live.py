@@ -7,16 +7,18 @@ each fact that has been moving; a fact that starts to move joins those, and the 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping
-from copy import copy
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from copy import copy, deepcopy
 from functools import reduce
 from math import ldexp
 from operator import and_
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
-from contextdb.facts import Unknown, no_condition, read_fact
+from contextdb.errors import Fault, NoSuchFact, in_quotes, some
+from contextdb.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
 from contextdb.lookup import SingleLookup
 from contextdb.matches import Matches
+from contextdb.mirroring import kept_facts
 from contextdb.when.rules import Unusual
 
 if TYPE_CHECKING:
@@ -28,24 +30,35 @@ if TYPE_CHECKING:
 
 MOST_MOVING = 8
 
+_SHARED = frozenset(("_lookups", "_others"))
+"""What a context never changes, and shares with its copies."""
+
 CAST = ""
 """What stands among the unusual facts while actors are offered, so that a question without actors has nothing to check."""
 
 
-class LiveContext:
-    """Facts kept between questions. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` asks."""
+class LiveContext(MutableMapping[str, object]):
+    """Facts kept between questions. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` asks.
+
+    A mapping of the facts that are set; a name that is not among them raises NoSuchFact, which is a KeyError too. `copy()` gives a
+    context that goes its own way. Two are equal when they are one.
+    """
 
     __slots__ = (
+        "_alike",
         "_answer",
         "_answering",
         "_cast",
         "_compiled",
         "_facts",
+        "_keep",
+        "_known",
         "_lookups",
         "_masks",
         "_moving",
         "_n_moving",
         "_odd",
+        "_passed",
         "_still",
         "_unknown",
     )
@@ -66,6 +79,14 @@ class LiveContext:
         self._odd: dict[str, tuple[int, bool]] = {}
         """Facts that are missing or sets: the rows that accept all of it, and whether it is missing."""
         self._cast: LiveActors | None = None
+        self._known = frozenset(compiled.asked)
+        """The names of the facts that can be set."""
+        self._passed: set[str] = set()
+        """Other names that `update` was given and that are like none of these."""
+        self._alike: dict[str, tuple[str, ...]] = {}
+        """For each other name the facts that it is like."""
+        self._keep = compiled.keeping(unknown) if compiled.mirroring and not compiled.is_soft else None
+        """What keeps the facts of an answer, where it must know them for a mirror; a soft table's answers know them anyway."""
         self._answer = Matches(0, self._answering)
         """The last answer: while the rows stay the same, so does the object."""
         for condition in compiled.conditions:
@@ -84,19 +105,100 @@ class LiveContext:
                 self._odd.pop(name, None)
 
     def __getitem__(self, name: str) -> object:
-        return self._facts[name]
+        value = self._value(name)
+        if value is None:
+            raise NoSuchFact(Fault(f"the fact {in_quotes(name)} is not set.", some(self) or "none: no fact is set"))
+        return value
 
     def __delitem__(self, name: str) -> None:
         self[name] = None
 
-    def __contains__(self, name: str) -> bool:
-        return self._facts.get(name) is not None
+    def __contains__(self, name: object) -> bool:
+        return name in self._known and self._value(name) is not None
 
-    def update(self, facts: Mapping[str, object]) -> None:
-        """Set several facts; those that no condition of the table asks for are passed over, as in `query`."""
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, value in self.facts.items() if value is not None)
+
+    def __len__(self) -> int:
+        return sum(value is not None for value in self.facts.values())
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    def _value(self, name: str) -> object:
+        """One fact, None where it is missing."""
+        if name not in self._facts:
+            raise no_condition(name, self._lookups)
+        return self._facts[name]
+
+    def update(self, facts: Mapping[str, object] | Iterable[tuple[str, object]]) -> None:  # type: ignore[override]
+        """Set several facts; those that no condition of the table asks for are passed over, as in `query`.
+
+        Raises
+        ------
+        ContextError
+            A name is very likely that of a condition misspelt, whose fact is not given beside it: then none is set. Names that the
+            project declares are of other tables, and no slips. Or a value is wrong, which names the fact.
+        """
+        if type(facts) is not dict:
+            facts = as_context(facts)
+        if not self._known.issuperset(facts):
+            facts = self._own(facts)
         for name, value in facts.items():
-            if name in self._lookups:
-                self[name] = value
+            self[name] = value
+
+    def _own(self, facts: Mapping[str, object]) -> dict[str, object]:
+        """Of some facts those that the table asks for; raises ContextError where another is very likely one of them, misspelt."""
+        require_names(facts)
+        for name in facts:
+            if name not in self._known and name not in self._passed:
+                self._look_at(name, facts)
+        return {name: value for name, value in facts.items() if name in self._known}
+
+    def _look_at(self, name: str, facts: Mapping[str, object]) -> None:
+        """Raise ContextError where a name that the table does not ask for is very likely one that it does, misspelt."""
+        if name not in self._alike:
+            self._alike[name] = () if name in self._compiled.declared else alike(name, self._known)
+        if not self._alike[name]:
+            self._passed.add(name)
+        for near in self._alike[name]:
+            if near not in facts:
+                found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is not given beside it."
+                raise NoSuchFact(Fault(found, NAMES, in_quotes(near), rule="unknown-fact"))
+
+    def copy(self) -> Self:
+        """A context of its own with the same facts and actors, which shares the compiled table. The actors' mappings are shared."""
+        new: Self = object.__new__(type(self))
+        for name, value in self._state().items():
+            setattr(new, name, copy(value) if type(value) in (dict, set) and name not in _SHARED else value)
+        new._cast = copy(self._cast)
+        return new
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """The same, with facts and actors that are copies too."""
+        new = self.copy()
+        memo[id(self)] = new
+        new._facts = deepcopy(self._facts, memo)
+        if new._cast is not None:
+            new.actors(deepcopy(new._cast.actors, memo), deepcopy(new._cast.prefer, memo))
+        return new
+
+    def _state(self) -> dict[str, Any]:
+        state: dict[str, Any] = object.__getstate__(self)[1]  # type: ignore[index]
+        return state
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """What is pickled: the table, the facts and the actors. Masks are found again."""
+        cast = None if self._cast is None else (self._cast.actors, self._cast.prefer)
+        return _live_again, (self._compiled, self._unknown, self.facts, cast)
 
     def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
         """Offer actors for roles from now on, as `query` takes them; None takes them back. They are read when next asked.
@@ -114,11 +216,17 @@ class LiveContext:
 
     @property
     def facts(self) -> dict[str, object]:
-        """The facts as they were set; None where one is missing."""
-        return dict(self._facts)
+        """The facts as they were set, without derived ones; None where one is missing."""
+        return dict(self._told)
+
+    @property
+    def _told(self) -> dict[str, object]:
+        """The facts as the caller gave them; not a copy."""
+        return self._facts
 
     def matches(self) -> Matches:
-        """The valid rows now; the same object as before while they stay the same.
+        """The valid rows now; the same object as before while they stay the same, in a table without soft cells and without
+        conditions whose facts change in a mirror.
 
         Raises
         ------
@@ -142,6 +250,10 @@ class LiveContext:
             return self.matches()
         if self._odd:
             return self._set_matches(bits)
+        if self._keep is not None:
+            answer = Matches(bits, self._answering)
+            answer._mirrored = self._keep(self._told)
+            return answer
         if bits != self._answer.bits:
             self._answer = Matches(bits, self._answering)
         return self._answer
@@ -179,7 +291,8 @@ class LiveContext:
     def _set_matches(self, bits: int) -> Matches:
         masks = {**self._masks, **self._moving}
         every = (self._odd[n][0] if n in self._odd else m for n, m in masks.items())
-        return self._compiled.matches(bits, reduce(and_, every, self._compiled.enabled_bits))
+        found = self._compiled.matches(bits, reduce(and_, every, self._compiled.enabled_bits))
+        return found if self._keep is None else found.with_mirrored(self._keep(kept_facts(self._told)))
 
 
 class SoftLiveContext(LiveContext):
@@ -190,7 +303,9 @@ class SoftLiveContext(LiveContext):
     def matches(self) -> Matches:
         """The valid rows for the facts as they are now."""
         answer = super().matches()
-        return answer if self._cast is not None else self._compiled.with_penalties(copy(answer), self.facts, self._unknown)
+        if self._cast is not None:
+            return answer
+        return self._compiled.bound(answer.again(), kept_facts(self._told) if self._odd else self._told, self._unknown)
 
 
 class AskingLiveContext(LiveContext):
@@ -223,8 +338,8 @@ class AskingLiveContext(LiveContext):
             super().__setitem__(name, value)
         self._given[name] = value
 
-    def __getitem__(self, name: str) -> object:
-        """One fact; a derived one is computed."""
+    def _value(self, name: str) -> object:
+        """One fact, None where it is missing; a derived one is computed."""
         if name in self._given:
             return self._given[name]
         if name not in self._computed:
@@ -232,19 +347,23 @@ class AskingLiveContext(LiveContext):
         self._compute()
         return self._computed[name]
 
-    def __contains__(self, name: str) -> bool:
-        return (name in self._given or name in self._computed) and self[name] is not None
+    def __contains__(self, name: object) -> bool:
+        return (name in self._given or name in self._computed) and self._value(name) is not None
 
-    def update(self, facts: Mapping[str, object]) -> None:
-        """Set several facts; those that the table does not ask for are passed over, derived ones refused."""
-        for name, value in facts.items():
-            if name in self._given or (name in self._computed and value is not None):
-                self[name] = value
+    def _look_at(self, name: str, facts: Mapping[str, object]) -> None:
+        if name not in self._computed:
+            super()._look_at(name, facts)
+        elif facts[name] is not None:
+            self._refuse(name)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        new = super().__deepcopy__(memo)
+        new._given = deepcopy(self._given, memo)
+        return new
 
     @property
-    def facts(self) -> dict[str, object]:
-        """The facts as they were set, without derived ones; None where one is missing."""
-        return dict(self._given)
+    def _told(self) -> dict[str, object]:
+        return self._given
 
     def matches(self) -> Matches:
         """The valid rows for the facts as they are now."""
@@ -319,6 +438,8 @@ class RuledLiveContext(AskingLiveContext):
                 left &= ~self._when.rules[number].rows
         if left == answer.bits:
             return answer
+        if self._keep is not None:
+            return Matches(left, self._answering).with_mirrored(self._keep(self._told))
         if left != self._left.bits:
             self._left = Matches(left, self._answering)
         return self._left
@@ -344,9 +465,20 @@ class SoftRuledLiveContext(SoftLiveContext, RuledLiveContext):
     __slots__ = ()
 
 
+def _live_again(
+    compiled: CompiledTable, unknown: Unknown, facts: Mapping[str, object], cast: tuple[Actors, Prefer] | None
+) -> LiveContext:
+    """A live context out of a pickle."""
+    live = live_context(compiled, unknown)
+    live.update(facts)
+    if cast is not None:
+        live.actors(*cast)
+    return live
+
+
 def live_context(compiled: CompiledTable, unknown: Unknown = "error") -> LiveContext:
     """A context of the kind that a table needs."""
-    is_soft = any(compiled.soft)
+    is_soft = compiled.is_soft
     if compiled.when is not None:
         return SoftRuledLiveContext(compiled, unknown) if is_soft else RuledLiveContext(compiled, unknown)
     if compiled.derivation is not None:

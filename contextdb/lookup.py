@@ -36,17 +36,21 @@ def ask(c, {names}):
     answer = new(Matches)
     answer.bits = {terms}
     answer._table = answering
-    answer._rows = None
+    answer._rows = None{kept}
     return answer
 """
 
 Column = tuple[Condition, ColumnMasks]
 Ask = Callable[[Mapping[str, object]], Matches]
+Keep = Callable[[Mapping[str, object]], dict[str, object]]
 SingleLookup = tuple[list[float] | None, Any]
 
 
-def build_ask(columns: Sequence[Column], enabled: int, answering: Answering) -> Ask:
-    """A function from a context to its answer; raises whatever it raises when a fact is unusual."""
+def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, keep: Keep | None = None) -> Ask:
+    """A function from a context to its answer; raises whatever it raises when a fact is unusual.
+
+    With `keep`, which copies a context, the answer knows the facts it was asked with, for the answer in a mirror.
+    """
     n_rows = len(answering.assets)
     names: dict[str, Any] = {"bisect_right": bisect_right, "index": index, "ldexp": math.ldexp}
     names |= {"new": object.__new__, "Matches": Matches, "answering": answering}
@@ -56,7 +60,9 @@ def build_ask(columns: Sequence[Column], enabled: int, answering: Answering) -> 
         names["enabled"] = enabled
         values.append("enabled")
     # Every fact is looked up, also when no row is left: a missing one is an error whatever the others say.
-    source = _ASK.format(names=", ".join(f"{n}={n}" for n in names), terms=" & ".join(values + numbers))
+    names |= {"keep": keep} if keep is not None else {}
+    kept = "\n    answer._mirrored = keep(c)" if keep is not None else ""
+    source = _ASK.format(names=", ".join(f"{n}={n}" for n in names), terms=" & ".join(values + numbers), kept=kept)
     exec(compile(source, "<contextdb lookup>", "exec"), names)
     ask: Ask = names["ask"]
     return ask

@@ -2,41 +2,94 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.bitmask import Flags, Rows, Words
-from contextdb.errors import ContextError, Fault
+from contextdb.bitmask import Flags, Rows, Words, read_only
+from contextdb.errors import ContextError, Fault, in_quotes, plural
 
 _INT64 = np.dtype(np.int64)
 
 FEW = 48
 """Up to this many rows are read off the integer bit by bit; beyond, unpacking all bits at once is faster."""
 
+_PACK = [struct.Struct(f"={count}q").pack for count in range(FEW + 1)]
+"""For so many row numbers what makes bytes of them: an array over bytes is read-only, and made sooner than one of a list."""
+
 
 class Answering:
-    """What the answers of one table share: its assets, with their paths and without, and 0 … n_rows - 1 to cut row numbers from."""
+    """What the answers of one table share: its assets, with their paths and without, and 0 … n_rows - 1 to cut row numbers from.
 
-    __slots__ = ("assets", "leaves", "row_numbers")
+    Two are of the same table where name and `version` are equal; the version is worked out where two have to be compared.
+    """
 
-    def __init__(self, assets: Sequence[str], leaves: Sequence[str] | None = None) -> None:
+    __slots__ = ("_version", "ask_mirrored", "assets", "is_mirroring", "leaves", "name", "row_numbers")
+
+    def __init__(
+        self,
+        assets: Sequence[str],
+        leaves: Sequence[str] | None = None,
+        name: str = "",
+        version: str | Callable[[], str] = "",
+        ask_mirrored: Callable[[Mapping[str, object]], Matches] | None = None,
+        is_mirroring: bool = False,
+    ) -> None:
         self.assets = assets
+        self.ask_mirrored = ask_mirrored
+        """Asks with the facts as a mirror shows them; None for a table in which no fact changes there, and where it was pickled."""
+        self.is_mirroring = is_mirroring or ask_mirrored is not None
+        """Whether facts of the table change in a mirror."""
         self.leaves = assets if leaves is None else leaves
-        self.row_numbers: Rows = np.arange(len(assets), dtype=np.int64)
-        self.row_numbers.flags.writeable = False
+        self.name = name
+        self.row_numbers: Rows = read_only(np.arange(len(assets), dtype=np.int64))
+        self._version = version
+
+    @property
+    def version(self) -> str:
+        """What the table says, as a digest."""
+        if not isinstance(self._version, str):
+            self._version = self._version()
+        return self._version
+
+    def require(self, other: Answering) -> None:
+        """Raise ContextError unless an answer of `other` is one of this table in this version."""
+        if other is self or (self.name == other.name and self.version == other.version):
+            return
+        own, its = (f"{in_quotes(a.name)} ({plural(len(a.assets), 'row')}" for a in (self, other))
+        if self.name == other.name:
+            versions = f"version {other.version[:8]}), this is version {self.version[:8]} ({plural(len(self.assets), 'row')})"
+            raise ContextError(Fault(f"the answer is of another version of {its}, {versions}.", _OWN_ANSWER, _ASK_AGAIN))
+        raise ContextError(Fault(f"the answer is of the table {its}), not of {own}).", _OWN_ANSWER, _ASK_AGAIN))
+
+    def __copy__(self) -> Answering:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Answering:
+        return self
+
+    def __reduce__(self) -> tuple[type[Answering], tuple[object, ...]]:
+        """What is pickled: not the table, which `ask_mirrored` would bring along."""
+        return Answering, (self.assets, self.leaves, self.name, self.version, None, self.is_mirroring)
+
+
+_OWN_ANSWER = "an answer of this compiled table"
+_ASK_AGAIN = "to ask this table again: query(facts)"
 
 
 class Matches:
-    """The valid rows for one context. True when there is at least one; its length is their number.
+    """The valid rows for one context. True when there is at least one; its length is their number. Iteration gives row numbers;
+    `in` takes a row number or an asset.
 
     Attributes
     ----------
     indices : int64 array
-        Row numbers, ascending, from 0. Not to be written to.
+        Row numbers, ascending, from 0. This and all other arrays of an answer are read-only.
     assets : list of str
         The assets of those rows; of a row in a table inside the table with its path, "hit_mid_air/dive/MidAir_Dive".
     leaves : list of str
@@ -47,8 +100,10 @@ class Matches:
         The rows that hold *all* values of the facts that were given as sets; the same as `mask` when none was.
     """
 
-    __slots__ = ("_penalties", "_rows", "_table", "bits")
+    __slots__ = ("_mirrored", "_penalties", "_rows", "_table", "bits")
 
+    _mirrored: Matches | dict[str, object] | Callable[[], Matches]
+    """Set for tables with conditions whose facts change in a mirror: the answer there, the facts to ask with, or what asks."""
     _penalties: Callable[[], NDArray[np.float64]]
     """Set for tables with soft cells only: a plain answer has nothing to pay for."""
 
@@ -65,7 +120,7 @@ class Matches:
 
     @property
     def indices(self) -> Rows:
-        """Row numbers, ascending: int64 [count]."""
+        """Row numbers, ascending: int64 [count], read-only."""
         rows = self._rows
         if rows is None:
             rows = self._rows = rows_of(self.bits, self._table.row_numbers)
@@ -96,7 +151,7 @@ class Matches:
     @property
     def flags(self) -> Flags:
         """Whether each row of the table is valid: bool [n_rows]."""
-        return bitmask.unpack(self.mask, self.n_rows)
+        return read_only(bitmask.unpack(self.mask, self.n_rows))
 
     @property
     def table_assets(self) -> Sequence[str]:
@@ -112,12 +167,45 @@ class Matches:
     @property
     def penalties(self) -> NDArray[np.float64]:
         """What each row's soft cells cost in a search with this context: float64 [n_rows]; see `CompiledTable.penalties`."""
-        return self._penalties() if self.has_penalties else np.zeros(self.n_rows)
+        return read_only(self._penalties() if self.has_penalties else np.zeros(self.n_rows))
 
     def with_penalties(self, penalties: Callable[[], NDArray[np.float64]]) -> Matches:
         """The same answer of a table with soft cells; what they cost is worked out when it is asked for."""
         self._penalties = penalties
         return self
+
+    @property
+    def mirrored(self) -> Matches:
+        """The answer to the same question with the facts as a mirror shows them: the rows whose assets may be played mirrored.
+
+        Asked when it is first wanted, with the facts as they were. The same object where no fact of the table changes in a mirror.
+
+        Raises
+        ------
+        ContextError
+            A derived fact or a rule cannot be computed with mirrored facts, or the answer was asked by codes, which keep no facts.
+        """
+        if not self._table.is_mirroring:
+            return self
+        known = getattr(self, "_mirrored", None)
+        if known is None:
+            found = "this answer was not asked with facts, so there are none to mirror."
+            raise ContextError(Fault(found, "an answer of query, query_many or live"))
+        if isinstance(known, dict):
+            assert self._table.ask_mirrored is not None, "what was pickled has its answer"
+            known = self._mirrored = self._table.ask_mirrored(known)
+        elif not isinstance(known, Matches):
+            known = self._mirrored = known()
+        return known
+
+    def with_mirrored(self, asked: dict[str, object] | Callable[[], Matches]) -> Matches:
+        """The same answer, of a table with conditions whose facts change in a mirror: with its facts, kept, or with what asks."""
+        self._mirrored = asked
+        return self
+
+    def again(self) -> Matches:
+        """The same rows as an answer of its own, which knows neither penalties nor a mirror."""
+        return Matches(self.bits, self._table)
 
     def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
         """Who plays which role in a valid row, as {role: actor}; for an answer to a query with actors."""
@@ -136,8 +224,48 @@ class Matches:
     def __iter__(self) -> Iterator[int]:
         return iter(self.indices.tolist())
 
-    def __contains__(self, row: int) -> bool:
-        return 0 <= row < self.n_rows and bool(self.bits >> int(row) & 1)
+    def __contains__(self, row: object) -> bool:
+        if isinstance(row, str):
+            return any(row in (self._table.assets[r], self._table.leaves[r]) for r in self)
+        try:
+            number = int(row)  # type: ignore[call-overload]
+        except (TypeError, ValueError, OverflowError):
+            return False
+        return 0 <= number < self.n_rows and bool(number == row and self.bits >> number & 1)
+
+    def require_own(self, table: Answering) -> None:
+        """Raise ContextError unless this is an answer of a table, in that version."""
+        if self._table is not table:
+            table.require(self._table)
+
+    def __copy__(self) -> Self:
+        copied: Self = object.__new__(type(self))
+        copied._set(_slots(self))
+        return copied
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: what soft cells cost as numbers, the answer in a mirror itself, and not what can be worked out again."""
+        state = _slots(self) | {"_rows": None}
+        if state.pop("_mirrored", None) is not None and (seen := self._mirrored_or_none()) is not None:
+            state["_mirrored"] = seen
+        return state | {"_penalties": partial(_known, self.penalties)} if self.has_penalties else state
+
+    def _mirrored_or_none(self) -> Matches | None:
+        """The answer in a mirror, which knows this one as its own; None where it cannot be had."""
+        try:
+            seen = self.mirrored
+        except ContextError:
+            return None
+        if not isinstance(getattr(seen, "_mirrored", None), Matches):
+            seen._mirrored = self
+        return seen
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._set(state)
+
+    def _set(self, state: Mapping[str, Any]) -> None:
+        for name, value in state.items():
+            setattr(self, name, value)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Matches):
@@ -164,9 +292,13 @@ class SetMatches(Matches):
         """The rows that hold all values of set-valued facts: uint64 [W]."""
         return bitmask.from_int(self._always, self.n_rows)
 
+    def again(self) -> Matches:
+        """The same rows as an answer of its own, which knows neither penalties nor a mirror."""
+        return SetMatches(self.bits, self._table, self._always)
+
 
 def rows_of(bits: int, numbers: Rows) -> Rows:
-    """The rows of an integer mask: int64 [count]. One row, the usual answer, is a view of `numbers` and costs no array."""
+    """The rows of an integer mask: int64 [count], read-only. One row, the usual answer, is a view of `numbers`."""
     top = bits.bit_length() - 1
     if top < 0:
         return numbers[:0]
@@ -176,9 +308,19 @@ def rows_of(bits: int, numbers: Rows) -> Rows:
     found = [top]
     while rest:
         if len(found) == FEW:
-            return bitmask.rows(bitmask.from_int(bits, len(numbers)))
+            return read_only(bitmask.rows(bitmask.from_int(bits, len(numbers))))
         top = rest.bit_length() - 1
         found.append(top)
         rest ^= 1 << top
     found.reverse()
-    return np.array(found, _INT64)
+    return np.frombuffer(_PACK[len(found)](*found), _INT64)
+
+
+def _slots(matches: Matches) -> dict[str, Any]:
+    """All that an answer holds, by name."""
+    state: dict[str, Any] = object.__getstate__(matches)[1]  # type: ignore[index]
+    return state
+
+
+def _known(costs: NDArray[np.float64]) -> NDArray[np.float64]:
+    return costs

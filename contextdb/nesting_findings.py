@@ -66,11 +66,13 @@ def _shut_out(flat: FlatTable) -> Iterator[Finding]:
 
 def own_findings(flat: FlatTable, findings: Iterable[Finding]) -> Iterator[Finding]:
     """Findings about rows of a flat table as findings about the rows of its outer table."""
-    for finding in findings:
-        if finding.row is None:
-            yield finding
-        elif not _is_of_inner(flat, (finding.row, *finding.by)):
-            yield _own(flat, finding, finding.row)
+    for finding in outer_findings(flat, findings):
+        yield finding if finding.row is None else _own(flat, finding, finding.row)
+
+
+def outer_findings(flat: FlatTable, findings: Iterable[Finding]) -> Iterator[Finding]:
+    """The findings about rows of a flat table, without those that the check of an inner table tells of."""
+    return (f for f in findings if f.row is None or not _is_of_inner(flat, (f.row, *f.by)))
 
 
 def _is_of_inner(flat: FlatTable, rows: Sequence[int]) -> bool:

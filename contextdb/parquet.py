@@ -2,7 +2,8 @@
 
 Strings stay as they are; numbers become the shortest text that reads back as the same number, bools True and False, a list of
 strings an enum set (`CB FS "Half Back"`), and null is empty: Any. Without an edit the same bytes are written. After one, a column
-keeps its type where every text still fits it, and becomes strings where one does not. Nothing here touches the disk.
+keeps its type where every text still fits it, and becomes strings where one does not. What is written is sealed: its metadata hold
+the digest of its bytes. Nothing here touches the disk.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from numpy.typing import NDArray
 from contextdb.bitmask import Flags
 from contextdb.cell_words import NUMBER_TEXT, quoted, truth_of
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, Place, TableError, shown
+from contextdb.errors import Fault, Place, TableError, row_name, shown
 from contextdb.foreign import seems_to_be
+from contextdb.parquet_frame import MAGIC, UNSEALED, DamagedFrame, require_whole, sealed
 from contextdb.record_faults import MOST_CHARACTERS
 from contextdb.rewrite import Origin, changed_rows, source_fields
 from contextdb.source import name_faults, text_columns
 
-MAGIC = b"PAR1"
 _ACCEPTED = "strings, categories, bools, numbers, and lists of strings"
 _WHOLE = re.compile(r"[+-]?\d{1,40}")
 _NUMBER = re.compile(NUMBER_TEXT)
@@ -110,8 +111,8 @@ def rewritten_parquet(
     old = _frame(source.raw, "").get_columns() if source else []
     series = [_series(c, old[f] if f >= 0 else None, origin, rows) for c, f, rows in zip(columns, fields, changed, strict=True)]
     out = io.BytesIO()
-    pl.DataFrame(series).write_parquet(out)
-    return read_parquet(out.getvalue(), "")[0]
+    pl.DataFrame(series).write_parquet(out, metadata=dict(UNSEALED))
+    return read_parquet(sealed(out.getvalue()), "")[0]
 
 
 # ---- the file
@@ -122,7 +123,10 @@ def _frame(raw: bytes, file: str) -> pl.DataFrame:
     if fault:
         raise TableError(fault.at(Place(file)))
     try:
+        require_whole(raw)
         return pl.read_parquet(io.BytesIO(raw))
+    except DamagedFrame as error:
+        reason = str(error)
     except pl.exceptions.PolarsError as error:
         reason = shown(str(error).split("\n")[0], 200)
     except (Exception, pl.exceptions.PanicException):  # some damage makes polars stumble instead of complain
@@ -162,7 +166,7 @@ def _long_faults(column: TextColumn) -> Iterator[Fault]:
         if len(text) > MOST_CHARACTERS:
             row = int((column.codes == code).argmax())
             yield Fault(
-                f"the cell in row {row:,} has {len(text):,} characters.", f"at most {MOST_CHARACTERS:,} characters in a cell"
+                f"the cell in {row_name(row)} has {len(text):,} characters.", f"at most {MOST_CHARACTERS:,} characters in a cell"
             )
 
 

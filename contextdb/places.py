@@ -9,6 +9,7 @@ from contextdb.artefact import SUFFIX
 from contextdb.compiled import CompiledTable
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes
 from contextdb.errors import Fault, FileError, Place, TableError, nearest, plural, shown
+from contextdb.file_names import composed
 from contextdb.project import SCHEMA_FILE, load_table, read_folder_schema, table_files, twice_named
 
 FOLDERS = (Path(), Path("tables"))
@@ -36,7 +37,7 @@ def table_path(text: str) -> Path:
         return path
     tables = [_tables_in(folder) for folder in FOLDERS]
     for here in tables:
-        named = [(name, file) for name, file in here if name == text]
+        named = [(name, file) for name, file in here if composed(name) == composed(text)]
         if faults := twice_named(named):
             raise TableError(*faults)
         if named:

@@ -7,25 +7,45 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from contextdb import files
-from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.arguments import require_kind, require_path
+from contextdb.disk import names_a_table, path_in_quotes, read_bytes
+from contextdb.errors import ContextDBError, Fault, FileError, NoSuchTable, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.file_names import alike, composed, spelled
 from contextdb.nesting.links import Neighbours, inner_tables, is_nested, require_sound
-from contextdb.schema import EMPTY, Schema, read_schema
+from contextdb.other_files import other_form, stray_sentence
+from contextdb.schema import EMPTY, Schema, TableSettings, read_schema
 from contextdb.table import Table, build_table
+from contextdb.together import finish
+from contextdb.unchanging import Unchanging
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
 
 SCHEMA_FILE = "contextdb.toml"
-CASES_SUFFIX = ".cases.csv"
+T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Project:
-    """All tables of a folder, under one contextdb.toml."""
+class ByName(Mapping[str, T]):
+    """A mapping by names that is equal to itself alone, and true though it may be empty."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    def __bool__(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True, eq=False)
+class Project(Unchanging, ByName[Table]):
+    """All tables of a folder, under one contextdb.toml: a mapping of tables by name."""
 
     folder: Path
     schema: Schema
@@ -45,7 +65,7 @@ class Project:
         ContextDBError
             With every fault of every file.
         """
-        folder = folder_of(Path(path))
+        folder = folder_of(require_path(path))
         schema = read_folder_schema(folder)
         tables: dict[str, Table] = {}
         faults: list[Fault] = []
@@ -64,15 +84,22 @@ class Project:
         return project
 
     def __getitem__(self, name: str) -> Table:
-        """One table by its name; a name that is not there raises TableError and names the nearest."""
+        """One table by its name; a name that is not there raises NoSuchTable, which is a KeyError too, and names the nearest."""
         if name not in self.tables:
-            near = nearest(name, self.tables)
-            found = f"there is no table {in_quotes(name)}."
-            raise TableError(Fault(found, some(self.tables) or "none: the folder has no table", in_quotes(near) if near else ""))
+            near = nearest(str(name), self.tables)
+            found = f"there is no table {in_quotes(str(name))}."
+            raise NoSuchTable(Fault(found, some(self.tables) or "none: the folder has no table", in_quotes(near) if near else ""))
         return self.tables[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def __len__(self) -> int:
+        return len(self.tables)
 
     def with_table(self, table: Table) -> Project:
         """The project with one table in another version, for those too whose rows stand for it."""
+        require_kind(table, Table, "table", "a Table")
         return replace(self, tables=around_each_other({**self.tables, table.name: table}))
 
     @property
@@ -153,13 +180,14 @@ class _Folder(Mapping[str, Table]):
 
 def schema_for(path: Path) -> tuple[Path, Schema]:
     """The folder and the schema that a table file belongs to."""
+    finish(path.parent)
     beside = path.parent / SCHEMA_FILE
     if beside.is_file():
         return path.parent, read_folder_schema(path.parent)
     for folder in path.resolve().parent.parents:
         if (folder / SCHEMA_FILE).is_file():
             schema = read_folder_schema(folder)
-            if any(_below(path, folder) in settings.files for settings in schema.tables.values()):
+            if settings_of(path, folder, schema) in schema.tables.values():
                 return folder, schema
             break
     return path.parent, EMPTY
@@ -167,6 +195,7 @@ def schema_for(path: Path) -> tuple[Path, Schema]:
 
 def read_folder_schema(folder: Path) -> Schema:
     """What the folder's contextdb.toml says; nothing where there is none."""
+    finish(folder)
     path = folder / SCHEMA_FILE
     if not path.is_file():
         return EMPTY
@@ -180,16 +209,70 @@ def read_folder_schema(folder: Path) -> Schema:
 
 
 def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
-    """Name and file of every table: those that contextdb.toml declares, then others that lie in the folder."""
-    taken: set[Path] = set()
+    """Name and file of every table: those that contextdb.toml declares, then others that lie in the folder and may be tables."""
+    declared = list(_declared_files(folder, schema))
+    yield from declared
+    for path in _undeclared_files(folder, declared):
+        if other_form(path, schema.conditions) is None:
+            yield composed(path.stem), path
+
+
+def stray_files(folder: Path, schema: Schema) -> Iterator[tuple[Path, str]]:
+    """The files that lie beside the tables and look like something else, each with a sentence that says so."""
+    for path in _undeclared_files(folder, list(_declared_files(folder, schema))):
+        form = other_form(path, schema.conditions)
+        if form is not None:
+            yield path, stray_sentence(path, form)
+
+
+def _declared_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
+    names: dict[Path, list[str]] = {}
     for settings in schema.tables.values():
         candidates = [folder / f for f in settings.files]
-        path = next((p for p in candidates if p.is_file()), candidates[0])
-        taken.add(path)
-        yield settings.name, path
-    for path in sorted(folder.iterdir()):
-        if path not in taken and _is_table(path):
-            yield path.stem, path
+        yield settings.name, next((found for p in candidates if (found := _on_disk(p, names)) is not None), candidates[0])
+
+
+def _undeclared_files(folder: Path, declared: Iterable[tuple[str, Path]]) -> Iterator[Path]:
+    taken = {path for _, path in declared}
+    return (path for path in sorted(folder.iterdir()) if path not in taken and _is_table(path))
+
+
+def _on_disk(path: Path, names: dict[Path, list[str]]) -> Path | None:
+    """A file as its folder spells it: in another Unicode form perhaps, on some disks in other capitals; None where it is not there.
+    `names` are those of folders that were listed already."""
+    if path.parent not in names:
+        names[path.parent] = _names_in(path.parent)
+    present = names[path.parent]
+    found = spelled(path.name, present)
+    if found is None and path.is_file():  # a disk that does not tell capitals, or a folder that cannot be listed
+        found = next((name for name in present if alike(name) == alike(path.name)), path.name)
+    return path.with_name(found) if found is not None and path.with_name(found).is_file() else None
+
+
+def _names_in(folder: Path) -> list[str]:
+    try:
+        return sorted(os.listdir(folder))
+    except (OSError, ValueError):
+        return []
+
+
+def settings_of(path: Path, folder: Path, schema: Schema) -> TableSettings:
+    """What contextdb.toml says of a table file: what it declares for this file, whatever the disk makes of its name."""
+    below = _below(path, folder)
+    settings = schema.settings_for(below)
+    if settings.name in schema.tables:
+        return settings
+    for declared in schema.tables.values():
+        for file in declared.files:
+            if alike(file) == alike(below) and _is_same_file(folder / file, path):
+                return declared
+    return settings
+
+
+def _is_same_file(one: Path, other: Path) -> bool:
+    with suppress(OSError, ValueError):
+        return os.path.samefile(one, other)
+    return False
 
 
 def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
@@ -204,9 +287,7 @@ def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
 
 
 def _is_table(path: Path) -> bool:
-    name = path.name.lower()
-    is_hidden = name.startswith(".")  # what macOS and editors put beside a file
-    return name.endswith(TABLE_SUFFIXES) and not name.endswith(CASES_SUFFIX) and not is_hidden and path.is_file()
+    return names_a_table(path.name) and path.is_file()
 
 
 def folder_of(path: Path) -> Path:
@@ -224,7 +305,7 @@ def folder_of(path: Path) -> Path:
 
 
 def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: Mapping[str, Table] | None = None) -> Table:
-    settings = schema.settings_for(_below(path, folder))
+    settings = settings_of(path, folder, schema)
     source, columns = files.read_texts(path)
     table = replace(build_table(settings.name, columns, schema, settings, path, source), around=around)
     if strict:

@@ -43,13 +43,15 @@ def _conflict_faults(raw: bytes, records: Records) -> Iterator[Found]:
     """Unresolved git conflicts. Nothing else is reported with them: which rows there are is not decided yet."""
     firsts = np.frombuffer(raw, np.uint8)[records.starts]
     at = records.starts[(firsts == CONFLICT[0]) | (firsts == CONFLICT_END[0])]
-    for start in at.tolist():
+    first = raw.find(b"\n" + CONFLICT)
+    marks = [start for start in at.tolist() if raw.startswith((CONFLICT, CONFLICT_END + b" "), start)]
+    for start in marks[:MOST_FAULTS]:
         if raw.startswith(CONFLICT, start):
             end = raw.find(b"\n>>>>>>>", start)
             extent = f" and ends on line {line_of(raw, end + 1)}" if end >= 0 else ""
             mend = 'to keep one side and delete the lines "<<<<<<<", "=======" and ">>>>>>>"'
             yield start, Fault(f"an unresolved git conflict starts here{extent}.", "one version of each row", mend)
-        elif raw.startswith(CONFLICT_END + b" ", start) and not raw.startswith(CONFLICT) and b"\n" + CONFLICT not in raw[:start]:
+        elif not raw.startswith(CONFLICT) and not 0 <= first < start:
             yield start, Fault("a mark that git leaves in a conflict stands here.", "one version of each row", "to delete the line")
 
 

@@ -7,7 +7,6 @@ a CSV are facts as on the command line; values of a Parquet file become such tex
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,8 +19,7 @@ from contextdb.cell_words import quoted
 from contextdb.cells import format_number
 from contextdb.conditions import Condition
 from contextdb.disk import read_bytes
-from contextdb.errors import Fault, Place, TableError
-from contextdb.files import read_texts
+from contextdb.files import scanned_parquet
 from contextdb.foreign import UTF8_BOM, require_text
 from contextdb.record_faults import record_faults
 from contextdb.records import fields_of, find_records, text_of
@@ -104,25 +102,17 @@ def _said(name: str, column: pl.Series) -> pl.Expr:
 
 
 def _open_parquet(path: Path, conditions: Collection[str]) -> Recording:
-    with _whole(path):
-        scan = pl.scan_parquet(path, glob=False)
+    with scanned_parquet(path) as scan:
         facts = tuple(name for name in scan.collect_schema().names() if name in conditions)
         n_rows = scan.select(pl.len()).collect().item()
 
     def read(start: int, stop: int) -> pl.DataFrame:
-        with _whole(path):
-            return scan.select(by_name(facts)).slice(start, stop - start).collect() if facts else pl.DataFrame()
+        if not facts:
+            return pl.DataFrame()
+        with scanned_parquet(path) as scan:
+            return scan.select(by_name(facts)).slice(start, stop - start).collect()
 
     return Recording(path, n_rows, facts, read)
-
-
-@contextmanager
-def _whole(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
-        read_texts(path)  # says what is wrong with the file
-        raise TableError(Fault(f"cannot read the file: {error}.", "a whole Parquet file", place=Place(str(path)))) from None
 
 
 def _open_csv(path: Path, conditions: Collection[str]) -> Recording:

@@ -12,12 +12,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-from contextdb.conditions import Condition
+from contextdb import toml_values
+from contextdb.cells import covers
+from contextdb.conditions import Condition, Mirror
 from contextdb.disk import TABLE_SUFFIXES
-from contextdb.domains import Domain
+from contextdb.domains import KINDS, Domain
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
+from contextdb.file_names import alike, composed
+from contextdb.mirroring import NEGATED_KINDS, SWAPPED_KINDS, sided_pairs, swap_faults, swapped_tag
 from contextdb.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
 from contextdb.toml_lines import Path, key_lines, line_of, read_toml
 
@@ -29,6 +33,7 @@ Section = Mapping[str, Any]
 
 _HEADERS = {name: "[project]" if name == "project" else f"[{name}.NAME]" for name in SECTIONS}
 _BOUNDED = ("int", "number")
+_EACH_ONCE = 'each name in one pair, such as { Left = "Right" }'
 _KINDS_WITH = {"min": _BOUNDED, "max": _BOUNDED, "values": ("enum", "tags")}
 _HAS_NO_PLACE = {
     "angle": "an angle goes round, so it has no ends and no list",
@@ -117,8 +122,8 @@ class Schema:
 
     def settings_for(self, file: str) -> TableSettings:
         """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as name."""
-        path = PurePosixPath(file)
-        declared = (settings for settings in self.tables.values() if str(path) in settings.files)
+        path = PurePosixPath(composed(file))
+        declared = (settings for settings in self.tables.values() if str(path) in map(composed, settings.files))
         return next(declared, TableSettings(path.stem))
 
 
@@ -270,7 +275,7 @@ def _condition_faults(path: Path, part: Section) -> Iterator[Found]:
     fitting = _fitting("conditions", part)
     kind = fitting.get("type")
     meant = {_near_key(key, _shapes("conditions")) for key in part}
-    if "type" not in meant and not any(isinstance(value, Mapping) for value in part.values()):
+    if "type" not in meant and not any(isinstance(v, Mapping) for k, v in part.items() if k != "mirror"):
         guess = 'type = "enum"' if "values" in part else 'type = "number"' if {"min", "max"} & part.keys() else ""
         yield path, Fault(f"{_header(path)} has no type.", _shapes("conditions")["type"].accepted, guess)
     if kind == "enum" and "values" not in meant:
@@ -281,6 +286,8 @@ def _condition_faults(path: Path, part: Section) -> Iterator[Found]:
             yield (*path, key), _no_place(path, key, fitting)
     if kind in _BOUNDED:
         yield from _bound_faults(path, fitting)
+    if kind in KINDS and "mirror" in fitting:
+        yield from _mirror_faults(path, fitting)
 
 
 def _no_place(path: Path, key: str, fitting: Section) -> Fault:
@@ -301,6 +308,42 @@ def _bound_faults(path: Path, fitting: Section) -> Iterator[Found]:
             yield (*path, key), Fault(f"{said} leaves no number.", "a finite number", "to leave it out")
         elif fitting["type"] == "int" and math.isfinite(bound) and bound != math.floor(bound):
             yield (*path, key), Fault(f"{said}: an int has whole bounds.", "a whole number", _said(key, nearer(bound)))
+
+
+def _mirror_faults(path: Path, fitting: Section) -> Iterator[Found]:
+    """Why the facts of a condition cannot change in a mirror as it says."""
+    kind, mirror, values = fitting["type"], fitting["mirror"], fitting.get("values")
+    said, key = f"{_header(path)} {_said('mirror', mirror)}", (*path, "mirror")
+    if mirror == "none":
+        return
+    if "expr" in fitting:
+        found = f"{said} has no place here: a derived fact is computed from mirrored facts."
+        yield key, Fault(found, "mirror in the conditions that it is computed from", "to leave it out")
+    elif mirror == "negate" and kind not in NEGATED_KINDS:
+        mend = _said("mirror", sided_pairs(values or ()) or {"Left": "Right"})
+        yield key, Fault(f"{said}: a condition of type {kind} has no sign.", 'names that change places, or "none"', mend)
+    elif mirror != "negate" and kind not in SWAPPED_KINDS:
+        yield key, Fault(f"{said}: a condition of type {kind} has no names.", '"negate" or "none"', _said("mirror", "negate"))
+    elif mirror != "negate":
+        yield from ((key, Fault(f"{said}: {in_quotes(name)}: {why}.", _EACH_ONCE)) for name, why in swap_faults(mirror, kind))
+        yield from ((key, replace(fault, found=f"{said}: {fault.found}")) for fault in _unknown_partners(mirror, kind, values))
+
+
+def _unknown_partners(mirror: Mapping[str, str], kind: str, values: Sequence[str] | None) -> Iterator[Fault]:
+    """Faults of names of pairs that are no declared values, and of tags that would change places with one that is none."""
+    if values is None:
+        return
+    known = frozenset(values)
+    names = dict.fromkeys(name for pair in mirror.items() for name in pair)
+    unknown = [name for name in names if not (covers(name, known) if kind == "tags" else name in known)]
+    for name in unknown:
+        near = nearest(name, values)
+        yield Fault(f"there is no value {in_quotes(name)}.", some(values), in_quotes(near) if near else "")
+    for value in values if kind == "tags" and not unknown else ():
+        image = swapped_tag(value, tuple(mirror.items()))
+        if not covers(image, known):
+            found = f"{in_quotes(value)} changes places with {in_quotes(image)}, which is no declared value."
+            yield Fault(found, "values that hold both", f"to add {in_quotes(image)} to the values")
 
 
 def _column_faults(path: Path, table: Section, conditions: Set[str]) -> Iterator[Found]:
@@ -327,7 +370,7 @@ def _file_faults(tables: Mapping[str, Section]) -> Iterator[Found]:
             yield path, Fault(f"{_header(path)} has no file, and its name cannot be that of one: {wrong}.", 'file = "NAME.csv"')
         if wrong:
             continue
-        standing = {one.casefold() for one in TableSettings(name, file).files}
+        standing = {alike(one) for one in TableSettings(name, file).files}
         if shared := next((one for one in sorted(standing) if one in owners), None):
             found = f"{_header(path)} stands in {in_quotes(shared)}, as {_header(('tables', owners[shared]))} does."
             yield (*path, "file"), Fault(found, "one file for each table")
@@ -353,7 +396,9 @@ def _header(path: Path) -> str:
 
 
 def _said(key: str, value: object) -> str:
-    return shown(f"{key} = {as_toml(value)}")
+    """A key with its value, that of a mirror with the names in it."""
+    is_pairs = key == "mirror" and isinstance(value, Mapping)
+    return shown(f"{key} = {toml_values.as_toml(value) if is_pairs else as_toml(value)}")
 
 
 def _shapes(section: str) -> Mapping[str, Shape]:
@@ -399,7 +444,13 @@ def _schema(document: Section, file: str) -> Schema:
 def _condition(name: str, part: Section) -> Condition:
     values = tuple(part["values"]) if "values" in part else None
     domain = Domain(part["type"], values, float(part.get("min", -math.inf)) + 0.0, float(part.get("max", math.inf)) + 0.0)
-    return Condition(name, domain, part.get("unit", ""), part.get("description", ""), part.get("expr"))
+    return Condition(
+        name, domain, part.get("unit", ""), part.get("description", ""), part.get("expr"), mirror=_mirror(part.get("mirror"))
+    )
+
+
+def _mirror(said: str | Mapping[str, str] | None) -> Mirror | None:
+    return tuple(said.items()) if isinstance(said, Mapping) else cast("Mirror | None", said)
 
 
 def _settings(name: str, part: Section) -> TableSettings:

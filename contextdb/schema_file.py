@@ -14,12 +14,13 @@ from pathlib import Path
 
 from contextdb import toml_edit
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ContextDBError, Fault, Place, SchemaError, in_quotes, shown, some
-from contextdb.files import read_texts
-from contextdb.project import SCHEMA_FILE, read_folder_schema, table_files
+from contextdb.errors import Fault, FileError, Place, SchemaError, shown, some
+from contextdb.file_names import alike
+from contextdb.project import SCHEMA_FILE, read_folder_schema
 from contextdb.schema import EMPTY, Schema, TableSettings, read_schema
 from contextdb.sections import schema_to_dict, settings_to_dict
 from contextdb.table import Table
+from contextdb.together import NewFile
 from contextdb.toml_values import Path as KeyPath
 from contextdb.toml_values import as_toml, dotted
 
@@ -38,6 +39,19 @@ class SchemaChange:
 
     path: Path
     raw: bytes
+    was: bytes | None
+    """The file that the change was made for; None where there was none."""
+
+    @property
+    def new_file(self) -> NewFile:
+        """The file as `contextdb.together.write_together` writes it, unless somebody has changed it meanwhile."""
+        return NewFile(self.path, self.raw, self.was)
+
+    @property
+    def fault(self) -> Fault:
+        """What is said when somebody has changed it meanwhile."""
+        found = "the file was changed by somebody else in this moment."
+        return Fault(found, mend="to do the same once more", place=Place(str(self.path)), rule="merge-conflict")
 
     def write(self) -> None:
         """Replace the file in one step.
@@ -45,9 +59,10 @@ class SchemaChange:
         Raises
         ------
         FileError
-            The disk refuses; the old file is then whole.
+            The disk refuses, or somebody has changed the file since it was read; the old file is then whole.
         """
-        write_atomic(self.path, self.raw)
+        if not write_atomic(self.path, self.raw, self.was):
+            raise FileError(self.fault)
 
 
 def write_schema(before: Table | None, after: Table) -> bool:
@@ -94,7 +109,7 @@ def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
         text = toml_edit.set_key("", ("project", "name"), path.parent.resolve().name or "tables")
     now = _edited(text, wanted, after, _settings_name(after, path))
     _require_said(now, wanted, theirs, path)
-    return SchemaChange(path, bom + now.encode())
+    return SchemaChange(path, bom + now.encode(), raw if path.is_file() else None)
 
 
 def schema_path(table: Table) -> Path:
@@ -103,29 +118,6 @@ def schema_path(table: Table) -> Path:
     if table.schema.file is not None and _is_below(table.path, Path(table.schema.file).parent):
         return Path(table.schema.file)
     return table.path.parent / SCHEMA_FILE
-
-
-def users_of(table: Table, condition: str) -> list[str]:
-    """Who else in the project uses a condition that is declared: other tables, blueprints, and expressions, in words.
-
-    Other tables are read for it. One that cannot be read counts as a user: what it holds is not known.
-    """
-    schema, folder = table.schema, schema_path(table).parent
-    found = [f"the blueprint {in_quotes(name)}" for name, names in schema.blueprints.items() if condition in names]
-    found += [f"the condition {in_quotes(c.name)}" for c in schema.conditions.values() if c.expr and condition in c.expr]
-    assumed = (*table.settings.assume, *(text for settings in schema.tables.values() for text in settings.assume))
-    found += ["an assumption"] if any(condition in text for text in assumed) else []
-    for name, path in table_files(folder, schema):
-        if table.path is not None and path.resolve() != table.path.resolve() and _has_column(path, condition):
-            found.append(f"the table {in_quotes(name)}")
-    return found
-
-
-def _has_column(path: Path, name: str) -> bool:
-    try:
-        return any(column.name == name for column in read_texts(path)[1])
-    except ContextDBError:
-        return True
 
 
 # ---- what a table says, key by key
@@ -152,11 +144,13 @@ def _settings_name(table: Table, path: Path) -> str:
 
 
 def _file(table: Table, path: Path) -> str:
+    """The table's file as contextdb.toml has it, whatever the disk makes of its name."""
     assert table.path is not None
     folder = path.parent
-    if table.path.is_relative_to(folder):
-        return table.path.relative_to(folder).as_posix()
-    return (table.path.parent.resolve() / table.path.name).relative_to(folder.resolve()).as_posix()
+    is_below = table.path.is_relative_to(folder)
+    whole = table.path if is_below else table.path.parent.resolve() / table.path.name
+    file = whole.relative_to(folder if is_below else folder.resolve()).as_posix()
+    return next((declared for declared in table.settings.files if alike(declared) == alike(file)), file)
 
 
 def _is_below(file: Path, folder: Path) -> bool:
@@ -229,7 +223,10 @@ def _edited(text: str, wanted: Changes, table: Table, name: str) -> str:
     for key, (_, now) in wanted.items():
         parts.setdefault(key[:-1], {})[key[-1]] = now
     gone = [part for part, keys in parts.items() if all(now is None for now in keys.values())]
-    for part in [part for part in parts if part not in gone]:
+    new = {} if gone else _new_conditions(text, parts, table)  # what is gone may be what a new one was called
+    if new:
+        text = toml_edit.add_sections(text, new, _behind(next(iter(new)), table, name))
+    for part in [part for part in parts if part not in new and part not in gone]:
         old = next((one for one in gone if _is_renamed(wanted, one, part)), None)
         renamed = toml_edit.rename_section(text, old, part) if old is not None else None
         if old is not None and renamed is not None:
@@ -240,6 +237,13 @@ def _edited(text: str, wanted: Changes, table: Table, name: str) -> str:
     for part in gone:
         text = toml_edit.drop_empty_section(_with_keys(text, part, parts[part], ()), part)
     return text
+
+
+def _new_conditions(text: str, parts: Mapping[KeyPath, Mapping[str, object]], table: Table) -> dict[KeyPath, dict[str, object]]:
+    """The parts that are conditions of the table and of which nothing stands in the text, and what their keys say."""
+    own = {("conditions", c.condition.name) for c in table.conditions}
+    new = toml_edit.absent(text, [part for part in parts if part in own])
+    return {part: {key: now for key, now in parts[part].items() if now is not None} for part in new}
 
 
 def _with_keys(text: str, part: KeyPath, keys: Mapping[str, object], behind: Sequence[KeyPath]) -> str:

@@ -32,7 +32,10 @@ def condition_to_dict(condition: Condition) -> Part:
     if domain.values is not None:
         said["values"] = list(domain.values)
     texts = {"unit": condition.unit, "description": condition.description, "expr": condition.expr}
-    return said | {key: text for key, text in texts.items() if text}
+    said |= {key: text for key, text in texts.items() if text}
+    if condition.mirror is not None:
+        said["mirror"] = dict(condition.mirror) if isinstance(condition.mirror, tuple) else condition.mirror
+    return said
 
 
 def has_place(key: str, kind: object) -> bool:
@@ -120,11 +123,12 @@ def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSett
 def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) -> Iterator[Fault]:
     """Why a table of these columns cannot have these settings: a column that is not there, has two jobs, or is a condition."""
     jobs: dict[str, str] = {}
+    known = frozenset(columns)
     named = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
     for key, column in [*named, *(("outputs", name) for name in settings.outputs)]:
         if column is None:
             continue
-        if column not in columns:
+        if column not in known:
             near = nearest(column, columns)
             yield Fault(f"there is no column {in_quotes(column)} for {key}.", some(columns), in_quotes(near) if near else "")
         elif column in jobs:

@@ -31,10 +31,16 @@ KIND_SYNONYMS = {
     **dict.fromkeys(("tag", "set", "labels", "gameplaytags", "tagset"), "tags"),
 }
 POLICY_SYNONYMS = {"all": "collect", "any": "collect", "single": "unique", "highest": "priority"}
+MIRRORS = ("negate", "none")
+MIRROR_SYNONYMS = {
+    **dict.fromkeys(("negative", "sign", "flip", "invert", "minus", "true"), "negate"),
+    **dict.fromkeys(("no", "off", "keep", "same", "false", "any", "-", ""), "none"),
+}
 KEY_SYNONYMS = {
     **{"kind": "type", "minimum": "min", "lower": "min", "maximum": "max", "upper": "max", "formula": "expr", "expression": "expr"},
     **dict.fromkeys(("options", "choices", "enum", "tags", "set"), "values"),
     **{"desc": "description", "help": "description", "comment": "description", "path": "file", "columns": "conditions"},
+    **dict.fromkeys(("mirrored", "swap", "mirroring"), "mirror"),
     **{"default": "fallback", "assumptions": "assume", "hit_policy": "policy"},
 }
 
@@ -159,6 +165,33 @@ def _meant_names(separators: str) -> Callable[[object], object]:
     return meant
 
 
+def _wrong_mirror(value: object) -> str | None:
+    if isinstance(value, str):
+        return None if value in MIRRORS else "there is no such way to mirror"
+    if not isinstance(value, Mapping):
+        return f"this is {what(value)}, neither a word nor names that change places"
+    for left, right in value.items():
+        for name in (left, right):
+            if wrong := wrong_name(name):
+                return f"the name {as_toml(name)} cannot be used: {wrong}"
+    return None if value else "no names change places"
+
+
+def _meant_mirror(value: object) -> object:
+    """What was likely meant: pairs may have been written as a list, or as "Left = Right"."""
+    if isinstance(value, str):
+        sides = [side.strip(" \"'") for side in re.split(r"[=:,/]|<->|->", value)]
+        if len(sides) == 2 and all(sides):
+            return {sides[0]: sides[1]}
+        return MIRROR_SYNONYMS.get(value.strip().casefold()) or nearest(value, MIRRORS)
+    if isinstance(value, bool):
+        return "negate" if value else "none"
+    pairs = [value] if isinstance(value, (list, tuple)) and all(isinstance(side, str) for side in value) else value
+    if isinstance(pairs, (list, tuple)) and all(isinstance(pair, (list, tuple)) and len(pair) == 2 for pair in pairs):
+        return dict(map(tuple, pairs)) if all(isinstance(side, str) for pair in pairs for side in pair) else None
+    return None
+
+
 def _one_of(words: Sequence[str], noun: str, synonyms: Mapping[str, str]) -> Shape:
     def wrong(value: object) -> str | None:
         return _wrong_text(value) or (None if value in words else f"there is no such {noun}")
@@ -178,6 +211,10 @@ NAMES = Shape('a list of different names, such as ["A", "B"]', _wrong_list, _mea
 VALUES = Shape('a list of different names, such as ["A", "B"]', _wrong_values, _meant_names(r"[,;|\s]+"))
 FILE = Shape("a .csv or .parquet file in the folder of contextdb.toml or below it", _wrong_file, _meant_file)
 
+MIRROR = Shape(
+    '"negate" (the other sign), "none", or names that change places, such as { Left = "Right" }', _wrong_mirror, _meant_mirror
+)
+
 SECTIONS: dict[str, Mapping[str, Shape] | None] = {
     "project": {"name": TEXT},
     "conditions": {
@@ -188,6 +225,7 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
         "unit": TEXT,
         "description": TEXT,
         "expr": EXPRESSION,
+        "mirror": MIRROR,
     },
     "tables": {
         "file": FILE,

@@ -130,7 +130,9 @@ def name_faults(names: Sequence[str]) -> Iterator[Fault]:
 def _name_faults(names: Sequence[str]) -> Iterator[Fault]:
     first: dict[str, int] = {}
     for at, name in enumerate(names, 1):
-        if not name.strip():
+        if any("\ud800" <= c <= "\udfff" for c in name):
+            yield Fault(f"field {at:,} of the column names has half a surrogate pair.", "text in UTF-8")
+        elif not name.strip():
             where = "the last" if at == len(names) else f"field {at:,}"
             yield Fault(f"{where} of {len(names):,} column names is empty.", "a name for each column")
         elif name in first:

@@ -2,7 +2,7 @@
 
 A Table is never changed: an edit gives a new one that shares every column it did not touch, and with it whatever was already
 worked out for that column (its cells, its masks). Texts that cannot be read stay as they are and stand in `faults`; only
-`compile` insists on none. Nothing here touches the disk; `load` and `Table.save` call `contextdb.files`.
+`compile` insists on none. Nothing here touches the disk; `load` and `Table.save` call the modules that do.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.arguments import require_kind, require_many, require_mapping, require_path, require_row, require_text, require_whole
 from contextdb.columns import TextColumn
 from contextdb.condition_column import ConditionColumn
 from contextdb.conditions import Condition, infer_condition
-from contextdb.errors import Fault, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, Place, SchemaError, TableError, in_quotes, nearest, some
 from contextdb.plain_columns import PlainColumns
 from contextdb.schema import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults
+from contextdb.unchanging import Unchanging
 from contextdb.when import WhenColumn
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Table(Unchanging):
     """Assets against conditions. Get one from `cdb.load`, `Table.from_columns` or a `Project`."""
 
     name: str
@@ -53,7 +55,7 @@ class Table:
         columns: Mapping[str, Sequence[str]],
         schema: Mapping[str, Mapping[str, object]] | Schema | None = None,
         settings: TableSettings | None = None,
-        name: str = "table",
+        name: str | None = None,
     ) -> Table:
         """Build a table from texts.
 
@@ -63,6 +65,10 @@ class Table:
             The cells of each column, equally many; the first column names the assets unless `settings.asset` says otherwise.
         schema : mapping, optional
             What `[conditions.NAME]` of contextdb.toml would hold: `{"speed": {"type": "number"}}`. Others are inferred.
+        settings : contextdb.schema.TableSettings, optional
+            What `[tables.NAME]` of contextdb.toml would hold.
+        name : str, optional
+            The name of the table. Default: that of the settings, "table" without.
 
         Raises
         ------
@@ -72,9 +78,15 @@ class Table:
             Columns of unequal length, or cells that cannot be read.
         """
         if not isinstance(schema, Schema):
-            schema = replace(EMPTY, conditions=conditions_from_dict(schema or {}))
+            schema = {} if schema is None else require_mapping(schema, "schema", 'a mapping: {"speed": {"type": "number"}}')
+            schema = replace(EMPTY, conditions=conditions_from_dict(schema))
             if faults := list(expression_faults(schema)):
                 raise SchemaError(*faults)
+        if settings is not None:
+            require_kind(settings, TableSettings, "settings", "a contextdb.schema.TableSettings")
+        name = require_text(name, "name") if name is not None else settings.name if settings is not None else "table"
+        for n, values in require_mapping(columns, "columns", 'a mapping: {"Asset Name": [...], "speed": [...]}').items():
+            require_many(values, f"the column {in_quotes(require_text(n, 'a name of columns'))}", "a list of texts")
         texts = [TextColumn.of(n, map(str, values)) for n, values in columns.items()]
         lengths = {c.name: c.n_rows for c in texts}
         if len(set(lengths.values())) > 1:
@@ -107,17 +119,19 @@ class Table:
 
     def condition(self, name: str) -> ConditionColumn:
         """The column of a condition."""
+        require_text(name, "name")
         for column in self.conditions:
             if column.condition.name == name:
                 return column
         raise TableError(_no_such("condition", name, [c.condition.name for c in self.conditions]))
 
     def text(self, row: int, column: str) -> str:
-        """The text of one cell."""
-        return self.text_column(column)[row]
+        """The text of one cell; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        return self.text_column(column)[require_row(row, self.n_rows)]
 
     def place(self, row: int, column: str | None = None) -> Place:
         """Where a row stands: its file and line where it has one, else its number."""
+        row = require_whole(row, "row")
         file = str(self.path) if self.path else None
         record = int(self.origin[row]) if self.source is not None and row < len(self.origin) else -1
         line = self.source.line(record) if self.source is not None and record >= 0 else None
@@ -150,7 +164,11 @@ class Table:
     def with_cells(self, edits: Iterable[tuple[int, str, str]]) -> Table:
         """The table with some cells changed, given as (row, column, text)."""
         changed: dict[int, TextColumn] = {}
-        for row, name, text in edits:
+        accepted = "a row, a column and a text for each cell"
+        for edit in require_many(edits, "edits", accepted):
+            if not isinstance(edit, (tuple, list)) or len(edit) != 3:
+                raise ContextError(Fault("edits hold what is no edit.", accepted))
+            row, name, text = require_whole(edit[0], "row"), edit[1], require_text(edit[2], "text")
             at = self._column_at(name)
             if not 0 <= row < self.n_rows:
                 raise TableError(self._no_row(row))
@@ -159,8 +177,11 @@ class Table:
 
     def with_rows(self, at: int, rows: Sequence[Mapping[str, str]]) -> Table:
         """The table with new rows before row `at`; columns that a row leaves out are empty (Any)."""
-        for name in (n for row in rows for n in row):
-            self._column_at(name)
+        at, rows = require_whole(at, "at"), list(require_many(rows, "rows", "a list of mappings of columns to texts"))
+        for row in rows:
+            for name, text in require_mapping(row, "a row of rows", "a mapping of columns to texts").items():
+                self._column_at(name)
+                require_text(text, f"the text for {in_quotes(name)}")
         if not 0 <= at <= self.n_rows:
             raise TableError(Fault(f"there is no row {at}.", f"0 to {self.n_rows}, to insert before"))
         columns = [c.with_inserted(at, [row.get(c.name, "") for row in rows]) for c in self.columns]
@@ -168,26 +189,37 @@ class Table:
 
     def with_rows_taken(self, rows: Sequence[int] | NDArray[np.int64]) -> Table:
         """The table of the given rows in the given order: deletes, moves, sorts."""
-        taken = np.asarray(rows, np.int64)
-        for row in taken[(taken < 0) | (taken >= self.n_rows)][:1].tolist():
-            raise TableError(self._no_row(row))
+        numbers = rows.tolist() if isinstance(rows, np.ndarray) else require_many(rows, "rows", "a list of row numbers")
+        numbers = [require_whole(row, "a row of rows") for row in require_many(numbers, "rows", "a list of row numbers")]
+        if wrong := [row for row in numbers if not 0 <= row < self.n_rows]:
+            raise TableError(self._no_row(wrong[0]))
+        taken = np.array(numbers, np.int64)
         return self._with_columns([c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
 
-    def save(self, path: str | Path | None = None) -> Table:
+    def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
         """Write the table: atomic, only changed lines differ. Gives the table as it now stands on the disk.
+
+        What others wrote into its file since it was read is merged, cell by cell. A file that is gone is made anew.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            Another file, which is written over whatever it holds. Default: the file that the table was read from.
+        overwrite : bool
+            Write over what others wrote into its own file, too.
 
         Raises
         ------
         FileError
-            The disk refuses; the old file is then whole.
+            The disk refuses, or others changed the same cells otherwise (rule "merge-conflict", which names them). The old file is
+            then whole.
         """
-        from contextdb import files
+        from contextdb.saving import save_table
 
-        target = Path(path) if path is not None else self.path
+        target = require_path(path) if path is not None else self.path
         if target is None:
             raise TableError(Fault(f"the table {in_quotes(self.name)} has no file yet.", "save(path)"))
-        source = files.write_texts(target, self.columns, self.source, self.origin)
-        return replace(self, path=target, source=source, origin=np.arange(self.n_rows))
+        return save_table(self, target, overwrite)
 
     def compile(self, tables: Mapping[str, Table] | None = None) -> CompiledTable:
         """Compile into masks. Columns that were compiled before, in this table or one it was edited from, are not compiled again.
@@ -212,6 +244,9 @@ class Table:
         The table itself where no row stands for a table. `tables` and what is raised as in `compile`."""
         from contextdb.nesting.links import is_nested
 
+        if tables is not None:
+            for table in require_mapping(tables, "tables", "a mapping of names to tables").values():
+                require_kind(table, Table, "a table of tables", "a Table")
         if not is_nested(self):
             return self
         return self._flat if tables is None else flat_table(self, tables)
@@ -256,6 +291,7 @@ class Table:
         return Fault(f"there is no row {row}.", accepted)
 
     def _column_at(self, name: str) -> int:
+        require_text(name, "column")
         for at, column in enumerate(self.columns):
             if column.name == name:
                 return at
@@ -323,7 +359,7 @@ def load(path: str | Path, strict: bool = True) -> Table:
     """
     from contextdb.project import load_table
 
-    return load_table(Path(path), strict)
+    return load_table(require_path(path), strict)
 
 
 def _no_such(what: str, name: str, known: list[str]) -> Fault:

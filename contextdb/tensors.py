@@ -157,19 +157,31 @@ def texts_from_array(octets: NDArray[np.uint8]) -> list[str]:
     return texts
 
 
-def _check_frame(path: Path, kind: FileKind) -> None:
-    """Refuse a file that is not wholly there, or not of this kind."""
+def metadata_of(path: Path, kind: FileKind) -> dict[str, str]:
+    """The metadata of a .safetensors file, whichever kind it is of; `kind` is for the message.
+
+    Raises
+    ------
+    ArtefactError
+        The file is truncated, or no .safetensors file.
+    FileError
+        The file cannot be read.
+    """
     from safetensors import SafetensorError, safe_open
 
     if not os.path.isfile(path) or path.stat().st_size < 8:  # Path raises, where this says no, to a name that no file can have
         raise kind.refused(path, f"the file has {len(read_bytes(path))} bytes, too few for any artefact.")
     try:
         with safe_open(path, framework="numpy") as frame:
-            metadata = frame.metadata() or {}
+            return dict(frame.metadata() or {})
     except (SafetensorError, OSError) as error:
         read_bytes(path)  # raises FileError where it is the disk that refuses
         raise kind.refused(path, f"not a whole .safetensors file ({error}).") from None
-    if kind.key not in metadata:
+
+
+def _check_frame(path: Path, kind: FileKind) -> None:
+    """Refuse a file that is not wholly there, or not of this kind."""
+    if kind.key not in metadata_of(path, kind):
         raise kind.refused(path, f"a .safetensors file, but not {kind.found}.")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -46,9 +46,9 @@ def set_key(text: str, path: Path, value: object, behind: Sequence[Path] = ()) -
         if one.value and one.path == path[: len(one.path)]:
             return _replaced(text, one.value, merged(text[slice(*one.value)], path[len(one.path) :], value))
     part = path[:-1]
-    if any(one.path == path for one in found):  # an array of tables, [[a.b]]: one list in its place
-        text = _without(text, [one for one in found if one.path[: len(path)] == path])
-        return set_key(text, path, value, behind)
+    below = [one for one in found if one.path[: len(path)] == path]
+    if below:  # an array of tables, [[a.b]], or a table of its own, [a.b] or a.b.key = …: one value in its place
+        return set_key(_without(text, below), path, value, behind)
     inside = [one for one in found if one.path[: len(part)] == part and len(one.section) <= len(part)]
     if inside:
         last = inside[-1]
@@ -57,6 +57,24 @@ def set_key(text: str, path: Path, value: object, behind: Sequence[Path] = ()) -
     at = _end_of_section(text, found, behind)
     blank = [""] if text[:at].strip() else []
     return _inserted(text, at, [*blank, f"[{dotted(part)}]", f"{dotted(path[-1:])} = {as_toml(value)}"])
+
+
+def add_sections(text: str, sections: Mapping[Path, Mapping[str, object]], behind: Sequence[Path] = ()) -> str:
+    """The text with sections that it does not have yet, one behind the other, where `set_key` would put the first of them."""
+    at = _end_of_section(text, statements(text), behind)
+    lines: list[str] = []
+    for part, keys in sections.items():
+        lines += [""] if lines or text[:at].strip() else []
+        lines += [f"[{dotted(part)}]", *(f"{dotted((key,))} = {as_toml(value)}" for key, value in keys.items())]
+    return _inserted(text, at, lines)
+
+
+def absent(text: str, paths: Sequence[Path]) -> list[Path]:
+    """Those of some sections of which nothing stands in the text, in whichever form."""
+    found = statements(text)
+    said = {one.path[:depth] for one in found for depth in range(1, len(one.path) + 1)}
+    whole = {one.path for one in found if one.value}
+    return [path for path in paths if path not in said and not any(path[:depth] in whole for depth in range(1, len(path)))]
 
 
 def drop_key(text: str, path: Path) -> str:
@@ -139,7 +157,8 @@ def _keys(dotted: str) -> Path:
 
 def _end_of_section(text: str, found: Sequence[Statement], paths: Sequence[Path]) -> int:
     """Where the last of some sections ends: before the next header, or with the last statement. Without one of them, at the end."""
-    anchors = [i for i, one in enumerate(found) for path in paths if one.path[: len(path)] == path]
+    wanted, depths = set(paths), {len(path) for path in paths}
+    anchors = [i for i, one in enumerate(found) if any(one.path[:depth] in wanted for depth in depths)]
     last = anchors[-1] if anchors else len(found) - 1
     while last + 1 < len(found) and found[last + 1].value is not None:
         last += 1

@@ -15,9 +15,15 @@ from contextdb.errors import Fault, Place, SchemaError, in_quotes, shown
 from contextdb.toml_edit import statements
 from contextdb.toml_values import Path as Path
 
+MOST_PARTS = 256
+"""A key of more parts, a.b.c, is refused: reading it would cost the square of them."""
 MOST_KEYS = 8
 """Deeper keys are placed on the line of their first ones; no section of ours goes as deep."""
 
+_STRING_OR_COMMENT = re.compile(
+    r'"""(?:\\.|[^\\])*?(?:"""+|\Z)|\'\'\'.*?(?:\'\'\'+|\Z)|"(?:\\.|[^"\\\n])*"?|\'[^\'\n]*\'?|#[^\n]*', re.DOTALL
+)
+"""Strings that are not closed count as strings up to where they could end, so that no character is looked at twice."""
 _PLACE = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
 
 _ACCEPTED = '[section.name], key = "text", key = 1.5, key = ["A", "B"]'
@@ -31,7 +37,7 @@ _LINE_MENDS: tuple[tuple[str, str], ...] = (
     (r"$", "]"),
     (r"^", "["),
     (r"$", '"'),
-    (r"^\s*\[\s*([\w-]+)\.([^\"'\[\]]+?)\s*\]?\s*$", r'[\1."\2"]'),
+    (r"^\s*\[\s*([\w-]+)\.([^\"'\[\]]*[^\"'\[\]\s])\s*(?:\]\s*)?$", r'[\1."\2"]'),
     (r"^(\s*[\w.-]+\s*=\s*)([^\s\"'\[{][^\"'#]*?)\s*(#.*)?$", r'\1"\2"'),
     (r"([\[,]\s*)([^\s\"'\[\],][^\"'\[\],]*?)(?=\s*[,\]])", r'\1"\2"'),
 )
@@ -45,12 +51,30 @@ def read_toml(text: str, file: str) -> dict[str, object]:
     SchemaError
         With the line that cannot be read, the character in it and what would be read in its place.
     """
+    _require_short_keys(text, file)
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise SchemaError(Fault("lists stand in lists too deep to be read.", "lists of names", place=Place(file))) from None
     except ValueError as error:  # TOMLDecodeError, and a whole number of too many digits
         raise SchemaError(_syntax_fault(str(error), text, file)) from None
+
+
+def _require_short_keys(text: str, file: str) -> None:
+    """Refuse a key of very many parts; what stands in strings and comments does not count."""
+    if text.count(".") <= MOST_PARTS:
+        return
+    line = 1
+    for chunk in re.split(r"([=,\[\]{}\n])", _STRING_OR_COMMENT.sub(_bare, text)):
+        if chunk.count(".") >= MOST_PARTS:
+            found = f"a key has {chunk.count('.') + 1:,} parts."
+            raise SchemaError(Fault(found, f"at most {MOST_PARTS}, as in [section.name]", place=Place(file, line)))
+        line += chunk == "\n"
+
+
+def _bare(found: re.Match[str]) -> str:
+    """What stands for a string or a comment where only its lines count."""
+    return "\n" * found[0].count("\n") or "q"
 
 
 def key_lines(text: str) -> dict[Path, int]:

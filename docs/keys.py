@@ -10,14 +10,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from tui.commands import COMMANDS, Command
-from tui.screens.help import key_name
+from tui.commands import COMMANDS, Command, key_names
 
 PAGE = Path(__file__).parent / "keys.md"
 HEAD = """# Keys
 
 Every command of [the editor](editor.md), with its keys, and its name for a
-[file of your own keys](editor.md#keys-and-colours-of-your-own). A command without keys is in the palette (Ctrl+P) or on the line of
+[file of your own keys](editor.md#keys-and-colours-of-your-own). The first key of each command works in every terminal, the others
+[where the terminal sends them](editor.md#terminals). A command without keys is in the palette (Ctrl+P) or on the line of
 tools. In a dialog the keys stand at its foot. This page is written by `python docs/keys.py`.
 """
 
@@ -34,8 +34,7 @@ def _section(group: str) -> str:
 
 
 def _line(command: Command) -> str:
-    keys = ", ".join(key_name(key) for key in command.keys.split(",") if key and key != "ctrl+@")
-    return f"| {keys} | `{command.id}` | {command.about} |"
+    return f"| {', '.join(key_names(command.keys))} | `{command.id}` | {command.about} |"
 
 
 if __name__ == "__main__":

@@ -240,36 +240,36 @@ def test_the_columns_of_these_tests_can_be_asked_with():
         ({"speed": [1.0, 2.0]}, "the columns are not equally long"),
         (
             {"state": ["Ground", "Grond", "Air"]},
-            'row 1, column "state": "Grond" is not a declared value. Accepted: "Ground", "Air". Did you mean "Ground"?',
+            'row 2, column "state": "Grond" is not a declared value. Accepted: "Ground", "Air". Did you mean "Ground"?',
         ),
-        ({"state": np.array(["Ground", "Air", "Ar"])}, 'row 2, column "state": "Ar" is not a declared value.'),
+        ({"state": np.array(["Ground", "Air", "Ar"])}, 'row 3, column "state": "Ar" is not a declared value.'),
         (
             {"state": pl.Series(["Ground", "Air", "Ar"], dtype=pl.Categorical)},
-            'row 2, column "state": "Ar" is not a declared value.',
+            'row 3, column "state": "Ar" is not a declared value.',
         ),
-        ({"state": [1, 2, 3]}, 'row 0, column "state": int "1" is not a fact of type enum.'),
+        ({"state": [1, 2, 3]}, 'row 1, column "state": int "1" is not a fact of type enum.'),
         (
             {"speed": [1.0, None, 2.0]},
-            'row 1, column "speed": the fact is missing in 1 context. Accepted: a value, or unknown="any" or "never".',
+            'row 2, column "speed": the fact is missing in 1 context. Accepted: a value, or unknown="any" or "never".',
         ),
-        ({"speed": np.array([1.0, math.nan, math.nan])}, 'row 1, column "speed": the fact is missing in 2 contexts.'),
-        ({"state": [None, "Air", None]}, 'row 0, column "state": the fact is missing in 2 contexts.'),
-        ({"speed": pl.Series([1.0, None, math.nan])}, 'row 1, column "speed": the fact is missing in 2 contexts.'),
+        ({"speed": np.array([1.0, math.nan, math.nan])}, 'row 2, column "speed": the fact is missing in 2 contexts.'),
+        ({"state": [None, "Air", None]}, 'row 1, column "state": the fact is missing in 2 contexts.'),
+        ({"speed": pl.Series([1.0, None, math.nan])}, 'row 2, column "speed": the fact is missing in 2 contexts.'),
         ({"speed": ...}, 'the fact "speed" is missing.'),
         ({"speed": ..., "sped": [1.0] * 3}, 'there is no condition "sped", and "speed" is missing.'),
-        ({"speed": ["fast"] * 3}, 'row 0, column "speed": cannot read "fast" as a number.'),
+        ({"speed": ["fast"] * 3}, 'row 1, column "speed": cannot read "fast" as a number.'),
         (
             {"speed": [1.0, "0..5", 2.0]},
-            'row 1, column "speed": a set of values is for one query at a time. Accepted: one value in each context.',
+            'row 2, column "speed": a set of values is for one query at a time. Accepted: one value in each context.',
         ),
-        ({"state": [["Ground", "Air"]] * 3}, 'row 0, column "state": a set of values is for one query at a time.'),
-        ({"speed": [date(2024, 1, 1)] * 3}, 'row 0, column "speed": date "2024-01-01" is not a fact of type number.'),
-        ({"speed": [{}, {}, {}]}, 'row 0, column "speed": '),
+        ({"state": [["Ground", "Air"]] * 3}, 'row 1, column "state": a set of values is for one query at a time.'),
+        ({"speed": [date(2024, 1, 1)] * 3}, 'row 1, column "speed": date "2024-01-01" is not a fact of type number.'),
+        ({"speed": [{}, {}, {}]}, 'row 1, column "speed": '),
         (
             {"steps": [1.0, 2.5, 3.0]},
-            'row 1, column "steps": float "2.5" is not a fact of type int. Accepted: a whole number. Did you mean 2?',
+            'row 2, column "steps": float "2.5" is not a fact of type int. Accepted: a whole number. Did you mean 2?',
         ),
-        ({"steps": np.array([1.0, 2.0, 2.5])}, 'row 2, column "steps": float "2.5" is not a fact of type int.'),
+        ({"steps": np.array([1.0, 2.0, 2.5])}, 'row 3, column "steps": float "2.5" is not a fact of type int.'),
     ],
     ids=str,
 )
@@ -350,7 +350,7 @@ def test_truth_of_numpy_among_other_things_makes_no_truth_of_them():
     table = Table.from_columns({"Asset": ["a", "b"], "x": ["True", "False"]}, {"x": {"type": "bool"}}).compile()
     many = table.query_many({"x": [np.False_, math.nan, None, 1.0]}, "never")
     assert [rows.tolist() for rows in many.lists()] == [[1], [], [], [0]]
-    with pytest.raises(ContextError, match=r'row 1, column "x": float "2\.5" is not a fact of type bool'):
+    with pytest.raises(ContextError, match=r'row 2, column "x": float "2\.5" is not a fact of type bool'):
         table.query_many({"x": [np.True_, 2.5]})
 
 

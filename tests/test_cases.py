@@ -189,3 +189,19 @@ def test_a_condition_with_a_name_that_the_file_uses_itself_is_refused(tmp_path: 
     with pytest.raises(TableError, match=f'"{name}"'):
         keep_case(path, Case("one", {name: "1"}))
     assert not path.exists()
+
+
+def test_a_case_that_somebody_else_keeps_in_the_same_moment_is_not_lost(tmp_path, monkeypatch):
+    from contextdb import cases
+
+    path, real = tmp_path / "t.cases.csv", cases.new_source
+    keep_case(path, Case("one", {"speed": "1"}, "walk"))
+
+    def meanwhile(*given):
+        monkeypatch.setattr(cases, "new_source", real)
+        keep_case(path, Case("theirs", {"speed": "2"}, "run"))
+        return real(*given)
+
+    monkeypatch.setattr(cases, "new_source", meanwhile)
+    keep_case(path, Case("mine", {"speed": "3"}, "run"))
+    assert [case.name for case in read_cases(path)] == ["one", "theirs", "mine"]

@@ -49,7 +49,7 @@ def test_many_contexts_take_one_cast_for_all_or_one_for_each():
     assert each.counts.tolist() == [2, 0]
     with pytest.raises(ContextError, match="actors for 1 context"):
         compiled.query_many({"down": [1, 2]}, actors=[both])
-    with pytest.raises(ContextError, match="row 1"):
+    with pytest.raises(ContextError, match="row 2"):
         compiled.query_many({"down": [1, "x"]}, actors=both)
 
 

@@ -15,6 +15,7 @@ from contextdb.check import check
 from contextdb.errors import Place
 from contextdb.findings import Finding, worst
 from contextdb.project import Project, load_table
+from contextdb.schema import TableSettings
 from contextdb.table import Table
 
 ROOT = Path(__file__).parent.parent
@@ -59,8 +60,8 @@ def test_nothing_is_found_in_a_table_that_is_as_declared(tmp_path: Path):
 @pytest.mark.parametrize("name", ["hit_mid_air", "contested_catch", "locomotion"])
 def test_the_sample_tables_have_no_errors(name: str):
     found = check(Project.load(ROOT / "tables")[name])
-    assert worst(found) in (None, "warning")
-    assert {f.rule for f in found} <= {"identical-rows"}
+    assert worst(found) in (None, "info")
+    assert {f.rule for f in found} <= {"variety"}
 
 
 @given(strategies.tables())
@@ -205,13 +206,39 @@ def test_an_asset_that_stands_twice_is_a_warning_caused_by_the_first(tmp_path: P
 # ---- rows
 
 
-def test_rows_whose_cells_mean_the_same_are_warnings_caused_by_the_first(tmp_path: Path):
+SAME = 'Asset,speed,ok\na,3..5,Any\nb,"4, 1",\nc,3..5,True\nd,3..3 | 3..5,-\n'
+
+
+@pytest.mark.parametrize("policy", ["first", "unique"])
+def test_rows_whose_cells_mean_the_same_are_warnings_caused_by_the_first_where_one_may_play(tmp_path: Path, policy: str):
     message = 'every condition is the same as in line 2 ("a").'
-    csv = 'Asset,speed,ok\na,3..5,Any\nb,"4, 1",\nc,3..5,True\nd,3..3 | 3..5,-\n'
-    assert findings(tmp_path, csv) == [
+    assert findings(tmp_path, SAME, f'{TYPES}[tables.t]\npolicy = "{policy}"\n') == [
         at(tmp_path, "identical-rows", "warning", message, row=1, asset="b", line=3, by=(0,)),
         at(tmp_path, "identical-rows", "warning", message, row=3, asset="d", line=5, by=(0,)),
     ]
+
+
+@pytest.mark.parametrize("policy", ["collect", "priority"])
+def test_different_assets_of_the_same_contexts_are_one_line_of_information_where_several_may_play(tmp_path: Path, policy: str):
+    message = '2 other rows (line 3 ("b") and line 5 ("d")) are valid in the same contexts.'
+    assert findings(tmp_path, SAME, f'{TYPES}[tables.t]\npolicy = "{policy}"\n') == [
+        at(tmp_path, "variety", "info", message, row=0, asset="a", line=2, by=(1, 3)),
+    ]
+
+
+def test_one_asset_twice_with_the_same_conditions_is_no_variety(tmp_path: Path):
+    found = findings(tmp_path, "Asset,speed\na,1\nb,1\nb,1\na,1\nc,1\n")
+    assert [(f.rule, f.level, f.row, f.by) for f in found if f.rule != "duplicate-asset"] == [
+        ("variety", "info", 0, (1, 4)),
+        ("identical-rows", "warning", 2, (1,)),
+        ("identical-rows", "warning", 3, (0,)),
+    ]
+
+
+def test_of_a_large_group_the_first_rows_are_named_and_all_are_listed_by_number(tmp_path: Path):
+    (found,) = findings(tmp_path, "Asset,speed\n" + "".join(f"a{i},1\n" for i in range(300)))
+    assert found.message.startswith('299 other rows (line 3 ("a1"), line 4 ("a2"), line 5 ("a3") and 296 more) are valid')
+    assert found.by == tuple(range(1, 300))
 
 
 def test_a_soft_cell_differs_from_a_hard_one_and_from_one_of_another_penalty(tmp_path: Path):
@@ -220,7 +247,7 @@ def test_a_soft_cell_differs_from_a_hard_one_and_from_one_of_another_penalty(tmp
 
 def test_outputs_tell_no_rows_apart(tmp_path: Path):
     toml = TYPES + '[tables.t]\noutputs = ["Slot"]\n'
-    assert [f.rule for f in findings(tmp_path, "Asset,Slot,speed\na,L,1\nb,R,1\n", toml)] == ["identical-rows"]
+    assert [f.rule for f in findings(tmp_path, "Asset,Slot,speed\na,L,1\nb,R,1\n", toml)] == ["variety"]
 
 
 def test_a_disabled_row_is_never_valid_together_with_another(tmp_path: Path):
@@ -230,7 +257,7 @@ def test_a_disabled_row_is_never_valid_together_with_another(tmp_path: Path):
 
 def test_cells_that_cannot_be_read_are_the_same_only_as_themselves(tmp_path: Path):
     found = findings(tmp_path, "Asset,speed\na,x\nb,y\nc,Any\nd,x\n")
-    assert [(f.row, f.by) for f in found if f.rule == "identical-rows"] == [(3, (0,))]
+    assert [(f.row, f.by) for f in found if f.rule == "variety"] == [(0, (3,))]
 
 
 # ---- many findings
@@ -252,7 +279,7 @@ def test_of_very_many_findings_of_a_kind_the_first_are_listed_and_the_others_cou
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, row: str, rule: str
 ):
     monkeypatch.setattr(check_module, "MOST_ROWS", 3)
-    toml = '[conditions.speed]\ntype = "number"\n'
+    toml = '[conditions.speed]\ntype = "number"\n[tables.t]\npolicy = "first"\n'
     csv = "Asset,speed\n" + "".join(row.format(i=i) + "\n" for i in range(9))
     found = [f for f in findings(tmp_path, csv, toml) if f.rule == rule]
     n_all = 9 if rule in ("empty-cell", "no-asset") else 8
@@ -263,14 +290,15 @@ def test_of_very_many_findings_of_a_kind_the_first_are_listed_and_the_others_cou
 def test_a_table_of_python_has_rows_and_no_lines():
     table = Table.from_columns({"Asset": ["a", "a"], "x": ["1", "1"]}, {"x": {"type": "number"}})
     assert [(f.rule, f.message, f.file, f.line, f.row) for f in check(table)] == [
-        ("duplicate-asset", 'the asset "a" stands in row 0 too.', None, None, 1),
-        ("identical-rows", 'every condition is the same as in row 0 ("a").', None, None, 1),
+        ("duplicate-asset", 'the asset "a" stands in row 1 too.', None, None, 1),
+        ("identical-rows", 'every condition is the same as in row 1 ("a").', None, None, 1),
     ]
 
 
-def test_ten_thousand_identical_rows_are_told_from_the_first(tmp_path: Path):
+def test_ten_thousand_identical_rows_are_told_from_the_first():
     n_rows = check_module.MOST_ROWS + 500
-    table = Table.from_columns({"Asset": [f"a{i}" for i in range(n_rows)], "x": ["1..2"] * n_rows}, {"x": {"type": "number"}})
+    columns = {"Asset": [f"a{i}" for i in range(n_rows)], "x": ["1..2"] * n_rows}
+    table = Table.from_columns(columns, {"x": {"type": "number"}}, TableSettings("table", policy="unique"))
     found = check(table)
     assert len(found) == check_module.MOST_ROWS + 1
     assert {f.by for f in found} == {(0,)}
@@ -303,3 +331,62 @@ def test_the_worst_level_is_the_highest():
     assert worst([made["info"]]) == "info"
     assert worst([made["info"], made["warning"]]) == "warning"
     assert worst([made["warning"], made["error"], made["info"]]) == "error"
+
+
+MIRRORED = """
+[conditions.direction]
+type = "angle"
+[conditions.slope]
+type = "angle"
+mirror = "none"
+[conditions.foot]
+type = "enum"
+values = ["Left", "Right", "Both"]
+[conditions.lean]
+type = "number"
+min = -1.0
+max = 2.0
+mirror = "negate"
+[databases.loco]
+table = "outer"
+clips = "*.bvh"
+features = "loco"
+mirror = {mirror}
+"""
+
+
+def mirror_findings(folder: Path, mirror: str) -> list[tuple[str, str | None, str | None]]:
+    (folder / "contextdb.toml").write_text(MIRRORED.replace("{mirror}", mirror), encoding="utf-8")
+    (folder / "outer.csv").write_text("Asset,direction,slope,side\n@inner,Any,Any,left\nb,10,5,right\n", encoding="utf-8")
+    (folder / "inner.csv").write_text("Asset,foot,lean\nc,Left,0\nd,Right,1\n", encoding="utf-8")
+    (folder / "other.csv").write_text("Asset,foot,direction\nc,Left,0\nd,Right,1\n", encoding="utf-8")
+    tables = Project.load(folder).tables
+    return [(f.rule, f.table, f.column) for name in tables for f in check(tables[name]) if "mirror" in f.rule]
+
+
+def test_what_a_mirror_does_to_facts_is_told_of_the_tables_whose_clips_are_played_mirrored(tmp_path: Path):
+    assert sorted(mirror_findings(tmp_path, "true"), key=str) == [
+        ("inferred-mirror", "outer", None),
+        ("undeclared-mirror", "inner", "foot"),
+        ("undeclared-mirror", "outer", "side"),
+        ("uneven-mirror", "inner", "lean"),
+    ]
+    assert mirror_findings(tmp_path, "false") == [("uneven-mirror", "inner", "lean")]
+
+
+def test_facts_that_rules_and_derived_facts_need_are_told_too(tmp_path: Path):
+    toml = (
+        MIRRORED.replace("{mirror}", "true")
+        + """
+[conditions.turn]
+type = "angle"
+expr = "direction * 2"
+[tables.outer]
+when = "When"
+"""
+    )
+    (tmp_path / "contextdb.toml").write_text(toml, encoding="utf-8")
+    (tmp_path / "outer.csv").write_text("Asset,turn,When\na,10,foot == 'Left'\n", encoding="utf-8")
+    found = {f.rule: f for f in check(Project.load(tmp_path).tables["outer"]) if "mirror" in f.rule}
+    assert found["inferred-mirror"].message.startswith('"direction" is negated for mirrored clips of the database "loco"')
+    assert found["undeclared-mirror"].column == "foot"

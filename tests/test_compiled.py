@@ -271,7 +271,7 @@ def test_a_table_with_a_cell_that_cannot_be_read_does_not_compile():
     table = strategies_table().with_cell(0, "speed", "20; 9")
     with pytest.raises(TableError) as caught:
         table.compile()
-    assert 'row 0, column "speed": cannot read "20; 9" as a number.' in str(caught.value)
+    assert 'row 1, column "speed": cannot read "20; 9" as a number.' in str(caught.value)
     assert 'Did you mean "20, 9"?' in str(caught.value)
 
 

@@ -42,8 +42,18 @@ def write(rows: str, name: str = "jog") -> None:
     Path(f"tables/{name}.csv").write_text(rows, encoding="utf-8")
 
 
+def one_may_play() -> None:
+    """Of several valid rows the first plays: those that others make needless are slips then."""
+    with Path("tables/contextdb.toml").open("a", encoding="utf-8") as file:
+        file.write('[tables.jog]\npolicy = "first"\n')
+
+
 def baseline(file: str = "before.json") -> None:
     assert run("coverage", "tables", "--format", "json", "-o", file).code == 0
+
+
+def folded(text: str) -> str:
+    return " ".join(text.split())
 
 
 def test_the_json_document_keeps_its_contract():
@@ -65,11 +75,20 @@ def test_the_json_document_keeps_its_contract():
 
 
 def test_findings_have_the_fields_of_a_check():
+    one_may_play()
     write(JOG + "jog,1..2,Walk\n")
-    (finding,) = run("coverage", "tables", "--json").json["tables"][0]["findings"]
+    finding, never = run("coverage", "tables", "--json").json["tables"][0]["findings"]
+    assert never["rule"] == "never-chosen"
     wanted = {"rule": "subsumed-row", "level": "warning", "row": 2, "asset": "jog", "line": 4, "column": None, "by": [0]}
     assert {key: finding[key] for key in wanted} == wanted
     assert finding["message"]
+
+
+def test_rows_that_share_contexts_are_one_line_of_information_where_several_may_play():
+    write(JOG + "jog,1..2,Walk\nstroll,0..1,Walk\nwalk,3..4,Walk\n")
+    inner, group = run("coverage", "tables", "--json").json["tables"][0]["findings"][::-1]
+    assert (group["rule"], group["level"], group["row"], group["by"]) == ("variety", "info", 0, [2, 3])
+    assert (inner["rule"], inner["level"], inner["row"], inner["by"]) == ("subsumed-row", "warning", 4, [0])
 
 
 def test_the_same_tables_give_the_same_bytes():
@@ -146,14 +165,63 @@ def test_a_closed_gap_passes_and_is_told():
     assert "- 30.00 %  speed: (4..10], gait: Walk" in result.out
 
 
-def test_tables_that_came_and_went_since_the_baseline_fail_nothing():
+def test_a_new_table_fails_nothing():
+    baseline()
+    write("Asset,speed,gait\n", "new")
+    assert run("coverage", "tables", "--baseline", "before.json").code == 0
+
+
+@pytest.mark.parametrize("name", ["run", "-run", "a b"])
+def test_a_table_of_the_baseline_that_is_gone_fails_unless_it_is_named(name: str):
+    write(JOG, name)
+    baseline()
+    Path(f"tables/{name}.csv").rename("tables/dash.csv")
+    result = run("coverage", "tables", "--baseline", "before.json", "--max-drop", "100")
+    assert result.code == 1
+    assert f'FAILED  gone  the table "{name}" of the baseline is not there any more. New since the baseline: "dash".' in folded(
+        result.out
+    )
+    assert "1 of 2 bars missed." in result.out
+    assert run("coverage", "tables", "--baseline", "before.json", f"--gone={name}").code == 0
+
+
+def test_a_table_that_lost_all_its_rows_fails_unless_it_is_named():
+    baseline()
+    write("Asset,speed,gait\n")
+    result = run("coverage", "tables", "--baseline", "before.json", "--max-drop", "100")
+    assert (result.code, "the table had 2 rows in the baseline and has none now." in folded(result.out)) == (1, True)
+    assert run("coverage", "tables", "--baseline", "before.json", "--gone", "jog").code == 0
+
+
+@pytest.mark.parametrize("format_name", ["json", "github", "junit", "sarif", "markdown", "html"])
+def test_every_format_tells_a_table_that_is_gone(format_name: str):
     write(JOG, "run")
     baseline()
     Path("tables/run.csv").unlink()
-    write("Asset,speed,gait\n", "new")
+    result = run("coverage", "tables", "--baseline", "before.json", "--format", format_name)
+    assert result.code == 1
+    assert "run" in result.out
+    assert "of the baseline is not there any more" in result.out
+
+
+def test_gone_tables_want_a_baseline():
+    result = run("coverage", "tables", "--gone", "run")
+    assert (result.code, "--gone names tables of a baseline" in result.err) == (2, True)
+
+
+def test_an_altered_baseline_is_refused_and_one_that_was_only_written_anew_is_not():
+    baseline()
+    text = Path("before.json").read_text(encoding="utf-8")
+    document = json.loads(text)
+    Path("before.json").write_text(json.dumps(document, indent=1, sort_keys=True).replace(": 1.0", ": 1"), encoding="utf-8")
+    assert run("coverage", "tables", "--baseline", "before.json").code == 0
+    document["tables"][0]["covered"]["lower"] = 0.1
+    Path("before.json").write_text(json.dumps(document), encoding="utf-8")
     result = run("coverage", "tables", "--baseline", "before.json")
-    assert result.code == 0
-    assert "No longer there: run." in result.out
+    assert (result.code, "its contents do not give its digest" in result.err) == (2, True)
+    del document["digest"]
+    Path("before.json").write_text(json.dumps(document), encoding="utf-8")
+    assert run("coverage", "tables", "--baseline", "before.json").code == 0
 
 
 def test_an_output_file_is_written_and_nothing_is_printed():
@@ -171,16 +239,19 @@ def test_a_gap_is_told_by_number_and_by_id():
     assert "contextdb query tables/jog.csv speed=2 gait=Run --unknown any --explain" in by_number.out
 
 
-def test_a_row_is_explained_by_number_and_by_asset():
+@pytest.mark.parametrize(("policy", "level"), [("first", "warning"), ("collect", "info")])
+def test_a_row_is_explained_by_number_and_by_asset(policy: str, level: str):
+    if policy == "first":
+        one_may_play()
     write(JOG + "jog,1..2,Walk\n")
     result = run("coverage", "jog", "--explain", "jog")
     assert result.code == 0
-    assert result.out == run("coverage", "jog", "--explain", "2").out
-    assert result.lines == [
-        "line 4 jog of jog (row 2)",
+    assert result.out == run("coverage", "jog", "--explain", "3").out
+    assert result.lines[:5] == [
+        "line 4 jog of jog (row 3)",
         "valid in 5.00 % of the contexts",
         "",
-        'warning subsumed-row: wherever it is valid, line 2 ("walk") is valid too.',
+        f'{level} subsumed-row: wherever it is valid, line 2 ("walk") is valid too.',
         "  line 2 walk, valid in 20.00 %",
     ]
     assert "needless" in run("coverage", "jog", "--explain", "walk").out
@@ -202,7 +273,8 @@ def test_a_row_is_explained_by_number_and_by_asset():
         (("jog", "--gap", "1", "--explain", "1"), "do not go together"),
         (("jog", "--gap", "1", "--format", "html"), "--format html does not go with them"),
         (("jog", "--explain", "wlak"), 'Did you mean "walk"?'),
-        (("jog", "--explain", "2"), 'there is no row "2".'),
+        (("jog", "--explain", "0"), 'there is no row "0". Accepted: a row from 1 to 2, or an asset.'),
+        (("jog", "--explain", "3"), 'there is no row "3".'),
     ],
 )
 def test_bad_use_exits_with_2_and_says_what_is_wrong(arguments: tuple[str, ...], said: str):

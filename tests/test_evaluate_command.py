@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import csv
+import os
+import stat
+import subprocess
+import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import polars as pl
@@ -11,7 +16,7 @@ import pytest
 import strategies
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from running import Result, run
+from running import ROOT, Result, run
 
 from contextdb.commands.evaluate_command import share
 from contextdb.contexts import read_contexts
@@ -82,9 +87,9 @@ def test_sums_stand_on_standard_output():
         "1 context without a valid asset (25.0 %)\n"
         "\n"
         "contexts   share  row  asset\n"
-        "       1  25.0 %    0  run\n"
-        "       1  25.0 %    1  jump\n"
-        "       1  25.0 %    2  fall\n",
+        "       1  25.0 %    1  run\n"
+        "       1  25.0 %    2  jump\n"
+        "       1  25.0 %    3  fall\n",
         "",
     )
 
@@ -96,8 +101,8 @@ def test_rows_are_listed_by_how_often_they_are_valid_and_those_that_never_are_co
     assert lines[1] == "0 contexts without a valid asset (0.0 %)"
     assert lines[3:6] == [
         "contexts    share  row  asset",
-        "       3  100.0 %    0  a0",
-        "       2   66.7 %    1  a1",
+        "       3  100.0 %    1  a0",
+        "       2   66.7 %    2  a1",
     ]
     assert lines[-3:] == ["… and 3 more rows", "", "3 rows never valid"]
 
@@ -272,7 +277,7 @@ def test_missing_facts_are_treated_as_said(here: Path, unknown: str, found: list
 
 
 @pytest.mark.parametrize(
-    ("name", "place"), [("c.csv", 'c.csv, line 3, column "speed"'), ("c.parquet", 'c.parquet, row 1, column "speed"')]
+    ("name", "place"), [("c.csv", 'c.csv, line 3, column "speed"'), ("c.parquet", 'c.parquet, row 2, column "speed"')]
 )
 def test_a_missing_fact_is_named_with_its_place(here: Path, name: str, place: str):
     frame = pl.DataFrame(
@@ -322,17 +327,17 @@ def test_a_wrong_fact_that_stands_in_many_lines_is_told_once(here: Path):
 @pytest.mark.parametrize(
     ("name", "values", "message"),
     [
-        ("speed", ["1", "fast"], 'row 1, column "speed": cannot read "fast" as a number.'),
-        ("speed", ["1..2"], 'row 0, column "speed": a set of values is for one query at a time.'),
-        ("speed", [[1.0]], 'row 0, column "speed": '),
-        ("speed", [{"x": 1}], 'row 0, column "speed": '),
-        ("state", ["Ground", "Gruond"], 'row 1, column "state": "Gruond" is not a declared value.'),
-        ("state", [1], 'row 0, column "state": int "1" is not a fact of type enum.'),
-        ("ok", ["True"], 'row 0, column "ok": str "True" is not a fact of type bool.'),
-        ("ok", [2], 'row 0, column "ok": int "2" is not a fact of type bool.'),
-        ("heading", [0.0, float("inf")], 'row 1, column "heading": '),
-        ("tags", [[1]], 'row 0, column "tags": '),
-        ("tags", [b"x"], 'row 0, column "tags": '),
+        ("speed", ["1", "fast"], 'row 2, column "speed": cannot read "fast" as a number.'),
+        ("speed", ["1..2"], 'row 1, column "speed": a set of values is for one query at a time.'),
+        ("speed", [[1.0]], 'row 1, column "speed": '),
+        ("speed", [{"x": 1}], 'row 1, column "speed": '),
+        ("state", ["Ground", "Gruond"], 'row 2, column "state": "Gruond" is not a declared value.'),
+        ("state", [1], 'row 1, column "state": int "1" is not a fact of type enum.'),
+        ("ok", ["True"], 'row 1, column "ok": str "True" is not a fact of type bool.'),
+        ("ok", [2], 'row 1, column "ok": int "2" is not a fact of type bool.'),
+        ("heading", [0.0, float("inf")], 'row 2, column "heading": '),
+        ("tags", [[1]], 'row 1, column "tags": '),
+        ("tags", [b"x"], 'row 1, column "tags": '),
     ],
 )
 def test_a_wrong_fact_of_a_parquet_file_is_named_with_its_row(here: Path, name: str, values: list[object], message: str):
@@ -446,7 +451,7 @@ def test_answers_do_not_depend_on_how_much_is_read_at_once(here: Path, monkeypat
 
 
 @pytest.mark.parametrize(
-    ("name", "place"), [("c.csv", 'c.csv, line 42, column "speed"'), ("c.parquet", 'c.parquet, row 40, column "speed"')]
+    ("name", "place"), [("c.csv", 'c.csv, line 42, column "speed"'), ("c.parquet", 'c.parquet, row 41, column "speed"')]
 )
 def test_the_place_of_a_fault_counts_what_was_read_before(here: Path, monkeypatch: pytest.MonkeyPatch, name: str, place: str):
     frame = pl.DataFrame({"speed": ["1"] * 40 + ["fast"] + ["1"] * 9})
@@ -477,3 +482,49 @@ def test_a_set_in_a_file_of_contexts_is_refused():
     Path("c.csv").write_text("x\na b\n", encoding="utf-8")
     with pytest.raises(ContextError, match='"a b" is a set of values'):
         read_contexts(Path("c.csv"), compiled)
+
+
+# ---- where answers cannot go, and where they can
+
+
+LIMITED = """
+import resource, sys
+from contextdb import cli
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
+sys.exit(cli.main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits as POSIX has them")
+@pytest.mark.parametrize("n_bytes", [100, 6_000, 30_000])
+@pytest.mark.parametrize("name", ["answers.csv", "answers.parquet"])
+def test_a_full_disk_is_told_of_the_file_that_was_asked_for(here: Path, name: str, n_bytes: int):
+    rows = "".join(f"{i % 97 / 10},{i % 3 == 0}\n" for i in range(30_000))
+    (here / "c.csv").write_text("speed,ok\n" + rows, encoding="utf-8")
+    (here / name).write_text("of yesterday", encoding="utf-8")
+    told = [sys.executable, "-c", LIMITED, str(n_bytes), "evaluate", "moves", "c.csv", "--unknown", "any", "--out", name]
+    done = subprocess.run(told, capture_output=True, text=True, cwd=here, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"contextdb: {name}: the ")
+    assert ".contextdb-" not in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert (here / name).read_text(encoding="utf-8") == "of yesterday"
+    assert list(here.glob(".contextdb-*")) == []
+
+
+def test_answers_into_nowhere_are_no_error(here: Path):
+    if not Path("/dev/null").exists():
+        pytest.skip("there is no nowhere")
+    told = run("evaluate", "moves", "data/a.csv", "--out", "/dev/null")
+    assert (told.code, told.err) == (0, "")
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names")
+def test_answers_into_a_pipe_are_csv(here: Path):
+    os.mkfifo(here / "pipe")
+    with ThreadPoolExecutor(1) as pool:
+        read = pool.submit((here / "pipe").read_text, "utf-8")
+        assert run("evaluate", "moves", "data/a.csv", "--out", "pipe").code == 0
+        assert read.result().startswith("context,file,count,rows,assets\n0,data/a.csv,1,0,run\n")
+    assert stat.S_ISFIFO(os.stat(here / "pipe").st_mode)

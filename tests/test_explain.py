@@ -275,7 +275,8 @@ def test_the_nearest_rows_leave_out_valid_ones_and_are_as_many_as_there_are():
 def test_rows_are_asked_for_by_number_and_by_asset():
     explanation = PLAYS.explain({"state": "Air", "speed": 9})
     assert [(r.row, r.is_valid) for r in explanation.asset("run")] == [(0, False), (3, True)]
-    assert explanation.asset("swim") == []
+    with pytest.raises(ContextError, match='has no asset "swim"'):
+        explanation.asset("swim")
     assert explanation[0].row == 2
     assert explanation.facts == {"state": "Air", "speed": 9.0}
 

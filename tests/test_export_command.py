@@ -77,3 +77,31 @@ def test_bad_use_is_told_with_a_mend(arguments: tuple[str, ...], said: str):
     result = run("export", *arguments)
     assert (result.code, result.out) == (2, "")
     assert said in result.err.replace("'", '"')
+
+
+FORMULAS = "Asset Name,note,speed,tags\n=cmd|' /C calc'!A0,@SUM(1),-5,+InAir\n+1,-2..3,+7,-\n'=a,\"\trun\",5,Any\n"
+
+
+def test_cells_that_a_spreadsheet_may_run_are_named_and_kept():
+    Path("game/f.csv").write_text(FORMULAS, encoding="utf-8")
+    for suffix in ("csv", "tsv"):
+        result = run("export", "game/f.csv", f"f.{suffix}")
+        said = (
+            'f: 5 cells may run as a formula in a spreadsheet, first "=cmd|\' /C calc\'!A0" in "Asset Name"; --formulas quote puts'
+        )
+        assert said in result.err
+    assert Path("f.csv").read_text(encoding="utf-8") == FORMULAS
+    assert "formula" not in run("export", "game/f.csv", "k.csv", "--formulas", "keep").err
+    assert "formula" not in run("export", "game/f.csv", "f.json").err
+    assert "formula" not in run("export", "game/jog.csv", "jog.tsv").err
+
+
+def test_formulas_get_an_apostrophe_when_asked_and_every_other_byte_stays():
+    Path("game/f.csv").write_text(FORMULAS, encoding="utf-8")
+    assert run("export", "game/f.csv", "f.csv", "--formulas", "quote").code == 0
+    lines = Path("f.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "Asset Name,note,speed,tags"
+    assert lines[1] == "'=cmd|' /C calc'!A0,'@SUM(1),-5,'+InAir"
+    assert lines[2] == "+1,'-2..3,+7,-"
+    assert lines[3] == "'=a,\"'\trun\",5,Any"
+    assert run("export", "game/f.csv", "-", "--as", "tsv", "--formulas", "quote").out.splitlines()[2] == "+1\t'-2..3\t+7\t-"

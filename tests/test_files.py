@@ -352,14 +352,17 @@ while True:
 def test_a_save_killed_at_any_call_leaves_the_old_file_or_the_new_one(table: Path):
     table.write_bytes(b"old" * 1000)
     left = {
-        "open 1": "old",
-        "open 2": "new",  # the folder's, after the rename
+        "open 1": "old",  # the folder's, for the turn in which the temporary file is made
+        "open 2": "old",
+        "close 1": "old",
         "write 1": "old",
         "chmod 1": "old",
         "fsync 1": "old",
-        "fsync 2": "new",
-        "close 1": "old",
+        "open 3": "old",  # the folder's, for the turn in which the file is replaced
+        "close 2": "old",
         "replace 1": "old",
+        "fsync 2": "new",
+        "close 3": "new",
     }
     command = [sys.executable, "-c", KILLED_AT_A_CALL, str(table), *left]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)

@@ -128,7 +128,8 @@ def test_status_exits_with_1_until_all_is_set(here):
     install()
     result = run("git", "status")
     assert (result.code, result.out.count("missing")) == (0, 0)
-    assert "merge %O %A %B --path %P" in result.out
+    assert "merge %O %A %B --path=%P || {" in result.out
+    assert "git text --\n" in result.out
 
 
 def test_the_attributes_can_stand_in_a_folder_with_a_blank(here):
@@ -163,6 +164,17 @@ def test_a_machine_without_git_is_told_so(here, monkeypatch):
     result = run("git", "install")
     assert result.code == 2
     assert "git cannot be run" in result.err
+
+
+@pytest.mark.parametrize("command", ["install", "status", "uninstall"])
+def test_this_clone_is_meant_unless_told_otherwise(here, command):
+    git("config", "--global", "user.name", "somebody")
+    if command != "install":
+        install("--local")
+    done = install() if command == "install" else run("git", command)
+    assert done.code == 0
+    assert "the configuration of this clone" in done.out
+    assert git("config", "--global", "--list") == "user.name=somebody\n"
 
 
 # ---- what git then does
@@ -226,3 +238,123 @@ def test_the_heading_of_a_hunk_names_its_asset(installed):
 def test_git_diff_shows_a_file_that_is_no_table_as_it_is(installed):
     put("my tables/t.csv", BASE + "too,many,cells,here\r\n")
     assert "+too,many,cells,here" in git("diff")
+
+
+# ---- what cannot be merged cell by cell
+
+
+OPEN_QUOTE = BASE.replace("walk,0..5", 'walk,"0..4') + "land,Any,Any\r\n"
+WAYS = {
+    "merge": ("merge", "-q", "other", "-m", "both"),
+    "rebase": ("rebase", "-q", "other"),
+    "cherry-pick": ("cherry-pick", "other"),
+}
+
+
+CASES = [
+    *(("cells", way, is_ours) for way in WAYS for is_ours in (True, False)),
+    ("without contextdb", "merge", True),
+    ("without contextdb", "rebase", False),
+    ("without git merge-file", "merge", False),
+]
+
+
+def driven(driver: str) -> None:
+    """Have git call the driver, one that is not there, or one that finds no git."""
+    if driver == "without contextdb":
+        assert run("git", "install", "--command", "no-such-contextdb").code == 0
+    if driver == "without git merge-file":
+        program = Path("..", "a driver.py")
+        broken = (
+            "import contextdb.diffing.lines as lines\nlines.subprocess.run = lambda *a, **b: (_ for _ in ()).throw(OSError())\n"
+        )
+        text = program.read_text(encoding="utf-8").replace("sys.exit(", broken + "sys.exit(")
+        program.write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize(("driver", "way", "is_ours"), CASES)
+def test_of_a_side_that_cannot_be_read_no_row_is_left_out_without_a_mark(installed, driver, way, is_ours):
+    driven(driver)
+    other = BASE.replace("walk,0..5", "walk,1..5") + "climb,Any,Any\r\n"
+    branched("my tables/t.csv", *((OPEN_QUOTE, other) if is_ours else (other, OPEN_QUOTE)))
+    said = git(*WAYS[way], fails=True)
+    if driver != "without contextdb":
+        assert "my tables/t.csv (" in said
+        assert ".merge_file" not in said
+    assert git("status", "--porcelain") == 'UU "my tables/t.csv"\n'
+    git("add", "-A")
+    git("-c", "core.editor=true", "commit", "-q", "-m", "without looking")
+    for row in ('walk,"0..4', "walk,1..5", "land,", "climb,"):
+        assert row in read("my tables/t.csv")
+    checked = run("check", "my tables")
+    assert checked.code != 0
+    assert "my tables/t.csv" in checked.out.replace("\\", "/")
+    assert "an unresolved git conflict" in checked.out
+
+
+@pytest.mark.parametrize("broken", ["[conditions.speed\n", "\udcff"], ids=["no TOML", "not UTF-8"])
+def test_of_a_contextdb_toml_that_cannot_be_read_no_key_is_left_out_without_a_mark(installed, broken):
+    ours, theirs = TOML.replace("10.0", "20.0"), TOML.replace("10.0", "30.0")
+    git("checkout", "-q", "-b", "other")
+    Path("my tables/contextdb.toml").write_bytes(theirs.encode() + broken.encode(errors="surrogateescape"))
+    commit("theirs")
+    git("checkout", "-q", "main")
+    put("my tables/contextdb.toml", ours)
+    commit("ours")
+    said = git("merge", "-q", "other", "-m", "both", fails=True)
+    assert "my tables/contextdb.toml (theirs)" in said.replace("\\", "/")
+    raw = Path("my tables/contextdb.toml").read_bytes()
+    assert all(part in raw for part in (b"<<<<<<< ours", b"max = 20.0", b"max = 30.0", b">>>>>>> theirs"))
+
+
+def test_lines_that_go_together_are_told_all_the_same(installed):
+    long = BASE + "".join(f"a{i},Any,Any\r\n" for i in range(20))
+    put("my tables/t.csv", long)
+    commit("more")
+    broken = long + 'land,"open,Any\r\n'
+    branched("my tables/t.csv", long.replace("walk,0..5", "walk,1..5"), broken)
+    said = git("merge", "-q", "other", "-m", "both", fails=True)
+    assert "lines were merged instead of cells, with 0 places between marks." in said
+    assert read("my tables/t.csv") == broken.replace("walk,0..5", "walk,1..5")
+
+
+def test_a_table_whose_name_begins_with_a_dash_merges_and_is_shown_cell_by_cell(installed):
+    put("-t.csv", BASE)
+    commit("dash")
+    branched("-t.csv", BASE.replace("walk,0..5", "walk,1..5"), BASE.replace("5..9", "5..8"))
+    git("merge", "-q", "other", "-m", "both")
+    assert read("-t.csv") == BASE.replace("walk,0..5", "walk,1..5").replace("5..9", "5..8")
+    put("-t.csv", BASE)
+    assert "-  speed: 5..8\n" in git("diff", "--", "-t.csv")
+    assert "fatal" not in git("log", "-p")
+    commit("back")
+    branched_again = BASE.replace("5..9", "1..2"), BASE.replace("5..9", "3..4")
+    git("branch", "-D", "other")
+    branched("-t.csv", *branched_again)
+    assert "-t.csv: run, speed" in git("merge", "-q", "other", "-m", "both", fails=True)
+
+
+def test_a_table_that_both_sides_added_has_the_rows_of_both(installed):
+    git("checkout", "-q", "-b", "other")
+    put("new.csv", "Asset,speed\nwalk,1\nswim,2\n")
+    commit("theirs")
+    git("checkout", "-q", "main")
+    put("new.csv", "Asset,speed\nwalk,1\nclimb,3\n")
+    commit("ours")
+    git("merge", "-q", "other", "-m", "both", fails=True)
+    assert all(part in read("new.csv") for part in ("<<<<<<< ours", "climb,3", "swim,2", ">>>>>>> theirs"))
+
+
+def test_a_parquet_file_that_cannot_be_read_is_told_and_stays_as_ours_has_it(installed):
+    Path("t.parquet").write_bytes(b"PAR1 base")
+    commit("base of it")
+    git("checkout", "-q", "-b", "other")
+    Path("t.parquet").write_bytes(b"PAR1 theirs")
+    commit("theirs")
+    git("checkout", "-q", "main")
+    Path("t.parquet").write_bytes(b"PAR1 ours")
+    commit("ours")
+    said = git("merge", "-q", "other", "-m", "both", fails=True)
+    assert "t.parquet: the file stays as ours has it. Try to take one side with git checkout --ours or --theirs." in said
+    assert git("status", "--porcelain") == "UU t.parquet\n"
+    assert Path("t.parquet").read_bytes() == b"PAR1 ours"

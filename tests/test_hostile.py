@@ -60,7 +60,7 @@ def refusals(path: str = "t.csv") -> list[str]:
 def _unplaced(line: str, finding: dict[str, object]) -> str:
     """A line without the place that stands before its message."""
     place = [str(finding["file"])]
-    place += [f"line {finding['line']}"] if finding["line"] else [f"row {finding['row']}"] if finding["row"] is not None else []
+    place += [f"line {finding['line']}"] if finding["line"] else [f"row {finding['row'] + 1}"] if finding["row"] is not None else []
     place += [f'column "{finding["column"]}"'] if finding["column"] else []
     return line.removeprefix(", ".join(place) + ": ")
 
@@ -162,10 +162,10 @@ def test_a_parquet_file_whose_values_are_of_another_type_is_refused(here: Path):
     pl.DataFrame({"Asset": ["a", "b"], "ok": [0.5, 2.0], "state": [1, 2]}).write_parquet(here / "t.parquet")
     told = refusals("t.parquet")
     assert [line.partition(": ")[0] for line in told] == [
-        't.parquet, row 0, column "ok"',
-        't.parquet, row 0, column "state"',
         't.parquet, row 1, column "ok"',
         't.parquet, row 1, column "state"',
+        't.parquet, row 2, column "ok"',
+        't.parquet, row 2, column "state"',
     ]
 
 

@@ -10,6 +10,7 @@ import pytest
 from running import Result, run
 
 from contextdb import cli
+from contextdb.commands import import_command
 from contextdb.project import Project
 
 TOML = '# ours\n[conditions.speed]\ntype = "number"\nunit = "m/s"\n'
@@ -40,12 +41,14 @@ def test_what_becomes_of_each_column_is_printed_with_the_reason():
         "  column  becomes              why",
         "  Name    asset                the first column",
         '  Speed   condition speed      declared as "speed"',
-        '  sped    new condition, int   all numbers are whole; is "speed" meant? --map "sped=speed"',
-        '  pos     new condition, enum  2 names in 2 cells: "CB", "FS"',
+        '  sped    new condition, int   whole numbers alone, as counts are; is "speed" meant? --map "sped=speed"',
+        '  pos     new condition, enum  2 names in 2 cells: "CB", "CB FS"',
         'game/contextdb.toml declares 2 conditions ("sped", "pos") and the table "moves".',
     ]
     assert "semicolons between the fields" in result.err
     assert "decimal commas became points" in result.err
+    said = 'moves.csv: column "pos": each text is one name, such as "CB FS"; --names words reads each word as a name.'
+    assert said in result.err
 
 
 def test_what_is_written_is_a_table_of_the_project():
@@ -92,7 +95,7 @@ def test_cells_that_cannot_be_read_are_told_and_kept():
     result = run("import", "bad.tsv", "game/bad.csv")
     assert result.code == 0
     assert result.lines[-2] == "1 cell cannot be read:"
-    assert result.lines[-1].startswith('  speed, row 0: cannot read "5;3" as a number.')
+    assert result.lines[-1].startswith('  speed, row 1: cannot read "5;3" as a number.')
     assert Project.load("game", strict=False)["bad"].text(0, "speed") == "5;3"
 
 
@@ -135,3 +138,51 @@ def test_bad_use_is_told_with_a_mend_and_writes_nothing(arguments: tuple[str, ..
 def test_a_contextdb_toml_that_cannot_be_read_stops_the_import():
     Path("game/contextdb.toml").write_text("[conditions.speed]\ntype = 5\n", encoding="utf-8")
     assert "game/contextdb.toml, line 2" in refused("moves.csv", "game/moves.csv")
+
+
+def test_a_large_import_says_what_it_is_at_also_where_no_terminal_is(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(import_command, "LARGE_BYTES", 10)
+    monkeypatch.setattr(import_command, "LARGE_COLUMNS", 4)
+    lines = run("import", "moves.csv", "game/moves.csv").err.splitlines()
+    said = [line for line in lines if line.endswith("…")]
+    assert said == [
+        "moves.csv: reading 0 MB …",
+        "moves.csv: 2 rows of 4 columns read; finding the type of each column …",
+        "moves.csv: writing game/moves.csv …",
+    ]
+
+
+@pytest.mark.parametrize("where", ["read", "propose", "plan_import"])
+def test_an_import_that_is_interrupted_ends_with_130_and_writes_nothing(where: str, here: Path, monkeypatch: pytest.MonkeyPatch):
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(import_command, where, interrupted)
+    assert run("import", "moves.csv", "game/moves.csv").code == 130
+    assert [p.name for p in (here / "game").iterdir()] == ["contextdb.toml"]
+    assert (here / "game" / "contextdb.toml").read_text(encoding="utf-8") == TOML
+
+
+def test_names_are_read_word_by_word_when_asked():
+    result = run("import", "moves.csv", "game/moves.csv", "--names", "words")
+    assert '  pos     new condition, enum  2 names in 2 cells: "CB", "FS"' in result.lines
+    assert "each text is one name" not in result.err
+    assert Project.load("game")["moves"].compile().query({"speed": 5.0, "sped": 2, "pos": "FS"}).assets == ["run"]
+
+
+def test_a_table_of_another_project_keeps_its_cells(here: Path):
+    (here / "other").mkdir()
+    run("import", "moves.csv", "game/moves.csv", "--names", "words")
+    result = run("import", "game/moves.csv", "other/moves.csv")
+    assert result.code == 0, result.err
+    assert Path("other/moves.csv").read_bytes() == Path("game/moves.csv").read_bytes()
+    assert Project.load("other")["moves"].condition("pos").condition.domain.values == ("CB", "FS")
+
+
+def test_a_foreign_file_that_only_lies_in_a_folder_of_tables_has_whole_names(here: Path):
+    (here / "game" / "foreign.csv").write_text("Name,state\njog,Mid Air\n", encoding="utf-8")
+    assert "each text is one name" in run("import", "game/foreign.csv", "game/t.csv").err
+    (here / "broken").mkdir()
+    (here / "broken" / "contextdb.toml").write_text("[", encoding="utf-8")
+    (here / "broken" / "f.csv").write_text("Name,state\njog,Mid Air\n", encoding="utf-8")
+    assert "each text is one name" in run("import", "broken/f.csv", "game/u.csv").err

@@ -226,13 +226,38 @@ def test_a_gap_that_one_side_opened_is_not_told_again(here):
 # ---- bad use
 
 
-def test_what_cannot_be_read_exits_with_2_and_changes_nothing(here):
+def test_lines_are_merged_where_a_side_is_no_table(here):
     files = put(base=BASE, ours=OURS, theirs="A,b\n1\n")
     result = run("merge", *files)
-    assert (result.code, read("ours.csv")) == (2, OURS)
+    assert result.code == 1
     assert "theirs.csv, line 2" in result.err
+    marked = read("ours.csv")
+    assert all(part in marked for part in ("<<<<<<< ours", "walk,1..5,True", "=======\nA,b\n1\n>>>>>>> theirs"))
+
+
+def test_a_side_that_is_no_table_is_not_decided_for_anybody(here):
+    result = run("merge", *put(base=BASE, ours=OURS, theirs="A,b\n1\n"), "--take", "theirs")
+    assert (result.code, read("ours.csv")) == (2, OURS)
+
+
+@pytest.mark.parametrize("error", [RecursionError("too deep"), ValueError("a slip"), MemoryError()])
+def test_whatever_goes_wrong_inside_leaves_both_sides_in_the_file(here, monkeypatch, error):
+    def fails(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("contextdb.commands.merge_command.merge", fails)
+    result = run("merge", *put(base=BASE, ours=OURS, theirs=THEIRS))
+    assert result.code == 1
+    assert type(error).__name__ in result.err
+    assert "walk,1..5" in read("ours.csv")
+    assert "land,," in read("ours.csv")
+
+
+def test_files_that_are_missing_exit_with_2_and_change_nothing(here):
+    put(base=BASE, ours=OURS)
     assert run("merge", "base.csv", "ours.csv", "missing.csv").code == 2
     assert run("merge", "base.csv", "ours.csv").code == 2
+    assert read("ours.csv") == OURS
 
 
 # ---- git

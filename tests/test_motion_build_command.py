@@ -6,6 +6,7 @@ import contextlib
 import errno
 import io
 import os
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -102,6 +103,7 @@ def test_the_json_document_has_the_same_facts(here: Path):
         "features": 7,
         "computed": ["walk"],
         "cached": ["jog"],
+        "doubts": [],
     }
     assert frames == open_database(JOG).n_frames
     assert (tired["table"], tired["assets"], tired["clips"], tired["ranges"]) == (None, None, 1, 2)
@@ -165,7 +167,7 @@ def test_nothing_is_told_when_all_assets_have_clips_and_all_clips_are_held(here:
     (here / "game" / "locomotion.csv").write_text("Asset\nwalk\njog\njog_tired\n", encoding="utf-8")
     toml = TOML.replace("mirror = true", 'table = "locomotion"')
     (here / "game" / "contextdb.toml").write_text(toml, encoding="utf-8")
-    assert build("game").err == ""
+    assert "mirror" not in build("game").err
 
 
 def test_markup_that_does_nothing_is_told(here: Path):
@@ -273,3 +275,91 @@ def test_what_the_disk_refuses_is_told(here: Path):
     with mock.patch("os.fsync", side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))):
         assert refused("game").startswith(f"{JOG}: the disk is full.")
     assert saved(here) == []
+
+
+def test_a_rig_whose_sides_differ_is_told_with_bones_and_metres_cached_or_not(here: Path):
+    assert "mirror" not in build("game").err
+    clip = make_clip("jog_tired").clip
+    offsets = clip.skeleton.offsets.copy()
+    offsets[clip.skeleton.index("LeftLeg")] += [0.0, -3.0, 0.0]
+    uneven = replace(clip, skeleton=replace(clip.skeleton, offsets=offsets))
+    write_bvh(uneven, here / "game" / "clips" / "jog_tired.bvh", digits=3)
+    expected = 'contextdb: warning: [databases.tired] mirror: the two sides of the rig differ in 1 clip, most in "jog_tired": '
+    expected += '"LeftLeg" by 0.030 m, "RightLeg" by 0.030 m. '
+    for _ in range(2):
+        assert expected in build("game").err
+
+
+# ---- faults stop what needs them
+
+
+OTHER = """
+[features.other]
+rate = 30.0
+channels = [{ type = "position", bone = "Hips" }]
+[databases.others]
+clips = "others/*.bvh"
+features = "other"
+[databases.broken]
+clips = "broken/*.bvh"
+features = "other"
+[selectors.free]
+order = [{ database = "others" }]
+"""
+
+
+@pytest.fixture
+def two_kinds(here: Path) -> Path:
+    """Databases of a second schema, one of them with a clip that cannot be read."""
+    game = here / "game"
+    (game / "contextdb.toml").write_text(TOML + OTHER, encoding="utf-8")
+    for folder in ("others", "broken"):
+        (game / folder).mkdir()
+        write_bvh(make_clip("walk").clip, game / folder / f"{folder}_walk.bvh", digits=3)
+    (game / "broken" / "bad.bvh").write_text("no clip", encoding="utf-8")
+    return game
+
+
+def test_a_broken_clip_stops_a_build_and_with_keep_going_only_itself(two_kinds: Path):
+    assert "bad.bvh" in refused("game")
+    result = run("motion", "build", "game", "--keep-going", "--json")
+    assert result.code == 1
+    assert "left out: game/broken/bad.bvh, line 1" in result.err.replace(os.sep, "/")
+    assert {row["database"]: row["clips"] for row in result.json["databases"]} == {"jog": 2, "tired": 1, "others": 1, "broken": 1}
+    assert len(result.json["left_out"]) == 1
+    (two_kinds / "broken" / "bad.bvh").unlink()
+    assert run("motion", "build", "game", "--keep-going").code == 0
+
+
+def test_with_keep_going_a_database_without_a_good_clip_leaves_its_file_as_it_was(two_kinds: Path):
+    run("motion", "build", "game", "--keep-going")
+    before = (two_kinds / "broken.motion.safetensors").read_bytes()
+    (two_kinds / "broken" / "broken_walk.bvh").write_text("", encoding="utf-8")
+    result = run("motion", "build", "game", "--keep-going")
+    assert (result.code, "broken" in result.out) == (1, False)
+    assert (two_kinds / "broken.motion.safetensors").read_bytes() == before
+
+
+@pytest.mark.parametrize("is_saved", [False, True])
+def test_a_broken_database_stops_no_search_of_another(two_kinds: Path, is_saved: bool):
+    if is_saved:
+        run("motion", "build", "game", "--keep-going")
+    of_other_features = run("motion", "search", "game", "jog", "--query", "walk@0.5")
+    assert (of_other_features.code, of_other_features.err) == (0, "")
+    of_the_same = run("motion", "search", "game", "others", "--query", "others_walk@0.5")
+    assert of_the_same.code == 0
+    assert "warning: left out: " in of_the_same.err
+    assert run("motion", "select", "game", "free", "--query", "others_walk@0.5").code == 0
+    needed = run("motion", "search", "game", "broken", "--query", "broken_walk@0.5")
+    assert needed.code == 2
+    assert "bad.bvh" in needed.err
+
+
+def test_a_doubtful_clip_is_told_as_a_warning_and_built(here: Path):
+    toml = here / "game" / "contextdb.toml"
+    toml.write_text(TOML.replace('features = "loco"\nmirror', 'features = "loco"\nmetres_per_unit = 1.0\nmirror'), encoding="utf-8")
+    result = build("game", "--json")
+    assert "warning: [databases.tired] game/clips/jog_tired.bvh: the body is" in result.err.replace(os.sep, "/")
+    assert "Try metres_per_unit = 0.01 (centimetres)." in result.err
+    [doubt] = result.json["databases"][1]["doubts"]
+    assert (doubt["rule"], doubt["asset"], doubt["frame"]) == ("odd-size", "jog_tired", None)

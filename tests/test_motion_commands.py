@@ -508,7 +508,7 @@ def test_a_replay_as_json_has_every_decision():
 
 def test_a_name_leaves_what_it_fits():
     assert len(motion("replay", "session.parquet", "--name", "jog").lines) < len(motion("replay", "session.parquet").lines)
-    assert motion("replay", "session.parquet", "--name", "swim").lines[-1] == 'no asset\'s name holds "swim"'
+    assert motion("replay", "session.parquet", "--name", "swim").lines[-1].startswith('no asset\'s name holds "swim".')
     one = motion("replay", "session.parquet", "--at", "0", "--name", "tired")
     assert {row[1] for row in rows_of(one)} <= {"walk_tired"}
 
@@ -538,3 +538,29 @@ def test_a_name_leaves_what_it_fits():
 )
 def test_a_wrong_argument_of_a_replay_is_told(arguments: list[str], message: str):
     assert message in refused("replay", *arguments)
+
+
+# ---- why was mine not chosen
+
+
+def test_replay_works_the_costs_of_any_asset_out_again(here, monkeypatch):
+    (here / "stick.csv").write_text("time_s,speed_mps\n0,1.3\n0.5,1.3\n", encoding="utf-8")
+    assert run("motion", "run", "game", "player", "stick.csv", "--out", "s.parquet", "--k", "1").code == 0
+    first = run("motion", "replay", "s.parquet", "--at", "0", "--name", "jog", "--json").json
+    assert first["not_asked"] is None
+    assert {row["asset"] for row in first["asked"]} == {asset for asset in first_assets("game") if "jog" in asset}
+    assert all(row["cost"] is not None and row["rank"] >= 1 and row["channels"] for row in first["asked"])
+    shown = run("motion", "replay", "s.parquet", "--at", "0", "--name", "jog").out
+    assert 'the best frames of assets whose name holds "jog" (summary)' in shown
+    unknown = run("motion", "replay", "s.parquet", "--at", "0", "--name", "jgo")
+    assert (unknown.code, 'Did you mean "jog"?' in unknown.err) == (2, True)
+    (here / "game").rename(here / "moved")
+    gone = run("motion", "replay", "s.parquet", "--at", "0", "--name", "jog").out
+    assert "its project is no longer at" in gone
+    assert run("motion", "replay", "s.parquet", "--at", "0", "--name", "jog", "--project", "moved").out == shown
+    assert "no such folder" in run("motion", "replay", "s.parquet", "--at", "0", "--name", "jog", "--project", "nowhere").err
+
+
+def first_assets(folder: str) -> set[str]:
+    """The clips of a project."""
+    return {path.stem for path in Path(folder).glob("**/*.bvh")}

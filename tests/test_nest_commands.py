@@ -37,9 +37,13 @@ def test_a_folder_measures_an_inner_table_once_where_it_stands(tmp_path: Path):
 def test_commands_answer_with_paths_and_files_inside_a_compiled_file_too(tmp_path: Path):
     write(tmp_path)
     facts = ("in_air=true", "speed=5")
-    expected = [{"row": 1, "asset": "tackle/dive/Left", "always": True}, {"row": 2, "asset": "tackle/dive/Right", "always": True}]
+    expected = [
+        {"row": 1, "asset": "tackle/dive/Left", "always": True, "chance": 0.25},
+        {"row": 2, "asset": "tackle/dive/Right", "always": True, "chance": 0.75},
+    ]
     asked = run("query", tmp_path / "tackle.csv", *facts, "--json").json
-    assert asked["matches"] == [*expected, {"row": 4, "asset": "Fall", "always": True}]
+    outranked = {"chance": 0.0, "not_picked": "outranked by @dive (an earlier row)"}
+    assert asked["matches"] == [*expected, {"row": 4, "asset": "Fall", "always": True, **outranked}]
     assert run("compile", tmp_path, "-o", tmp_path / "out").code == 0
     assert run("query", tmp_path / "out" / "tackle.safetensors", *facts, "--json").json == asked
     told = run("query", tmp_path / "out" / "tackle.safetensors", "in_air=true", "speed=2.5", "--explain", "--json").json["explain"]
@@ -72,7 +76,7 @@ def test_coverage_says_in_which_file_a_row_of_an_inner_table_stands(tmp_path: Pa
     assert "nearest: line 2 Hit" in said
     assert "Hit in" not in said
     told = run("coverage", tmp_path / "tackle.csv", "--explain", "tackle/dive/Twin").out
-    assert told.startswith("line 3 tackle/dive/Twin in dive.csv of tackle (row 2)\n")
+    assert told.startswith("line 3 tackle/dive/Twin in dive.csv of tackle (row 3)\n")
     findings = run("coverage", tmp_path / "tackle.csv", "--json").json["tables"][0]["findings"]
     assert f"line 2 of {tmp_path / 'dive.csv'} (" in next(f["message"] for f in findings if f["rule"] == "identical-rows")
 

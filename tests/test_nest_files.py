@@ -355,13 +355,22 @@ def test_a_check_tells_of_missing_cyclic_and_broken_tables_once_each(tmp_path: P
 def test_findings_of_an_inner_table_are_told_of_it_and_not_of_the_outer_one_too(tmp_path: Path):
     write(tmp_path, dive="Asset,Weight,speed\nLeft,1,..8\nRight,3,4..6\n")
     outer, inner = cdb.Project.load(tmp_path)["tackle"], cdb.load(tmp_path / "dive.csv")
-    assert rules([*check(inner), *check_rows(inner)]) == {"subsumed-row": [1]}
+    assert rules([*check(inner), *check_rows(inner)]) == {"variety": [0]}
     assert rules([*check(outer), *check_rows(outer)]) == {"subsumed-row": [1]}, (
         "that Left lies in Fall; of Right its own table tells"
     )
     [first] = check_rows(outer)
-    assert (first.asset, first.line, first.by) == ("tackle/dive/Left", 3, (2,))
+    assert (first.level, first.asset, first.line, first.by) == ("warning", "tackle/dive/Left", 3, (2,))
     assert f"The row stands in {tmp_path / 'dive.csv'}, line 2." in first.message
+
+
+def test_rows_of_an_inner_table_share_contexts_by_variety_where_every_policy_on_the_way_lets_several_play(tmp_path: Path):
+    write(tmp_path, dive="Asset,Weight,speed\nLeft,1,..8\nRight,3,4..6\n")
+    toml = tmp_path / "contextdb.toml"
+    toml.write_text(toml.read_text().replace('policy = "first"', 'policy = "collect"'))
+    [first] = check_rows(cdb.Project.load(tmp_path)["tackle"])
+    assert (first.rule, first.asset, first.line, first.by) == ("variety", "Fall", 4, (1,))
+    assert f'line 2 of {tmp_path / "dive.csv"} ("tackle/dive/Left") is valid only where' in first.message
 
 
 def test_a_row_that_the_outer_row_shuts_out_is_told(tmp_path: Path):

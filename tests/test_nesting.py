@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import oracles
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from nested_tables import NAMES, Nest, cost_of, is_valid, nests, pickable
@@ -18,6 +19,7 @@ import contextdb as cdb
 from contextdb import bitmask
 from contextdb.cells import format_cell
 from contextdb.compiled import CompiledTable
+from contextdb.pick import Outcome
 from contextdb.project import Project, around_each_other
 from contextdb.schema import TableSettings
 
@@ -114,7 +116,12 @@ def test_the_cells_that_an_explanation_names_are_those_that_fail(nest: Nest, dat
 def test_a_pick_goes_through_the_tables_one_by_one(nest: Nest, seed: int, data: st.DataObject):
     given_facts, _ = data.draw(contexts(nest.all_cells()))
     compiled = nest.outer.compile(nest.tables)
-    possible = {compiled.assets[row] for row in pickable(nest, compiled.query(given_facts).indices.tolist())}
+    matches = compiled.query(given_facts)
+    possible = {compiled.assets[row] for row in pickable(nest, matches.indices.tolist())}
+    outcome = Outcome(compiled, matches)
+    assert set(outcome.candidates.tolist()) == pickable(nest, matches.indices.tolist()) == set(outcome.chances)
+    assert sum(outcome.chances.values()) == pytest.approx(1.0 if possible else 0.0)
+    assert {row for row in matches if outcome.said_of([row]).startswith("picked")} == set(outcome.chances)
     rng = random.Random(seed)
     picked = [compiled.pick(given_facts, rng) for _ in range(6)]
     assert set(picked) <= (possible or {None})

@@ -123,7 +123,7 @@ def test_an_empty_name_and_a_text_that_is_too_long_are_refused():
         "t.parquet: the last of 2 column names is empty. Accepted: a name for each column."
     ]
     assert faults_of(parquet({"a": ["x", "y" * 70_000]})) == [
-        't.parquet, column "a": the cell in row 1 has 70,000 characters. Accepted: at most 65,536 characters in a cell.'
+        't.parquet, column "a": the cell in row 2 has 70,000 characters. Accepted: at most 65,536 characters in a cell.'
     ]
 
 

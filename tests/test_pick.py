@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import gc
+import pickle
 import random
+import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,7 +18,7 @@ from hypothesis import strategies as st
 
 from contextdb.compiled import CompiledTable
 from contextdb.errors import ContextError, PolicyError
-from contextdb.pick import MOST_KEPT, Memory, pick_row
+from contextdb.pick import FEW, Memory, Outcome, Rng, pick_row
 from contextdb.schema import TableSettings
 from contextdb.shapes import Policy
 from contextdb.table import Table
@@ -176,17 +180,89 @@ def test_generators_that_are_gone_are_forgotten():
     del rng
     gc.collect()
     assert len(memory) == 0
-    for seed in range(MOST_KEPT + 10):
+    for seed in range(3 * FEW):
         memory.remember(np.random.default_rng(seed), "a")
-    assert len(memory) == MOST_KEPT
+    assert len(memory) <= FEW
+
+
+@pytest.mark.parametrize("make", MADE)
+def test_however_many_generators_there_are_none_repeats_itself(make):
+    table = table_of("collect", *((name, "True") for name in "abcd"))
+    matches = table.query({"x": True})
+    characters = [make(seed) for seed in range(FEW + 300)]
+    last = [table.pick(matches, rng=rng) for rng in characters]
+    for _ in range(2):
+        for seed in range(FEW):
+            table.pick(matches, rng=make(seed))  # many more, that come and go
+        following = [table.pick(matches, rng=rng) for rng in characters]
+        assert all(one != other for one, other in zip(last, following, strict=True))
+        last = following
+
+
+class Equal(random.Random):
+    """Generators that are all equal, and yet each somebody's own."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Equal)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+def test_a_generator_is_known_by_what_it_is_and_not_by_what_it_equals():
+    memory, one, other = Memory(), Equal(1), Equal(2)
+    memory.remember(one, "a")
+    memory.remember(other, "b")
+    assert (memory.last(one), memory.last(other), len(memory)) == ("a", "b", 2)
 
 
 def test_a_generator_that_is_used_is_not_forgotten_for_others():
     memory, hero = Memory(), np.random.default_rng(0)
-    for seed in range(2 * MOST_KEPT):
+    for seed in range(2 * FEW):
         memory.remember(hero, f"asset {seed}")
         memory.remember(np.random.default_rng(seed), "a")
-    assert memory.last(hero) == f"asset {2 * MOST_KEPT - 1}"
+    assert memory.last(hero) == f"asset {2 * FEW - 1}"
+
+
+@pytest.mark.parametrize("make", MADE)
+@given(seeds=st.integers(0, 99), n_before=st.integers(0, 6))
+def test_with_the_last_asset_given_a_generator_out_of_a_pickle_picks_as_the_one_that_went_in(make, seeds, n_before):
+    rng, last = make(seeds), ""
+    for _ in range(n_before):
+        last = ABC.pick({"x": True}, rng=rng, last=last)
+    restored, restored_last = pickle.loads(pickle.dumps((rng, last)))
+    for _ in range(4):
+        last, restored_last = ABC.pick({"x": True}, rng, last), ABC.pick({"x": True}, restored, restored_last)
+        assert last == restored_last
+
+
+def test_threads_that_share_the_tables_own_generator_get_no_asset_twice_in_a_row():
+    table = table_of("collect", ("a", "True"), ("b", "True"), ("c", "True"))
+    matches, seen = table.query({"x": True}), []
+    remember = table.memory.remember
+
+    def noted(rng: Rng, asset: str) -> None:
+        time.sleep(0)  # let another thread go on between the look at what was last and this
+        seen.append(asset)
+        remember(rng, asset)
+
+    with mock.patch.object(table.memory, "remember", noted), ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda _: [table.pick(matches) for _ in range(100)], range(4)))
+    assert len(seen) == 400
+    assert all(one != other for one, other in pairwise(seen))
+
+
+def test_all_who_give_no_generator_are_one_character():
+    table = table_of("collect", ("a", "True"), ("b", "True"))
+    seen = [table.pick({"x": True}) for _ in range(8)]
+    assert len(set(seen[::2])) == len(set(seen[1::2])) == 1
+
+
+def test_a_newer_version_of_a_table_goes_on_with_what_was_picked():
+    older, newer, rng = ABC, table_of("collect", ("a", "True"), ("b", "Any"), ("c", "Any")), random.Random(4)
+    newer.remember_as(older)
+    for _ in range(20):
+        assert older.pick({"x": True}, rng) != newer.pick({"x": True}, rng)
 
 
 # ---- chance
@@ -242,3 +318,48 @@ def test_disabled_rows_are_never_picked():
     columns = {"Asset": ["a", "b"], "On": ["False", "True"], "x": ["Any", "Any"]}
     table = Table.from_columns(columns, {"x": {"type": "bool"}}, TableSettings("t", enabled="On")).compile()
     assert {table.pick({"x": True}, rng=seed) for seed in range(10)} == {"b"}
+
+
+# ---- what a pick may give
+
+
+def said(table: CompiledTable) -> list[str]:
+    matches = table.query({"x": True})
+    outcome = Outcome(table, matches)
+    return [outcome.said_of([row]) for row in matches]
+
+
+def test_a_row_that_is_not_picked_says_who_outranks_it():
+    rows = ("a", "Any", "1"), ("b", "Any", "5"), ("c", "Any", "5", "3"), ("d", "Any"), ("e", "Any", "9", "0")
+    outranked = "outranked by b and 1 more (priority 5)"
+    shares = ["picked, chance 25 %", "picked, chance 75 %"]
+    assert said(table_of("priority", *rows)) == [outranked, *shares, outranked, "weight 0: never picked"]
+    assert said(table_of("first", *rows)) == ["picked", *["outranked by a (an earlier row)"] * 4]
+    refused = 'none is picked: 5 rows of "t" are valid at once: "a", "b", "c", "d", "e"'
+    assert said(table_of("unique", *rows)) == [refused] * 5
+    assert said(table_of("unique", ("a", "Any"))) == ["picked"]
+
+
+def test_a_chance_never_rounds_to_0_nor_100():
+    assert said(table_of("collect", ("a", "Any", "", "1"), ("b", "Any", "", "999"))) == [
+        "picked, chance <1 %",
+        "picked, chance >99 %",
+    ]
+
+
+ROWS = st.lists(st.tuples(st.booleans(), st.integers(0, 2), st.sampled_from([0.0, 0.5, 3.0])), max_size=5)
+
+
+@given(ROWS, st.sampled_from(["collect", "priority", "first", "unique"]))
+def test_the_outcome_holds_just_the_rows_that_picks_give(rows: list[tuple[bool, int, float]], policy: Policy):
+    table = table_of(policy, *((f"a{i}", str(x), str(p), str(w)) for i, (x, p, w) in enumerate(rows)))
+    matches = table.query({"x": True})
+    outcome = Outcome(table, matches)
+    if policy == "unique" and len(matches) > 1:
+        assert outcome.refusal is not None
+        return
+    rng = random.Random(1)
+    seen = {row for _ in range(60) if (row := pick_row(table, matches, rng, last="")) is not None}
+    assert seen == set(outcome.candidates.tolist()) == set(outcome.chances)
+    assert outcome.chance(outcome.candidates.tolist()) == pytest.approx(1.0 if seen else 0.0)
+    assert all(outcome.said_of([row]).startswith("picked") == (row in seen) for row in matches)

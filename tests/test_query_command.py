@@ -68,7 +68,7 @@ def refused(*arguments: str) -> list[str]:
 
 
 def test_the_valid_assets_stand_on_standard_output_with_their_rows():
-    assert run("query", "moves", *FACTS) == Result(0, "1 of 4 rows valid in moves\n\nrow  asset\n  0  run\n", "")
+    assert run("query", "moves", *FACTS) == Result(0, "1 of 4 rows valid in moves\n\nrow  asset\n  1  run\n", "")
 
 
 def test_without_a_valid_asset_the_nearest_rows_are_told_and_the_exit_code_is_1():
@@ -80,10 +80,10 @@ def test_without_a_valid_asset_the_nearest_rows_are_told_and_the_exit_code_is_1(
         "nearest rows that are not valid, and the cells to change",
         "",
         "row  asset  condition              fact    cell      change to",
-        "  0  run    speed                  7 m/s   3..6      3..7",
-        "  3  old    speed                  7 m/s   3..6      3..7",
+        "  1  run    speed                  7 m/s   3..6      3..7",
+        "  4  old    speed                  7 m/s   3..6      3..7",
         "            (the row is disabled)",
-        '  1  jump   state                  Ground  "In Air"  Ground "In Air"',
+        '  2  jump   state                  Ground  "In Air"  Ground "In Air"',
         "            speed                  7 m/s   0..4      0..7",
     ]
 
@@ -91,7 +91,7 @@ def test_without_a_valid_asset_the_nearest_rows_are_told_and_the_exit_code_is_1(
 def test_explain_tells_the_nearest_rows_beside_the_valid_ones():
     result = run("query", "moves", *FACTS, "--explain", "--most", "1")
     assert result.code == 0
-    assert result.lines[-2:] == ["row  asset  condition              fact  cell  change to", "  3  old    (the row is disabled)"]
+    assert result.lines[-2:] == ["row  asset  condition              fact  cell  change to", "  4  old    (the row is disabled)"]
     assert len(run("query", "moves", *FACTS, "--explain").lines) > len(result.lines)
     assert run("query", "moves", *FACTS, "--explain", "--most", "0") == run("query", "moves", *FACTS)
 
@@ -99,7 +99,7 @@ def test_explain_tells_the_nearest_rows_beside_the_valid_ones():
 def test_in_a_narrow_terminal_each_failing_cell_has_its_own_lines(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("COLUMNS", "60")
     lines = run("query", "moves", "state=Ground", "speed=7", "heading=0", "ok=True", "Defender.Tags=Move.Run").lines
-    assert lines[4:7] == ["0  run", "   speed is 7 m/s", '     change "3..6" to "3..7"']
+    assert lines[4:7] == ["1  run", "   speed is 7 m/s", '     change "3..6" to "3..7"']
     assert "   the row is disabled" in lines
 
 
@@ -111,7 +111,43 @@ def test_a_set_of_values_finds_the_rows_that_may_match(fact: str, count: int):
 
 def test_of_a_set_of_values_it_is_said_which_rows_always_match():
     result = run("query", "moves", "--unknown", "any", "speed=3..5")
-    assert result.lines[2:] == ["row  matches  asset", "  0  always   run", "  1  may      jump", "  2  always   fall"]
+    assert result.lines[2:] == ["row  matches  asset", "  1  always   run", "  2  may      jump", "  3  always   fall"]
+
+
+RULED = """
+[conditions.speed]
+type = "number"
+[conditions.target]
+type = "number"
+[tables.t]
+when = "Rule"
+priority = "P"
+policy = "priority"
+"""
+
+
+def test_it_is_said_which_rows_only_may_be_valid_and_who_is_picked(here: Path):
+    (here / "contextdb.toml").write_text(RULED)
+    (here / "t.csv").write_text("Asset,speed,Rule,P\na,Any,,1\nb,Any,target > 1,5\nc,Any,,5\n")
+    asked = run("query", "t.csv", "speed=3", "--unknown", "any")
+    assert [line.split() for line in asked.out.splitlines()[2:6]] == [
+        ["row", "matches", "asset", "pick"],
+        ["1", "always", "a", *["outranked", "by", "b", "and", "1", "more", "(priority", "5)"]],
+        ["2", "may", "b", *["picked,", "chance", "50", "%"]],
+        ["3", "always", "c", *["picked,", "chance", "50", "%"]],
+    ]
+    a, b, c = run("query", "t.csv", "speed=3", "--unknown", "any", "--json").json["matches"]
+    assert (a["chance"], a["not_picked"]) == (0.0, "outranked by b and 1 more (priority 5)")
+    assert (b["chance"], b["undecided"], c["chance"]) == (0.5, True, 0.5)
+    assert "undecided" not in c
+    assert "may" not in run("query", "t.csv", "speed=3", "target=2").out
+
+
+def test_a_set_of_values_for_a_fact_that_only_a_rule_names_is_text_in_json(here: Path):
+    (here / "contextdb.toml").write_text(RULED)
+    (here / "t.csv").write_text("Asset,speed,Rule,P\na,Any,target > 1,1\n")
+    document = run("query", "t.csv", "speed=3", "target=0..3", "--json").json
+    assert document["context"] == {"speed": 3.0, "target": "0..3"}
 
 
 @pytest.mark.parametrize(("unknown", "assets"), [("any", ["run", "fall"]), ("never", [])])
@@ -127,7 +163,7 @@ def test_options_may_stand_anywhere():
 
 def test_a_table_without_conditions_is_asked_without_facts(here: Path):
     (here / "bare.csv").write_text("Asset\na\nb\n", encoding="utf-8")
-    assert run("query", "bare.csv") == Result(0, "2 of 2 rows valid in bare\n\nrow  asset\n  0  a\n  1  b\n", "")
+    assert run("query", "bare.csv") == Result(0, "2 of 2 rows valid in bare\n\nrow  asset\n  1  a\n  2  b\n", "")
 
 
 def test_a_name_with_an_equals_sign_can_be_given(here: Path):

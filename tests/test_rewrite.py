@@ -176,9 +176,9 @@ def test_rows_can_be_added_to_a_header_alone():
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("x\0y", r'row 1, column "b": the text "x\x00y" has a NUL character. Accepted: text in UTF-8.'),
-        ("ab\ud800", 'row 1, column "b": the text has half a surrogate pair as character 3. Accepted: text in UTF-8.'),
-        ("x" * 65_537, 'row 1, column "b": the text has 65,537 characters, more than 65,536. Accepted: text in UTF-8.'),
+        ("x\0y", r'row 2, column "b": the text "x\x00y" has a NUL character. Accepted: text in UTF-8.'),
+        ("ab\ud800", 'row 2, column "b": the text has half a surrogate pair as character 3. Accepted: text in UTF-8.'),
+        ("x" * 65_537, 'row 2, column "b": the text has 65,537 characters, more than 65,536. Accepted: text in UTF-8.'),
     ],
 )
 def test_a_text_that_could_not_be_read_again_is_not_written(text: str, found: str):

@@ -16,6 +16,7 @@ from contextdb.domains import KINDS, Domain
 from contextdb.errors import Fault, SchemaError
 from contextdb.expressions.tokens import written_text
 from contextdb.schema import EMPTY, Schema, TableSettings, conditions_from_dict, read_schema
+from contextdb.sections import condition_to_dict
 from contextdb.shapes import SECTIONS
 from contextdb.toml_lines import key_lines
 
@@ -265,12 +266,12 @@ def test_a_type_of_another_language_is_mended(found: str, mend: str):
         (
             "tpye = 'bool'",
             'line 2: [conditions.x] has no key "tpye". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr". Did you mean "type"?',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror". Did you mean "type"?',
         ),
         (
             "type = 'enum'\noptions = ['A']",
             'line 3: [conditions.x] has no key "options". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr". Did you mean "values"?',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror". Did you mean "values"?',
         ),
     ],
 )
@@ -466,7 +467,7 @@ def test_conditions_given_in_python_are_checked_as_those_of_a_file():
         ),
         (
             {"speed": {"type": "number", 7: 1}},
-            '[conditions.speed] has no key "7". Accepted: "type", "min", "max", "values", "unit", "description", "expr".',
+            '[conditions.speed] has no key "7". Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror".',
         ),
     ],
 )
@@ -598,3 +599,81 @@ def test_any_mix_of_keys_and_values_is_a_schema_or_refused_with_the_line_of_each
     for fault in faults_of("\n".join(lines)):
         assert fault.place.line is not None
         assert lines[fault.place.line - 1].startswith(("[", *KEYS))
+
+
+SIDES = 'values = ["Left", "Right", "Both"]'
+WRONG_MIRRORS = [
+    ("enum", SIDES, '"negate"',
+     'mirror = "negate": a condition of type enum has no sign.'
+     ' Accepted: names that change places, or "none". Did you mean mirror = { Left = "Right" }?'),
+    ("enum", SIDES, '{ Left = "Rigth" }',
+     'mirror = { Left = "Rigth" }: there is no value "Rigth".'
+     ' Accepted: "Left", "Right", "Both". Did you mean "Right"?'),
+    ("enum", SIDES, '{ Left = "Left" }',
+     'mirror = { Left = "Left" }: "Left": it changes places with itself.'
+     ' Accepted: each name in one pair, such as { Left = "Right" }.'),
+    ("enum", SIDES, '{ Left = "Right", Both = "Right" }',
+     'mirror = { Left = "Right", Both = "Right" }: "Right": it has two partners.'
+     ' Accepted: each name in one pair, such as { Left = "Right" }.'),
+    ("number", "", '{ Left = "Right" }',
+     'mirror = { Left = "Right" }: a condition of type number has no names.'
+     ' Accepted: "negate" or "none". Did you mean mirror = "negate"?'),
+    ("number", 'expr = "2"', '"negate"',
+     'mirror = "negate" has no place here: a derived fact is computed from mirrored facts.'
+     ' Accepted: mirror in the conditions that it is computed from. Try to leave it out.'),
+    ("tags", 'values = ["Left.Hand", "Right.Hand", "Left.Foot"]', '{ Left = "Right" }',
+     'mirror = { Left = "Right" }: "Left.Foot" changes places with "Right.Foot", which is no declared value.'
+     ' Accepted: values that hold both. Try to add "Right.Foot" to the values.'),
+    ("tags", "", '{ A = "B", "A.x" = "C" }',
+     'mirror = { A = "B", "A.x" = "C" }: "A.x": it stands under "A", with which it changes places anyway.'
+     ' Accepted: each name in one pair, such as { Left = "Right" }.'),
+]  # fmt: skip
+MIRRORS_ACCEPTED = 'Accepted: "negate" (the other sign), "none", or names that change places, such as { Left = "Right" }.'
+
+
+@pytest.mark.parametrize(("kind", "more", "mirror", "message"), WRONG_MIRRORS)
+def test_a_mirror_that_does_not_fit_its_condition_is_told(kind: str, more: str, mirror: str, message: str):
+    text = f"[conditions.side]\ntype = '{kind}'\nmirror = {mirror}\n{more}"
+    assert fault(text) == f"contextdb.toml, line 3: [conditions.side] {message}"
+
+
+@pytest.mark.parametrize(
+    ("mirror", "mend"),
+    [
+        ('"Negate"', 'mirror = "negate"'),
+        ('"flip"', 'mirror = "negate"'),
+        ("false", 'mirror = "none"'),
+        ('[["Left", "Right"]]', 'mirror = { Left = "Right" }'),
+        ('"Left = Right"', 'mirror = { Left = "Right" }'),
+        ("3", ""),
+        ("{}", ""),
+        ("{ Left = 3 }", ""),
+    ],
+)
+def test_a_mirror_of_another_form_is_told_with_what_was_likely_meant(mirror: str, mend: str):
+    told = fault(f"[conditions.side]\ntype = 'text'\nmirror = {mirror}")
+    assert MIRRORS_ACCEPTED in told
+    assert told.endswith(f"Did you mean {mend}?" if mend else MIRRORS_ACCEPTED)
+
+
+@pytest.mark.parametrize(
+    ("kind", "mirror", "read"),
+    [
+        ("angle", '"negate"', "negate"),
+        ("angle", '"none"', "none"),
+        ("bool", '"negate"', "negate"),
+        ("text", '{ Left = "Right", "far left" = "far right" }', (("Left", "Right"), ("far left", "far right"))),
+        ("tags", '{ Left = "Right" }', (("Left", "Right"),)),
+        ("enum", '{ Left = "Right", Right = "Left" }', (("Left", "Right"), ("Right", "Left"))),
+    ],
+)
+def test_a_mirror_is_read_and_said_again_as_it_stands(kind: str, mirror: str, read: object):
+    values = SIDES if kind == "enum" else ""
+    condition = read_schema(f"[conditions.side]\ntype = '{kind}'\nmirror = {mirror}\n{values}", "t").conditions["side"]
+    assert condition.mirror == read
+    said = condition_to_dict(condition)
+    assert conditions_from_dict({"side": said})["side"] == condition
+
+
+def test_a_mirror_of_a_condition_without_a_type_is_no_excuse():
+    assert "has no type" in fault("[conditions.side]\nmirror = { Left = 'Right' }")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb import edits
+from contextdb import edits, toml_edit
 from contextdb.edits import Edit
 from contextdb.errors import FileError, SchemaError
 from contextdb.project import Project
-from contextdb.schema_file import users_of, write_schema
+from contextdb.schema_file import schema_change, write_schema
 from contextdb.sections import schema_to_dict
 from contextdb.table import Table, load
 
@@ -115,6 +116,8 @@ def changed_lines(before: str, after: str) -> list[str]:
         ),
         (lambda t: edits.set_condition(t, "speed", min=-1, unit="m/s"), ["+min = -1.0", '+unit = "m/s"']),
         (lambda t: edits.set_condition(t, "mood", values=["calm", "scared", "mad"]), ['+  "mad",']),
+        (lambda t: edits.set_condition(t, "speed", mirror="negate"), ['+mirror = "negate"']),
+        (lambda t: edits.set_condition(t, "mood", mirror={"calm": "scared"}), ['+mirror = { calm = "scared" }']),
         (
             lambda t: edits.set_condition(t, "wet", description="in rain"),
             ["+[conditions.wet]", '+type = "bool"', '+description = "in rain"'],
@@ -177,6 +180,24 @@ def test_whatever_form_the_file_has_it_says_then_what_the_table_says_and_undo_ta
     assert ends == 0 if "\r" in toml else "\r" not in raw(tmp_path)
     saved(after, table)
     assert raw(tmp_path) == toml
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        'mirror = { Left = "Right" } # sides',
+        "mirror.Left = 'Right'",
+        'mirror = {Left="Right", "far left" = "far right"}',
+        '[conditions.mood.mirror]\nLeft = "Right"',
+    ],
+)
+@pytest.mark.parametrize("mirror", [None, "none", {"Left": "far right"}, {"Left": "Right", "far left": "far right"}])
+def test_a_mirror_is_said_anew_in_whatever_form_it_stands(tmp_path: Path, said: str, mirror: object):
+    toml = f"[conditions.mood]\ntype = 'text'\n{said}\n\n[conditions.speed]\ntype = 'number' # fast\n"
+    table = project(tmp_path, toml)
+    after = edits.set_condition(table, "mood", mirror=mirror).apply(table)
+    assert schema_to_dict(saved(table, after).schema) == schema_to_dict(after.schema)
+    assert raw(tmp_path).endswith("\n[conditions.speed]\ntype = 'number' # fast\n")
 
 
 def test_a_file_is_made_only_when_there_is_something_to_say(tmp_path: Path):
@@ -331,16 +352,6 @@ def test_brackets_quotes_and_signs_in_strings_and_comments_mislead_nobody(tmp_pa
     assert_says_the_same(load(tmp_path / "jog.csv"), table)
 
 
-def test_who_uses_a_condition_is_told(tmp_path: Path):
-    table = project(tmp_path)
-    assert users_of(table, "speed") == []
-    assert users_of(table, "mood") == ['the blueprint "base"']
-    assert users_of(table, "wet") == ["an assumption"]
-    (tmp_path / "trot.csv").write_text("Asset,speed\na,1\n", encoding="utf-8")
-    (tmp_path / "bad.csv").write_bytes(b"\xff")
-    assert users_of(table, "speed") == ['the table "bad"', 'the table "trot"']
-
-
 # ---- any edits, saved and undone at any time
 
 
@@ -441,3 +452,60 @@ def test_any_edits_saved_and_undone_at_any_time_leave_a_file_that_says_what_the_
 
 def with_file(table: Table) -> Table:
     return replace(table, settings=replace(table.settings, file="jog.csv"))
+
+
+SECTIONS = [
+    "",
+    "# only a comment",
+    "[project]\nname = 'x'\n\n[conditions.a]\ntype = 'int'\n# what follows\n\n"
+    "[tables.t]\nfile = 't.csv'\n\n[blueprints.b]\nconditions = []\n",
+    "[tables.t]\r\npolicy = 'first'\r\n\r\n[conditions.a] # here\r\ntype = 'int'",
+    "conditions.a.type = 'int'\n[tables.t]\n",
+    "[conditions]\na = { type = 'int' }\n",
+]
+NEW = {
+    ("conditions", "b"): {"type": "enum", "values": ["x", "y z"]},
+    ("conditions", "c.d"): {"type": "number", "min": 0.5},
+    ("conditions", "e"): {"type": "text"},
+}
+BEHIND = [("tables", "t"), ("conditions", "a"), *NEW]
+
+
+@pytest.mark.parametrize("text", SECTIONS)
+@pytest.mark.parametrize("behind", [BEHIND, []], ids=["behind others", "at the end"])
+def test_sections_written_in_one_go_stand_where_one_after_the_other_would(text: str, behind: list[tuple[str, str]]):
+    one_by_one = text
+    for part, keys in NEW.items():
+        for key, value in keys.items():
+            one_by_one = toml_edit.set_key(one_by_one, (*part, key), value, behind)
+    assert toml_edit.add_sections(text, NEW, behind) == one_by_one
+    tomllib.loads(one_by_one)
+
+
+def test_a_section_is_absent_when_nothing_of_it_stands_in_any_form():
+    text = "conditions.a.type = 'int'\n[conditions.b]\n[conditions.c.d]\nx = 1\n[other]\ne = { f = { g = 1 } }\n"
+    paths = [("conditions", name) for name in "abcd"] + [("other", "e"), ("other", "e", "f"), ("other", "x")]
+    assert toml_edit.absent(text, paths) == [("conditions", "d"), ("other", "x")]
+
+
+def test_the_statements_that_are_looked_at_grow_with_the_new_conditions_and_not_with_their_square(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    walked = 0
+    plain = toml_edit._statements
+
+    def counted(text: str) -> Iterator[toml_edit.Statement]:
+        nonlocal walked
+        for one in plain(text):
+            walked += 1
+            yield one
+
+    monkeypatch.setattr(toml_edit, "_statements", counted)
+    counts = []
+    for n in (20, 160):
+        walked = 0
+        declared = {f"c{i}": {"type": "number", "min": 0.5} for i in range(n)}
+        table = Table.from_columns({"A": ["x"], **{name: ["1"] for name in declared}}, declared)
+        assert schema_change(None, replace(table, path=tmp_path / "t.csv")) is not None
+        counts.append(walked)
+    assert counts[1] < 16 * counts[0]

@@ -122,7 +122,7 @@ def test_an_edit_that_cannot_be_read_is_kept_and_told_and_can_be_mended():
     edited = TABLE.with_cell(2, "state", "Grond")
     assert edited.text(2, "state") == "Grond"
     (fault,) = edited.faults
-    assert str(fault) == 'row 2, column "state": "Grond" is not a declared value. Accepted: "Ground", "Air". Did you mean "Ground"?'
+    assert str(fault) == 'row 3, column "state": "Grond" is not a declared value. Accepted: "Ground", "Air". Did you mean "Ground"?'
     assert edited.with_cell(2, "state", "Ground").faults == []
     assert edited.with_rows_taken([0, 1]).faults == []
 
@@ -172,14 +172,14 @@ def test_all_cells_that_cannot_be_read_are_told_together_in_the_order_of_rows():
     table = faulty({"Asset": ["a", "b"], "n1": ["x", "5"], "n2": ["1;2", "y"]})
     with pytest.raises(TableError) as caught:
         table.compile()
-    assert [line.split(":")[0] for line in told(caught)] == ['row 0, column "n1"', 'row 0, column "n2"', 'row 1, column "n2"']
+    assert [line.split(":")[0] for line in told(caught)] == ['row 1, column "n1"', 'row 1, column "n2"', 'row 2, column "n2"']
 
 
 def test_from_columns_refuses_cells_that_cannot_be_read():
     with pytest.raises(TableError) as caught:
         Table.from_columns({"Asset": ["a"], "speed": ["20; 9"]}, DECLARED)
     assert told(caught) == [
-        'row 0, column "speed": cannot read "20; 9" as a number. '
+        'row 1, column "speed": cannot read "20; 9" as a number. '
         'Accepted: "20, 9.99" (centre, tolerance), "10..30", "<=5", "0..5 | 10..15", "Any". Did you mean "20, 9"?'
     ]
 
@@ -198,11 +198,11 @@ def test_plain_columns_that_cannot_be_read_are_faults_too():
     settings = TableSettings("t", enabled="On", priority="P", weight="W")
     table = faulty({"Asset": ["a", "b"], "On": ["maybe", ""], "P": ["1.5", "high"], "W": ["-1", "nan"]}, settings)
     assert [str(fault) for fault in table.faults] == [
-        'row 0, column "On": cannot read "maybe". Accepted: "True" or "False".',
-        'row 0, column "P": cannot read "1.5". Accepted: a whole number.',
-        'row 0, column "W": cannot read "-1". Accepted: a number from 0 up.',
-        'row 1, column "P": cannot read "high". Accepted: a whole number.',
-        'row 1, column "W": cannot read "nan". Accepted: a number from 0 up.',
+        'row 1, column "On": cannot read "maybe". Accepted: "True" or "False".',
+        'row 1, column "P": cannot read "1.5". Accepted: a whole number.',
+        'row 1, column "W": cannot read "-1". Accepted: a number from 0 up.',
+        'row 2, column "P": cannot read "high". Accepted: a whole number.',
+        'row 2, column "W": cannot read "nan". Accepted: a number from 0 up.',
     ]
     with pytest.raises(TableError):
         table.compile()

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from textual import events
 from textual.app import App, SystemCommand
+from textual.binding import BindingType
 from textual.dom import DOMNode
 from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES
@@ -17,7 +18,7 @@ from textual.widget import Widget
 
 from contextdb.diff import Merge, Side
 from contextdb.errors import ContextDBError
-from tui.commands import COMMANDS, key_name
+from tui.commands import BY_ID, COMMANDS, bindings, key_names
 from tui.editor_settings import EditorSettings
 from tui.model.conflicted import conflicts_in, write_decided
 from tui.model.session import Session
@@ -40,7 +41,7 @@ class EditorApp(App[None]):
 
     TITLE = "contextdb"
     ENABLE_COMMAND_PALETTE = True
-    COMMAND_PALETTE_BINDING: ClassVar[str] = "ctrl+p"
+    BINDINGS: ClassVar[list[BindingType]] = bindings([BY_ID["palette"]])
     CSS: ClassVar[str] = """
     CommandPalette SearchIcon { display: none; }
     OptionList { min-width: 8; }
@@ -97,8 +98,6 @@ class EditorApp(App[None]):
 
     async def _take(self, event: events.Event) -> None:
         is_typed = isinstance(event, (events.Key, events.Paste)) and not event.is_forwarded
-        if isinstance(event, events.Key) and event.key.startswith("alt+"):
-            event.character = None  # terminals send Esc and the letter, of which the letter would be typed into the cell
         await super().on_event(event)
         if is_typed and self._settling is None:
             self._settling = asyncio.create_task(self._settle())
@@ -200,8 +199,8 @@ class EditorApp(App[None]):
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
         for command in COMMANDS:
             if command.is_listed and command.id != "palette":
-                keys = command.keys.split(",")[0]
-                about = f"{command.about}  {key_name(keys)}" if keys else command.about
+                keys = key_names(self.settings.keys.get(command.id, command.keys))
+                about = f"{command.about}  {keys[0]}" if keys else command.about
                 yield SystemCommand(command.label, about, partial(self._run, command.id))
         yield SystemCommand("Theme", "Other colours.", self.action_change_theme)
         yield SystemCommand("Screenshot", "Keep a picture of the screen as SVG.", self.deliver_screenshot)

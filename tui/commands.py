@@ -27,7 +27,7 @@ class Command:
     id: str
     """Names it in a keymap file."""
     keys: str
-    """With commas between; empty: only by the palette or the mouse."""
+    """With commas between, first one that every terminal sends; empty: only by the palette or the mouse."""
     label: str
     about: str
     """A sentence for the palette and the help."""
@@ -96,12 +96,15 @@ def _move_up(sheet: Sheet) -> Done:
 GRID: tuple[Command, ...] = (
     *_moves(),
     *_jumps(),
-    Command("select-rows", "shift+space,alt+r", "Select rows", "Select the whole rows of the selection.", "Select", "select_rows"),
-    Command("select-columns", "ctrl+@,ctrl+space,alt+k", "Select columns", "Select the whole columns.", "Select", "select_columns"),
+    Command("select-rows", "alt+r,shift+space", "Select rows", "Select the whole rows of the selection.", "Select", "select_rows"),
+    Command("select-columns", "ctrl+@,alt+k,ctrl+space", "Select columns", "Select the whole columns.", "Select", "select_columns"),
     Command("select-all", "ctrl+a", "Select all", "Select every cell.", "Select", "select_all"),
     Command("edit", "f2,enter", "Edit", "Change the cell; Enter takes it, Esc does not.", "Edit", "edit", in_footer=True),
     Command("choose", "f4,alt+down", "Choose", "Open the list of what the cell may be.", "Edit", "choose"),
-    Command("clear", "delete,backspace", "Clear", "Empty the selected cells; an empty condition is Any.", "Edit", "clear"),
+    Command(
+        "edit-empty", "backspace", "Edit empty", "Empty the one cell and change it; Esc leaves it as it was.", "Edit", "edit_empty"
+    ),
+    Command("clear", "delete", "Clear", "Empty the selected cells; an empty condition is Any.", "Edit", "clear"),
     Command("copy", "ctrl+c", "Copy", "Copy the selected cells, also for Excel.", "Edit", "copy"),
     Command("cut", "ctrl+x", "Cut", "Copy the selected cells and empty them.", "Edit", "cut"),
     Command("paste", "ctrl+v", "Paste", "Paste cells; rows that are missing are added.", "Edit", "paste"),
@@ -116,16 +119,16 @@ GRID: tuple[Command, ...] = (
         "Edit",
         verb=lambda s: s.fill_right(),
     ),
-    Command("undo", "ctrl+z", "Undo", "Take back the last step.", "Edit", verb=lambda s: s.undo(), in_footer=True),
-    Command("redo", "ctrl+y,ctrl+shift+z", "Redo", "Make the step again that was taken back.", "Edit", verb=lambda s: s.redo()),
+    Command("undo", "ctrl+z", "Undo", "Take back the last step; in the test row the last fact.", "Edit", "undo(False)"),
+    Command("redo", "ctrl+y,ctrl+shift+z", "Redo", "Make the step again that was taken back.", "Edit", "undo(True)"),
     Command("insert-row", "insert,alt+a", "Insert row", "Insert as many rows above as are selected.", "Rows", "insert_rows(False)"),
     Command("insert-below", "ctrl+n", "Insert below", "Insert as many rows below as are selected.", "Rows", "insert_rows(True)"),
     Command("duplicate", "ctrl+b", "Duplicate", "Copy the selected rows to below them.", "Rows", verb=lambda s: s.duplicate_rows()),
     Command(
-        "delete-rows", "ctrl+delete,ctrl+k", "Delete rows", "Delete the selected rows.", "Rows", verb=lambda s: s.delete_rows()
+        "delete-rows", "ctrl+k,ctrl+delete", "Delete rows", "Delete the selected rows.", "Rows", verb=lambda s: s.delete_rows()
     ),
-    Command("row-up", "alt+shift+up", "Move up", "Move the selected rows up.", "Rows", verb=_move_up),
-    Command("row-down", "alt+shift+down", "Move down", "Move the selected rows down.", "Rows", verb=_move_down),
+    Command("row-up", "alt+i,alt+shift+up", "Move up", "Move the selected rows up.", "Rows", verb=_move_up),
+    Command("row-down", "alt+m,alt+shift+down", "Move down", "Move the selected rows down.", "Rows", verb=_move_down),
     Command(
         "enable", "ctrl+e", "Enable / disable", "Disable the rows, or enable them again.", "Rows", verb=lambda s: s.enable_rows()
     ),
@@ -137,8 +140,12 @@ GRID: tuple[Command, ...] = (
         "Columns",
         verb=lambda s: s.delete_columns(),
     ),
-    Command("column-left", "alt+shift+left", "Move left", "Move the column left.", "Columns", verb=lambda s: s.move_column(-1)),
-    Command("column-right", "alt+shift+right", "Move right", "Move the column right.", "Columns", verb=lambda s: s.move_column(1)),
+    Command(
+        "column-left", "alt+h,alt+shift+left", "Move left", "Move the column left.", "Columns", verb=lambda s: s.move_column(-1)
+    ),
+    Command(
+        "column-right", "alt+l,alt+shift+right", "Move right", "Move the column right.", "Columns", verb=lambda s: s.move_column(1)
+    ),
     Command("sort", "alt+s", "Sort", "Show the rows sorted by this column: up, down, as in the file.", "View", "sort"),
     Command("test-row", "f6", "Test row", "Go to the test row, or back to the table.", "Test row", "test_row", in_footer=True),
     Command("open-row", "alt+o", "Open the row", "Go into the table that the row stands for.", "Move", "open_row"),
@@ -151,7 +158,7 @@ _OF_ASSETS = (
     Command("find-previous", "shift+f3", "Find previous", "Go to the cell found before.", "Edit", "find_next(True)"),
     Command("go-to", "ctrl+g", "Go to", "Go to a row by its number or its asset.", "Move", "go_to"),
     Command("filter", "ctrl+l", "Filter", "Show only some rows.", "View", "filter"),
-    Command("filter-same", "alt+f,alt+e", "Filter same", "Show only rows with the text of this cell.", "View", "filter_same"),
+    Command("filter-same", "alt+e,alt+f", "Filter same", "Show only rows with the text of this cell.", "View", "filter_same"),
     Command("show-all", "alt+g", "Show all rows", "Take the filter off.", "View", "show_all"),
     Command("sort-file", "", "Sort the file", "Put the rows of the file itself in the order shown.", "Rows", "sort_file"),
     Command("autofit", "alt+w", "Autofit", "Make each column as wide as its texts.", "View", "autofit"),
@@ -161,10 +168,20 @@ _OF_ASSETS = (
 
 _OF_SCREEN = (
     Command("help", "f1", "Help", "Every key, and how cells are written.", "Help", "help", in_footer=True),
+    Command(
+        "palette",
+        "ctrl+p",
+        "Commands",
+        "Find a command by its name.",
+        "Help",
+        "app.command_palette",
+        scope="screen",
+        in_footer=True,
+    ),
     Command("save", "ctrl+s", "Save", "Write the table to its file.", "File", "save", in_footer=True),
     Command("save-as", "", "Save as", "Write the table to another file, and go on with that.", "File", "save_as"),
     Command("open", "ctrl+o", "Tables", "Go to another table of the folder.", "File", "tables"),
-    Command("back", "alt+b,alt+up", "Back", "Leave a table that a row stands for, and go back to that row.", "File", "back"),
+    Command("back", "alt+q,alt+up,alt+b", "Back", "Leave a table that a row stands for, and go back to that row.", "File", "back"),
     Command("new-table", "", "New table", "Make a table, with the columns of a blueprint.", "File", "new_table"),
     Command("refresh", "f5", "Refresh", "Take in what changed on the disk, sort and filter anew.", "File", "refresh"),
     Command("import", "", "Import", "Bring rows in from Excel, CSV, Parquet or JSON.", "File", "import"),
@@ -184,16 +201,6 @@ _OF_SCREEN = (
     Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
     Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
     Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
-    Command(
-        "palette",
-        "ctrl+p",
-        "Commands",
-        "Find a command by its name.",
-        "Help",
-        "app.command_palette",
-        scope="screen",
-        in_footer=True,
-    ),
     Command("quit", "ctrl+q", "Quit", "Leave; unsaved edits are asked about.", "File", "quit"),
 )
 
@@ -215,9 +222,16 @@ NAMES = {"pageup": "PgUp", "pagedown": "PgDn", "escape": "Esc", "delete": "Del",
 
 def key_name(key: str) -> str:
     """A key as people write it: "ctrl+shift+left" is "Ctrl+Shift+Left", "left_square_bracket" is "["."""
+    if key == "ctrl+@":
+        return "Ctrl+Space"
     return "+".join(
         NAMES.get(part) or _sign(part) or (part.upper() if len(part) == 1 else part.capitalize()) for part in key.split("+")
     )
+
+
+def key_names(keys: str) -> list[str]:
+    """The keys of a command as people write them, each once; Ctrl+Space comes as "ctrl+@" or by its name."""
+    return list(dict.fromkeys(key_name(key.strip()) for key in keys.split(",") if key.strip()))
 
 
 def _sign(part: str) -> str:

@@ -52,3 +52,11 @@ class Told(Message):
 
     text: str
     level: Literal["information", "warning", "error"] = "information"
+
+
+@dataclass
+class RenameWanted(Message):
+    """Give a column another name, and ask where others speak of its condition."""
+
+    old: str
+    new: str

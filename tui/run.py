@@ -7,6 +7,7 @@ import os
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from tui.app import EditorApp
 from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
+from tui.keyboard import read_whole_keys
 from tui.model.conflicted import conflicts_in
 from tui.model.workspace import Workspace
 
@@ -31,6 +32,7 @@ def edit(path: str | None, theme: str | None = None) -> None:
         raise SettingsError(Fault(found, ", ".join(themes), in_quotes(near) if near else ""))
     _require_readable(workspace)
     _forget_exported_size()
+    read_whole_keys()
     EditorApp(workspace, settings, theme or _theme_for(settings)).run()
 
 

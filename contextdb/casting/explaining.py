@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.arguments import require_row
 from contextdb.casting.assigning import Part
 from contextdb.casting.facts import Actors, Offer, Prefer
 from contextdb.casting.rules import CastRules
@@ -40,7 +41,8 @@ class CastExplanation(Explanation):
         self._plain = plain
 
     def row(self, row: int) -> RowExplanation:
-        """Why this row is valid or not."""
+        """Why this row is valid or not; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        row = require_row(row, len(self))
         found = super().row(row)
         return RowExplanation(found.row, found.asset, found.is_enabled, (*found.failures, *self._role_failures(row)))
 
@@ -50,6 +52,12 @@ class CastExplanation(Explanation):
         left, _ = stage.left_by_rules(when.rows, when.rows)
         cast = self._cast_rules.rows & ~stage.offered.bits if self._cast_rules is not None else 0
         return when.rows & ~left & ~cast
+
+    def _decided(self, always: int) -> int:
+        """The same with the rules of castings."""
+        rules = self.stage.rules
+        strict = None if rules is None else replace(rules, unknown="never", _known={})
+        return replace(self.stage, unknown="never", rules=strict).left_by_rules(always, always)[1]
 
     @property
     def _lenient(self) -> Unknown:
@@ -76,7 +84,7 @@ class CastExplanation(Explanation):
         counts = np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled
         for row in bitmask.rows(bitmask.from_int(((1 << len(counts)) - 1) & ~self.stage.offered.bits, len(counts))).tolist():
             counts[row] += len(list(self._role_failures(row)))
-        return counts
+        return bitmask.read_only(counts)
 
     @cached_property
     def _fails(self) -> NDArray[np.bool_]:

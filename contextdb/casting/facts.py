@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, shown
 from contextdb.facts import Context, Fact, Unknown, missing_error, misspelt, read_fact
+from contextdb.mirroring import kept_facts, mirrored_facts
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
@@ -85,6 +86,19 @@ def read_offers(
     return offers
 
 
+def mirrored_offers(
+    compiled: CompiledTable,
+    conditions: Mapping[str, Sequence[int]],
+    context: Context,
+    offers: Mapping[str, Sequence[Offer]],
+    unknown: Unknown,
+) -> dict[str, tuple[Offer, ...]]:
+    """Actors that were read, with their facts as a mirror shows them, in a context that is mirrored already. They are the same
+    actors, as much preferred."""
+    reader = _Reader(compiled, context, None, unknown)
+    return {role: tuple(reader.mirrored(role, conditions[role], offer) for offer in offered) for role, offered in offers.items()}
+
+
 def _listed(offered: object, role: str) -> Sequence[Actor]:
     if isinstance(offered, Sequence) and not isinstance(offered, (str, bytes)):
         return offered
@@ -125,16 +139,31 @@ class _Reader:
             raise ContextError(Fault(f"{where} is {_kind(actor)}.", "a mapping of facts", rule="wrong-fact"))
         key = self._key(where, actor)
         try:
-            facts = self._facts(role, places, actor)
+            told = _own_facts(role, actor)
+            facts = self._facts(role, places, told)
             cost = self._cost(role, actor, facts)
         except ContextError as error:
             raise ContextError(*(_in_actor(f, where) for f in error.faults)) from None
+        return Offer(actor, key, place, facts, kept_facts(told), *self._bits(facts), cost)
+
+    def mirrored(self, role: str, places: Sequence[int], offer: Offer) -> Offer:
+        """An actor that was read, with facts as a mirror shows them."""
+        try:
+            told = mirrored_facts(offer.told, self.compiled.mirroring)
+            facts = self._facts(role, places, told)
+        except ContextError as error:
+            raise ContextError(*(_in_actor(f, f"{role}[{offer.place}]") for f in error.faults)) from None
+        some_bits, every = self._bits(facts)
+        return replace(offer, facts=facts, told=told, some=some_bits, every=every)
+
+    def _bits(self, facts: Mapping[int, Fact]) -> tuple[int, int]:
+        """The rows whose cells accept some, and those whose cells accept all values of facts."""
         some_bits = every = (1 << self.compiled.n_rows) - 1
         for at, fact in facts.items():
             one, all_ = self.compiled.condition_bits(at, fact, self.unknown)
             some_bits &= one
             every &= all_
-        return Offer(actor, key, place, facts, _own_facts(role, actor), some_bits, every, cost)
+        return some_bits, every
 
     def _key(self, where: str, actor: Actor) -> object:
         own = actor.get("id")
@@ -151,10 +180,9 @@ class _Reader:
                 raise ContextError(Fault(found, "one id for one actor, with the same facts in every role", rule="wrong-fact"))
         return "id", own
 
-    def _facts(self, role: str, places: Sequence[int], actor: Actor) -> dict[int, Fact]:
-        """The facts of a role's conditions, read; derived ones computed from those of the actor and of the context."""
+    def _facts(self, role: str, places: Sequence[int], given: Mapping[str, object]) -> dict[int, Fact]:
+        """The facts of a role's conditions, read from what an actor tells; derived ones computed from that and from the context."""
         conditions = [self.compiled.conditions[at] for at in places]
-        given = _own_facts(role, actor)
         derivation = self.compiled.derivation
         derived: Mapping[str, object] = {}
         joint: Mapping[str, object] = given

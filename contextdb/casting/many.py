@@ -5,32 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from contextdb.batch import Answers
 from contextdb.batch_columns import Contexts, common_length, facts_of
-from contextdb.bitmask import Rows, Words
+from contextdb.bitmask import Rows, Words, read_only
 from contextdb.casting.facts import Actors, Prefer
 from contextdb.casting.stage import CastMatches, query_with_actors
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.facts import Unknown, check_mode
+from contextdb.unchanging import Unchanging
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
 
 
 @dataclass(frozen=True, eq=False)
-class ManyCastMatches:
+class ManyCastMatches(Unchanging, Answers[CastMatches]):
     """The answers for N contexts with actors, as `ManyMatches` tells them, and each with its castings: `many[i].casting(row)`."""
 
     compiled: CompiledTable
     answers: Sequence[CastMatches]
 
     @cached_property
+    def mirrored(self) -> ManyCastMatches:
+        """The answers with the facts of contexts and actors as a mirror shows them; see `Matches.mirrored`."""
+        return ManyCastMatches(self.compiled, tuple(cast("CastMatches", m.mirrored) for m in self.answers))
+
+    @cached_property
     def counts(self) -> Rows:
         """How many rows are valid in each context: int64 [N]."""
-        return np.array([len(m) for m in self.answers], np.int64)
+        return read_only(np.array([len(m) for m in self.answers], np.int64))
 
     @cached_property
     def hits(self) -> Rows:
@@ -38,12 +45,13 @@ class ManyCastMatches:
         hits = np.zeros(self.compiled.n_rows, np.int64)
         for matches in self.answers:
             hits[matches.indices] += 1
-        return hits
+        return read_only(hits)
 
     @cached_property
     def mask(self) -> Words:
         """The rows of each context as bits: uint64 [N, W]."""
-        return np.array([m.mask for m in self.answers], np.uint64).reshape(len(self.answers), len(self.compiled.enabled))
+        masks = np.array([m.mask for m in self.answers], np.uint64)
+        return read_only(masks.reshape(len(self.answers), len(self.compiled.enabled)))
 
     def lists(self) -> list[Rows]:
         """The row numbers of each context: a list of int64 arrays."""
@@ -52,7 +60,7 @@ class ManyCastMatches:
     def __len__(self) -> int:
         return len(self.answers)
 
-    def __getitem__(self, context: int) -> CastMatches:
+    def _answer(self, context: int) -> CastMatches:
         return self.answers[context]
 
     def __iter__(self) -> Iterator[CastMatches]:

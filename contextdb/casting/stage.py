@@ -21,12 +21,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.arguments import require_whole
 from contextdb.casting.assigning import Chosen, Holds, Part, best, every
-from contextdb.casting.facts import Actor, Actors, Offer, Prefer, read_offers
+from contextdb.casting.facts import Actor, Actors, Offer, Prefer, mirrored_offers, read_offers
 from contextdb.casting.rules import CastRules
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
-from contextdb.facts import Context, Fact, Unknown, check_mode
+from contextdb.facts import Context, Fact, Unknown, check_mode, require_context
 from contextdb.matches import SetMatches
+from contextdb.mirroring import in_mirror, kept_facts, mirrored_facts
 
 if TYPE_CHECKING:
     from contextdb.compiled import CompiledTable
@@ -73,7 +75,7 @@ class CastMatches(SetMatches):
         return self._stage.all(row)
 
     def _require_valid(self, row: int) -> None:
-        if row not in self:
+        if require_whole(row, "row") not in self:
             raise ContextError(Fault(f"row {row} is not valid, so nobody is cast for it.", "one of the valid rows, m.indices"))
 
 
@@ -114,6 +116,8 @@ class Stage:
     unknown: Unknown
     rule_facts: Mapping[str, Fact]
     """The facts of plain rules."""
+    context: Context
+    """The facts as they were given, kept where the table asks in a mirror."""
     rules: CastRules | None = None
     """The rules that are decided for each casting; None where there are none."""
 
@@ -134,9 +138,24 @@ class Stage:
             some_bits &= some_rows
             all_bits &= all_rows
         found = CastMatches(*self.left_by_rules(some_bits, all_bits), self)
-        if any(self.compiled.soft):
+        if self.compiled.mirroring:
+            found.with_mirrored(self.mirrored)
+        if self.compiled.is_soft:
             found.with_penalties(lambda: self.penalties(found))
         return found
+
+    def mirrored(self) -> CastMatches:
+        """The answer with the facts of the context and of the actors as a mirror shows them. The actors stay who they are, and as
+        much preferred."""
+        compiled, unknown = self.compiled, self.unknown
+        try:
+            context = mirrored_facts(self.context, compiled.mirroring)
+            offers = mirrored_offers(compiled, self.roles.conditions, context, self.offers, unknown)
+            offered = Offered(self.roles, offers, compiled.n_rows)
+            stage, plain = set_stage(compiled, context, {}, None, unknown, offered)
+            return stage.matches(plain)
+        except ContextError as error:
+            raise in_mirror(error) from None
 
     def left_by_rules(self, some_rows: int, all_rows: int) -> tuple[int, int]:
         """Of rows that may and that always match by their cells, those whose rule holds: with plain facts, or for some casting."""
@@ -261,7 +280,7 @@ def set_stage(
     if offered is None:
         offers = read_offers(compiled, roles.conditions, context, actors, prefer, unknown)
         offered = Offered(roles, offers, compiled.n_rows)
-    return Stage(compiled, offered, facts, unknown, read, rules), plain
+    return Stage(compiled, offered, facts, unknown, read, kept_facts(context) if compiled.mirroring else context, rules), plain
 
 
 def _ruled_names(compiled: CompiledTable, roles: Roles) -> list[str]:
@@ -291,8 +310,7 @@ def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles
     if compiled.slots is None:
         found = "this compiled file does not say which slots are mandatory."
         raise ContextError(Fault(found, "the table itself, compiled by Table.compile()"))
-    if not isinstance(context, Mapping):
-        raise ContextError(Fault(f"a context is a mapping of facts, not {type(context).__name__}.", "a dict"))
+    require_context(context)
     members, slots = compiled.roles.conditions, compiled.roles.slot_rows
     _require_roles(actors, list(dict.fromkeys([*members, *(w for words in slots.values() for w in words)])))
     plain = {n for n in members if n not in actors and _given(compiled, n, context)}

@@ -13,19 +13,30 @@ import argparse
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from contextdb import report
 from contextdb.cases import cases_path, check_cases, read_cases
 from contextdb.check import check
-from contextdb.console import output, progress, terminal_width, wants_colour
+from contextdb.commands.coverage_telemetry import Bar, log_of
+from contextdb.console import output, printable, progress, terminal_width, wants_colour
 from contextdb.covering.check_rows import check_rows, unused_conditions
-from contextdb.disk import TABLE_SUFFIXES, read_bytes
+from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.exit_codes import ExitCode
+from contextdb.file_names import alike, composed, confusable, why_unportable
 from contextdb.findings import LEVELS, Finding
 from contextdb.places import table_path
-from contextdb.project import CASES_SUFFIX, SCHEMA_FILE, folder_of, load_table, read_folder_schema, table_files, twice_named
+from contextdb.project import (
+    SCHEMA_FILE,
+    folder_of,
+    load_table,
+    read_folder_schema,
+    stray_files,
+    table_files,
+    twice_named,
+)
 from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema import Schema
 from contextdb.table import Table
@@ -37,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or its cases")
     formats = ", ".join(report.FORMATS)
     parser.add_argument("--format", choices=report.FORMATS, default="text", metavar="FORMAT", help=f"{formats} (default: text)")
-    parser.add_argument("--json", action="store_const", const="json", dest="format", help="the same as --format json")
+    same = "the same as --format json"
+    parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
     parser.add_argument(
         "--fail-on", choices=("error", "warning", "none"), default="error", help="the level that fails (default: error)"
     )
@@ -80,7 +92,23 @@ def check_path(text: str) -> CheckReport:
             (), (Finding("no-tables", "error", f"the folder holds no table. Accepted: {accepted}.", file=str(folder)),)
         )
     found = _check_files(files, schema)
-    return CheckReport(found.tables, (*found.findings, *_strays(folder, [file for _, file in files])))
+    others = (Finding("not-a-table", "info", sentence, file=str(path)) for path, sentence in stray_files(folder, schema))
+    strays = _strays(folder, [file for _, file in files])
+    return CheckReport(found.tables, (*found.findings, *_unportable(files, schema), *others, *strays))
+
+
+def _unportable(files: Sequence[tuple[str, Path]], schema: Schema) -> Iterator[Finding]:
+    """A finding for every table whose file another system could not have, or would take for another one."""
+    others = dict(confusable(str(path) for _, path in files))
+    for name, path in files:
+        wanted = [Path(one).name for one in (schema.tables[name].files if name in schema.tables else ())]
+        declared = next((one for one in wanted if alike(one) == alike(path.name)), path.name)
+        told = [f"{why}." for why in [why_unportable(path.name)] if why]
+        if other := others.get(str(path)):
+            told.append(f"this and {path_in_quotes(other)} are one file on disks that do not tell capitals.")
+        if composed(declared) != composed(path.name):
+            told.append(f"{SCHEMA_FILE} calls it {in_quotes(declared)}: there is no such file on disks that tell capitals.")
+        yield from (Finding("unportable-name", "warning", message, name, str(path)) for message in told)
 
 
 def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None = None) -> CheckReport:
@@ -97,11 +125,16 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         tables.append(TableSummary(table.name, str(path), table.n_rows, len(table.conditions)))
         read.append(table)
         findings += check(table)
-        findings += check_rows(table)
+        log = log_of(f"checking {printable(table.name)}", table.n_rows * len(table.conditions))
+        findings += check_rows(table, progress=None if log is None else partial(_tell, log))
         findings += _check_cases(table, cases_path(path))
     if schema is not None and len(read) == len(files):
         findings += unused_conditions(schema, read, _lines_of(schema))
     return CheckReport(tuple(tables), tuple(findings))
+
+
+def _tell(told: Bar, part: str, share: float) -> None:
+    told(int(1000 * share), 1000, part)
 
 
 def _lines_of(schema: Schema) -> dict[tuple[str, ...], int]:

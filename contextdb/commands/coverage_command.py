@@ -1,6 +1,7 @@
 """Which contexts have a valid row, which have none, and whether that is enough.
 
-Exits with 1 when a bar is missed: --fail-under, --fail-under-telemetry, --max-drop (0 unless given, when there is a --baseline).
+Exits with 1 when a bar is missed: --fail-under, --fail-under-telemetry, --max-drop (0 unless given, when there is a --baseline),
+or when a table of the baseline is gone or has lost all its rows, unless --gone names it.
 Bars are held against the lower bound of the covered share, so that no lucky sample passes.
 
   contextdb coverage tables/
@@ -45,13 +46,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     formats = coverage_formats.FORMATS
     told = f"{', '.join(formats)} (default: text)"
     parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=told)
-    parser.add_argument("--json", action="store_const", const="json", dest="format", help="the same as --format json")
+    same = "the same as --format json"
+    parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
     parser.add_argument("--fail-under", type=_percent, metavar="PCT", help="fail when less is covered in any table")
     parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run")
     parser.add_argument("--max-drop", type=_percent, metavar="PCT", help="how many points a table may fall below the baseline")
+    parser.add_argument(
+        "--gone", action="append", default=[], metavar="TABLE", help="a table of the baseline that is meant to be gone, or empty"
+    )
     parser.add_argument("--gap", metavar="N", help="tell all of one gap, by its number or id")
-    parser.add_argument("--explain", metavar="ROW", help="tell all of one row, by its number (from 0) or asset")
+    parser.add_argument("--explain", metavar="ROW", help="tell all of one row, by its number (from 1) or asset")
     parser.add_argument("--all", action="store_true", help="list every gap and finding")
     parser.add_argument("--seed", type=_count, default=0, metavar="N", help="where samples start (default: 0)")
     parser.add_argument("--work", type=_count, default=WORK, metavar="N", help=f"steps of the exact count (default: {WORK:,})")
@@ -108,6 +113,8 @@ def tables_at(text: str) -> list[Table]:
 def _require_sense(arguments: argparse.Namespace) -> None:
     if arguments.max_drop is not None and not arguments.baseline:
         raise ContextError(Fault("--max-drop compares with a baseline.", "--baseline FILE beside it"))
+    if arguments.gone and not arguments.baseline:
+        raise ContextError(Fault("--gone names tables of a baseline.", "--baseline FILE beside it"))
     coverage_telemetry.require_telemetry(arguments)
     is_detail = arguments.gap is not None or arguments.explain is not None
     names = ("fail_under", "fail_under_telemetry", "max_drop", "baseline")
@@ -120,13 +127,15 @@ def _require_sense(arguments: argparse.Namespace) -> None:
 
 
 def _results(arguments: argparse.Namespace, tables: Sequence[Table], baseline: dict[str, Earlier] | None) -> CoverageResults:
-    from contextdb.report.coverage_results import CoverageResults
+    from contextdb.report.coverage_results import CoverageResults, table_gone
 
     measured = tuple(_measured(arguments, table, baseline) for table in tables)
     names = {table.name for table in tables} | {n for t in tables if isinstance(t, FlatTable) for n in t.expansion.names}
     is_folder = os.path.isdir(arguments.path) or Path(arguments.path).name == SCHEMA_FILE
-    gone = tuple(name for name in baseline or () if name not in names) if is_folder else ()
-    return CoverageResults(measured, gone)
+    known = baseline or {}
+    new = [name for name in sorted(names) if name not in known]
+    gone = [name for name in known if name not in names] if is_folder else []
+    return CoverageResults(measured, {name: table_gone(name, name in arguments.gone, new) for name in gone})
 
 
 def _measured(arguments: argparse.Namespace, table: Table, baseline: dict[str, Earlier] | None) -> Measured:
@@ -134,7 +143,7 @@ def _measured(arguments: argparse.Namespace, table: Table, baseline: dict[str, E
 
     from contextdb.covering.assumed import opened
     from contextdb.covering.baseline import compared
-    from contextdb.report.coverage_results import fail_under, fail_under_telemetry, max_drop
+    from contextdb.report.coverage_results import fail_under, fail_under_telemetry, max_drop, table_emptied
 
     found = measure(arguments, table)
     gates = [] if arguments.fail_under is None else [fail_under(found.report, arguments.fail_under)]
@@ -142,8 +151,12 @@ def _measured(arguments: argparse.Namespace, table: Table, baseline: dict[str, E
         gates.append(fail_under_telemetry(found.telemetry, arguments.fail_under_telemetry))
     change = None
     if baseline is not None and table.name in baseline:
-        change = compared(opened(table), found.report, baseline[table.name])
-        gates.append(max_drop(change, arguments.max_drop or 0.0))
+        earlier = baseline[table.name]
+        change = compared(opened(table), found.report, earlier)
+        if earlier.n_rows and not table.n_rows:
+            gates.append(table_emptied(table.name, earlier.n_rows, table.name in arguments.gone))
+        else:
+            gates.append(max_drop(change, arguments.max_drop or 0.0))
     return coverage_telemetry.ranked(arguments, replace(found, change=change, gates=tuple(gates)), table)
 
 
@@ -154,14 +167,15 @@ def measure(arguments: argparse.Namespace, table: Table) -> Measured:
     from contextdb.report.coverage_results import Measured
 
     with _placed(table):
-        with coverage_telemetry.bar(f"measuring {printable(table.name)}") as told:
+        n_cells = table.n_rows * len(table.conditions)
+        with coverage_telemetry.bar(f"measuring {printable(table.name)}", n_cells) as told:
             report = coverage(
                 table,
                 seed=arguments.seed,
                 work=arguments.work,
                 samples=arguments.samples,
                 max_gaps=MOST_GAPS,
-                progress=None if told is None else lambda _, share: told(int(1000 * share), 1000),
+                progress=None if told is None else lambda part, share: told(int(1000 * share), 1000, part),
             )
         seen = coverage_telemetry.observed(arguments, table, report.gaps)
         compared = pairs(table, seed=arguments.seed, samples=min(arguments.samples, PAIR_SAMPLES))
@@ -207,18 +221,18 @@ def _details(arguments: argparse.Namespace, table: Table) -> str:
 
 
 def _row(text: str, table: Table) -> int:
-    """The row that --explain means: a number from 0, else an asset that stands in one row."""
+    """The row that --explain means: a number from 1, else an asset that stands in one row."""
     rows = [row for row, asset in enumerate(table.assets) if asset == text]
     if len(rows) == 1:
         return rows[0]
-    if text.isdecimal() and int(text) < table.n_rows:
-        return int(text)
+    if text.isdecimal() and 1 <= int(text) <= table.n_rows:
+        return int(text) - 1
     if rows:
-        numbers = ", ".join(map(str, rows[:6]))
+        numbers = ", ".join(str(row + 1) for row in rows[:6])
         found = f"the asset {in_quotes(text)} stands in {plural(len(rows), 'row')}."
         raise ContextError(Fault(found, f"one of the rows {numbers}"))
     near = nearest(text, table.assets)
-    accepted = f"a row from 0 to {table.n_rows - 1:,}, or an asset" if table.n_rows else "none: the table has no rows"
+    accepted = f"a row from 1 to {table.n_rows:,}, or an asset" if table.n_rows else "none: the table has no rows"
     raise ContextError(Fault(f"there is no row {in_quotes(text)}.", accepted, in_quotes(near) if near else ""))
 
 

@@ -7,9 +7,10 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from contextdb.console import printable
+from contextdb.covering.progress import PREPARING
 from contextdb.errors import ContextError, Fault
 
 if TYPE_CHECKING:
@@ -19,6 +20,15 @@ if TYPE_CHECKING:
     from contextdb.telemetry import Observed
 
 ENGINES = ("local", "dask")
+
+MANY_CELLS = 20_000
+"""From so many cells on a log is told of the work."""
+
+
+class Bar(Protocol):
+    """Is told how much is done of how much, and what is being done."""
+
+    def __call__(self, done: float, total: int, part: str = "") -> None: ...
 
 
 def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], float]) -> None:
@@ -95,14 +105,33 @@ def ranked(arguments: argparse.Namespace, measured: Measured, table: Table) -> M
 
 
 @contextmanager
-def bar(label: str) -> Iterator[Callable[[float, int], None] | None]:
-    """A bar, told how much is done of how much; on standard error where that is a terminal, else None."""
+def bar(label: str, n_cells: int = 0) -> Iterator[Bar | None]:
+    """Shows on standard error what is being done and how much of it is: a bar on a terminal, else lines as `log_of` has them."""
     if not sys.stderr.isatty():
-        yield None
+        yield log_of(label, n_cells)
         return
     from rich.console import Console
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as shown:
         task = shown.add_task(label, total=None)
-        yield lambda done, total: shown.update(task, completed=done, total=total)
+        yield lambda done, total, part="": shown.update(
+            task, completed=done, total=total, description=f"{label}: {part}" if part else label
+        )
+
+
+def log_of(label: str, n_cells: int) -> Bar | None:
+    """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal, and where cells are
+    not very many."""
+    if sys.stderr.isatty() or n_cells < MANY_CELLS:
+        return None
+    told: set[object] = set()
+
+    def tell(done: float, total: int, part: str = "") -> None:
+        tenth = int(10 * done / total) if total else 0
+        mark = part if part == PREPARING else tenth
+        if mark not in told:
+            told.add(mark)
+            print(f"contextdb: {label}: {10 * tenth} % {part}".rstrip(), file=sys.stderr, flush=True)
+
+    return tell

@@ -7,6 +7,7 @@ The clips are made by formulas, not captured; they are written as BVH files and 
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import sys
 import tempfile
@@ -18,10 +19,11 @@ import contextdb
 from contextdb.commands.demo_teams import cast_lines
 from contextdb.compiled import CompiledTable
 from contextdb.console import aligned, output, styled, wants_colour
-from contextdb.disk import make_folder
+from contextdb.disk import make_folder, refused_writing
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import Context
+from contextdb.folder_lock import temporary_folder
 from contextdb.matches import Matches
 from contextdb.motion import (
     FeatureSchema,
@@ -85,9 +87,12 @@ def make_sample(source: Path, folder: Path) -> None:
         found = Fault("this is there already.", "the name of a folder that is not there yet", place=Place(str(folder)))
         raise FileError(found)
     make_folder(folder.parent)
-    shutil.copytree(source, folder, ignore=shutil.ignore_patterns(".*", "*.bvh", "*.safetensors"))
-    (folder / "clips").mkdir(exist_ok=True)
-    write_made_clips(folder / "clips")
+    with refused_writing(folder, ()), temporary_folder(folder.parent.resolve()) as temporary:
+        growing = temporary / "growing"
+        shutil.copytree(source, growing, ignore=shutil.ignore_patterns(".*", "*.bvh", "*.safetensors"))
+        (growing / "clips").mkdir(exist_ok=True)
+        write_made_clips(growing / "clips")
+        os.rename(growing, folder)
 
 
 def sample_folder() -> Path:

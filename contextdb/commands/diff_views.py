@@ -12,7 +12,7 @@ from itertools import accumulate, groupby
 
 from contextdb.console import aligned, printable, styled
 from contextdb.diff import CellChange, Diff
-from contextdb.errors import shown
+from contextdb.errors import row_name, shown
 from contextdb.report.render_markdown import MOST_BYTES, escaped
 from contextdb.table import Table
 
@@ -90,7 +90,7 @@ def _rows(found: Diff) -> list[Told]:
 
 def _place(table: Table, row: int) -> str:
     line = table.place(row).line
-    return f"row {row}" if line is None else f"line {line}"
+    return row_name(row) if line is None else f"line {line}"
 
 
 def _cell_lines(found: Diff, colour: bool, shows_all: bool) -> Iterator[str]:

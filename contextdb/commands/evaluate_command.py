@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import argparse
 import os
-import secrets
-import shutil
 import sys
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,10 +32,11 @@ from contextdb.commands.coverage_telemetry import ENGINES, bar
 from contextdb.compiled import CompiledTable
 from contextdb.console import aligned, output, printable, styled, wants_colour
 from contextdb.contexts import context_files
-from contextdb.disk import make_folder, path_in_quotes, write_atomic
-from contextdb.errors import ContextError, Fault, FileError, Place, plural
+from contextdb.disk import is_stream, path_in_quotes, refused_writing, write_atomic
+from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.facts import UNKNOWN_MODES
+from contextdb.folder_lock import temporary_folder
 from contextdb.places import open_compiled
 from contextdb.report.render_json import as_json
 
@@ -51,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("table", metavar="TABLE", help="a .csv, .parquet or .safetensors file, or the name of a table")
     parser.add_argument("contexts", metavar="CONTEXTS", help="a CSV or Parquet file with a column for each fact, or a glob")
-    parser.add_argument("--out", metavar="FILE", help="write each context's valid rows: .csv or .parquet")
+    parser.add_argument("--out", metavar="FILE", help="write each context's valid rows: .csv, .parquet, or a pipe that reads CSV")
     parser.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
     parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="what a missing fact does (default: error)")
@@ -127,17 +128,26 @@ def _folder_beside(out: Path | None) -> Iterator[Path | None]:
     if out is None:
         yield None
         return
-    folder = out.parent.resolve() / f".contextdb-{secrets.token_hex(8)}"
-    make_folder(folder)
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    beside = Path(tempfile.gettempdir()) if is_stream(out) else out.parent.resolve()
+    with ExitStack() as stack:
+        with refused_writing(out, ()):
+            folder = stack.enter_context(temporary_folder(beside))
+        try:
+            yield folder
+        except ContextDBError as error:  # what is not finished has names that nobody asked for
+            raise type(error)(*(_of_out(fault, folder, out) for fault in error.faults)) from None
+
+
+def _of_out(fault: Fault, folder: Path, out: Path) -> Fault:
+    is_inside = fault.place.file is not None and Path(fault.place.file).is_relative_to(folder)
+    return replace(fault, place=Place(str(out))) if is_inside else fault
 
 
 def _out_file(out: Path, files: Sequence[Path]) -> Path:
     """The file to write to, refused before the work where it could only be refused after."""
     place = Place(str(out))
+    if is_stream(out):
+        return out
     if out.suffix not in OUT_SUFFIXES:
         raise FileError(
             Fault("answers cannot be written to such a file.", f"a name that ends in {' or '.join(OUT_SUFFIXES)}", place=place)
@@ -153,22 +163,20 @@ def _out_file(out: Path, files: Sequence[Path]) -> Path:
 
 def _write(answered: Mapping[Path, Answered], folder: Path, out: Path) -> None:
     """Join the answers of the files, numbering contexts through, into one file; streamed."""
-    from contextdb.telemetry.evaluate_file import answers_of
+    from contextdb.telemetry.evaluate_file import answers_of, answers_written
 
     frames, first = [], 0
     for path, own in answered.items():
         scan = pl.scan_parquet(answers_of(folder, path), glob=False)
         frames.append(scan.with_columns(pl.col("context") + first))
         first += own.contexts
-    joined, whole = pl.concat(frames), folder / f"answers{out.suffix}"
-    try:
-        if out.suffix == ".parquet":
+    joined, whole = pl.concat(frames), folder / f"answers{out.suffix or OUT_SUFFIXES[0]}"
+    with answers_written(out):
+        if whole.suffix == ".parquet":
             joined.sink_parquet(whole)
         else:
             texts = (pl.col("rows").cast(pl.List(pl.String)).list.join(" "), pl.col("assets").list.join(" | "))
             joined.with_columns(*texts).sink_csv(whole)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise FileError(Fault(f"the answers cannot be written: {error}.", "room on the disk", place=Place(str(out)))) from None
     with whole.open("rb") as file:
         write_atomic(out, iter(partial(file.read, PIECE_BYTES), b""))
 
@@ -186,7 +194,7 @@ def _lines(compiled: CompiledTable, n_contexts: int, n_without: int, hits: Rows)
     order = np.argsort(-hits, kind="stable")
     used = [r for r in order.tolist() if hits[r]]
     if used:
-        lines = [(f"{int(hits[r]):,}", share(int(hits[r]), n_contexts), str(r), compiled.assets[r]) for r in used[:N_SHOWN]]
+        lines = [(f"{int(hits[r]):,}", share(int(hits[r]), n_contexts), str(r + 1), compiled.assets[r]) for r in used[:N_SHOWN]]
         yield ""
         yield from aligned([("contexts", "share", "row", "asset"), *lines], right=(0, 1, 2))
         if len(used) > N_SHOWN:

@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 from contextdb.console import drop_output, printable
-from contextdb.disk import write_atomic
+from contextdb.disk import is_stream, write_atomic
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exchange.formats import FORMATS, format_of, write
 from contextdb.exit_codes import ExitCode
@@ -30,6 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", metavar="DST", help="the file to write; - for standard output")
     names = [name for name, one in FORMATS.items() if one.is_written]
     parser.add_argument("--as", dest="format", metavar="FORMAT", choices=names, help=f"the format of DST: {', '.join(names)}")
+    told = "cells of CSV and TSV that a spreadsheet may run as formulas: named (tell, default), kept, or with ' before each (quote)"
+    parser.add_argument("--formulas", choices=("tell", "keep", "quote"), default="tell", help=told)
     parser.add_argument("--force", action="store_true", help="write over a file that is there")
 
 
@@ -39,12 +41,12 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if is_standard and arguments.format is None:
         raise FileError(Fault("standard output has no suffix that tells a format.", "--as with a format", "--as tsv"))
     kind = format_of(arguments.target, arguments.format, for_writing=True)
-    if not is_standard and os.path.exists(arguments.target) and not arguments.force:
+    if not is_standard and os.path.exists(arguments.target) and not (arguments.force or is_stream(Path(arguments.target))):
         raise FileError(
             Fault("the file is there already.", "a new name, or --force to write over it", place=Place(arguments.target))
         )
     table = load_table(table_path(arguments.source), strict=False)
-    raw, remarks = write(table, kind)
+    raw, remarks = write(table, kind, arguments.formulas)
     for remark in remarks:
         print(printable(f"{table.name}: {remark}"), file=sys.stderr)
     if is_standard:

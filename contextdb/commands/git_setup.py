@@ -23,6 +23,8 @@ LINES = (
     b"contextdb.toml merge=contextdb",
 )
 NAME = "contextdb: tables by asset and cell"
+BY_LINES = "{ test $? = 1 || git merge-file --diff3 -L ours -L base -L theirs %A %O %B; exit 1; }"
+"""What git does where the driver cannot be run or fails: else ours alone would stand in the file, without a mark."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,8 @@ class Setup:
         """The keys of git's configuration, and what they say."""
         return {
             "merge.contextdb.name": NAME,
-            "merge.contextdb.driver": f"{self.command} merge %O %A %B --path %P",
-            "diff.contextdb.textconv": f"{self.command} git text",
+            "merge.contextdb.driver": f"{self.command} merge %O %A %B --path=%P || {BY_LINES}",
+            "diff.contextdb.textconv": f"{self.command} git text --",
             "diff.contextdb.xfuncname": r"^([^[:space:]].*)$",
         }
 
@@ -101,7 +103,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments that say where."""
     parser.add_argument("path", metavar="PATH", nargs="?", default=".", help=f"the folder whose {ATTRIBUTES} is meant (default: .)")
     scope = parser.add_mutually_exclusive_group()
-    scope.add_argument("--local", action="store_false", dest="is_global", help="configure this clone (default)")
+    scope.add_argument("--local", action="store_false", dest="is_global", default=False, help="configure this clone (default)")
     scope.add_argument("--global", action="store_true", dest="is_global", help="configure all repositories of this user")
 
 

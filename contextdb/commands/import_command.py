@@ -20,17 +20,19 @@ from pathlib import Path
 from contextdb.console import aligned, output, printable
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.domains import KINDS
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural, row_name
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
 from contextdb.exchange.importing import Plan, declared_differently, plan_import, project_of
 from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
 from contextdb.exchange.reading import Reading, listed
 from contextdb.exit_codes import ExitCode
-from contextdb.project import SCHEMA_FILE
+from contextdb.file_names import why_unportable
+from contextdb.project import SCHEMA_FILE, schema_for
 from contextdb.shapes import KIND_SYNONYMS
 
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|"}
-MOST_TEXT = 100
+LARGE_BYTES, LARGE_CELLS, LARGE_COLUMNS = 10_000_000, 1_000_000, 2_000
+"""From such a size on an import takes seconds, and says what it is at."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,6 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     between = f"what stands between fields: {', '.join(DELIMITERS)} (default: told from the file)"
     parser.add_argument("--delimiter", metavar="NAME", choices=DELIMITERS, help=between)
     parser.add_argument("--decimal", choices=("comma", "point"), help="what stands in 3,5 (default: told from the cells)")
+    whole = "whether Mid Air is one name (whole) or two (words), in columns that are new (default: whole, but in our own workbooks)"
+    parser.add_argument("--names", choices=("whole", "words"), help=whole)
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
     parser.add_argument("--force", action="store_true", help="write over a table that is there")
 
@@ -60,15 +64,30 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Read, decide, say what was decided, write."""
     target = _target(arguments.target, arguments.force or arguments.dry_run)
     raw, name = _bytes(arguments.source)
+    if len(raw) >= LARGE_BYTES:
+        _say(name, f"reading {len(raw) / 1e6:,.0f} MB …")
     reading = read(raw, name, _options(arguments))
+    is_large = reading.n_rows * len(reading.columns) >= LARGE_CELLS or len(reading.columns) >= LARGE_COLUMNS
+    if is_large:
+        size = f"{plural(reading.n_rows, 'row')} of {plural(len(reading.columns), 'column')}"
+        _say(name, f"{size} read; finding the type of each column …")
     for remark in reading.remarks:
         print(printable(f"{name}: {remark}"), file=sys.stderr)
     plan = _plan(reading, target, arguments)
+    if arguments.names is None and (told := _whole_names(plan, reading)):
+        print(printable(f"{name}: {told}"), file=sys.stderr)
     if not arguments.dry_run:
+        if is_large:
+            _say(name, f"writing {plan.path} …")
         plan.write()
     with output():
         print(*_lines(plan, reading, name, arguments.dry_run), sep="\n")
     return ExitCode.OK
+
+
+def _say(name: str, what: str) -> None:
+    """What a long import is at, as a line that a log shows at once."""
+    print(printable(f"{name}: {what}"), file=sys.stderr, flush=True)
 
 
 def _target(text: str, may_overwrite: bool) -> Path:
@@ -77,6 +96,8 @@ def _target(text: str, may_overwrite: bool) -> Path:
     if target.suffix.lower() not in TABLE_SUFFIXES:
         mend = path_in_quotes(target.with_suffix(".csv")) if target.name else ""
         raise FileError(Fault("a table file does not end so.", f"a name that ends in {' or '.join(TABLE_SUFFIXES)}", mend, place))
+    if why := why_unportable(target.name):
+        raise FileError(Fault(f"this is no name for a table: {why}.", "a name that every system can have", place=place))
     if not os.path.isdir(target.parent):
         folder = path_in_quotes(target.parent)
         raise FileError(Fault(f"there is no folder {folder}.", "a folder of tables", place=place, rule="no-such-path"))
@@ -92,7 +113,21 @@ def _bytes(source: str) -> tuple[bytes, str]:
 def _options(arguments: argparse.Namespace) -> ReadOptions:
     is_comma = None if arguments.decimal is None else arguments.decimal == "comma"
     delimiter = None if arguments.delimiter is None else DELIMITERS[arguments.delimiter]
-    return ReadOptions(arguments.format, arguments.sheet, arguments.encoding, delimiter, is_comma)
+    is_whole = arguments.names == "whole" if arguments.names else False if _is_of_a_project(arguments.source) else None
+    return ReadOptions(arguments.format, arguments.sheet, arguments.encoding, delimiter, is_comma, is_whole)
+
+
+def _is_of_a_project(source: str) -> bool:
+    """Whether a contextdb.toml declares a file as a table, so that its cells are cells of ours."""
+    path = Path(source)
+    if path.suffix.lower() not in TABLE_SUFFIXES or not path.is_file():
+        return False
+    try:
+        folder, schema = schema_for(path)
+    except ContextDBError:  # it is no concern of this import
+        return False
+    said = (path.parent.resolve() / path.name).relative_to(folder.resolve()).as_posix()
+    return any(said in settings.files for settings in schema.tables.values())
 
 
 def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> Plan:
@@ -143,6 +178,18 @@ def _typed(mapped: Sequence[Mapped], reading: Reading, types: dict[str, str]) ->
 # ---- what is said
 
 
+def _whole_names(plan: Plan, reading: Reading) -> str:
+    """Which columns have texts that became one name each though blanks part names in a cell, with the first such text."""
+    changed = [(column, reading.column(column.source)) for column in plan.columns if column.cells is not None]
+    names = [column.source for column, _ in changed]
+    texts = (text for _, column in changed for text in column.texts if " " in text.strip())
+    example = next(texts, None)
+    if example is None:
+        return ""
+    where = "column" if len(names) == 1 else "columns"
+    return f"{where} {listed(names)}: each text is one name, such as {in_quotes(example)}; --names words reads each word as a name."
+
+
 def _lines(plan: Plan, reading: Reading, name: str, is_dry: bool) -> list[str]:
     table = plan.table
     done = "would become" if is_dry else "became"
@@ -176,6 +223,6 @@ def _fault_lines(plan: Plan) -> list[str]:
     faults = plan.table.faults
     if not faults:
         return []
-    shown = [f"  {f.place.column}, row {f.place.row}: {f.message}" for f in faults[:3]]
+    shown = [f"  {f.place.column}, {row_name(f.place.row or 0)}: {f.message}" for f in faults[:3]]
     more = f"  and {len(faults) - 3:,} more: contextdb check {plan.path}" if len(faults) > 3 else ""
     return [f"{plural(len(faults), 'cell')} cannot be read:", *map(printable, shown), *([more] if more else [])]

@@ -1,8 +1,11 @@
 """Join what two sides made of one table, cell by cell, with rows and columns that came, went and moved. A git merge driver.
 
 A contextdb.toml is merged key by key. The result is written over OURS, or into FILE. What the sides disagree about stands in it
-between git's marks, row by row, for a person or the editor to decide; a Parquet file then stays as it was. Exits with 0 when all
-went together, with 1 when something is to be decided, with 2 when a file cannot be read.
+between git's marks, row by row, for a person or the editor to decide; a Parquet file then stays as it was. Where one of the three
+files is no table, lines are merged as git does it.
+
+Exits with 0 when all went together, with 1 when something is to be decided or lines were merged, with 2 when a file is not there or
+cannot be written.
 
 After a clean merge the meaning is looked at again: gaps, overlaps under the policy "unique" and rows that can play no more that
 neither side had are told on standard error; with --strict they give 1 too.
@@ -10,32 +13,40 @@ neither side had are told on standard error; with --strict they give 1 too.
   contextdb merge base.csv ours.csv theirs.csv --out merged.csv
   contextdb merge base.csv ours.csv theirs.csv --take theirs
 
-As a merge driver of git, with the lines "*.csv merge=contextdb" and "contextdb.toml merge=contextdb" in .gitattributes:
+As a merge driver of git, with the lines "*.csv merge=contextdb" and "contextdb.toml merge=contextdb" in .gitattributes (what
+`git install` sets merges lines where the driver itself cannot be run):
 
-  git config merge.contextdb.driver "contextdb merge %O %A %B --path %P"
+  git config merge.contextdb.driver "contextdb merge %O %A %B --path=%P"
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from contextdb.console import printable
 from contextdb.diff import Merge, Side, diff, merge
+from contextdb.diffing.lines import merged_lines
 from contextdb.diffing.markers import with_markers
-from contextdb.diffing.reading import merged_bytes, table_of
+from contextdb.diffing.reading import PARQUET, merged_bytes, table_of
 from contextdb.diffing.toml_merging import merge_toml
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
 from contextdb.exit_codes import ExitCode
 from contextdb.parquet import ParquetSource
-from contextdb.project import neighbours, schema_for
+from contextdb.project import neighbours, schema_for, settings_of
 from contextdb.schema import EMPTY, Schema, TableSettings
 from contextdb.table import Table
 
 MOST_TOLD = 20
+
+Raws = Sequence[bytes]
+"""Base, ours, theirs."""
+Merged = tuple[bytes | None, Callable[[], ExitCode]]
+"""The bytes to write, if any, and what then tells what came of it."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,16 +63,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Merge three files."""
     path = Path(arguments.path or arguments.ours)
-    if path.suffix.lower() == ".toml":
-        return _merge_toml(path, arguments)
-    base, ours, theirs = _tables(path, arguments)
+    raws = [read_bytes(file) for file in (arguments.base, arguments.ours, arguments.theirs)]
+    merged = _merged_toml if path.suffix.lower() == ".toml" else _merged_tables
+    try:
+        raw, tell = merged(path, raws, arguments)
+    except Exception as error:  # whatever it is: git would go on with ours alone
+        if arguments.take:
+            raise
+        return _merge_lines(path, raws, arguments, error)
+    if raw is not None:
+        write_atomic(Path(arguments.out or arguments.ours), raw)
+    return tell()
+
+
+def _merged_tables(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
+    base, ours, theirs = _tables(path, raws, arguments)
     found = merge(base, ours, theirs)
     if arguments.take:
         found = _decided(found, arguments.take)
-    out = Path(arguments.out or arguments.ours)
-    is_parquet = isinstance(ours.source, ParquetSource)
-    if not (found.conflicts and is_parquet):
-        write_atomic(out, with_markers(found) if found.conflicts else merged_bytes(found))
+    is_parquet = isinstance(found.ours.source, ParquetSource)
+    raw = with_markers(found) if found.conflicts and not is_parquet else None if found.conflicts else merged_bytes(found)
+    return raw, lambda: _told(found, path, is_parquet, arguments)
+
+
+def _told(found: Merge, path: Path, is_parquet: bool, arguments: argparse.Namespace) -> ExitCode:
+    """Tell what came of it."""
     _tell(found, path, is_parquet)
     if found.conflicts:
         return ExitCode.FOUND
@@ -93,35 +119,65 @@ def _tell_meaning(found: Merge, path: Path) -> bool:
     return bool(said)
 
 
-def _merge_toml(path: Path, arguments: argparse.Namespace) -> ExitCode:
+def _merged_toml(path: Path, raws: Raws, arguments: argparse.Namespace) -> Merged:
     """Merge three versions of contextdb.toml, key by key."""
-    files = arguments.base, arguments.ours, arguments.theirs
-    base, ours, theirs = (_toml_text(file) for file in files)
-    found = merge_toml(base, ours, theirs, files)
+    base, ours, theirs = _names(path, arguments)
+    texts = [_toml_text(raw, name) for raw, name in zip(raws, (base, ours, theirs), strict=True)]
+    found = merge_toml(texts[0], texts[1], texts[2], (base, ours, theirs))
     if found.conflicts and arguments.take:
         raise ContextDBError(Fault("--take decides conflicts of tables.", "a .csv or .parquet file", place=Place(str(path))))
-    write_atomic(Path(arguments.out or arguments.ours), found.with_markers.encode())
-    for key in found.conflicts:
-        said = f"{in_quotes('.'.join(key))} changed on both sides."
-        fault = Fault(said, mend="to keep one of the versions between the marks", place=Place(str(path)))
+
+    def tell() -> ExitCode:
+        for key in found.conflicts:
+            said = f"{in_quotes('.'.join(key))} changed on both sides."
+            fault = Fault(said, mend="to keep one of the versions between the marks", place=Place(str(path)))
+            print(printable(f"contextdb: {fault}"), file=sys.stderr)
+        return ExitCode.FOUND if found.conflicts else ExitCode.OK
+
+    return found.with_markers.encode(), tell
+
+
+def _merge_lines(path: Path, raws: Raws, arguments: argparse.Namespace, error: Exception) -> ExitCode:
+    """Merge lines, as git does it, where the meaning cannot be merged: nothing of either side is left out without a mark."""
+    place = Place(str(path))
+    unforeseen = Fault(f"the tables cannot be merged ({type(error).__name__}: {error}).", place=place)
+    faults = error.faults if isinstance(error, ContextDBError) else (unforeseen,)
+    for fault in faults[:MOST_TOLD]:
         print(printable(f"contextdb: {fault}"), file=sys.stderr)
-    return ExitCode.FOUND if found.conflicts else ExitCode.OK
+    if len(faults) > MOST_TOLD:
+        print(f"contextdb: … and {len(faults) - MOST_TOLD:,} more.", file=sys.stderr)
+    if any(raw.startswith(PARQUET) for raw in raws):
+        said, mend = "the file stays as ours has it.", "to take one side with git checkout --ours or --theirs"
+    else:
+        raw, n_conflicts = merged_lines(*raws)
+        write_atomic(Path(arguments.out or arguments.ours), raw)
+        said = f"lines were merged instead of cells, with {plural(n_conflicts, 'place')} between marks."
+        mend = "to look at the file, and to mend what cannot be read"
+    print(printable(f"contextdb: {Fault(said, mend=mend, place=place)}"), file=sys.stderr)
+    return ExitCode.FOUND
 
 
-def _toml_text(file: str) -> str:
+def _names(path: Path, arguments: argparse.Namespace) -> tuple[str, str, str]:
+    """The three versions in messages. The files that git hands over have names that say nothing."""
+    if not arguments.path:
+        return arguments.base, arguments.ours, arguments.theirs
+    return f"{path} (base)", f"{path} (ours)", f"{path} (theirs)"
+
+
+def _toml_text(raw: bytes, name: str) -> str:
     try:
-        return read_bytes(file).decode("utf-8-sig")
+        return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(file))) from None
+        raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(name))) from None
 
 
-def _tables(path: Path, arguments: argparse.Namespace) -> list[Table]:
+def _tables(path: Path, raws: Raws, arguments: argparse.Namespace) -> list[Table]:
     schema, settings = _schema(path)
     tables: list[Table] = []
     faults: list[Fault] = []
-    for file in (arguments.base, arguments.ours, arguments.theirs):
+    for raw, name in zip(raws, _names(path, arguments), strict=True):
         try:
-            tables.append(table_of(read_bytes(file), file, schema, settings))
+            tables.append(table_of(raw, name, schema, settings))
         except TableError as error:
             faults += error.faults
     if faults:
@@ -133,8 +189,7 @@ def _schema(path: Path) -> tuple[Schema, TableSettings]:
     """What is declared of the table; nothing where contextdb.toml cannot be read, as in the middle of a merge."""
     try:
         folder, schema = schema_for(path)
-        root, whole = folder.resolve(), path.parent.resolve() / path.name
-        return schema, schema.settings_for(whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path.name)
+        return schema, settings_of(path, folder, schema)
     except ContextDBError as error:
         print(printable(f"contextdb: {error.faults[0]} Merging without it."), file=sys.stderr)
         return EMPTY, TableSettings(path.stem)

@@ -5,6 +5,10 @@ the next build computes only the clips that changed.
 
   contextdb motion build tables/                       all databases, beside contextdb.toml
   contextdb motion build tables/ --out build/ --database jog
+  contextdb motion build tables/ --keep-going            without the clips and databases of which something is wrong
+
+Nothing is saved while a clip cannot be read: all faults are told, and the exit code is 2. With --keep-going such clips are left
+out and told, and the exit code is 1. Clips that are only doubtful, such as a body of 170 m, are told as warnings.
 """
 
 from __future__ import annotations
@@ -12,8 +16,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from contextdb.commands.motion_bar import building_bar
@@ -21,7 +25,9 @@ from contextdb.console import aligned, output, printable
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
 from contextdb.exit_codes import ExitCode
+from contextdb.motion.clips.doubts import grouped
 from contextdb.motion.storage import building
+from contextdb.motion.storage.build_inputs import told_once
 from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
@@ -37,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
     parser.add_argument("--out", metavar="FOLDER", help=f"where the databases are saved (default: beside {SCHEMA_FILE})")
     parser.add_argument("--database", metavar="NAME", action="append", help="only this one; may be given several times")
+    parser.add_argument("--keep-going", action="store_true", help="leave out what is wrong, build the rest, and exit with 1")
     parser.add_argument("--no-cache", action="store_true", help="compute every clip, and keep nothing")
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of a table")
 
@@ -45,6 +52,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Build and save; prints a line for each database."""
     project = MotionProject.load(arguments.path)
     targets = project.targets(arguments.out, arguments.database)
+    left_out = LeftOut()
     with building_bar() as progress:
         built = building.build_all(
             project.config,
@@ -53,20 +61,51 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             progress,
             names=arguments.database,
             cache=None if arguments.no_cache else building.CACHE_FOLDER,
+            tolerates=left_out.take if arguments.keep_going else None,
         )
+    targets = {name: target for name, target in targets.items() if name in built}
     for name, target in targets.items():
         make_folder(target.parent)
         save_database(built[name].database, target, inputs=built[name].digest)
-    for warning in project.warnings(built):
-        print(printable(f"contextdb: warning: {warning}"), file=sys.stderr)
+    warn(project.warnings(built))
     with output():
         if arguments.json:
             rows = [_as_json(project, name, built[name], target) for name, target in targets.items()]
-            print(json.dumps({"format": 1, "databases": rows}, ensure_ascii=False))
+            print(json.dumps({"format": 1, "databases": rows, "left_out": left_out.messages}, ensure_ascii=False))
         else:
             cells = [_cells(project, name, built[name], target) for name, target in targets.items()]
             print("\n".join(aligned([HEADER, *cells], right=range(1, 8))))
-    return ExitCode.OK
+    warn(left_out.sentences())
+    return ExitCode.FOUND if left_out.errors else ExitCode.OK
+
+
+def warn(sentences: Iterable[str]) -> None:
+    """Print warnings on standard error."""
+    for sentence in sentences:
+        print(printable(f"contextdb: warning: {sentence}"), file=sys.stderr)
+
+
+@dataclass
+class LeftOut:
+    """What a build goes on without: for each database what is wrong with it, or with some of its clips."""
+
+    errors: dict[str, list[ContextDBError]] = field(default_factory=dict)
+
+    def take(self, database: str, error: ContextDBError) -> bool:
+        """Take down what is wrong, and let the build go on."""
+        self.errors.setdefault(database, []).append(error)
+        return True
+
+    @property
+    def messages(self) -> list[str]:
+        """Each fault, once."""
+        return [str(fault) for fault in told_once(fault for errors in self.errors.values() for e in errors for fault in e.faults)]
+
+    def sentences(self) -> Iterator[str]:
+        """Each fault, then what was left out."""
+        yield from (f"left out: {message}" for message in self.messages)
+        for name, errors in self.errors.items():
+            yield f"[databases.{name}] is left out, or lacks what is told above ({plural(len(errors), 'error')})."
 
 
 @dataclass(frozen=True)
@@ -115,7 +154,10 @@ class MotionProject:
             yield f"[tables.{table}] no database has a clip of {plural(len(assets), 'asset')}: {some(assets)}"
         if unlisted:
             yield f"no table has a row for {plural(len(unlisted), 'clip')}: {some(unlisted)}"
-        yield from dict.fromkeys(str(fault) for each in built.values() for fault in each.markup_faults)
+        yield from dict.fromkeys(str(fault) for each in built.values() for fault in (*each.markup_faults, *each.mirror_faults))
+        for name, each in built.items():
+            n_clips = len(each.computed) + len(each.cached)
+            yield from (f"[databases.{name}] {sentence}" for sentence in grouped(each.doubts, n_clips))
 
 
 def _as_json(project: MotionProject, name: str, built: Built, target: Path) -> dict[str, object]:
@@ -132,6 +174,7 @@ def _as_json(project: MotionProject, name: str, built: Built, target: Path) -> d
         "features": database.n_features,
         "computed": list(built.computed),
         "cached": list(built.cached),
+        "doubts": [doubt.to_json() for doubt in built.doubts],
     }
 
 

@@ -3,26 +3,40 @@
 Without --at a row stands for each change, with what playing on would have cost and how long it then went on. --at takes an update's
 tick, as the first column tells it, or a time such as 2.5s.
 
+A session keeps the best candidates of each search. With --at and --name the costs of all assets of that name are worked out again
+from the databases: those of the project that the session was recorded with, or of --project.
+
   contextdb motion replay session.parquet
   contextdb motion replay session.parquet --at 2.5s --view pose
   contextdb motion replay session.parquet --name jog
+  contextdb motion replay session.parquet --at 2.5s --name jog          why was mine not chosen?
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 from bisect import bisect_right
+from collections.abc import Mapping
+from pathlib import Path
 
+from contextdb.commands.motion_bar import building_bar
+from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_stage import add_view
 from contextdb.console import output, terminal_width
-from contextdb.errors import Fault, Place, QueryError, in_quotes
+from contextdb.disk import path_in_quotes
+from contextdb.errors import ContextDBError, Fault, MotionError, Place, QueryError, in_quotes
 from contextdb.exit_codes import ExitCode
+from contextdb.motion import MotionDatabase, open_database, open_or_build, saved_path
 from contextdb.motion.reading import as_number
-from contextdb.motion.selection.decision import Playing
-from contextdb.motion.trace.cost_views import View
-from contextdb.motion.trace.json_form import decision_json
+from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.trace.cost_views import Ranked, View
+from contextdb.motion.trace.filter_rows import fingerprint
+from contextdb.motion.trace.json_form import decision_json, ranked_json
+from contextdb.motion.trace.reasked import reasked, require_known, why_not_asked
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.views import decision_lines, session_lines, summary_line
+from contextdb.project import SCHEMA_FILE, folder_of
 from contextdb.report.render_json import as_json
 
 
@@ -32,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--at", metavar="N|TIME", help="one decision in full: its tick, or a time such as 2.5s")
     add_view(parser, "with --at: which costs are shown")
     parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name holds this")
+    parser.add_argument("--project", metavar="FOLDER", help="with --name: where the databases are (default: where they were)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
@@ -88,7 +103,19 @@ def _print_session(trace: Trace, asked: argparse.Namespace) -> None:
         return
     print(summary_line(trace.brief()))
     lines = list(session_lines(trace.brief(), name=asked.name, width=terminal_width()))
-    print("", *(lines or [f"no asset's name holds {in_quotes(asked.name)}" if asked.name else "no decision"]), sep="\n")
+    print("", *(lines or [_never_played(trace, asked) if asked.name else "no decision"]), sep="\n")
+
+
+def _never_played(trace: Trace, asked: argparse.Namespace) -> str:
+    """What to say of a name that no playing asset holds, and of one that no asset of the databases holds."""
+    databases, why = databases_of(trace, asked.project, asked.file)
+    if why:
+        return f"nothing whose name holds {in_quotes(asked.name)} plays; {why}"
+    try:
+        require_known(asked.name, databases, asked.file)
+    except MotionError as error:
+        return error.faults[0].message
+    return f"nothing whose name holds {in_quotes(asked.name)} plays; --at N|TIME beside --name tells what it would have cost"
 
 
 def _is_named(playing: Playing | None, name: str) -> bool:
@@ -102,8 +129,54 @@ def _brief(decision: dict[str, object]) -> dict[str, object]:
 
 def _print_decision(trace: Trace, place: int, asked: argparse.Namespace) -> None:
     decision, events = trace[place], trace.events(place)
+    ranked, why = _asked(trace, decision, asked) if asked.name else (None, "")
     if asked.json:
-        print(as_json({"format": 1, "file": asked.file, **decision_json(decision, events)}), end="")
+        again = (
+            {} if not asked.name else {"asked": None if ranked is None else ranked_json(ranked, events), "not_asked": why or None}
+        )
+        print(as_json({"format": 1, "file": asked.file, **decision_json(decision, events), **again}), end="")
         return
     view = View(asked.view or View.SUMMARY)
-    print(*decision_lines(decision, view, name=asked.name, events=events, width=terminal_width()), sep="\n")
+    lines = decision_lines(decision, view, name=asked.name, events=events, width=terminal_width(), asked=ranked)
+    print(*lines, sep="\n")
+    if why:
+        print(f"\nof the candidates that the session keeps alone: {why}")
+
+
+def _asked(trace: Trace, decision: Decision, asked: argparse.Namespace) -> tuple[list[Ranked] | None, str]:
+    """The best frame of each range whose asset's name holds --name; None, and why, where they cannot be worked out."""
+    databases, why = databases_of(trace, asked.project, asked.file)
+    why = why or why_not_asked(decision, trace.about, databases)
+    if why:
+        return None, why
+    require_known(asked.name, databases, asked.file)
+    return reasked(decision, databases, asked.name), ""
+
+
+def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str, MotionDatabase], str]:
+    """The databases that a session was recorded with, from the project's folder, or why there are none.
+
+    A saved database that is the one which was recorded is opened without a look at the clips.
+    """
+    said = {str(about["project"]) for about in trace.about.values() if "project" in about}
+    if project is None and not said:
+        return {}, "the session does not say which project it was recorded with: --project FOLDER says it."
+    folder = os.path.normpath(os.path.join(os.path.dirname(file), said.pop())) if project is None else project
+    if project is None and not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
+        return {}, f"its project is no longer at {path_in_quotes(folder)}: --project FOLDER says where."
+    opened = {name: _saved(saved_path(folder_of(Path(folder)), name), about) for name, about in trace.about.items()}
+    if all(opened.values()):
+        return {name: database for name, database in opened.items() if database is not None}, ""
+    motion = MotionProject.load(folder)
+    names = [name for name in trace.about if name in motion.config.databases]
+    with building_bar() as progress:
+        return open_or_build(motion.config, motion.folder, motion.assets, progress, names=names), ""
+
+
+def _saved(path: Path, about: Mapping[str, object]) -> MotionDatabase | None:
+    """A saved database, if it is the one that was recorded."""
+    try:
+        database = open_database(path)
+    except ContextDBError:
+        return None
+    return database if fingerprint(database) == about.get("digest") else None

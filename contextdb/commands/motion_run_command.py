@@ -54,9 +54,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Run a controller along a stick."""
     out = _out_file(Path(arguments.out), Path(arguments.stick))
-    stage = Stage.of(arguments.path)
+    stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
     controller = stage.config.controller(arguments.controller, stage.databases, rng=random.Random(arguments.seed))
     trace = controller.recorder = Trace(arguments.k, controller.selector.databases)
+    trace.about = {name: {**about, **_project(stage.folder, out)} for name, about in trace.about.items()}
     names = list(controller.selector.names)
     tables = stage.tables(names)
     path = Path(arguments.stick)
@@ -71,6 +72,14 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         else:
             print(summary_line(trace.brief()))
     return ExitCode.OK if any(decision.playing is not None for decision in trace.brief()) else ExitCode.FOUND
+
+
+def _project(folder: Path, out: Path) -> dict[str, str]:
+    """Where the project is, seen from the session; nothing where no relative path leads there."""
+    try:
+        return {"project": Path(os.path.relpath(folder, out.parent)).as_posix()}
+    except ValueError:  # another drive
+        return {}
 
 
 def steer(controller: Controller, schema: FeatureSchema, stick: Stick, moments: Moments | None, rate: float | None) -> None:

@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Search one database."""
-    stage = Stage.of(arguments.path)
+    stage = Stage.of(arguments.path, lambda config: [config.database(arguments.database).name])
     name = stage.config.database(arguments.database).name
     valid, facts = stage.valid([name], arguments.facts, arguments.unknown)
     query = stage.query(arguments.query, [name], arguments)

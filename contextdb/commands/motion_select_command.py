@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Choose as a character does that plays nothing yet."""
-    stage = Stage.of(arguments.path)
+    stage = Stage.of(arguments.path, lambda config: config.databases_of(arguments.selector))
     selector = stage.config.selector(arguments.selector, stage.databases)
     names = list(selector.names)
     valid, facts = stage.valid(names, arguments.facts, arguments.unknown)

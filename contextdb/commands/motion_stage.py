@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from contextdb.commands import missing_facts_by_option
 from contextdb.commands.motion_bar import building_bar
-from contextdb.commands.motion_build_command import MotionProject
+from contextdb.commands.motion_build_command import LeftOut, MotionProject, warn
 from contextdb.commands.query_command import read_facts
 from contextdb.compiled import CompiledTable
 from contextdb.errors import ContextDBError, Fault, QueryError, in_quotes, nearest, some
@@ -49,11 +49,25 @@ class Stage:
     project: Project
 
     @classmethod
-    def of(cls, path: str) -> Stage:
-        """Read a project, open its databases where they are saved and up to date, and build the others."""
+    def of(cls, path: str, names_of: Callable[[MotionConfig], Collection[str]]) -> Stage:
+        """Read a project, open some of its databases where they are saved and up to date, and build the others.
+
+        `names_of` says which are needed. Those of the same features are taken too, as they share a normalisation; what is wrong
+        with one of these is told, and it is left out.
+        """
         motion, project = MotionProject.load(path), Project.load(path)
+        needed = names_of(motion.config)
+        features = {motion.config.databases[name].features for name in needed}
+        others = [name for name, each in motion.config.databases.items() if each.features in features and name not in needed]
+        left_out = LeftOut()
+
+        def tolerates(name: str, error: ContextDBError) -> bool:
+            return name not in needed and left_out.take(name, error)
+
         with building_bar() as progress:
-            databases = open_or_build(motion.config, motion.folder, motion.assets, progress)
+            names = [*needed, *others]
+            databases = open_or_build(motion.config, motion.folder, motion.assets, progress, names=names, tolerates=tolerates)
+        warn(left_out.sentences())
         return cls(motion.folder, motion.config, databases, project)
 
     @cached_property
@@ -119,7 +133,7 @@ class Stage:
     def _pose(self, clip: str, at_s: float, names: Sequence[str]) -> Features:
         """The features of a moment of a clip that is in one of the databases, or in another of the same features."""
         features = self.config.database(names[0]).features
-        others = [name for name, settings in self.config.databases.items() if settings.features == features and name not in names]
+        others = [name for name in self.databases if self.config.databases[name].features == features and name not in names]
         for name in (*names, *others):
             database = self.databases[name]
             if clip in database.assets:

@@ -18,11 +18,13 @@ from collections.abc import Iterator
 from contextdb.casting.stage import CastMatches
 from contextdb.commands import missing_facts_by_option
 from contextdb.compiled import CompiledTable
+from contextdb.conditions import Condition
 from contextdb.console import aligned, output, printable, styled, terminal_width, wants_colour, width_of
 from contextdb.errors import ContextError, Fault, in_quotes, plural
 from contextdb.exit_codes import ExitCode
 from contextdb.explain import Explanation, RowExplanation, describe_fact
 from contextdb.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
+from contextdb.pick import Outcome
 from contextdb.places import open_compiled
 from contextdb.report.render_json import as_json
 
@@ -43,7 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--explain", action="store_true", help="for the rows nearest to valid, the cells that fail and what to change"
     )
-    parser.add_argument("--most", type=_count, metavar="N", help=f"explain so many rows (default: {N_EXPLAINED})")
+    told = f"explain so many rows (default: {N_EXPLAINED})"
+    parser.add_argument("--most", type=_count, default=N_EXPLAINED, metavar="N", help=told)
     parser.add_argument(
         "--prefer", metavar="FACT", help="cast the actors with the lowest FACT first; -FACT, as in --prefer=-speed: the highest"
     )
@@ -59,12 +62,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     context = read_facts(plain, compiled)
     with missing_facts_by_option():
         explanation = compiled.explain(context, arguments.unknown, actors, arguments.prefer)
-    most = arguments.most if arguments.most is not None else N_EXPLAINED
     with output():
         if arguments.json:
-            print(as_json(_document(compiled, explanation, arguments.explain, most)), end="")
+            print(as_json(_document(compiled, explanation, arguments.explain, arguments.most)), end="")
         else:
-            print(*_lines(compiled, explanation, arguments.explain, most), sep="\n")
+            print(*_lines(compiled, explanation, arguments.explain, arguments.most), sep="\n")
     return ExitCode.OK if explanation.matches else ExitCode.FOUND
 
 
@@ -153,7 +155,15 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
     matches = explanation.matches
     always = set(explanation.always_rows())
     context = {n: _json_fact(f, n, compiled) for n, f in explanation.facts.items() if f is not None}
-    rows: list[dict[str, object]] = [{"row": r, "asset": compiled.assets[r], "always": r in always} for r in matches]
+    outcome, undecided = Outcome(compiled, matches), explanation.undecided
+    rows: list[dict[str, object]] = []
+    for r in matches:
+        rows.append({"row": r, "asset": compiled.assets[r], "always": r in always})
+        rows[-1] |= {"undecided": True} if undecided >> r & 1 else {}
+        if outcome.prefers_some:
+            rows[-1] |= (
+                {"chance": outcome.chances[r]} if r in outcome.chances else {"chance": 0.0, "not_picked": outcome.why_not(r)}
+            )
     if isinstance(matches, CastMatches):
         for row in rows:
             row["casting"] = {role: offer.label for role, offer in matches.cast(int(str(row["row"]))).items()}
@@ -168,7 +178,12 @@ def _json_fact(fact: Fact, name: str, compiled: CompiledTable) -> object:
     if isinstance(fact, frozenset):
         return sorted(fact)
     is_plain = isinstance(fact, (bool, str)) or (isinstance(fact, float) and math.isfinite(fact))
-    return fact if is_plain else describe_fact(fact, compiled.conditions[compiled.places[name]])
+    return fact if is_plain else describe_fact(fact, _condition(name, compiled))
+
+
+def _condition(name: str, compiled: CompiledTable) -> Condition:
+    """A condition of the table or of its rules."""
+    return next(c for c in (*compiled.conditions, *compiled.ruled) if c.name == name)
 
 
 def _explained(row: RowExplanation) -> dict[str, object]:
@@ -196,18 +211,23 @@ def _lines(compiled: CompiledTable, explanation: Explanation, explains: bool, mo
 
 
 def _matching(compiled: CompiledTable, explanation: Explanation) -> Iterator[tuple[str, ...]]:
-    """The valid rows; where some match only for a part of a set-valued fact, with a word for how."""
-    always = set(explanation.always_rows())
-    rows = list(explanation.matches)
-    if isinstance(explanation.matches, CastMatches):
-        yield "row", "asset", "cast"
-        yield from ((str(r), compiled.assets[r], _cast(explanation.matches, r)) for r in rows)
-    elif len(always) == len(rows):
-        yield "row", "asset"
-        yield from ((str(r), compiled.assets[r]) for r in rows)
-    else:
-        yield "row", "matches", "asset"
-        yield from ((str(r), "always" if r in always else "may", compiled.assets[r]) for r in rows)
+    """The valid rows; where some only may be valid, with a word for that, and where the policy prefers some, how it does."""
+    matches, undecided = explanation.matches, explanation.undecided
+    outcome = Outcome(compiled, matches)
+    cast = matches if isinstance(matches, CastMatches) else None
+    head = [
+        "row",
+        *(["matches"] if undecided else []),
+        "asset",
+        *(["cast"] if cast else []),
+        *(["pick"] if outcome.prefers_some else []),
+    ]
+    yield tuple(head)
+    for r in matches:
+        line = [str(r + 1), *(["may" if undecided >> r & 1 else "always"] if undecided else []), compiled.assets[r]]
+        line += [_cast(cast, r)] if cast else []
+        line += [outcome.said_of([r])] if outcome.prefers_some else []
+        yield tuple(line)
 
 
 def _cast(matches: CastMatches, row: int) -> str:
@@ -222,9 +242,9 @@ def _nearest_lines(rows: list[RowExplanation], width: int) -> Iterator[str]:
     if max(map(width_of, table)) <= width:
         yield from table
         return
-    digits = max(len(str(row.row)) for row in rows)
+    digits = max(len(str(row.row + 1)) for row in rows)
     for row in rows:
-        yield printable(f"{row.row:>{digits}}  {row.asset}")
+        yield printable(f"{row.row + 1:>{digits}}  {row.asset}")
         for f in row.failures:
             yield printable(f"{' ' * digits}  {f.condition} is {f.fact}")
             where = f" in {f.step}" if f.step else ""
@@ -239,4 +259,4 @@ def _failures(rows: list[RowExplanation], has_steps: bool) -> Iterator[tuple[str
         if not row.is_enabled:
             failures.append(("(the row is disabled)", "", "", "", ""))
         for i, failure in enumerate(failures):
-            yield (*((str(row.row), row.asset) if i == 0 else ("", "")), *failure[: 5 if has_steps else 4])
+            yield (*((str(row.row + 1), row.asset) if i == 0 else ("", "")), *failure[: 5 if has_steps else 4])

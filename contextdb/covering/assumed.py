@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from contextdb.arguments import require_kind, require_many
 from contextdb.compiled import CompiledTable
 from contextdb.conditions import Condition
 from contextdb.covering.draw import Drawer
@@ -45,12 +46,14 @@ def opened(
     progress: Progress = SILENT,
 ) -> Opened:
     """A table with its space; see `contextdb.covering.coverage` for the arguments and what is raised."""
+    require_kind(table, (Table, CompiledTable), "table", "a Table, or a CompiledTable")
     if isinstance(table, CompiledTable):
         table.refuse_rules("what they leave is worked out from the table itself")
         return Opened(table, None, Space.of(table, impossible, weights, progress), None)
     ruled = without_rules(table.flat())
     table = ruled.table
     compiled = table.compile()
+    impossible = list(require_many(impossible, "impossible", "a list of mappings of conditions to cells"))
     if not assume and not ruled.rules:
         return Opened(compiled, table, Space.of(compiled, impossible, weights, progress), None, ruled=ruled)
     assumed = assumptions_of(table if assume else replace(table, settings=replace(table.settings, assume=())))

@@ -7,11 +7,12 @@ now. Where that cannot be told (the search is too long, a condition is gone) gap
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from contextdb.cells import Cell, parse_cell
@@ -57,6 +58,7 @@ class Earlier:
     is_complete: bool
     dead: Counter[tuple[str, str]]
     """Rule and asset of each dead row."""
+    n_rows: int = 0
 
 
 @dataclass(frozen=True)
@@ -99,11 +101,29 @@ def read_baseline(text: str, file: str) -> dict[str, Earlier]:
         document = json.loads(text)
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise ValueError('it has no "format": 1')
+        if document.get("digest", expected := digest_of(document)) != expected:
+            raise ValueError("it was altered after it was written: its contents do not give its digest")
         return {_text(entry["table"]): _earlier(entry) for entry in document["tables"]}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else str(error) or "lists stand in lists too deep"
         fault = Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))
         raise ContextError(fault) from None
+
+
+def digest_of(document: Mapping[str, Any]) -> str:
+    """BLAKE2b-128 of all that a report says but its digest, whatever the order of its keys and the form of its numbers."""
+    about = {name: value for name, value in document.items() if name != "digest"}
+    text = json.dumps(_plain(about), sort_keys=True, separators=(",", ":"))
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """A value of JSON in which 1 and 1.0 are the same."""
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) and abs(value) <= 1 << 53 else value
 
 
 def _earlier(entry: Mapping[str, Any]) -> Earlier:
@@ -113,7 +133,10 @@ def _earlier(entry: Mapping[str, Any]) -> Earlier:
     ]
     found = entry.get("findings", [])
     dead = Counter((_text(f["rule"]), str(f.get("asset"))) for f in found if f["rule"] in DEAD_RULES)
-    return Earlier(_share(entry["covered"]["lower"]), tuple(items), gaps["complete"] is True, dead)
+    n_rows = entry.get("rows", 0)
+    if isinstance(n_rows, bool) or not isinstance(n_rows, int):
+        raise TypeError(f"{n_rows!r:.60} is no number of rows")
+    return Earlier(_share(entry["covered"]["lower"]), tuple(items), gaps["complete"] is True, dead, n_rows)
 
 
 def _text(value: object) -> str:
@@ -131,11 +154,12 @@ def _share(value: object) -> float:
 def compared(ready: Opened, report: CoverageReport, earlier: Earlier) -> Change:
     """What became of a table; `report` is that of the table that `ready` holds."""
     now, before = [gap.cells for gap in report.gaps], [gap.cells for gap in earlier.gaps]
-    excluded = [ready.space.cells(box) for box in ready.space.impossible]
+    exact = replace(ready.space, is_strict=True)
+    excluded = [exact.cells(box) for box in ready.space.impossible]
     space, boxes = _boxes(ready, [*excluded, *now, *before])
     impossible = [box for box in boxes[: len(excluded)] if box is not None]
     now_boxes, before_boxes = boxes[len(excluded) :][: len(now)], boxes[len(excluded) + len(now) :]
-    held_before = BoxSet.of(space.full, [*impossible, *(box for box in before_boxes if box is not None)])
+    held_before = BoxSet.of(space.full, [*impossible, *(box for box in before_boxes if box is not None), *space.boxes])
     rows = BoxSet.of(space.full, [*impossible, *space.boxes])
     ids_now, ids_before = {gap.id for gap in report.gaps}, {gap.id for gap in earlier.gaps}
     opened = (g for g, box in zip(report.gaps, now_boxes, strict=True) if g.id not in ids_before and not _is_in(box, held_before))

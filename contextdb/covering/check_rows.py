@@ -19,11 +19,12 @@ from contextdb.check import capped
 from contextdb.covering.assumed import opened
 from contextdb.covering.engine import finding_steps
 from contextdb.covering.judge import Judge
+from contextdb.covering.progress import Progress, Tell
 from contextdb.errors import ContextDBError, plural
 from contextdb.expressions import ExpressionError, assumptions_of, names_in
 from contextdb.findings import Finding
 from contextdb.nesting.flat import FlatTable
-from contextdb.nesting_findings import own_findings
+from contextdb.nesting_findings import outer_findings, own_findings
 from contextdb.schema import Schema
 from contextdb.table import Table
 from contextdb.toml_lines import Path
@@ -32,7 +33,7 @@ WORK = 4_000_000
 """A tenth of what coverage may spend."""
 
 
-def check_rows(table: Table, work: int = WORK) -> list[Finding]:
+def check_rows(table: Table, work: int = WORK, progress: Tell | None = None) -> list[Finding]:
     """What is wrong with the rows of a table that can be read, those of the whole table first; nothing where cells cannot be read.
 
     The same table and work give the same findings. Rows that could not be decided within the work have none, and one
@@ -46,23 +47,27 @@ def check_rows(table: Table, work: int = WORK) -> list[Finding]:
         return [_of_schema(table, "bad-assumption", fault.message) for fault in error.faults]
     if contradictions:
         return [_of_schema(table, "no-context", f"no context is possible: {fault.message}") for fault in contradictions]
-    found = capped([*_always_any(table), *_judged(table, work)])
+    found = capped([*_always_any(table), *_judged(table, work, Progress(progress))])
     return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
 
 
-def _judged(table: Table, work: int) -> list[Finding]:
+def _judged(table: Table, work: int, progress: Progress) -> list[Finding]:
     if table.n_rows == 0:
         return []
     try:
         ready = opened(table)
     except ContextDBError:  # such as a domain without a value: said of the cells already
         return []
-    judge = Judge(ready.space, ready.compiled, ready.table, finding_steps(work, len(ready.space.boxes)), drawer=ready.drawer)
+    judging = progress.within("Comparing rows", 0.0, 1.0)
+    steps = finding_steps(work, len(ready.space.boxes))
+    judge = Judge(ready.space, ready.compiled, ready.table, steps, judging, ready.drawer)
     found = [finding for finding in judge.findings() if finding.rule != "identical-rows"]
     undecided = judge.unsure - {finding.row for finding in found}
     found = [*found, *([_undecided(table, len(undecided), ready.compiled.n_rows)] if undecided else [])]
     found = found if ready.ruled is None else list(ready.ruled.findings(found))
-    return list(own_findings(ready.table, found)) if isinstance(ready.table, FlatTable) else found
+    if isinstance(ready.table, FlatTable):
+        return list(own_findings(ready.table, judge.gathered(list(outer_findings(ready.table, found)))))
+    return judge.gathered(found)
 
 
 def _undecided(table: Table, n_undecided: int, n_rows: int) -> Finding:

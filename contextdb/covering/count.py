@@ -6,8 +6,10 @@ that no context of any measure is left. The budget counts steps, never time: the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Thread
 from typing import Any
 
@@ -31,6 +33,10 @@ EXACT_FIRST = 6
 """So many eighths of the work go to the exact share; when they do not do, the rest goes to better bounds."""
 LOG2_KNOWN = 20
 """How many parts are remembered, as a power of two; 32 bytes each."""
+MOST_DEPTH = 1000
+"""The loop calls itself so deep at most."""
+MANY_FACTORS = 100
+"""Above so many factors boxes that share none are counted apart from the start."""
 POLL_S = 0.02
 """How often a long count is looked at."""
 
@@ -65,7 +71,49 @@ def uncovered_share(
     if full in boxes:
         return Bounds(0.0, 0.0)
     sides = [tuple(box[f] for f in used) for box in boxes]
-    return _count(sides, tuple(full[f] for f in used), [weights[f] for f in used], work, progress)
+    own_full, own_weights = tuple(full[f] for f in used), [weights[f] for f in used]
+    if len(used) <= MANY_FACTORS:
+        return _count(sides, own_full, own_weights, work, progress)
+    return _product(sides, own_full, own_weights, work, progress)
+
+
+def _product(boxes: list[Box], full: Box, weights: list[NDArray[np.float64]], work: int, progress: Progress) -> Bounds:
+    """The count of each group of boxes that share no factor with the others; their shares multiply."""
+    lower = upper = 1.0
+    done = 0
+    for factors, own in _independent(boxes, full):
+        progress.check()
+        sides, own_weights = [tuple(box[f] for f in factors) for box in own], [weights[f] for f in factors]
+        if len(own) == 1:
+            share = 1.0 - math.prod(_share(side, parts) for side, parts in zip(sides[0], own_weights, strict=True))
+            found = Bounds(share, share, 1)
+        else:
+            found = _count(sides, tuple(full[f] for f in factors), own_weights, max(0, work - done), progress)
+        lower, upper, done = lower * found.lower, upper * found.upper, done + found.work
+    return Bounds(lower, upper, done)
+
+
+def _independent(boxes: list[Box], full: Box) -> list[tuple[list[int], list[Box]]]:
+    """The boxes in groups that share no factor, each with its factors."""
+    group = list(range(len(full)))
+
+    def head(f: int) -> int:
+        while group[f] != f:
+            group[f] = group[group[f]]
+            f = group[f]
+        return f
+
+    limited = [[f for f, side in enumerate(box) if side != full[f]] for box in boxes]
+    for own in limited:
+        for f in own[1:]:
+            group[head(f)] = head(own[0])
+    factors: dict[int, list[int]] = {}
+    for f in range(len(full)):
+        factors.setdefault(head(f), []).append(f)
+    members: dict[int, list[Box]] = {}
+    for box, own in zip(boxes, limited, strict=True):
+        members.setdefault(head(own[0]), []).append(box)
+    return [(factors[one], found) for one, found in members.items()]
 
 
 def _within(weights: NDArray[np.float64], side: int | None) -> NDArray[np.float64]:
@@ -113,6 +161,28 @@ def _tiny(
     least = float(np.prod([own[k] for own, k in zip(weights, point, strict=True)]))
     share = max(least, (low + high) / 2.0)
     return Bounds(share, share, done)
+
+
+def is_prepared() -> bool:
+    """Whether the loop was compiled on this machine already, or runs as it stands."""
+    from contextdb.covering.kernels import IS_COMPILED
+
+    if not IS_COMPILED:
+        return True
+    from contextdb.covering.count_kernels import uncovered
+
+    folder = Path(uncovered.stats.cache_path or "")
+    return bool(uncovered.signatures) or any(folder.glob("count_kernels.uncovered-*.nbi"))
+
+
+def prepare(progress: Progress) -> None:
+    """Compile the loop, if it is not compiled yet, by a count of two small boxes."""
+    progress.check()
+    _count([(1, 3), (3, 1)], (3, 3), [np.full(2, 0.5), np.full(2, 0.5)], 100, SILENT)
+
+
+def _share(side: int, weights: NDArray[np.float64]) -> float:
+    return float(sum(w for k, w in enumerate(weights.tolist()) if side >> k & 1))
 
 
 def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int]) -> tuple[NDArray[Any], ...]:
@@ -166,7 +236,7 @@ def _run(
 def scratch_of(part: tuple[NDArray[Any], ...], n_classes: int) -> tuple[NDArray[Any], ...]:
     """Room for the loop, every box of the part open at depth 0; as deep as factors and boxes one after the other may lead."""
     (n_factors, n_words), n_boxes = part[1].shape, len(part[9])
-    depth = 6 * n_factors + 160
+    depth = min(6 * n_factors + 160, MOST_DEPTH)
     opened, kept = np.zeros((depth, n_words), np.uint64), np.zeros((depth, n_words), np.uint64)
     listed = np.zeros((depth, n_factors), np.int64)
     listed[0] = np.arange(n_factors)

@@ -33,6 +33,9 @@ SMALL_SUM = 0.9
 """Boxes whose measures sum to no more are small: then no rounding can make the share that is left 0."""
 DENSE = 16
 """A part is made anew when it has so many boxes a word, or fewer."""
+ROOM, LEAST_DEPTH = 4, 160
+"""A part that lies less than `ROOM` above the deepest level is cut short. Boxes are taken one after the other down to
+`LEAST_DEPTH` at least, and where factors are few further down."""
 SAME = 1e-11
 """Bounds that differ by less come from rounding."""
 EPSILON = 2.3e-16
@@ -63,7 +66,7 @@ def uncovered(part, depth, n_listed, weights, salts, table, scratch, known, stat
         low, high = max(low, known[1][at, 0]), min(high, known[1][at, 1])
         if high - low <= SAME:
             return min(low, high), high
-    if state[WORK] >= state[LIMIT] or state[STOP]:
+    if state[WORK] >= state[LIMIT] or state[STOP] or depth >= opened.shape[0] - ROOM:
         state[CUT] += 1
         return low, high
     if split(part, depth, n, scratch):
@@ -77,7 +80,7 @@ def uncovered(part, depth, n_listed, weights, salts, table, scratch, known, stat
         return first_low * a, first_high * b
     state[WORK] += PER_NODE + (m >> 1)
     found_low, found_high = 0.0, 0.0
-    if m >= (FEW if total <= SMALL_SUM else MANY) and depth < opened.shape[0] - 4 * listed.shape[1]:
+    if m >= (FEW if total <= SMALL_SUM else MANY) and depth < max(LEAST_DEPTH, opened.shape[0] - 4 * listed.shape[1]):
         order, own = _largest_first(open_boxes, n_words, m, volumes)
         before, boxes, factors = np.zeros(n_words, np.uint64), np.empty(m, np.int64), part[0][listed[depth + 1, :n]]
         for t in range(m):

@@ -48,32 +48,30 @@ def _climbed(space: Space, rows: BoxSet, impossible: BoxSet, start: Point) -> in
     n_valid = _holding(rows, point).bit_count()
     for _ in range(SWEEPS):
         before = n_valid
-        for f in range(len(point)):
-            point[f], n_valid = _best_class(space, rows, impossible, point, f, n_valid)
+        n_valid = _swept(space, rows, impossible, point, n_valid)
         if n_valid == before:
             break
     return _holding(rows, point)
 
 
-def _best_class(space: Space, rows: BoxSet, impossible: BoxSet, point: list[int], f: int, n_valid: int) -> tuple[int, int]:
-    """The class of one factor with most rows, and how many; the present one unless another has more."""
-    if not rows.restricts[f]:
-        return point[f], n_valid
-    others, ruled_out = _holding(rows, point, f), _holding(impossible, point, f)
-    best = point[f]
-    for k, weight in enumerate(space.factors[f].weights.tolist()):
-        n = (others & rows.accepts[f][k]).bit_count()
-        if n > n_valid and weight > 0.0 and not ruled_out & impossible.accepts[f][k]:
-            best, n_valid = k, n
-    return best, n_valid
+def _swept(space: Space, rows: BoxSet, impossible: BoxSet, point: list[int], n_valid: int) -> int:
+    """Move each factor once, to the class with most rows, the present one unless another has more; how many rows there are then."""
+    behind, ruled_behind = rows.behind(point), impossible.behind(point)
+    before, ruled_before = rows.all, impossible.all
+    for f in range(len(point)):
+        if rows.restricts[f]:
+            others, ruled_out = before & behind[f + 1], ruled_before & ruled_behind[f + 1]
+            for k, weight in enumerate(space.factors[f].weights.tolist()):
+                n = (others & rows.accepts[f][k]).bit_count()
+                if n > n_valid and weight > 0.0 and not ruled_out & impossible.accepts[f][k]:
+                    point[f], n_valid = k, n
+        before &= rows.accepts[f][point[f]]
+        ruled_before &= impossible.accepts[f][point[f]]
+    return n_valid
 
 
-def _holding(boxes: BoxSet, point: list[int], without: int = -1) -> int:
-    found = boxes.all
-    for f, k in enumerate(point):
-        if f != without:
-            found &= boxes.accepts[f][k]
-    return found
+def _holding(boxes: BoxSet, point: list[int]) -> int:
+    return boxes.behind(point)[0]
 
 
 def _shared(space: Space, bits: int) -> Box:

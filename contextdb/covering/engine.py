@@ -14,11 +14,11 @@ import numpy as np
 
 from contextdb.compiled import CompiledTable
 from contextdb.covering.assumed import Opened, opened
-from contextdb.covering.count import Bounds, uncovered_share
+from contextdb.covering.count import Bounds, is_prepared, prepare, uncovered_share
 from contextdb.covering.crowded import find_crowds
 from contextdb.covering.gaps import SHARE_WORK, Measure, described, find_gaps, share_of
 from contextdb.covering.judge import Judge
-from contextdb.covering.progress import Progress, Stops, Tell
+from contextdb.covering.progress import PREPARING, Progress, Stops, Tell
 from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
 from contextdb.covering.sample import LITTLE, Counts, Sampler
 from contextdb.covering.sampled_shares import SampledShares
@@ -108,6 +108,8 @@ def coverage(
 
 def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, watcher: Progress) -> CoverageReport:
     space, compiled, drawer = opened.space, opened.compiled, opened.drawer
+    if space.boxes and not is_prepared():
+        prepare(watcher.within(PREPARING, COUNT_AT, COUNT_AT))
     possible = uncovered_share(space, space.impossible, work, None, watcher.within("Counting contexts", COUNT_AT, COUNT_AT))
     counting = watcher.within("Counting contexts", COUNT_AT, SAMPLES_AT)
     left = uncovered_share(space, space.boxes + space.impossible, work, None, counting)
@@ -145,7 +147,8 @@ def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, w
         method=covered.method,
         gaps=tuple(gaps),
         gaps_complete=found.is_complete and n_open <= max_gaps and len(gaps) == n_open,
-        findings=tuple(findings),
+        findings=tuple(judge.gathered(findings)),
+        needless=tuple(judge.needless(findings)),
         findings_complete=judge.is_complete,
         overlap=_overlap(counts, hits, whole is not None),
         certain=(certain.lower, certain.upper) if middle else (covered.lower, covered.upper),
@@ -224,7 +227,7 @@ def _crowded(space: Space, counts: Counts, measure: Measure, progress: Progress)
     crowds = []
     for found in find_crowds(space, counts.fullest, progress=progress):
         rows = tuple(row for i, row in enumerate(space.rows) if found.held_by >> i & 1)
-        crowds.append(Crowd(rows, measure(found.box, ())[0], space.cells(found.box)))
+        crowds.append(Crowd(rows, measure(found.box, ())[0], space.cells(found.box, is_label=True)))
     return tuple(crowd for crowd in crowds if crowd.share > 0.0 or not isinstance(measure, SampledShares))
 
 

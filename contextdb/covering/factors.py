@@ -15,17 +15,17 @@ chances, each by itself.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from operator import and_
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import intervals
-from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, format_cell, format_number
+from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, format_cell, format_number, tags_above
 from contextdb.classes import Value
 from contextdb.domains import Domain
 from contextdb.errors import Fault, TableError, plural
@@ -86,14 +86,22 @@ class NumberFactor:
         weights = np.array(lengths) / total if total > 0.0 else np.full(len(spans), 1.0 / len(spans))
         return cls(tuple(spans), domain.kind, weights, assumed)
 
+    @property
+    def cuts(self) -> list[float]:
+        """The first number of each class."""
+        return self._ends[0]
+
+    @cached_property
+    def _ends(self) -> tuple[list[float], list[float]]:
+        return [low for low, _ in self.spans], [high for _, high in self.spans]
+
     def classes(self, accepts: Accepted) -> int:
-        """The classes that a set holds; it must have been cut at."""
+        """The classes that a set holds whole."""
         assert isinstance(accepts, NumberSet)
-        lows, held = [low for low, _ in self.spans], 0
+        lows, highs = self._ends
+        held = 0
         for low, high in accepts.spans:
-            first, stop = bisect_left(lows, low), bisect_left(lows, math.inf if high == math.inf else intervals.above(high))
-            if high == math.inf:
-                stop = len(lows)
+            first, stop = bisect_left(lows, low), bisect_right(highs, high)
             held |= (1 << max(first, stop)) - (1 << first)
         return held
 
@@ -116,8 +124,9 @@ class TagFactor:
     def of(cls, tags: Sequence[str], declared: Iterable[str]) -> TagFactor:
         """Every answer that a set of declared tags can give, with its chance."""
         chances: dict[int, float] = {0: 1.0}
+        at = {tag: i for i, tag in enumerate(tags)}
         for tag in declared:
-            effect = sum(1 << i for i, named in enumerate(tags) if covers(named, frozenset((tag,))))
+            effect = sum(1 << at[above] for above in tags_above(tag) if above in at)
             if not effect:
                 continue
             after: dict[int, float] = {}
@@ -188,28 +197,26 @@ def tag_factors(accepted: Sequence[Accepted], domain: Domain) -> list[TagFactor]
     tags = sorted({t for s in sets for t in s.needs | s.bans})
     group = {t: t for t in tags}
 
-    def join(one: str, other: str) -> None:
-        old, new = group[one], group[other]
-        for tag in tags:
-            group[tag] = new if group[tag] == old else group[tag]
+    def head(tag: str) -> str:
+        while group[tag] != tag:
+            group[tag] = group[group[tag]]
+            tag = group[tag]
+        return tag
 
-    for above in tags:
-        for tag in tags:
-            if tag.startswith(above + "."):
-                join(tag, above)
-    if domain.values is not None:
-        for tag in domain.values:
-            over = [t for t in tags if covers(t, frozenset((tag,)))]
-            for one in over[1:]:
-                join(one, over[0])
-    for s in sets:
-        if s.is_complement:
-            members = sorted(s.needs | s.bans)
-            for one in members[1:]:
-                join(one, members[0])
     declared = domain.values if domain.values is not None else tags
-    heads = dict.fromkeys(group[t] for t in tags)
-    return [TagFactor.of([t for t in tags if group[t] == head], declared) for head in heads]
+    over = {tag: [t for t in tags_above(tag) if t in group] for tag in dict.fromkeys((*tags, *declared))}
+    negated = (sorted(s.needs | s.bans) for s in sets if s.is_complement)
+    for members in (*over.values(), *negated):
+        for one in members[1:]:
+            group[head(one)] = head(members[0])
+    members_of: dict[str, list[str]] = {}
+    for tag in tags:
+        members_of.setdefault(head(tag), []).append(tag)
+    declared_of: dict[str, list[str]] = {}
+    for tag in declared:
+        if over[tag]:
+            declared_of.setdefault(head(over[tag][0]), []).append(tag)
+    return [TagFactor.of(members, declared_of.get(one, ())) for one, members in members_of.items()]
 
 
 def weighted(factor: Factor, parts: Mapping[int, float]) -> Factor:

@@ -68,16 +68,14 @@ def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progr
 def widened(space: Space, rows: BoxSet, point: Point, order: Sequence[int]) -> Box:
     """The widest box round a context that meets no row, one factor after the other in the given order."""
     box = [1 << k for k in point]
-    meets = [rows.accepts[f][k] for f, k in enumerate(point)]
-    for f in order:
-        others = rows.all
-        for g, bits in enumerate(meets):
-            if g != f:
-                others &= bits
+    behind = rows.behind(point, order)
+    before = rows.all
+    for at, f in enumerate(order):
+        others = before & behind[at + 1]
         allowed = sum(1 << k for k, bits in enumerate(rows.accepts[f]) if not bits & others)
         factor = space.factors[f]
         box[f] = factor.widest(point[f], allowed) if isinstance(factor, TagFactor) else allowed
-        meets[f] = rows.meeting(f, box[f])
+        before &= rows.meeting(f, box[f])
     return tuple(box)
 
 
@@ -157,7 +155,7 @@ def _joined(cell: Cell, space: Space, at: int, gap: Box) -> str:
     if more is None or old is None:
         return "Any"
     if isinstance(old, NumberSet) and isinstance(more, NumberSet):
-        return format_cell(Cell(NumberSet(union([*old.spans, *more.spans]), old.is_circular)), domain)
+        return space.written(at, NumberSet(union([*old.spans, *more.spans]), old.is_circular))
     if isinstance(old, ValueSet) and isinstance(more, ValueSet):
         return _values_joined(old, more, space, at, gap)
     if isinstance(old, TagSet) and isinstance(more, TagSet) and not old.is_complement:

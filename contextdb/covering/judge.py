@@ -9,33 +9,40 @@
     no-context       no context at all is possible
 
 Single points count: a row that alone holds the number 5 is not redundant. A row has one of equal, subsumed, redundant and dead.
+What of these is variety, under the table's policy, is information: see `contextdb.variety`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.check import check, where
+from contextdb.check import identical_rows, named
 from contextdb.compiled import CompiledTable
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.questions import MANY, Questions
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
-from contextdb.errors import in_quotes, plural
+from contextdb.errors import in_quotes, plural, row_name
 from contextdb.findings import Finding, Level
 from contextdb.table import Table
+from contextdb.variety import gathered, lets_choose, needless, softened
 
 MOST_CAUSES = 24
 """Up to so many rows the causes of a redundant row are thinned out to those that are needed."""
+MOST_SIBLINGS = 50
+"""So many other rows of a row's asset are compared with it one by one."""
 QUESTIONS = 40
 """One question may use this part of the steps."""
+QUICK, QUICK_BOXES = 50, 5000
+"""Up to so many boxes a question is searched for so many steps first, which most need no more than; they count for nothing."""
 STEP, STEP_A_BOX = 100, 0.0625
 """A step of the search takes as long as so many of the compiled loops, and more for each box."""
 
@@ -67,7 +74,18 @@ class Judge:
                 self._whole("no-context", "error", "no context is possible under the assumptions; do they contradict each other?")
             ]
         found = [*self._identical, *self._rows(), *self._policy()]
+        found = softened(found, self.compiled.assets) if lets_choose(self.compiled.policies) else found
         return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+
+    def gathered(self, findings: Sequence[Finding]) -> list[Finding]:
+        """The findings, those of variety in one for each group of rows where the policy wants it."""
+        if not lets_choose(self.compiled.policies):
+            return list(findings)
+        return gathered(findings, self.compiled.assets, partial(self._finding, "variety", "info", ""), self._row_named)
+
+    def needless(self, findings: Sequence[Finding]) -> list[Finding]:
+        """The findings that `gathered` puts into groups."""
+        return needless(findings, self.compiled.assets) if lets_choose(self.compiled.policies) else []
 
     @cached_property
     def boxes(self) -> BoxSet:
@@ -80,7 +98,7 @@ class Judge:
 
     @cached_property
     def _identical(self) -> list[Finding]:
-        return [] if self.table is None else [f for f in check(self.table) if f.rule == "identical-rows"]
+        return [] if self.table is None else list(identical_rows(self.table))
 
     @cached_property
     def _equal(self) -> dict[Box, int]:
@@ -92,6 +110,7 @@ class Judge:
 
     def _rows(self) -> Iterator[Finding]:
         told = {f.row for f in self._identical}
+        assets = self._of_asset
         for i, box in enumerate(self.space.boxes):
             self.progress.at(i / len(self.space.boxes))
             self._asked_of = i
@@ -99,9 +118,9 @@ class Judge:
             if self.space.impossible and not self._is_possible(box):
                 yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions rule out.")
                 continue
-            first = (equal & -equal).bit_length() - 1
-            if first != i:
+            if equal & ((1 << i) - 1):
                 if self.space.rows[i] not in told:
+                    first = _lowest(equal & assets[self._asset(i)] & ((1 << i) - 1) or equal)
                     yield self._at(
                         i, "equal-row", "warning", f"is valid in just the contexts of {self._named(first, i)}.", 1 << first
                     )
@@ -109,7 +128,8 @@ class Judge:
             yield from self._contained(i, box, equal)
 
     def _contained(self, i: int, box: Box, equal: int) -> Iterator[Finding]:
-        other = self._first_holder(i, box, equal)
+        other = self._own_holder(i, box, equal)
+        other = self._first_holder(i, box, equal) if other is None else other
         if other is not None:
             yield self._at(i, "subsumed-row", "warning", f"wherever it is valid, {self._named(other, i)} is valid too.", 1 << other)
             return
@@ -121,8 +141,7 @@ class Judge:
             yield self._at(i, "redundant-row", "info", f"wherever it is valid, {by} is valid too.", causes)
 
     def _policy(self) -> Iterator[Finding]:
-        ways = self.compiled.ways
-        policies = {self.compiled.policy} if ways is None else {table.policy for table in ways.tables}
+        ways, policies = self.compiled.ways, self.compiled.policies
         if "unique" in policies:
             yield from self._overlapping()
         if not policies.isdisjoint(("first", "priority")):
@@ -171,7 +190,10 @@ class Judge:
                     others |= 1 << j
                     joint = joint or (j, shared)
             if joint:
-                cells = ", ".join(f"{name}: {cell}" for name, cell in self.space.cells(joint[1]).items()) or "every context"
+                cells = (
+                    ", ".join(f"{name}: {cell}" for name, cell in self.space.cells(joint[1], is_label=True).items())
+                    or "every context"
+                )
                 message = f'the policy is "unique", and {self._named(joint[0], i)} can be valid at the same time: {cells}.'
                 yield self._at(i, "policy-overlap", "error", message, others)
 
@@ -210,6 +232,11 @@ class Judge:
 
     def _asked(self, questions: Questions, box: Box, by: int, allowed: int) -> bool:
         self.progress.check()
+        if len(questions.boxes) <= QUICK_BOXES:
+            try:
+                return self.boxes.outside(by, box, Steps(QUICK, self.progress)) is None
+            except OutOfSteps:
+                pass
         step = STEP + int(STEP_A_BOX * len(questions.boxes))
         is_held, is_certain, done = questions.are_held(box, by, allowed * step) if by and allowed else (False, not by, 0)
         if not is_certain:
@@ -235,6 +262,22 @@ class Judge:
                 found &= self._met[f, side]
         return found
 
+    def _own_holder(self, i: int, box: Box, equal: int) -> int | None:
+        """The first row of the same asset that is valid wherever row i is, and elsewhere too; of very many the first few count."""
+        others = _bits(self._of_asset[self._asset(i)] & ~equal)
+        return next((j for j in islice(others, MOST_SIBLINGS) if _holds(self.space.boxes[j], box)), None)
+
+    @cached_property
+    def _of_asset(self) -> dict[str, int]:
+        """For each asset its rows, as bits."""
+        rows: dict[str, int] = {}
+        for i in range(len(self.space.boxes)):
+            rows[self._asset(i)] = rows.get(self._asset(i), 0) | 1 << i
+        return rows
+
+    def _asset(self, i: int) -> str:
+        return self.compiled.assets[self.space.rows[i]]
+
     def _first_holder(self, i: int, box: Box, equal: int) -> int | None:
         """The first row that is valid wherever row i is, and elsewhere too."""
         if self._questions is not None:
@@ -255,22 +298,35 @@ class Judge:
         return self._questions.holders(len(self.space.boxes))
 
     def _named(self, i: int, of: int) -> str:
-        row = self.space.rows[i]
-        told = f"row {row}" if self.table is None else where(self.table, row, self.space.rows[of])
-        return f"{told} ({in_quotes(self.compiled.assets[row])})"
+        return self._row_named(self.space.rows[i], self.space.rows[of])
+
+    def _row_named(self, row: int, of: int) -> str:
+        """A row in a sentence about another."""
+        if self.table is None:
+            return f"{row_name(row)} ({in_quotes(self.compiled.assets[row])})"
+        return named(self.table, row, of)
 
     def _at(self, i: int, rule: str, level: Level, message: str, by: int = 0) -> Finding:
-        row = self.space.rows[i]
-        causes = tuple(self.space.rows[j] for j in _bits(by))
+        return self._finding(rule, level, message, self.space.rows[i], tuple(self.space.rows[j] for j in _bits(by)))
+
+    def _finding(self, rule: str, level: Level, message: str, row: int, by: tuple[int, ...] = ()) -> Finding:
         asset = self.compiled.assets[row]
         if self.table is None:
-            return Finding(rule, level, message, self.compiled.name, row=row, asset=asset, by=causes)
+            return Finding(rule, level, message, self.compiled.name, row=row, asset=asset, by=by)
         place = self.table.place(row)
-        return Finding(rule, level, message, self.table.name, place.file, row, asset, place.line, None, causes)
+        return Finding(rule, level, message, self.table.name, place.file, row, asset, place.line, None, by)
 
     def _whole(self, rule: str, level: Level, message: str) -> Finding:
         file = str(self.table.path) if self.table is not None and self.table.path else None
         return Finding(rule, level, message, self.compiled.name, file)
+
+
+def _holds(outer: Box, inner: Box) -> bool:
+    return all(side & ~around == 0 for around, side in zip(outer, inner, strict=True))
+
+
+def _lowest(bits: int) -> int:
+    return (bits & -bits).bit_length() - 1
 
 
 def _bits(bits: int) -> Iterator[int]:

@@ -52,6 +52,17 @@ def lowest_bit(x):
     return n_bits((x & (~x + ONE)) - ONE)
 
 
+if not IS_COMPILED:  # Python counts bits of its own numbers faster
+
+    def n_bits(x: Any) -> int:
+        """How many bits of a word are set."""
+        return int(x).bit_count()
+
+    def lowest_bit(x: Any) -> int:
+        """The number of the lowest bit of a word that is set."""
+        return (int(x) & -int(x)).bit_length() - 1
+
+
 @njit(**options)
 def count_rows(codes, starts, masks, counts, hits):
     """How many boxes hold each context: codes int32 [N, F] are classes, mask starts[f] + class holds the boxes that accept it."""

@@ -28,6 +28,8 @@ from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
 from contextdb.table import Table
 
 SAMPLES = 50_000
+DIGITS = 12
+"""Shares that are equal to so many decimals are sorted as equal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,12 @@ class Slice:
     def is_exact(self) -> bool:
         """Whether `covered` is no estimate."""
         return self.covered is not None and self.lower == self.upper
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What slices are sorted by: the least covered first, then the largest. Roundings, which no two processors share, do not
+        count."""
+        return round(self.covered or 0.0, DIGITS), -round(self.share, DIGITS)
 
     def to_json(self) -> dict[str, object]:
         """As plain data."""
@@ -112,7 +120,7 @@ class PairTable:
     def worst(self, one: int, other: int) -> Slice | None:
         """The slice of two conditions that is covered least, the largest of equals; None where none has a measure."""
         measured = [s for s in self.slices(one, other) if s.covered is not None]
-        return min(measured, key=lambda s: (s.covered, -s.share)) if measured else None
+        return min(measured, key=lambda s: s.rank) if measured else None
 
     def explicit(self, one: int, other: int) -> float:
         """The share of the slices of two conditions that some row names."""
@@ -183,6 +191,8 @@ def pairs(
         is_possible = sampler.is_possible(codes)
         counts, _ = lookup(codes[is_possible], sampler.masks, len(space.boxes), True)
         tally.add(codes[is_possible], None if weights_of is None else weights_of[is_possible], counts)
+    meets = _meeting(sampler, sides, watcher)
+    of_part = [at for at, own in zip(shown, parts, strict=True) for _ in own]
     return PairTable(
         table=found.compiled.name,
         method="exact" if is_exact else "estimate",
@@ -193,9 +203,13 @@ def pairs(
         shares=tally.inside / tally.total if tally.total else tally.inside,
         covered=tally.valid / tally.total if tally.total else tally.valid,
         counts=np.zeros_like(tally.inside, np.int64) if is_exact else np.rint(tally.inside).astype(np.int64),
-        meeting=_rows_in_both(space, sides, None, watcher),
-        naming=_rows_in_both(space, sides, [at for at, own in zip(shown, parts, strict=True) for _ in own], watcher),
+        meeting=_rows_in_both(meets),
+        naming=_rows_in_both(meets & _restricted(sampler, of_part)),
     )
+
+
+MOST_AT_ONCE = 1 << 16
+"""So many rows are compared at once."""
 
 
 class _Tally:
@@ -208,29 +222,60 @@ class _Tally:
 
     def add(self, codes: Codes, weights: NDArray[np.float64] | None, counts: NDArray[np.int64]) -> None:
         """More contexts: the classes of each, its weight, and how many rows are valid in it."""
-        weights = np.ones(len(codes)) if weights is None else weights
-        flags = np.ones((len(codes), len(self._members)))
+        columns = np.ascontiguousarray(codes.T)
+        flags = np.ones((len(self._members), len(codes)), np.bool_)
         for p, part in enumerate(self._members):
             for f, members in part:
-                flags[:, p] *= members[codes[:, f]]
-        self.total += float(weights.sum())
+                flags[p] &= members[columns[f]]
         self.n_contexts += len(codes)
-        weighted = flags * weights[:, None]
-        self.inside += weighted.T @ flags
         has_row = counts > 0
-        self.valid += weighted[has_row].T @ flags[has_row]
+        for steps in [None] if weights is None else _in_steps(weights):
+            self.total += float(len(codes) if steps is None else steps.sum())
+            self.inside += _weight_in_both(flags, steps)
+            self.valid += _weight_in_both(flags[:, has_row], None if steps is None else steps[has_row])
 
 
-def _rows_in_both(
-    space: Space, sides: Sequence[Sides], of_condition: Sequence[int] | None, progress: Progress
-) -> NDArray[np.int64]:
-    """How many rows accept some of both parts; given the condition of each part, only rows that restrict both conditions."""
-    flags = np.ones((len(space.boxes), len(sides)))
+def _in_steps(weights: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Weights as sums of two, multiples of 2**-26 and of 2**-60: each of them adds up without rounding.
+
+    Processors add the products of a matrix in different orders, so sums that round would differ in their last digits.
+    """
+    coarse = np.rint(weights * 2.0**26) / 2.0**26
+    return [coarse, np.rint((weights - coarse) * 2.0**60) / 2.0**60]
+
+
+def _weight_in_both(flags: NDArray[np.bool_], weights: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """For each two parts the weight of the columns that both hold; how many they are, where no weights are given."""
+    if weights is not None:
+        return np.asarray((flags * weights) @ flags.T.astype(np.float64))
+    assert flags.shape[1] < 1 << 24  # whole numbers below that are exact in 32 bits
+    singles = flags.astype(np.float32)
+    return (singles @ singles.T).astype(np.float64)
+
+
+def _meeting(sampler: Sampler, sides: Sequence[Sides], progress: Progress) -> NDArray[np.bool_]:
+    """Which boxes accept some of each part: bool [parts, boxes]."""
+    found = np.ones((len(sides), len(sampler.space.boxes)), np.bool_)
     for p, part in enumerate(sides):
         progress.check()
-        meets = [all(box[f] & side for f, side in part.items()) for box in space.boxes]
-        flags[:, p] = meets
-        if of_condition is not None:
-            own = space.of_condition[of_condition[p]]
-            flags[:, p] *= [any(box[f] != space.full[f] for f in own) for box in space.boxes]
-    return np.rint(flags.T @ flags).astype(np.int64)
+        for f, side in part.items():
+            of_box, own = sampler.sides[f]
+            found[p] &= np.array([bool(one & side) for one in own], np.bool_)[of_box]
+    return found
+
+
+def _restricted(sampler: Sampler, of_part: Sequence[int]) -> NDArray[np.bool_]:
+    """Which boxes restrict the condition of each part: bool [parts, boxes]."""
+    space, known = sampler.space, dict[int, NDArray[np.bool_]]()
+    for at in dict.fromkeys(of_part):
+        known[at] = np.zeros(len(space.boxes), np.bool_)
+        for f in space.of_condition[at]:
+            of_box, own = sampler.sides[f]
+            known[at] |= np.array([one != space.full[f] for one in own], np.bool_)[of_box]
+    return np.array([known[at] for at in of_part], np.bool_).reshape(len(of_part), len(space.boxes))
+
+
+def _rows_in_both(flags: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """How many columns each two rows of flags have in common."""
+    parts = (flags[:, at : at + MOST_AT_ONCE] for at in range(0, max(1, flags.shape[1]), MOST_AT_ONCE))
+    return np.rint(sum(_weight_in_both(part, None) for part in parts)).astype(np.int64)

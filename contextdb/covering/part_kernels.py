@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contextdb.covering.kernels import ALL, NONE, ONE, mixed, njit, options
+from contextdb.covering.kernels import ALL, IS_COMPILED, NONE, ONE, mixed, njit, options
 
 
 @njit(**options)
@@ -164,3 +164,7 @@ def _add_side(i, side, groups, masses, start, stop, wider, sizes):
             sizes[side] += masses[g]
             for w in range(groups.shape[1]):
                 wider[side, w] &= groups[g, w]
+
+
+if not IS_COMPILED:
+    from contextdb.covering.part_arrays import part_of as part_of

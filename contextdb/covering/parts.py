@@ -6,6 +6,8 @@ by weight; a tag is there or not.
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,7 +30,7 @@ def parts_of(space: Space, at: int) -> list[tuple[str, Sides]]:
     f = numbers[0]
     factor = space.factors[f]
     sides = _value_sides(space, f) if isinstance(factor, ValueFactor) else _span_sides(factor.weights)
-    return [(format_cell(Cell(factor.accepts(side)), space.conditions[at].domain), {f: side}) for side in sides]
+    return [(space.written(at, factor.accepts(side), is_label=True), {f: side}) for side in sides]
 
 
 def _value_sides(space: Space, f: int) -> list[int]:
@@ -37,9 +39,9 @@ def _value_sides(space: Space, f: int) -> list[int]:
     if n <= MOST_PARTS:
         return [1 << k for k in range(n)]
     named = np.zeros(n, np.int64)
-    for box in space.boxes:
-        if box[f] != space.full[f]:
-            named += flags_of(box[f], n)
+    for side, n_boxes in Counter(box[f] for box in space.boxes).items():
+        if side != space.full[f]:
+            named += n_boxes * flags_of(side, n)
     chosen = sorted(np.argsort(-named, kind="stable")[: MOST_PARTS - 1].tolist())
     sides = [1 << k for k in chosen]
     return [*sides, space.full[f] & ~sum(sides)]

@@ -12,6 +12,10 @@ Tell = Callable[[str, float], None]
 Stops = Callable[[], bool]
 
 
+PREPARING = "Preparing the count, for the first time on this machine only"
+"""What is told while the loops are compiled."""
+
+
 class Cancelled(ContextDBError):
     """The computation was stopped by whoever asked for it."""
 

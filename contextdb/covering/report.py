@@ -130,6 +130,8 @@ class CoverageReport:
     """Where most rows are valid at once, the fullest first; the first is the fullest of all when `overlap` is exact."""
     assumptions: tuple[str, ...] = ()
     """The table's assumptions, as contextdb.toml has them."""
+    needless: tuple[Finding, ...] = ()
+    """The rows that `findings` tell of in groups, as variety: a finding for each."""
     sampled: tuple[str, ...] = ()
     """Of these, and of the derived facts, what only samples know: with any of them the share is an estimate."""
 

@@ -58,7 +58,7 @@ class Sampler:
     """Draws the contexts where boxes cannot tell which can happen."""
 
     @cached_property
-    def _sides(self) -> list[tuple[NDArray[np.int64], list[int]]]:
+    def sides(self) -> list[tuple[NDArray[np.int64], list[int]]]:
         """For each factor which side each box has, by number, and the sides."""
         return [_numbered([box[f] for box in self.space.boxes]) for f in range(len(self.space.factors))]
 
@@ -165,7 +165,7 @@ class Sampler:
             if len(factor.weights) == 1:
                 continue
             uniform = rng.random(len(drawn))
-            of_box, sides = self._sides[f]
+            of_box, sides = self.sides[f]
             for number in np.unique(of_box[drawn]).tolist():
                 members = np.flatnonzero(of_box[drawn] == number)
                 inside = np.where(_flags(sides[number], len(factor.weights)), factor.weights, 0.0)

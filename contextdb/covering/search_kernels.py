@@ -13,6 +13,7 @@ from contextdb.covering.count_kernels import (
     CUT,
     DENSE,
     LIMIT,
+    ROOM,
     WORK,
     choose,
     count_bits,
@@ -42,7 +43,7 @@ def leaves_open(part, depth, n_listed, weights, salts, table, scratch, state):
     m = count_bits(open_boxes, n_words)
     if m <= 1:
         return True
-    if state[WORK] >= state[LIMIT]:
+    if state[WORK] >= state[LIMIT] or depth >= opened.shape[0] - ROOM:
         state[CUT] += 1
         return False
     if n_words > 1 and m <= DENSE * n_words:

@@ -13,16 +13,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
 from contextdb import bitmask
-from contextdb.cells import Accepted, Cell, TagSet, format_cell, parse_cell
+from contextdb.arguments import require_many, require_mapping, require_text
+from contextdb.cells import Accepted, Cell, NumberSet, TagSet, format_cell, parse_cell
 from contextdb.compiled import CompiledTable
 from contextdb.conditions import Condition
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, some
+from contextdb.nesting_cells import TagMeet
+from contextdb.plain_ends import plain
+
+_WEIGHTS = "a mapping of conditions to mappings of cells to numbers"
+
+MOST_COUNTED = 1 << 48
+"""The most steps, samples or gaps."""
 
 Box = tuple[int, ...]
 CellBox = Mapping[str, Cell | str]
@@ -43,6 +52,8 @@ class Space:
     impossible: tuple[Box, ...]
     weighted: tuple[str, ...] = ()
     """The conditions whose weights were given."""
+    is_strict: bool = False
+    """Whether two valid rows are an error: then cells are written to the last bit, however many digits that takes."""
 
     @classmethod
     def of(
@@ -53,8 +64,10 @@ class Space:
         progress: Progress = SILENT,
     ) -> Space:
         """The space of a compiled table; see `contextdb.covering.coverage` for the arguments."""
-        excluded = [_read_box(box, compiled.conditions) for box in impossible]
-        given = {name: _read_weights(name, parts, compiled.conditions) for name, parts in (weights or {}).items()}
+        boxes = require_many(impossible, "impossible", "a list of mappings of conditions to cells")
+        excluded = [_read_box(box, compiled.conditions) for box in boxes]
+        shares = {} if weights is None else require_mapping(weights, "weights", _WEIGHTS)
+        given = {name: _read_weights(name, parts, compiled.conditions) for name, parts in shares.items()}
         factors: list[Factor] = []
         of_condition: list[tuple[int, ...]] = []
         for at, condition in enumerate(compiled.conditions):
@@ -66,7 +79,16 @@ class Space:
             new = factors_of(accepted, condition, given.get(condition.name))
             of_condition.append(tuple(range(len(factors), len(factors) + len(new))))
             factors += new
-        space = cls(compiled.conditions, tuple(factors), tuple(of_condition), (), (), (), tuple(given))
+        space = cls(
+            compiled.conditions,
+            tuple(factors),
+            tuple(of_condition),
+            (),
+            (),
+            (),
+            tuple(given),
+            is_strict="unique" in compiled.policies,
+        )
         return space._with_boxes(compiled, excluded, progress)
 
     def _with_boxes(self, compiled: CompiledTable, excluded: Sequence[Mapping[str, Cell]], progress: Progress) -> Space:
@@ -76,10 +98,12 @@ class Space:
             columns.append([self.sides(at, None if c.is_soft else c.accepts) for c in compiled.cells(at)])
         codes = [compiled.texts[at].codes.tolist() for at in range(len(self.conditions))]
         found: list[tuple[int, Box]] = []
+        n_factors = len(self.factors)  # a cell of tags that accepts nothing has one side too many
         for row in np.flatnonzero(bitmask.unpack(compiled.enabled, compiled.n_rows)).tolist():
             progress.check()
-            box = tuple(side for at in range(len(columns)) for side in columns[at][codes[at][row]])
-            if 0 not in box and not any(self._is_void(columns[at][codes[at][row]], at) for at in range(len(columns))):
+            own = [columns[at][codes[at][row]] for at in range(len(columns))]
+            box = tuple(chain.from_iterable(own))
+            if 0 not in box and len(box) == n_factors:
                 found.append((row, box))
         impossible = [self.box(cells) for cells in excluded]
         rows, boxes = tuple(r for r, _ in found), tuple(b for _, b in found)
@@ -91,6 +115,7 @@ class Space:
             boxes,
             tuple(dict.fromkeys(b for b in impossible if b is not None)),
             self.weighted,
+            self.is_strict,
         )
 
     def _is_void(self, sides: Sequence[int], at: int) -> bool:
@@ -105,11 +130,26 @@ class Space:
     def sides(self, at: int, accepts: Accepted | None) -> tuple[int, ...]:
         """The sides of a cell of condition number `at`, one for each of its factors; one 0 too many where nothing is accepted."""
         numbers = self.of_condition[at]
+        full = self.full[numbers[0] : numbers[-1] + 1] if numbers else ()
         if accepts is None:
-            return tuple(self.full[f] for f in numbers)
+            return full
         if accepts.is_empty:
             return tuple(0 for _ in numbers) or (0,)
-        return tuple(self._side(f, accepts) for f in numbers)
+        if not isinstance(accepts, TagSet):
+            return tuple(self._side(f, accepts) for f in numbers)
+        sides = list(full)  # a tag restricts its own factor only
+        for f in {self._of_tag[at][tag] for tag in tags_of(accepts) if tag in self._of_tag[at]}:
+            sides[f - numbers[0]] = self._side(f, accepts)
+        return tuple(sides)
+
+    @cached_property
+    def _of_tag(self) -> dict[int, dict[str, int]]:
+        """For each condition of tags the factor of each tag."""
+        return {
+            at: {tag: f for f in numbers for tag in self.factors[f].tags}  # type: ignore[union-attr]
+            for at, numbers in enumerate(self.of_condition)
+            if self.conditions[at].domain.kind == "tags"
+        }
 
     def _side(self, f: int, accepts: Accepted) -> int:
         factor = self.factors[f]
@@ -128,14 +168,21 @@ class Space:
             sides += own
         return tuple(sides)
 
-    def cells(self, box: Box) -> dict[str, str]:
-        """A box as cells, without the conditions that it does not restrict."""
-        found: dict[str, str] = {}
-        for at, condition in enumerate(self.conditions):
-            accepts = self.accepted(at, box)
-            if accepts is not None:
-                found[condition.name] = format_cell(Cell(accepts), condition.domain)
-        return found
+    def cells(self, box: Box, is_label: bool = False) -> dict[str, str]:
+        """A box as cells, without the conditions that it does not restrict; see `written`."""
+        accepted = ((at, self.accepted(at, box)) for at in range(len(self.conditions)))
+        return {self.conditions[at].name: self.written(at, accepts, is_label) for at, accepts in accepted if accepts is not None}
+
+    def written(self, at: int, accepts: Accepted, is_label: bool = False) -> str:
+        """A set of classes of condition number `at` as a cell, its ends as people write them; a row that gets it holds the set.
+
+        A label is read by people only, so that it may leave out what comes of rounding.
+        """
+        if isinstance(accepts, NumberSet) and (is_label or not self.is_strict):
+            factor = self.factors[self.of_condition[at][0]]
+            assert isinstance(factor, NumberFactor)
+            accepts = plain(accepts, factor.cuts, keeps_all=not is_label)
+        return format_cell(Cell(accepts), self.conditions[at].domain)
 
     def accepted(self, at: int, box: Box) -> Accepted | None:
         """What a box accepts of condition number `at`; None for everything."""
@@ -151,10 +198,17 @@ class Space:
     def volume(self, box: Box) -> float:
         """The measure of a box."""
         share = 1.0
-        for factor, full, side in zip(self.factors, self.full, box, strict=True):
+        for f, (full, side) in enumerate(zip(self.full, box, strict=True)):
             if side != full:
-                share *= weight_of(factor, side)
+                if (f, side) not in self._weights:
+                    self._weights[f, side] = weight_of(self.factors[f], side)
+                share *= self._weights[f, side]
         return share
+
+    @cached_property
+    def _weights(self) -> dict[tuple[int, int], float]:
+        """The shares of sides that were asked for."""
+        return {}
 
     @property
     def assumed(self) -> dict[str, str]:
@@ -166,11 +220,19 @@ class Space:
         }
 
 
+def tags_of(accepts: TagSet) -> frozenset[str]:
+    """The tags that a set of tag sets names."""
+    parts = accepts.parts if isinstance(accepts, TagMeet) else (accepts,)
+    return frozenset(tag for part in parts for tag in (*part.needs, *part.bans))
+
+
 def require_counts(**numbers: object) -> None:
-    """Raise ContextError unless every argument is a whole number from 0 up."""
+    """Raise ContextError unless every argument is a whole number from 0 up, and none that kernels cannot count to."""
     for name, number in numbers.items():
         if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
             raise ContextError(Fault(f"{name} is {number!r}.", "a whole number from 0 up"))
+        if number > MOST_COUNTED:
+            raise ContextError(Fault(f"{name} is {number:.3g}.", f"a whole number up to {MOST_COUNTED:,}"))
 
 
 def weight_of(factor: Factor, side: int) -> float:
@@ -203,13 +265,16 @@ def _condition(name: str, conditions: Sequence[Condition]) -> Condition:
         if condition.name == name:
             return condition
     known = [c.name for c in conditions]
-    near = nearest(name, known)
+    near = nearest(require_text(name, "the name of a condition"), known)
     raise ContextError(Fault(f"there is no condition {in_quotes(name)}.", some(known), in_quotes(near) if near else ""))
 
 
 def _read_box(box: CellBox, conditions: Sequence[Condition]) -> dict[str, Cell]:
-    read = ((name, cell, _condition(name, conditions)) for name, cell in box.items())
-    return {name: cell if isinstance(cell, Cell) else parse_cell(cell, condition.domain) for name, cell, condition in read}
+    given = require_mapping(box, "a box of impossible", "a mapping of conditions to cells")
+    read = ((name, cell, _condition(name, conditions)) for name, cell in given.items())
+    return {
+        n: c if isinstance(c, Cell) else parse_cell(require_text(c, f"the cell of {in_quotes(n)}"), at.domain) for n, c, at in read
+    }
 
 
 def _read_weights(name: str, parts: Mapping[object, float], conditions: Sequence[Condition]) -> dict[Cell, float]:
@@ -218,7 +283,7 @@ def _read_weights(name: str, parts: Mapping[object, float], conditions: Sequence
     if condition.domain.kind == "tags":
         raise ContextError(Fault("tags take no weights.", "a condition of another type", place=place))
     read: dict[Cell, float] = {}
-    for text, weight in parts.items():
+    for text, weight in require_mapping(parts, f"weights of {in_quotes(name)}", _WEIGHTS).items():
         if not (isinstance(weight, (int, float)) and 0.0 <= weight < float("inf")):
             raise ContextError(Fault(f"the weight {weight!r} is no share.", "a number from 0 up", place=place))
         cell = parse_cell(str(text), condition.domain)

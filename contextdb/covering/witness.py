@@ -14,6 +14,8 @@ from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, runs_of
 
 Point = tuple[int, ...]
+FACTORS = 100
+"""So many factors more make a step twice as long."""
 
 
 class OutOfSteps(Exception):
@@ -27,12 +29,30 @@ class Steps:
     left: int
     progress: Progress = SILENT
 
-    def take(self) -> None:
-        """One step. Raises OutOfSteps when there is none left, Cancelled when the search was stopped."""
+    def take(self, n_free: int = 0) -> None:
+        """One step that looks at so many factors, and is more where they are very many. Raises OutOfSteps when there is none left,
+        Cancelled when the search was stopped."""
         if self.left <= 0:
             raise OutOfSteps
-        self.left -= 1
+        self.left -= 1 + n_free // FACTORS
         self.progress.check()
+
+
+@dataclass(eq=False)
+class _Node:
+    """A factor that a search has fixed."""
+
+    factor: int
+    free: list[int]
+    """The factors that were free before, this one among them."""
+    open_boxes: int
+    known: int
+    """The boxes that are open there, of the first so many."""
+    n_before: int
+    """How many boxes there were when the present class was chosen."""
+    left: list[tuple[int, int]]
+    """What the classes that are still to be tried keep open, and the classes."""
+    searched: set[int] = field(default_factory=set)
 
 
 @dataclass(eq=False)
@@ -108,6 +128,14 @@ class BoxSet:
                 found &= bits
         return found
 
+    def behind(self, point: Sequence[int], order: Sequence[int] | None = None) -> list[int]:
+        """The boxes that accept a point's classes of all factors in an order from each place on; the last are all boxes."""
+        order = range(len(point)) if order is None else order
+        found = [self.all]
+        for f in reversed(order):
+            found.append(found[-1] & self.accepts[f][point[f]])
+        return found[::-1]
+
     def outside(self, open_boxes: int, within: Box, steps: Steps) -> Point | None:
         """A context of `within` that is in none of the open boxes, or None when there is none.
 
@@ -129,31 +157,40 @@ class BoxSet:
         for f, side in enumerate(within):
             if side != self.full[f]:
                 open_boxes &= self.meeting(f, side)
-        for point in self._points(open_boxes, {}, within, list(range(len(within))), steps):
+        for point in self._points(open_boxes, within, list(range(len(within))), steps):
             yield tuple(point.get(f, _first(side)) for f, side in enumerate(within))
 
-    def _points(
-        self, open_boxes: int, fixed: dict[int, int], within: Box, free: list[int], steps: Steps
-    ) -> Iterator[dict[int, int]]:
+    def _points(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> Iterator[dict[int, int]]:
+        fixed: dict[int, int] = {}
+        path: list[_Node] = []
         known = self.n_boxes
-        while not (now := self._open_now(open_boxes, known, fixed)):
-            yield fixed
-        steps.take()
-        factor = self._next_factor(now, within, free)
-        if factor is None:
-            return
-        rest = [f for f in free if f != factor]
-        searched: set[int] = set()
-        left = self._choices(now, factor, within[factor])
-        while left:
-            bits, k = left.pop(0)
-            n_before = self.n_boxes
-            yield from self._points(bits, fixed | {factor: k}, within, rest, steps)
-            searched.add(k)
-            if self.n_boxes > n_before:
-                now = self._open_now(open_boxes, known, fixed)
-                choices = self._choices(now, factor, within[factor], searched)
-                left = [choice for choice in choices if choice[1] not in searched]
+        while True:
+            while not (now := self._open_now(open_boxes, known, fixed)):
+                yield fixed
+            steps.take(len(free))
+            factor = self._next_factor(now, within, free)
+            if factor is not None:
+                path.append(_Node(factor, free, open_boxes, known, self.n_boxes, self._choices(now, factor, within[factor])))
+            while path and not self._next_choice(path[-1], within, fixed):
+                path.pop()
+            if not path:
+                return
+            node = path[-1]
+            open_boxes, k = node.left.pop(0)
+            known = node.n_before = self.n_boxes
+            free = [f for f in node.free if f != node.factor]
+            fixed[node.factor] = k
+
+    def _next_choice(self, node: _Node, within: Box, fixed: dict[int, int]) -> bool:
+        """Go on to the next class of a node, one that is worth it after what was added meanwhile; whether there is one."""
+        k = fixed.pop(node.factor, None)
+        if k is not None:
+            node.searched.add(k)
+            if self.n_boxes > node.n_before:
+                now = self._open_now(node.open_boxes, node.known, fixed)
+                choices = self._choices(now, node.factor, within[node.factor], node.searched)
+                node.left = [choice for choice in choices if choice[1] not in node.searched]
+        return bool(node.left)
 
     def _open_now(self, open_boxes: int, known: int, fixed: dict[int, int]) -> int:
         """Open boxes, and those of the boxes from number `known` on that hold what is fixed."""
@@ -163,19 +200,21 @@ class BoxSet:
         return open_boxes | added
 
     def _search(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> dict[int, int] | None:
-        if not open_boxes:
-            return {}
-        steps.take()
-        factor = self._next_factor(open_boxes, within, free)
-        if factor is None:
-            return None
-        rest = [f for f in free if f != factor]
-        for kept, k in self._choices(open_boxes, factor, within[factor]):
-            found = self._search(kept, within, rest, steps)
-            if found is not None:
-                found[factor] = k
-                return found
-        return None
+        found: dict[int, int] = {}
+        path: list[tuple[int, list[int], list[tuple[int, int]]]] = []
+        while open_boxes:
+            steps.take(len(free))
+            factor = self._next_factor(open_boxes, within, free)
+            if factor is not None:
+                path.append((factor, free, self._choices(open_boxes, factor, within[factor])))
+            while path and not path[-1][2]:
+                found.pop(path.pop()[0], None)
+            if not path:
+                return None
+            factor, free, left = path[-1]
+            open_boxes, found[factor] = left.pop(0)
+            free = [f for f in free if f != factor]
+        return found
 
     def _next_factor(self, open_boxes: int, within: Box, free: list[int]) -> int | None:
         """The factor to fix: of a box that has only that one left, else the one that most boxes restrict; None when some box has

@@ -25,7 +25,10 @@ def require_no_conflicts(text: str, file: str) -> None:
         With the lines on which conflicts start; a mark that stands alone, after a mend that was not finished, is named too.
     """
     unified = text.replace("\r\n", "\n").replace("\r", "\n")
-    marks = [(unified.count("\n", 0, found.start()) + 1, found[0][0]) for found in _MARK.finditer(unified)]
+    marks, line, at = list[tuple[int, str]](), 1, 0
+    for found in _MARK.finditer(unified):
+        line, at = line + unified.count("\n", at, found.start()), found.start()
+        marks.append((line, found[0][0]))
     starts = [line for line, mark in marks if mark == "<"]
     if not starts and not any(mark == ">" for _, mark in marks):
         return

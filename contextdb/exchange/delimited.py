@@ -18,7 +18,7 @@ from itertools import islice
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange.conflicts import require_no_conflicts
-from contextdb.exchange.grid import Block, columns_of
+from contextdb.exchange.grid import MOST_ABOVE, Block, columns_of, is_header
 from contextdb.exchange.reading import Reading, Remark, listed
 from contextdb.record_faults import MOST_CHARACTERS
 
@@ -26,9 +26,12 @@ DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "vertical bar
 SAMPLE = 100
 """Records that tell which delimiter a file has."""
 
+LEAST_BELOW_TITLE = 3
+"""Columns of a table below a title; with two, a comma in a text could make the header."""
+
 _SEP_LINE = re.compile(r'"?sep=(.)"?\r?\n?', re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
-_DECIMAL_POINT = re.compile(r"(?<!\.)\d*\.(?!\.)\d")
+_DECIMAL_POINT = re.compile(r"(?<!\.)\.(?!\.)\d")
 _NUMERIC = re.compile(r"(?:not\b|[\d\s.,+\-±<>=()\[\]|~])+", re.IGNORECASE)
 _BROKEN = {
     "unexpected end of data": "a quoted field is never closed",
@@ -70,7 +73,7 @@ def read_delimited(
     columns, more = columns_of(grid, file, block or _whole(grid), "line")
     columns, decimals = with_points(columns, dialect.delimiter, is_decimal_comma)
     name = "tsv" if dialect.delimiter == "\t" else "csv"
-    return Reading(tuple(columns), name, (*dialect.remarks, *notes, *more, *decimals))
+    return Reading(tuple(columns), name, (*dialect.remarks, *notes, *more, *decimals), has_whole_names=True)
 
 
 def dialect_of(text: str, wanted: str | None = None) -> Dialect:
@@ -97,9 +100,11 @@ def _field_counts(text: str, delimiter: str) -> list[int]:
     """How many fields each of the first records has under a delimiter; blank lines have none."""
     records = csv.reader(io.StringIO(text[: SAMPLE * 4096], newline=""), delimiter=delimiter)
     try:
-        return [len(record) for record in islice(records, SAMPLE + 1) if any(record)]
+        counts = [len(record) for record in islice(records, SAMPLE + 1) if any(record)]
     except csv.Error:
         return []
+    header = next((at for at, n in enumerate(counts[:MOST_ABOVE]) if n > 1), 0)
+    return counts[header:] if counts and counts[header] >= LEAST_BELOW_TITLE else counts  # a title has one field
 
 
 def _fit(counts: Sequence[int]) -> tuple[int, int, int]:
@@ -136,7 +141,17 @@ def _records(text: str, delimiter: str, file: str) -> tuple[list[list[str]], lis
         raise TableError(_broken(str(error), text, line, file)) from None
     while grid and not any(grid[-1]):
         grid.pop()
-    return _evened(grid, lines, file)
+    titles = _titles(grid)
+    said = [(at, next(filter(None, grid[at]), "")) for at in titles]
+    told = [Remark(f"left out above the header: {in_quotes(text)}.", f"line {lines[at]}") for at, text in said if text]
+    grid, short = _evened(grid[len(titles) :], lines[len(titles) :], file)
+    return grid, [*told, *short]
+
+
+def _titles(grid: Sequence[Sequence[str]]) -> range:
+    """The first records, where they are a title: at most one field each that says something, then a header of several columns."""
+    n = next((at for at, record in enumerate(grid[:MOST_ABOVE]) if sum(map(bool, record)) > 1), 0)
+    return range(n if n and len(grid[n]) >= LEAST_BELOW_TITLE and is_header(grid[n]) else 0)
 
 
 def _evened(grid: list[list[str]], lines: Sequence[int], file: str) -> tuple[list[list[str]], list[Remark]]:

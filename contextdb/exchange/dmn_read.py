@@ -1,7 +1,8 @@
 """A decision table of a DMN file as columns: inputs are conditions, outputs and annotations are data, the first output the asset.
 
-A rule is a row. The hit policy becomes the table's policy. What a cell cannot say is kept as `= TEXT`, which no type reads, and is
-told with its rule and column. A document type, and with it bombs and external entities, is refused before anything is parsed.
+A rule is a row. The hit policy becomes the table's policy. What a cell cannot say becomes the row's own rule where an expression
+can; else it is kept as `= TEXT`, which no type reads, and is told with its rule and column. A document type, and with it bombs and
+external entities, is refused before anything is parsed.
 
 Source: OMG, Decision Model and Notation 1.3 to 1.5; `bpmn-io/dmn-js` for what editors write.
 """
@@ -9,25 +10,33 @@ Source: OMG, Decision Model and Notation 1.3 to 1.5; `bpmn-io/dmn-js` for what e
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import count
 from typing import Any
 from xml.etree import ElementTree
 
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
-from contextdb.errors import Fault, Place, TableError, in_quotes, nearest, shown, some
+from contextdb.domains import TEXT, Domain
+from contextdb.errors import Fault, Place, TableError, in_quotes, nearest, plural, shown, some
 from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.dmn_types import InputType, Types, children_of, domain_of, tag_of, text_of
 from contextdb.exchange.encodings import decoded
-from contextdb.exchange.feel import STRING, cell_of, string_of, value_of
+from contextdb.exchange.feel import cell_of, strings_of, value_of
+from contextdb.exchange.feel_rules import rule_of
+from contextdb.exchange.proposals import propose_type
 from contextdb.exchange.reading import Reading, Remark, capped, listed
-from contextdb.schema import Schema, TableSettings
+from contextdb.schema import Schema, TableSettings, conditions_from_dict
 from contextdb.source import name_faults
+from contextdb.when import check_rule
 
 POLICIES: dict[str, Any] = {"UNIQUE": "unique", "FIRST": "first", "PRIORITY": "priority", "ANY": "collect", "COLLECT": "collect"}
 PRIORITY = "Priority"
 """The column that holds what DMN tells by the order of the output's values."""
+WHEN = "When"
+"""The column that holds the tests that no cell can say, as rules."""
 _LETTERS = {"U": "UNIQUE", "F": "FIRST", "P": "PRIORITY", "A": "ANY", "C": "COLLECT", "R": "RULE ORDER", "O": "OUTPUT ORDER"}
 _VERSIONS = {"20151101": "1.1", "20180521": "1.2", "20191111": "1.3", "20211108": "1.4", "20230324": "1.5"}
 _TYPE = re.compile(r"<!(?:DOCTYPE|ENTITY)", re.IGNORECASE)
@@ -51,6 +60,11 @@ class _Column:
     values: tuple[str, ...] = ()
     default: str = ""
 
+    @cached_property
+    def cells(self) -> list[str | None]:
+        """Of an input, the cell of each entry; None for what no cell can say."""
+        return [cell_of(entry.lower() if self.kind.kind == "boolean" else entry) for entry in self.entries]  # some write True
+
 
 def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
     """Read a decision table.
@@ -69,9 +83,11 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
     element, name = _chosen(root, decision, file)
     rules = children_of(element, "rule")
     types = Types.of(root)
-    inputs = [_input(one, at, rules, types) for at, one in enumerate(children_of(element, "input"))]
-    outputs = [_output(one, at, rules, name) for at, one in enumerate(children_of(element, "output"))]
-    notes = [_annotation(one, at, rules) for at, one in enumerate(children_of(element, "annotation"))] + _descriptions(rules)
+    tests, values, texts = (_entries(rules, tag) for tag in ("inputEntry", "outputEntry", "annotationEntry"))
+    inputs = [_input(one, at, _at(tests, at), types) for at, one in enumerate(children_of(element, "input"))]
+    outputs = [_output(one, at, _at(values, at), name) for at, one in enumerate(children_of(element, "output"))]
+    notes = [_annotation(one, at, _at(texts, at)) for at, one in enumerate(children_of(element, "annotation"))]
+    notes += _descriptions(rules)
     if not outputs:
         raise TableError(Fault("the decision table has no output.", "an output, which names the asset", place=Place(file)))
     policy, policy_remarks = _policy(element)
@@ -79,20 +95,35 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
         policy_remarks.append(
             Remark("the order of the first output's values gives the priorities; that of others is not kept.", is_loss=True)
         )
-    conditions, lost = _conditions(inputs)
+    declared, lost_types = _declared(inputs)
+    judged = {one.name: _judged(one) for one in inputs if one.name not in declared}
+    rules_of_rows = Rules.of(inputs, types, {**judged, **declared})
+    conditions, lost = _conditions(inputs, rules_of_rows)
     data, lost_values = _data([*outputs, *notes])
-    columns = [data[0], *conditions, *data[1:], *_priority(policy, outputs[0], data[0])]
+    taken = [column.name for column in (*conditions, *data)]
+    when = rules_of_rows.column(taken)
+    columns = [data[0], *conditions, *when, *data[1:], *_priority(policy, outputs[0], data[0])]
     faults = [fault.at(Place(file)) for fault in name_faults([column.name for column in columns])]
     if faults:
         raise TableError(*faults)
     plain = tuple(column.name for column in data[1:])
-    declared, lost_types = _declared(inputs)
     fallback, lost_defaults = _fallback(outputs)
     priority = _priority_name(columns, policy)
-    settings = TableSettings(name, asset=data[0].name, outputs=plain, policy=policy, priority=priority, fallback=fallback)
-    schema = Schema(conditions=declared, tables={name: settings})
+    rule_name = when[0].name if when else None
+    settings = TableSettings(
+        name, asset=data[0].name, outputs=plain, policy=policy, priority=priority, fallback=fallback, when=rule_name
+    )
+    schema = Schema(conditions={**declared, **rules_of_rows.facts}, tables={name: settings})
     lost = [*lost, *lost_values, *_notes_on_entries(rules)]
-    told = (*_version(root), *policy_remarks, *_expressions(element), *_results(root, inputs), *lost_types, *lost_defaults)
+    told = (
+        *_version(root),
+        *policy_remarks,
+        *_expressions(element),
+        *_results(root, inputs),
+        *lost_types,
+        *lost_defaults,
+        *rules_of_rows.remarks(),
+    )
     remarks = (*told, *capped(lost, "such entries"))
     return Reading(tuple(columns), "dmn", remarks, schema, outputs=plain)
 
@@ -121,9 +152,7 @@ def _parsed(raw: bytes, file: str) -> Element:
 
 def _chosen(root: Element, wanted: str | None, file: str) -> tuple[Element, str]:
     """The decision table that is asked for, and its decision's name."""
-    found = [
-        (one, table) for one in root.iter() if tag_of(one) in _HOLDERS for table in one.iter() if tag_of(table) == "decisionTable"
-    ]
+    found = list(_tables(root))
     names = [one.get("name") or one.get("id") or "decision" for one, _ in found]
     if wanted is not None:
         for (one, table), name in zip(found, names, strict=True):
@@ -142,40 +171,55 @@ def _chosen(root: Element, wanted: str | None, file: str) -> tuple[Element, str]
     return found[0][1], names[0]
 
 
+def _tables(root: Element) -> Iterator[tuple[Element, Element]]:
+    """The decision tables of a file in its order, each with the decision that it stands in; each element is looked at once."""
+    open_ones: list[tuple[Element, Element | None]] = [(root, None)]
+    while open_ones:
+        one, holder = open_ones.pop()
+        if tag_of(one) == "decisionTable" and holder is not None:
+            yield holder, one
+        holder = one if tag_of(one) in _HOLDERS else holder
+        open_ones += [(child, holder) for child in reversed(one)]
+
+
 def _version(root: Element) -> tuple[Remark, ...]:
     space = root.tag.partition("}")[0].lstrip("{")
     version = next((name for date, name in _VERSIONS.items() if date in space), None)
     return () if version else (Remark(f"the version of DMN is not known, {in_quotes(space)}; it is read as 1.3 to 1.5."),)
 
 
-def _entries(rules: Sequence[Element], tag: str, at: int) -> list[str]:
-    entries = (children_of(rule, tag) for rule in rules)
-    return [text_of(found[at]) if at < len(found) else "" for found in entries]
+def _entries(rules: Sequence[Element], tag: str) -> list[list[str]]:
+    """The texts of each rule's entries of one kind."""
+    return [[text_of(entry) for entry in children_of(rule, tag)] for rule in rules]
+
+
+def _at(entries: Sequence[Sequence[str]], at: int) -> list[str]:
+    """The entries of one column, empty where a rule has too few."""
+    return [found[at] if at < len(found) else "" for found in entries]
 
 
 # ---- columns
 
 
-def _input(element: Element, at: int, rules: Sequence[Element], types: Types) -> _Column:
+def _input(element: Element, at: int, entries: Sequence[str], types: Types) -> _Column:
     expression = next(iter(children_of(element, "inputExpression")), None)
     said, label = text_of(expression), (element.get("label") or "").strip()
     name = said if _NAME.fullmatch(said) else label or said or f"input {at + 1}"
     kind = types.of_input(expression, said)
     allowed = text_of(next(iter(children_of(element, "inputValues")), None)) or kind.allowed
-    return _Column(name, InputType(kind.kind, allowed), _entries(rules, "inputEntry", at))
+    return _Column(name, InputType(kind.kind, allowed), entries)
 
 
-def _output(element: Element, at: int, rules: Sequence[Element], decision: str) -> _Column:
+def _output(element: Element, at: int, entries: Sequence[str], decision: str) -> _Column:
     name = element.get("name") or element.get("label") or (decision if at == 0 else f"output {at + 1}")
     values = text_of(next(iter(children_of(element, "outputValues")), None))
-    found = tuple(string_of(literal) for literal in STRING.findall(values))
+    found = tuple(strings_of(values))
     default = text_of(next(iter(children_of(element, "defaultOutputEntry")), None))
-    return _Column(name, InputType(), _entries(rules, "outputEntry", at), found, default)
+    return _Column(name, InputType(), entries, found, default)
 
 
-def _annotation(element: Element, at: int, rules: Sequence[Element]) -> _Column:
-    texts = _entries(rules, "annotationEntry", at)
-    return _Column(element.get("name") or f"annotation {at + 1}", _NOTE, texts)
+def _annotation(element: Element, at: int, entries: Sequence[str]) -> _Column:
+    return _Column(element.get("name") or f"annotation {at + 1}", _NOTE, entries)
 
 
 def _descriptions(rules: Sequence[Element]) -> list[_Column]:
@@ -184,19 +228,76 @@ def _descriptions(rules: Sequence[Element]) -> list[_Column]:
     return [_Column("description", _NOTE, texts)] if any(texts) else []
 
 
-def _conditions(inputs: Sequence[_Column]) -> tuple[list[TextColumn], list[Remark]]:
+def _conditions(inputs: Sequence[_Column], rules: Rules) -> tuple[list[TextColumn], list[Remark]]:
+    """The columns of the inputs: a test that no cell can say is a rule of its row, or kept as a cell that no type reads."""
     columns, lost = [], []
     for one in inputs:
         texts = []
-        for rule, entry in enumerate(one.entries, 1):
-            cell = cell_of(entry.lower() if one.kind.kind == "boolean" else entry)  # some tools write True
-            if cell is None:
-                lost.append(
-                    Remark(f"{in_quotes(entry)} is no test that a cell can say; it is kept as text.", _place(rule, one.name), True)
-                )
-            texts.append(f"= {entry}" if cell is None else cell)
+        for rule, (entry, cell) in enumerate(zip(one.entries, one.cells, strict=True), 1):
+            is_rule = cell is None and rules.add(rule - 1, one.name, entry)
+            if cell is None and not is_rule:
+                told = f"{in_quotes(entry)} is no test that a cell or a rule can say; it is kept as text, which no type reads."
+                lost.append(Remark(told, _place(rule, one.name), True))
+            texts.append("-" if is_rule else f"= {entry}" if cell is None else cell)
         columns.append(TextColumn.of(one.name, texts))
     return columns, lost
+
+
+@dataclass
+class Rules:
+    """The rules of rows that tests become, and the facts that they name beside the inputs."""
+
+    conditions: Mapping[str, Condition]
+    types: Types
+    known: tuple[str, ...]
+    rules: list[list[str]]
+    facts: dict[str, Condition] = field(default_factory=dict)
+    n_tests: int = 0
+
+    @classmethod
+    def of(cls, inputs: Sequence[_Column], types: Types, declared: Mapping[str, Condition]) -> Rules:
+        """No rules yet, over the inputs and all other facts of the file."""
+        n_rows = len(inputs[0].entries) if inputs else 0
+        known = dict.fromkeys((*(one.name for one in inputs), *types.paths()))
+        return cls({one.name: declared[one.name] for one in inputs}, types, tuple(known), [[] for _ in range(n_rows)])
+
+    def add(self, row: int, name: str, test: str) -> bool:
+        """Make a test of an input a rule of its row; gives whether an expression can say it."""
+        found = rule_of(test, name, self.known)
+        if found is None:
+            return False
+        rule, named = found
+        new = {other: self._condition(other, self.conditions[name]) for other in named if other not in self.conditions}
+        together = [*self.rules[row], rule]
+        text = together[0] if len(together) == 1 else " and ".join(f"({one})" for one in together)
+        if check_rule(text, {**self.conditions, **self.facts, **new}) is not None:
+            return False
+        self.facts |= new
+        self.rules[row].append(rule)
+        self.n_tests += 1
+        return True
+
+    def _condition(self, name: str, like: Condition) -> Condition:
+        """A fact that is no input: of the type that the file says, else of that of the input it is compared with."""
+        kind = self.types.of_input(None, name)
+        domain, _ = domain_of(replace(kind, allowed=""), [], "")
+        if domain is None:
+            domain = TEXT if kind.kind == "string" or like.domain.kind in ("enum", "text") else Domain(like.domain.kind)
+        return Condition(name, domain)
+
+    def column(self, taken: Sequence[str]) -> list[TextColumn]:
+        """The column of rules, under a name that no other has; none where there is no rule."""
+        if not self.n_tests:
+            return []
+        name = next(name for i in count(1) if (name := WHEN if i == 1 else f"{WHEN} {i}") not in taken)
+        texts = (" and ".join(f"({rule})" for rule in rules) if len(rules) > 1 else "".join(rules) for rules in self.rules)
+        return [TextColumn.of(name, texts)]
+
+    def remarks(self) -> Iterator[Remark]:
+        """What is said of the rules."""
+        if self.n_tests:
+            named = f"; the game gives the facts that they name beside: {listed(list(self.facts))}" if self.facts else ""
+            yield Remark(f"{plural(self.n_tests, 'test')} that no cell can say became rules of their rows{named}.")
 
 
 def _data(outputs: Sequence[_Column]) -> tuple[list[TextColumn], list[Remark]]:
@@ -231,11 +332,24 @@ def _declared(inputs: Sequence[_Column]) -> tuple[dict[str, Condition], list[Rem
     """The conditions whose type the file tells for certain, others are judged by their cells; and what of the types is lost."""
     declared, lost = dict[str, Condition](), list[Remark]()
     for one in inputs:
-        domain, remarks = domain_of(one.kind, list(one.entries), f"input {in_quotes(one.name)}")
+        entries = [entry for entry, cell in zip(one.entries, one.cells, strict=True) if cell is not None]
+        domain, remarks = domain_of(one.kind, entries, f"input {in_quotes(one.name)}")
         lost += remarks
         if domain is not None:
             declared[one.name] = Condition(one.name, domain)
+        elif len(entries) < len(one.entries) or _said(one) is None:  # by its cells the column would be data
+            declared[one.name] = _judged(one)
     return declared, lost
+
+
+def _said(one: _Column) -> Mapping[str, object] | None:
+    """The type that the cells of an input tell of; None where they would be data."""
+    return propose_type(TextColumn.of(one.name, (cell for cell in one.cells if cell is not None))).declared
+
+
+def _judged(one: _Column) -> Condition:
+    """An input of no type that a column has, such as a date: what its cells say, and never data."""
+    return conditions_from_dict({one.name: _said(one) or {"type": "text"}})[one.name]
 
 
 def _fallback(outputs: Sequence[_Column]) -> tuple[str | None, list[Remark]]:

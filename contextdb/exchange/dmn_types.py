@@ -20,11 +20,11 @@ from xml.etree import ElementTree
 
 from contextdb.domains import BOOL, TEXT, Domain, Kind
 from contextdb.errors import in_quotes
-from contextdb.exchange.feel import STRING, STRINGS, string_of
+from contextdb.exchange.feel import STRINGS, strings_of
 from contextdb.exchange.reading import Remark
 
 MOST_LINKS = 20
-"""How many item definitions may stand for one another."""
+"""How many item definitions may stand for one another, and how deep the parts of a structure are looked at."""
 
 Element = ElementTree.Element
 _NUMBER = r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?"
@@ -82,6 +82,14 @@ class Types:
         own = expression.get("typeRef") if expression is not None else None
         return self._resolved(own or self._type_of_path(said))
 
+    def paths(self) -> list[str]:
+        """The names of all facts, and of the parts of those that are structures: Applicant.age."""
+        found = list(self.facts)
+        for fact, kind in self.facts.items():
+            start = f"{_plain(kind)}."
+            found += [f"{fact}.{name[len(start) :]}" for name in self.items if name.startswith(start)]
+        return [name for name in found if name]
+
     def _type_of_path(self, path: str) -> str:
         name, _, rest = path.partition(".")
         return f"{_plain(self.facts.get(name, ''))}.{rest}" if rest else self.facts.get(path, "")
@@ -99,11 +107,10 @@ class Types:
 
 
 def _items(root: Element) -> Iterator[tuple[str, Element]]:
-    open_ones = [(one.get("name") or "", one) for one in children_of(root, "itemDefinition")]
-    while open_ones:
-        name, one = open_ones.pop()
-        yield name, one
-        open_ones += [(f"{name}.{part.get('name') or ''}", part) for part in children_of(one, "itemComponent")]
+    level = [(one.get("name") or "", one) for one in children_of(root, "itemDefinition")]
+    for _ in range(MOST_LINKS):
+        yield from level
+        level = [(f"{name}.{part.get('name') or ''}", part) for name, one in level for part in children_of(one, "itemComponent")]
 
 
 def _plain(name: str) -> str:
@@ -124,9 +131,9 @@ def domain_of(kind: InputType, cells: list[str], place: str) -> tuple[Domain | N
     if kind.kind in _NUMBERS:
         return _bounded(_NUMBERS[kind.kind], kind.allowed, place)
     if STRINGS.fullmatch(kind.allowed):
-        return Domain("enum", tuple(dict.fromkeys(string_of(literal) for literal in STRING.findall(kind.allowed)))), []
+        return Domain("enum", tuple(dict.fromkeys(strings_of(kind.allowed)))), []
     remarks = [_unkept(kind.allowed, place)] if kind.allowed not in ("", "-") else []
-    are_strings = kind.kind == "string" and any(STRING.search(cell) for cell in cells) and all(map(_is_string_test, cells))
+    are_strings = kind.kind == "string" and any(map(strings_of, cells)) and all(map(_is_string_test, cells))
     return (TEXT if are_strings else None), remarks
 
 

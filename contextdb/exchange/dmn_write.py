@@ -13,7 +13,7 @@ from contextdb.cells import format_number
 from contextdb.condition_column import ConditionColumn
 from contextdb.console import printable
 from contextdb.domains import Domain
-from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.feel import literal, unary_tests
 from contextdb.exchange.reading import Remark, capped
 from contextdb.exchange.xlsx_parts import DECLARATION, NEVER, attribute
@@ -72,7 +72,7 @@ def _rows(table: Table, inputs: Sequence[ConditionColumn]) -> tuple[list[int], t
     """The rows that become rules, and what is lost of others."""
     rows, remarks = [], []
     for row in range(table.n_rows):
-        place = f"row {row}, {in_quotes(table.assets[row])}"
+        place = f"{row_name(row)}, {in_quotes(table.assets[row])}"
         empty = next((c.condition.name for c in inputs if c.cell(row).is_empty and not c.cell(row).is_soft), None)
         if not table.enabled[row] or empty is not None:
             why = "it is disabled" if empty is None else f"its cell of {in_quotes(empty)} accepts nothing"

@@ -23,7 +23,8 @@ from contextdb.cell_words import NUMBER_TEXT, quoted
 from contextdb.cells import Cell, NumberSet, ValueSet, format_cell
 from contextdb.domains import NUMBER
 
-_PART = re.compile(r'"(?:[^"\\]|\\.)*"|[^,"]+|.', re.DOTALL)
+_PART = re.compile(r'"(?:[^"\\]|\\.)*"?|[^,"]+|,', re.DOTALL)
+"""A string, also one that is not closed, so that no part of a text is looked at twice; a comma; or what stands between."""
 STRING = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 """A string of FEEL."""
 STRINGS = re.compile(rf"\s*{STRING.pattern}\s*(?:,\s*{STRING.pattern}\s*)*", re.DOTALL)
@@ -36,17 +37,30 @@ _COMPARED = re.compile(rf"(?:\?\s*(?=[<>=]))?(<=|>=|<|>|=)?\s*({NUMBER_TEXT})")
 _OURS = re.compile(rf"([\[(]?)({NUMBER_TEXT})?\.\.({NUMBER_TEXT})?([\])]?)")
 
 
+MOST_NOTS = 8
+"""How deep not(…) may stand in itself; FEEL's own grammar has one level."""
+
+
 # ---- from FEEL
+
+
+def strings_of(text: str) -> list[str]:
+    """The texts of the strings in a text, in order."""
+    return [string_of(part) for part in _PART.findall(text) if len(part) > 1 and STRING.fullmatch(part)]
 
 
 def cell_of(test: str) -> str | None:
     """The cell that unary tests mean; None for what no cell can say."""
-    text = test.strip()
+    text, n_nots = test.strip(), 0
+    while n_nots <= MOST_NOTS and (found := _NOT.fullmatch(text)):
+        text, n_nots = found[1].strip(), n_nots + 1
+    cell = None if n_nots > MOST_NOTS else _plain_cell(text)
+    return None if cell is None or (n_nots and cell == "-") else "not " * n_nots + cell
+
+
+def _plain_cell(text: str) -> str | None:
     if text in ("", "-"):
         return "-"
-    if found := _NOT.fullmatch(text):
-        inner = cell_of(found[1])
-        return None if inner is None or inner == "-" else f"not {inner}"
     parts = list(_split(text))
     if all(STRING.fullmatch(part) for part in parts):
         return " ".join(quoted(string_of(part)) for part in parts)

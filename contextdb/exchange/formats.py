@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
+from contextdb.columns import TextColumn
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest
 from contextdb.exchange.reading import Reading, Remark
 from contextdb.foreign import seems_to_be
 from contextdb.table import Table
+
+if TYPE_CHECKING:
+    from contextdb.exchange.formulas import Formulas
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,8 @@ FORMATS: Mapping[str, Format] = {
         Format("unreal-json", "an Unreal DataTable as JSON", ()),
     )
 }
+_GRIDS = ("csv", "tsv", "xlsx")
+"""Formats in which only its place says that a row names the columns."""
 _BINARY_SIGNS = {"an Excel workbook (.xlsx)": "xlsx", "an old Excel workbook (.xls)": "xlsx", "a Parquet file": "parquet"}
 
 
@@ -50,6 +57,8 @@ class ReadOptions:
     encoding: str | None = None
     delimiter: str | None = None
     is_decimal_comma: bool | None = None
+    has_whole_names: bool | None = None
+    """Whether a text with blanks in it is one name, in a column that nobody declares; None: it is, but in files of our own."""
 
     @property
     def says_how(self) -> bool:
@@ -106,6 +115,12 @@ def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading
     """
     kind = format_of(name, options.format, raw)
     reading = _read(kind.name, raw, name, options)
+    if kind.name in _GRIDS:
+        from contextdb.exchange.grid import doubts
+
+        reading = replace(reading, remarks=(*reading.remarks, *doubts(reading.columns)))
+    if options.has_whole_names is not None:
+        reading = replace(reading, has_whole_names=options.has_whole_names)
     suffix = PurePath(name).suffix.lower()
     if options.format is None and suffix and suffix not in kind.suffixes:
         told = Remark(f"by its first bytes this is {kind.about}, though its name ends in {suffix}.")
@@ -163,9 +178,15 @@ def _own_csv(raw: bytes, name: str) -> Reading | None:
         return None
     if any(map(begins_like_a_mark, columns[0].texts)):
         return None
-    if (len(columns) == 1 and any(mark in columns[0].name for mark in ";\t|")) or is_unreal_header([c.name for c in columns]):
+    if is_unreal_header([c.name for c in columns]) or (len(columns) == 1 and _is_parted_otherwise(columns[0])):
         return None
-    return Reading(tuple(columns), "csv", source=source)
+    return Reading(tuple(columns), "csv", source=source, has_whole_names=True)
+
+
+def _is_parted_otherwise(column: TextColumn) -> bool:
+    """Whether the only column of a CSV has another delimiter in its name, or, below a title, as often in each text."""
+    counts = ({text.count(mark) for text in column.texts[:100]} for mark in ";\t|")
+    return any(mark in column.name for mark in ";\t|") or any(len(n) == 1 and min(n) > 1 for n in counts)
 
 
 def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions) -> Reading:
@@ -187,8 +208,13 @@ def _read_text(kind: str, raw: bytes, name: str, options: ReadOptions) -> Readin
     return replace(reading, remarks=(*remarks, *reading.remarks))
 
 
-def write(table: Table, kind: Format) -> tuple[bytes, tuple[Remark, ...]]:
+def write(table: Table, kind: Format, formulas: Formulas = "tell") -> tuple[bytes, tuple[Remark, ...]]:
     """The bytes of a table in a format, and what could not be kept.
+
+    Parameters
+    ----------
+    formulas : "tell", "keep" or "quote"
+        What becomes of texts of CSV and TSV that a spreadsheet may compute: see `contextdb.exchange.formulas`.
 
     Raises
     ------
@@ -196,23 +222,29 @@ def write(table: Table, kind: Format) -> tuple[bytes, tuple[Remark, ...]]:
         The table has what the format cannot hold, with its place.
     """
     try:
-        return _written(table, kind.name)
+        return _written(table, kind.name, formulas)
     except UnicodeEncodeError:
         raise TableError(Fault("a text has half a surrogate pair.", "text in UTF-8")) from None
 
 
-def _written(table: Table, kind: str) -> tuple[bytes, tuple[Remark, ...]]:
-    columns = table.columns
+def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[Remark, ...]]:
+    columns: Sequence[TextColumn] = table.columns
+    told: tuple[Remark, ...] = ()
+    if kind in ("csv", "tsv"):
+        from contextdb.exchange.formulas import formulas_told, quoted_formulas
+
+        told = formulas_told(columns) if formulas == "tell" else ()
+        columns = quoted_formulas(columns) if formulas == "quote" else columns
     if kind == "xlsx":
         from contextdb.exchange.xlsx_write import write_xlsx
 
         return write_xlsx(table), ()
     if kind in ("csv", "parquet"):
-        return _rewritten(table, kind), ()
+        return _rewritten(table, columns, kind), told
     if kind == "tsv":
         from contextdb.exchange.tab_text import write_tab_text
 
-        return write_tab_text(columns), ()
+        return write_tab_text(columns), told
     if kind in ("json", "jsonl"):
         from contextdb.exchange.json_rows import write_json, write_json_lines
 
@@ -227,7 +259,7 @@ def _written(table: Table, kind: str) -> tuple[bytes, tuple[Remark, ...]]:
     return unreal.write_json(table) if kind == "unreal-json" else unreal.write_csv(table)
 
 
-def _rewritten(table: Table, kind: str) -> bytes:
+def _rewritten(table: Table, columns: Sequence[TextColumn], kind: str) -> bytes:
     """The table's own file as it would be saved: what nobody changed keeps its bytes."""
     import numpy as np
 
@@ -238,7 +270,7 @@ def _rewritten(table: Table, kind: str) -> bytes:
     fresh = np.full(table.n_rows, -1)
     if kind == "csv":
         is_own = isinstance(table.source, Source)
-        return rewritten(table.columns, table.source, table.origin).raw if is_own else rewritten(table.columns, None, fresh).raw  # type: ignore[arg-type]
+        return rewritten(columns, table.source, table.origin).raw if is_own else rewritten(columns, None, fresh).raw  # type: ignore[arg-type]
     if isinstance(table.source, ParquetSource):
-        return rewritten_parquet(table.columns, table.source, table.origin).raw
-    return rewritten_parquet(table.columns, None, fresh).raw
+        return rewritten_parquet(columns, table.source, table.origin).raw
+    return rewritten_parquet(columns, None, fresh).raw

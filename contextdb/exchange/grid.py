@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cells import reads
 from contextdb.columns import TextColumn
+from contextdb.domains import NUMBER
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange.reading import Remark, capped
 from contextdb.record_faults import MOST_CHARACTERS
@@ -24,6 +26,14 @@ Grid = Sequence[Sequence[str]]
 
 _RANGE = re.compile(r"\$?([A-Za-z]{1,3})\$?(\d{1,7}):\$?([A-Za-z]{1,3})\$?(\d{1,7})")
 MOST_BLOCKS = 8
+MOST_ABOVE = 10
+"""Rows in which the header is looked for."""
+MOST_NAMELESS = 3
+"""Columns without a name that are told one by one."""
+_VALUES = frozenset(("true", "false", "any"))
+_SUMS = frozenset(("total", "totals", "grand total", "sum", "average", "summe", "gesamt", "somme"))
+MOST_LOOKED_AT = 1_000
+"""Blocks of cells that are compared with each other; a sheet with more is no list of assets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,15 +83,19 @@ def parse_block(text: str) -> Block | None:
     return Block(max(min(rows), 1) - 1, min(columns), max(rows), max(columns) + 1)
 
 
-def columns_of(grid: Grid, file: str, block: Block | None = None, row_noun: str = "row") -> tuple[list[TextColumn], list[Remark]]:
+def columns_of(
+    grid: Grid, file: str, block: Block | None = None, row_noun: str = "row", sheet: str | None = None
+) -> tuple[list[TextColumn], list[Remark]]:
     """The columns of the table in a grid, or in a block of it.
 
     Parameters
     ----------
     block : Block, optional
-        Where the table stands; default: it is looked for.
+        Where the table stands, its first row the names; default: it is looked for, also below a title.
     row_noun : str
-        What a row of the grid is called in messages: "row" of a sheet, "line" of a text.
+        What a row of the grid is called in messages: "sheet row" of a workbook, "line" of a text.
+    sheet : str, optional
+        The name of the sheet, for messages.
 
     Raises
     ------
@@ -103,24 +117,75 @@ def columns_of(grid: Grid, file: str, block: Block | None = None, row_noun: str 
         first = next(at for at, row in enumerate(rows[1:], block.top + 2) if not any(row))
         remarks.append(Remark(f"{plural(len(rows) - 1 - len(kept), f'blank {row_noun}')} left out.", f"{row_noun} {first}"))
     names = [name.strip() for name in rows[0]]
-    _require_names(names, kept, block, file)
+    _require_names(names, kept, block, Place(file, block.top + 1), _mend(rows, block, sheet))
     columns = [TextColumn.of(n, t) for n, t in zip(names, zip(*kept, strict=True) if kept else [()] * len(names), strict=True)]
     _require_short(columns, file)
     return columns, remarks
 
 
-def _require_names(names: Sequence[str], rows: Grid, block: Block, file: str) -> None:
+def _require_names(names: Sequence[str], rows: Grid, block: Block, place: Place, mend: str) -> None:
+    nameless = [at for at, name in enumerate(names) if not name]
+    if len(nameless) > MOST_NAMELESS:
+        letters = ", ".join(column_letters(block.left + at) for at in nameless[:MOST_NAMELESS])
+        found = f"{len(nameless):,} of {plural(len(names), 'column')} have no name: {letters}, …"
+        raise TableError(Fault(found, "a name in the first row of each column", mend, place))
     faults = []
-    for at, name in enumerate(names):
-        if not name:
-            held = next((row[at] for row in rows if row[at].strip()), None)
-            of = f"; it holds {in_quotes(held)}" if held else ""
-            faults.append(
-                Fault(f"column {column_letters(block.left + at)} has no name{of}.", "a name in the first row of each column")
-            )
+    for at in nameless:
+        held = next((row[at] for row in rows if row[at].strip()), None)
+        of = f"; it holds {in_quotes(held)}" if held else ""
+        faults.append(
+            Fault(f"column {column_letters(block.left + at)} has no name{of}.", "a name in the first row of each column", mend)
+        )
     faults = faults or list(name_faults(names))
+    if mend and len(faults) > 1:  # the row is no header: which of its cells are wrong is no help
+        faults = [replace(faults[0], mend=mend)]
     if faults:
-        raise TableError(*(fault.at(Place(file, block.top + 1)) for fault in faults))
+        raise TableError(*(fault.at(place) for fault in faults))
+
+
+def _mend(rows: Grid, block: Block, sheet: str | None) -> str:
+    """The cells of the table without the rows above its header, where those are more than a title."""
+    at = header_at(rows)
+    if at == 0 or sheet is None:
+        return ""
+    cells = Block(block.top + at, block.left, block.bottom, block.right)
+    return f"to name the cells of the table: --sheet {in_quotes(f'{sheet}!{cells}')}"
+
+
+def header_at(rows: Grid) -> int:
+    """The row that names the columns: the first of a few that could; 0 where none could."""
+    return next((at for at, row in enumerate(rows[:MOST_ABOVE]) if is_header(row)), 0)
+
+
+def is_header(row: Sequence[str]) -> bool:
+    """Whether a row names columns: every cell says something, no two the same, and none a number or a truth."""
+    names = [name.strip() for name in row]
+    return all(names) and len(set(names)) == len(names) and not any(map(_is_value, names))
+
+
+def _is_value(text: str) -> bool:
+    """Whether a text is a value, as no name of a column is."""
+    return reads(text, NUMBER) or text.casefold() in _VALUES
+
+
+def is_title(row: Sequence[str]) -> bool:
+    """Whether a row of several cells says one thing alone, in one of them or over all of them."""
+    return len(row) > 1 and len({text.strip() for text in row if text.strip()}) == 1
+
+
+def doubts(columns: Sequence[TextColumn]) -> list[Remark]:
+    """What a person should look at: names that look like values, as where a header is missing; a last row that sums up others."""
+    found = []
+    odd = next((c for c in columns if _is_value(c.name) or (c.name and c.name in c.texts)), None)
+    if odd is not None:
+        why = "stands among its cells too" if odd.name in odd.texts else "looks like a value"
+        told = f"is the header missing? The column name {in_quotes(odd.name)} {why}. The first row is taken for names."
+        found.append(Remark(told))
+    last = columns[0].n_rows - 1 if columns else -1
+    first = next((c[last] for c in columns if c[last].strip()), "") if last > 0 else ""
+    if first.strip().rstrip(":").casefold() in _SUMS:
+        found.append(Remark(f"a row that begins with {in_quotes(first)} is read as an asset like others.", "the last row"))
+    return found
 
 
 def _require_short(columns: Sequence[TextColumn], file: str) -> None:
@@ -137,12 +202,17 @@ def _require_short(columns: Sequence[TextColumn], file: str) -> None:
 
 
 def _found(grid: Grid, file: str) -> tuple[Block, list[Remark]]:
-    blocks = blocks_of(grid)
+    try:
+        blocks = blocks_of(grid)
+    except TableError as error:
+        raise TableError(*(fault.at(Place(file)) for fault in error.faults)) from None
     if not blocks:
         raise TableError(
             Fault("there is nothing to read.", "a row with the names of the columns, then one for each asset", place=Place(file))
         )
-    tables = [block for block in blocks if block.n_rows > 1] or blocks[:1]
+    blocks, titles = _without_titles(blocks, grid)
+    deep = [block for block in blocks if block.n_rows > 1]
+    tables = [block for block in deep if block.right - block.left > 1] or deep or blocks[:1]
     if len(tables) > 1:
         places = ", ".join(map(str, tables[:MOST_BLOCKS]))
         more = f" and {len(tables) - MOST_BLOCKS} more" if len(tables) > MOST_BLOCKS else ""
@@ -150,7 +220,26 @@ def _found(grid: Grid, file: str) -> tuple[Block, list[Remark]]:
         raise TableError(Fault(found, "one of them", f'to name its cells, as in --sheet "SHEET!{tables[0]}"', Place(file)))
     left = [block for block in blocks if block is not tables[0]]
     notes = [Remark(f"left out, as it is no table: {in_quotes(_first_text(grid, block))}.", f"cells {block}") for block in left]
-    return tables[0], list(capped(notes, "such texts"))
+    return tables[0], list(capped([*titles, *notes], "such texts"))
+
+
+def _without_titles(blocks: Sequence[Block], grid: Grid) -> tuple[list[Block], list[Remark]]:
+    """The blocks without the rows of a title that stand right above a header, and blocks that are titles alone as one row."""
+    found, remarks = [], []
+    for block in blocks:
+        rows = [row[block.left : block.right] for row in grid[block.top : block.bottom]]
+        n_titles = next((at for at, row in enumerate(rows[:MOST_ABOVE]) if any(row) and not is_title(row)), len(rows[:MOST_ABOVE]))
+        if n_titles == len(rows):  # a title of several lines
+            found.append(Block(block.top, block.left, block.top + 1, block.right))
+        elif n_titles and is_header(rows[n_titles]):
+            found.append(Block(block.top + n_titles, block.left, block.bottom, block.right))
+        else:
+            found.append(block)
+            continue
+        for at, row in enumerate(grid[block.top : found[-1].top], block.top + 1):
+            if text := next(filter(None, row[block.left : block.right]), ""):
+                remarks.append(Remark(f"left out above the header: {in_quotes(text)}.", f"sheet row {at}"))
+    return found, remarks
 
 
 def _first_text(grid: Grid, block: Block) -> str:
@@ -161,6 +250,11 @@ def blocks_of(grid: Grid) -> list[Block]:
     """The tables of a grid: what blank columns, or blank rows, part from each other.
 
     Rows below a blank one belong to the same table when they stand under its columns, and do not begin with other names.
+
+    Raises
+    ------
+    TableError
+        There are more blocks than can be compared.
     """
     if not grid or not grid[0]:
         return []
@@ -169,6 +263,9 @@ def blocks_of(grid: Grid) -> list[Block]:
     for top, bottom in _runs(np.asarray(is_filled.any(axis=1))):
         for left, right in _runs(np.asarray(is_filled[top:bottom].any(axis=0))):
             _add(blocks, Block(top, left, bottom, right), is_filled)
+            if len(blocks) > MOST_LOOKED_AT:
+                found = f"the sheet holds more than {MOST_LOOKED_AT:,} blocks of cells apart from each other."
+                raise TableError(Fault(found, "one table", 'to name its cells, as in --sheet "SHEET!A1:F20"'))
     return blocks
 
 

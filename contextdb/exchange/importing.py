@@ -10,15 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, Place, TableError
+from contextdb.conditions import Condition
+from contextdb.disk import write_atomic
+from contextdb.errors import Fault, FileError, Place, TableError
 from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, propose
 from contextdb.exchange.reading import Reading
-from contextdb.files import write_texts
-from contextdb.project import schema_for
+from contextdb.files import new_source
+from contextdb.project import schema_for, settings_of
 from contextdb.schema import Schema, TableSettings, conditions_from_dict
 from contextdb.schema_file import SchemaChange, schema_change
 from contextdb.sections import condition_to_dict, job_faults
 from contextdb.table import Table, build_table
+from contextdb.together import NewFile, write_together
 
 if TYPE_CHECKING:
     from contextdb.files import AnySource
@@ -42,16 +45,21 @@ class Plan:
         return [column.name for column in self.columns if column.is_new and column.job == "condition"]
 
     def write(self) -> None:
-        """Write the table, then contextdb.toml.
+        """Write the table and contextdb.toml in one step: both or neither.
 
         Raises
         ------
         FileError, TableError
-            The disk refuses, or a text cannot be written; what stood there before is then whole.
+            The disk refuses, a text cannot be written, or somebody else has changed contextdb.toml since it was read; what stood
+            there before is then whole.
         """
-        write_texts(self.path, self.table.columns, self.table.source, self.table.origin, self.field_of)
-        if self.change is not None:
-            self.change.write()
+        table = self.table
+        new = NewFile(self.path, new_source(self.path, table.columns, table.source, table.origin, self.field_of).raw)
+        change = self.change
+        if change is None:
+            write_atomic(new.path, new.data)
+        elif not write_together(change.path.parent, [new, change.new_file]):
+            raise FileError(change.fault)
 
 
 def plan_import(
@@ -81,8 +89,7 @@ def plan_import(
 def project_of(path: Path) -> tuple[Schema, TableSettings]:
     """What contextdb.toml declares for a table file that is there or not yet, and what it says of this table."""
     folder, schema = schema_for(path)
-    whole, root = path.parent.resolve() / path.name, folder.resolve()
-    return schema, schema.settings_for(whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path.name)
+    return schema, settings_of(path, folder, schema)
 
 
 def table_of(
@@ -103,17 +110,26 @@ def table_of(
         found = "no column names the assets." if not assets else f"{len(assets)} columns name the assets."
         raise TableError(Fault(found, "one column of names", place=Place(str(path) if path else None)))
     declared = {c.name: c.declared for _, c in kept if c.is_new and c.job == "condition" and c.declared is not None}
-    schema = replace(schema, conditions={**schema.conditions, **conditions_from_dict(declared)})
+    beside = _named_beside(reading, [column for _, column in kept], schema)
+    schema = replace(schema, conditions={**schema.conditions, **conditions_from_dict(declared), **beside})
     settings = _settings(settings, [column for _, column in kept], reading)
     faults = list(job_faults(settings, [column.name for _, column in kept], schema))
     if faults:
         raise TableError(*(fault.at(Place(str(path) if path else None)) for fault in faults))
-    texts = [_renamed(reading.columns[at], column.name) for at, column in kept]
+    texts = [_renamed(column.cells or reading.columns[at], column.name) for at, column in kept]
     source, field_of = _source(reading, path), tuple(at for at, _ in kept)
     table = build_table(settings.name, texts, schema, settings, path, source)
     return replace(table, origin=np.arange(table.n_rows) if source else np.full(table.n_rows, -1)), field_of if source else (
         -1,
     ) * len(kept)
+
+
+def _named_beside(reading: Reading, kept: Sequence[Mapped], schema: Schema) -> dict[str, Condition]:
+    """Conditions that the file declares and that are no columns: facts that its rules name, where those come in."""
+    if not any(column.job == "when" for column in kept):
+        return {}
+    taken = {*reading.names, *(column.name for column in kept), *schema.conditions}
+    return {name: condition for name, condition in reading.schema.conditions.items() if name not in taken}
 
 
 def _renamed(column: TextColumn, name: str) -> TextColumn:

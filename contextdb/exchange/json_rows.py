@@ -6,8 +6,11 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.reading import Reading, Remark, listed
 from contextdb.exchange.values import text_of_value
@@ -17,6 +20,8 @@ from contextdb.source import name_faults
 
 _ACCEPTED = 'a list of objects, [{"Asset Name": "jog", "speed": "2..4"}], or one object a line'
 MOST_FAULTS = 20
+MOST_LEVELS = 16
+"""How deep objects may stand in a row: each makes the name of a column longer."""
 
 
 def read_json(text: str, file: str, format_name: str = "json") -> Reading:
@@ -34,9 +39,28 @@ def read_json(text: str, file: str, format_name: str = "json") -> Reading:
     rows, lines = parsed_rows(text, file)
     flat = [_flat(row, Place(file, line)) for row, line in zip(rows, lines, strict=True)]
     columns = columns_of_rows(flat, file)
+    sets = _sets(rows, len(rows))
     missing = [name for name in (c.name for c in columns) if any(name not in row for row in flat)]
     remarks = [Remark(f"some rows have no {listed(missing)}; those cells are empty.")] if missing else []
-    return Reading(tuple(columns), format_name, tuple(remarks))
+    return Reading(tuple(columns), format_name, tuple(remarks), has_whole_names=True, sets=sets)
+
+
+def _sets(rows: Sequence[Mapping[str, Any]], n_rows: int) -> dict[str, NDArray[np.bool_]]:
+    """The rows in which each column holds a list, which is a set of names."""
+    found: dict[str, NDArray[np.bool_]] = {}
+    for at, row in enumerate(rows):
+        for name in _lists(row):
+            found.setdefault(name, np.zeros(n_rows, np.bool_))[at] = True
+    return found
+
+
+def _lists(row: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """The columns of a row that hold a list; the row is no deeper than `MOST_LEVELS`."""
+    for key, value in row.items():
+        if isinstance(value, list):
+            yield prefix + key
+        elif isinstance(value, dict):
+            yield from _lists(value, f"{prefix}{key}.")
 
 
 def parsed_rows(text: str, file: str) -> tuple[list[dict[str, Any]], list[int | None]]:
@@ -107,7 +131,7 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _objects(rows: Sequence[Any], lines: Sequence[int | None], file: str) -> tuple[list[dict[str, Any]], list[int | None]]:
     faults = [
-        Fault(f"row {at} is {what(row)}, no object.", _ACCEPTED, place=Place(file, line))
+        Fault(f"{row_name(at)} is {what(row)}, no object.", _ACCEPTED, place=Place(file, line))
         for at, (row, line) in enumerate(zip(rows, lines, strict=True))
         if not isinstance(row, dict)
     ]
@@ -116,11 +140,13 @@ def _objects(rows: Sequence[Any], lines: Sequence[int | None], file: str) -> tup
     return list(rows), list(lines)
 
 
-def _flat(row: Mapping[str, Any], place: Place, prefix: str = "") -> dict[str, str]:
+def _flat(row: Mapping[str, Any], place: Place, prefix: str = "", level: int = 1) -> dict[str, str]:
+    if level > MOST_LEVELS:
+        raise TableError(Fault("objects stand in each other too deep.", f"at most {MOST_LEVELS} levels", place=place))
     found: dict[str, str] = {}
     for key, value in row.items():
         name = prefix + key
-        texts = _flat(value, place, f"{name}.") if isinstance(value, dict) else {name: _text(value, name, place)}
+        texts = _flat(value, place, f"{name}.", level + 1) if isinstance(value, dict) else {name: _text(value, name, place)}
         for twin in texts.keys() & found.keys():
             raise TableError(Fault(f"the key {in_quotes(twin)} stands twice in one row.", "each key once", place=place))
         found |= texts
@@ -139,6 +165,8 @@ def _text(value: object, name: str, place: Place) -> str:
             f"{in_quotes(name)} has {len(text):,} characters.", f"at most {MOST_CHARACTERS:,} characters in a cell", place=place
         )
         raise TableError(fault)
+    if not text.isascii() and any("\ud800" <= c <= "\udfff" for c in text):
+        raise TableError(Fault(f"{in_quotes(name)} has half a surrogate pair.", "text in UTF-8", place=place))
     return text
 
 

@@ -7,10 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
+from contextdb.cells import reads
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
+from contextdb.domains import NUMERIC, Domain
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, plural, some
-from contextdb.exchange.proposals import n_unreadable, names_of, propose_type
+from contextdb.exchange.proposals import n_unreadable, names_of, pair_in, propose_type
 from contextdb.exchange.reading import Reading
 from contextdb.schema import Schema, TableSettings, conditions_from_dict
 from contextdb.sections import condition_to_dict
@@ -20,6 +24,9 @@ JOBS: tuple[Job, ...] = ("asset", "condition", "output", "enabled", "priority", 
 PLAIN_JOBS: tuple[Job, ...] = ("enabled", "priority", "weight", "when")
 _NEVER_GUESSED = ("when",)
 """Jobs whose word is too common a name to go by."""
+
+MOST_COMPARED = 100_000
+"""Pairs of a column and a declared condition whose names are compared; each costs some 20 µs."""
 
 _ASSET_NAMES = ("assetname", "asset", "animation", "animationname", "animasset", "clip", "clipname", "rowname", "name")
 
@@ -43,6 +50,10 @@ class Mapped:
     """Rows whose cell cannot be read as the condition."""
     near: str | None = None
     """A declared condition whose name is near, and which may be meant."""
+    names: TextColumn | None = None
+    """The column with each text as one whole name, where its file has whole names and some must be quoted for it."""
+    cells: TextColumn | None = None
+    """The cells that the texts become, where some are written otherwise than in the file."""
 
     @property
     def kind(self) -> str:
@@ -74,7 +85,8 @@ def propose(
     kept = next(iter(reading.schema.tables.values()), None)
     merged = _merged(settings, kept)
     asset = _asset(reading, merged, renames)
-    mapped = tuple(_mapped(column, asset, reading, schema, merged, renames) for column in reading.columns)
+    known = _Known.of(schema, len(reading.columns))
+    mapped = tuple(_mapped(column, asset, reading, known, merged, renames) for column in reading.columns)
     _require_different(mapped)
     return mapped
 
@@ -82,11 +94,19 @@ def propose(
 def as_condition(mapped: Mapped, column: TextColumn, name: str, schema: Schema) -> Mapped:
     """The same column as the condition `name`: a declared one, or a new one of the type that its cells have."""
     if name in schema.conditions:
-        return _as_declared(column, schema.conditions[name], "chosen")
-    proposal = propose_type(column)
+        return _as_declared(column, schema.conditions[name], "chosen", mapped.names)
+    proposal = propose_type(column, mapped.names)
     declared = proposal.declared or {"type": "text"}
+    cells = mapped.names if proposal.are_names or proposal.declared is None else None
     return replace(
-        mapped, name=name, job="condition", why=proposal.why, declared=declared, is_new=True, n_unreadable=proposal.n_unreadable
+        mapped,
+        name=name,
+        job="condition",
+        why=proposal.why,
+        declared=declared,
+        is_new=True,
+        n_unreadable=proposal.n_unreadable,
+        cells=cells,
     )
 
 
@@ -99,22 +119,51 @@ def as_type(mapped: Mapped, column: TextColumn, kind: str) -> Mapped:
         An enum is wanted, and no cell holds a name.
     """
     declared: dict[str, object] = {"type": kind}
+    cells = mapped.names if kind in ("enum", "text") else None
+    column = cells or column
     if kind == "enum":
         declared["values"] = names_of(column)
         if not declared["values"]:
             raise ContextDBError(Fault(f"{in_quotes(column.name)} cannot be an enum: no cell holds a name.", "any other type"))
     domain = conditions_from_dict({"x": declared})["x"].domain
-    return replace(
-        mapped, job="condition", declared=declared, is_new=True, why="chosen", n_unreadable=n_unreadable(column, domain)[0]
-    )
+    n_wrong = n_unreadable(column, domain)[0]
+    return replace(mapped, job="condition", declared=declared, is_new=True, why="chosen", n_unreadable=n_wrong, cells=cells)
 
 
 def as_job(mapped: Mapped, job: Job) -> Mapped:
     """The same column with another job."""
-    return replace(mapped, job=job, why="chosen", declared=None, is_new=False, n_unreadable=0, near=None)
+    return replace(mapped, job=job, why="chosen", declared=None, is_new=False, n_unreadable=0, near=None, cells=None)
 
 
 # ---- parts
+
+
+@dataclass(frozen=True)
+class _Known:
+    """The conditions that are declared, and how a name is found among them."""
+
+    conditions: Mapping[str, Condition]
+    folded: Mapping[str, str]
+    """Their names by what `_folded` makes of them."""
+    is_compared: bool
+    """Whether names that are only near are looked for."""
+
+    @classmethod
+    def of(cls, schema: Schema, n_columns: int) -> _Known:
+        folded: dict[str, str] = {}
+        for name in schema.conditions:
+            folded.setdefault(_folded(name), name)
+        return cls(schema.conditions, folded, n_columns * len(folded) <= MOST_COMPARED)
+
+    def near(self, name: str) -> str | None:
+        """A declared name that may be meant."""
+        return nearest(name, self.conditions) if self.is_compared else None
+
+    def noted(self, why: str) -> str:
+        """The reason for a new column, and that its name was compared with no other."""
+        return (
+            why if self.is_compared else f"{why}; not compared with the {len(self.conditions):,} declared names, which are too many"
+        )
 
 
 def _require_known(renames: Mapping[str, str], names: Sequence[str]) -> None:
@@ -158,7 +207,7 @@ def _asset(reading: Reading, settings: TableSettings, renames: Mapping[str, str]
 
 
 def _mapped(
-    column: TextColumn, asset: str, reading: Reading, schema: Schema, settings: TableSettings, renames: Mapping[str, str]
+    column: TextColumn, asset: str, reading: Reading, known: _Known, settings: TableSettings, renames: Mapping[str, str]
 ) -> Mapped:
     source = column.name
     name = renames.get(source, source.strip())
@@ -171,7 +220,7 @@ def _mapped(
     if job := _plain_job(name, column, settings):
         said = getattr(settings, job) if job in PLAIN_JOBS else None
         return Mapped(source, said or name, job, "by its name")
-    return _condition(column, name, reading, schema)
+    return _condition(column, name, reading, known)
 
 
 def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> Job | None:
@@ -197,13 +246,14 @@ def _fits(column: TextColumn, job: Job) -> bool:
     return all(check_cell(empty, column.name, text) is None for text in column.texts)
 
 
-def _condition(column: TextColumn, name: str, reading: Reading, schema: Schema) -> Mapped:
-    if name in schema.conditions:
-        return _as_declared(column, schema.conditions[name], "declared")
-    alike = next((known for known in schema.conditions if _folded(known) == _folded(name)), None)
+def _condition(column: TextColumn, name: str, reading: Reading, known: _Known) -> Mapped:
+    names = reading.whole_names(column)
+    if name in known.conditions:
+        return _as_declared(column, known.conditions[name], "declared", names)
+    alike = known.folded.get(_folded(name))
     if alike is not None:
-        return _as_declared(column, schema.conditions[alike], f"declared as {in_quotes(alike)}")
-    near = nearest(name, schema.conditions)
+        return _as_declared(column, known.conditions[alike], f"declared as {in_quotes(alike)}", names)
+    near = known.near(name)
     kept = reading.schema.conditions.get(column.name)
     if kept is not None:
         declared = condition_to_dict(kept)
@@ -212,18 +262,32 @@ def _condition(column: TextColumn, name: str, reading: Reading, schema: Schema) 
         )
     if column.name in reading.outputs:
         return Mapped(column.name, name, "output", "data, as the file says")
-    proposal = propose_type(column)
+    proposal = propose_type(column, names)
+    why = known.noted(proposal.why)
     if proposal.declared is None:
-        return Mapped(column.name, name, "output", proposal.why, near=near)
-    return Mapped(column.name, name, "condition", proposal.why, proposal.declared, True, proposal.n_unreadable, near)
+        return Mapped(column.name, name, "output", why, near=near, names=names)
+    cells = names if proposal.are_names else None
+    return Mapped(column.name, name, "condition", why, proposal.declared, True, proposal.n_unreadable, near, names, cells)
 
 
-def _as_declared(column: TextColumn, condition: Condition, why: str) -> Mapped:
-    n_wrong, example = n_unreadable(column, condition.domain)
+def _as_declared(column: TextColumn, condition: Condition, why: str, names: TextColumn | None) -> Mapped:
+    cells = _fitting(column, names, condition.domain) if names and condition.domain.kind in ("enum", "text") else None
+    n_wrong, example = n_unreadable(cells or column, condition.domain)
     kind = condition.domain.kind
     if n_wrong:
         why = f"{why}; {plural(n_wrong, 'cell')} cannot be read as {kind}, such as {in_quotes(example)}"
-    return Mapped(column.name, condition.name, "condition", why, None, False, n_wrong)
+    if kind in NUMERIC:
+        why += pair_in(column.texts)
+    return Mapped(column.name, condition.name, "condition", why, None, False, n_wrong, names=names, cells=cells)
+
+
+def _fitting(column: TextColumn, names: TextColumn, domain: Domain) -> TextColumn:
+    """The texts as they are where the grammar of cells reads them, else as whole names where those are read."""
+    pairs = np.column_stack((column.codes, names.codes))
+    each, which = np.unique(pairs, axis=0, return_inverse=True)
+    said = [(column.texts[text], names.texts[name]) for text, name in each.tolist()]
+    chosen = [name if not reads(text, domain) and reads(name, domain) else text for text, name in said]
+    return TextColumn.of(column.name, (chosen[at] for at in which.ravel().tolist()))
 
 
 def _folded(name: str) -> str:

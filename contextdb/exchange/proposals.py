@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contextdb.cell_words import ANY_WORDS
 from contextdb.cells import Cell, TagSet, ValueSet, parse_cell, reads
 from contextdb.columns import TextColumn
 from contextdb.conditions import READABLE_SHARE
 from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
-from contextdb.errors import CellError, plural
-from contextdb.exchange.reading import listed
+from contextdb.errors import CellError, in_quotes, plural
+from contextdb.exchange.reading import ERRORS, listed
+from contextdb.number_cells import doubtful
 from contextdb.shapes import wrong_name
 
 MOST_ENUM_VALUES = 40
 """A column with more different names than this is a text: nobody wants to keep such a list."""
 FEW_ROWS = 10
 """Of so few rows nobody can tell whether their names are all there are."""
-MOST_EXAMINED = 2_000
-"""Distinct texts that are looked at; a column with more is judged by its commonest."""
-
-_ANY_WORDS = frozenset(("", "-", "any"))
 _ANGLE_NAME = re.compile(r"angle|direction|heading|bearing|yaw|rotation|degrees|(?:^|_)(?:dir|deg|rot)(?:_|$)", re.IGNORECASE)
+_PAIR = re.compile(r"\s*[+-]?[\d.]+,\d+\s*")
+_SHORT = re.compile(r"[^\s,;!?]+(?: +[^\s,;!?]+){0,3}")
+_WHOLE = re.compile(r"\s*=?\s*[+-]?\d+\s*(?:\|\s*=?\s*[+-]?\d+\s*)*")
+"""Whole numbers that a fact must be equal to, as only something that is counted is."""
+_UNIT = re.compile(r"\(\s*[^\d\s()]{1,8}\s*\)|\[\s*[^\d\s\[\]]{1,8}\s*\]|%")
+_MEASURE = re.compile(
+    "accel|acceleration|angle|cm|deg|degrees|depth|dist|distance|duration|elapsed|fov|force|fraction|height|km|kmh|kph|length|mass|"
+    "met(?:er|re)s?|mm|mph|ms|mps|percent|pitch|radius|ratio|roll|rotation|scale|sec|seconds|share|speed|time|velocity|weight|width|yaw",
+    re.IGNORECASE,
+)
 _FRACTION = re.compile(r"\d\.\d|(?<!\.)\.\d|\de-?\d", re.IGNORECASE)
 
 
@@ -36,6 +44,8 @@ class Proposal:
     why: str
     n_unreadable: int = 0
     """Rows whose cell cannot be read as this type."""
+    are_names: bool = False
+    """Whether each text is one whole name."""
 
 
 @dataclass(frozen=True)
@@ -45,50 +55,80 @@ class _Said:
     texts: Sequence[str]
     counts: Sequence[int]
     n_rows: int
+    n_errors: int
+    """Rows with an error of Excel, which say nothing of the type and can be read as none."""
 
     @classmethod
     def by(cls, column: TextColumn) -> _Said:
         counts = np.bincount(column.codes, minlength=len(column.texts)).tolist()
-        said = [(t, n) for t, n in zip(column.texts, counts, strict=True) if n and t.strip().casefold() not in _ANY_WORDS]
-        said.sort(key=lambda item: -item[1])
-        return cls([t for t, _ in said], [n for _, n in said], sum(n for _, n in said))
+        said = [(t, n) for t, n in zip(column.texts, counts, strict=True) if n and t.strip().casefold() not in ANY_WORDS]
+        n_errors = sum(n for t, n in said if t.strip() in ERRORS)
+        said = sorted((item for item in said if item[0].strip() not in ERRORS), key=lambda item: -item[1])
+        return cls([t for t, _ in said], [n for _, n in said], sum(n for _, n in said), n_errors)
+
+    def reads(self, domain: Domain) -> Iterator[tuple[bool, int]]:
+        """Whether a domain reads each text, and how many rows hold it. No text is left out, however many there are."""
+        rest = doubtful(self.texts, domain)  # of many number cells nearly all are surely read
+        asked = None if rest is None else frozenset(rest.tolist())
+        for at, (text, n) in enumerate(zip(self.texts, self.counts, strict=True)):
+            yield (asked is not None and at not in asked) or reads(text, domain), n
 
     def n_unread(self, domain: Domain) -> int:
-        """How many rows cannot be read as a domain; of very many texts only the commonest are tried."""
-        pairs = zip(self.texts[:MOST_EXAMINED], self.counts, strict=False)
-        return sum(n for text, n in pairs if not reads(text, domain))
+        """How many rows cannot be read as a domain."""
+        return self.n_errors + sum(n for is_read, n in self.reads(domain) if not is_read)
+
+    def read_as(self, domain: Domain) -> list[str]:
+        """The texts that a domain reads."""
+        return [text for text, (is_read, _) in zip(self.texts, self.reads(domain), strict=True) if is_read]
 
     @property
     def is_numeric(self) -> bool:
         """Whether half of the rows read as numbers and the others have digits: numbers with slips among them, as in "2; 5"."""
-        texts = self.texts[:MOST_EXAMINED]
-        has_digits = all(any(map(str.isdigit, text)) for text in texts)
-        return has_digits and 2 * self.n_unread(NUMBER) <= self.n_rows
+        has_digits = all(any(map(str.isdigit, text)) for text in self.texts)
+        return has_digits and 2 * (self.n_unread(NUMBER) - self.n_errors) <= self.n_rows
 
     def mostly(self, domain: Domain) -> bool:
         """Whether nearly all rows read as a domain; stops at the row that decides."""
+        return self._are_mostly(self.reads(domain))
+
+    def are_mostly(self, claim: Callable[[str], bool]) -> bool:
+        """Whether something is true of the texts of nearly all rows."""
+        return self._are_mostly(zip(map(claim, self.texts), self.counts, strict=True))
+
+    def _are_mostly(self, flags: Iterable[tuple[bool, int]]) -> bool:
         may_fail = (1 - READABLE_SHARE) * self.n_rows
-        for text, n in zip(self.texts[:MOST_EXAMINED], self.counts, strict=False):
-            may_fail -= 0 if reads(text, domain) else n
+        for is_so, n in flags:
+            may_fail -= 0 if is_so else n
             if may_fail < 0:
                 return False
         return True
 
 
-def propose_type(column: TextColumn) -> Proposal:
-    """The type that a column's cells most likely have."""
+def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposal:
+    """The type that a column's cells most likely have.
+
+    Parameters
+    ----------
+    names : TextColumn, optional
+        The same column with each text as one whole name: what its cells become when they are names.
+    """
     said = _Said.by(column)
     if not said.texts:
-        return Proposal({"type": "text"}, "no cell says anything but Any")
-    if {t.strip() for t in said.texts} <= {"0", "1"}:
-        return Proposal({"type": "int"}, "the cells are 0 and 1; bool, if they mean False and True")
+        return _with_unread({"type": "text"}, "no cell says anything but Any", said, TEXT)
+    if all(text.strip() in ("0", "1") for text in said.texts):
+        if _is_measure(column.name):
+            return _number(column.name, said)
+        return _with_unread({"type": "int"}, "the cells are 0 and 1; bool, if they mean False and True", said, INT)
     if said.mostly(BOOL):
         return _with_unread({"type": "bool"}, f"{plural(said.n_rows, 'cell')} of True and False", said, BOOL)
     if said.mostly(NUMBER) or said.is_numeric:
         return _number(column.name, said)
     if said.mostly(TAGS):
         return _with_unread(_tags(said), "every word has a + or a - before it", said, TAGS)
-    return _names(said)
+    if names is None:
+        return _names(said, said.mostly(TEXT))
+    proposal = _names(_Said.by(names), said.are_mostly(_is_short))
+    return proposal if proposal.declared is None else replace(proposal, are_names=True)
 
 
 def _with_unread(declared: Mapping[str, object], why: str, said: _Said, domain: Domain) -> Proposal:
@@ -97,16 +137,36 @@ def _with_unread(declared: Mapping[str, object], why: str, said: _Said, domain: 
 
 
 def _number(name: str, said: _Said) -> Proposal:
-    texts = [text for text in said.texts[:MOST_EXAMINED] if reads(text, NUMBER)]
+    proposal = _number_type(name, said)
+    return replace(proposal, why=proposal.why + pair_in(said.texts))
+
+
+def _number_type(name: str, said: _Said) -> Proposal:
+    texts = said.read_as(NUMBER)
     backwards = next((t for t in texts if _runs_backwards(t)), None)
     is_angle = _ANGLE_NAME.search(name) is not None or backwards is not None
-    if is_angle and all(reads(text, ANGLE) and _is_within_turn(text) for text in texts):
+    if is_angle and all(_is_within_turn(text) and reads(text, ANGLE) for text in texts):
         why = f'"{backwards}" runs through 180' if backwards else "the name tells of an angle, and no number is above 360"
         return _with_unread({"type": "angle"}, why, said, ANGLE)
-    if not any(_FRACTION.search(text) for text in texts):
-        return _with_unread({"type": "int"}, "all numbers are whole", said, INT)
-    fraction = next(text for text in texts if _FRACTION.search(text))
-    return _with_unread({"type": "number"}, f'numbers with fractions, such as "{fraction}"', said, NUMBER)
+    measured = _measured(name, texts)
+    if measured is None:
+        return _with_unread({"type": "int"}, "whole numbers alone, as counts are", said, INT)
+    return _with_unread({"type": "number"}, measured, said, NUMBER)
+
+
+def _measured(name: str, texts: Sequence[str]) -> str | None:
+    """Why the numbers are measured, so that a fact such as 3.7 must be allowed; None where they seem to be counted."""
+    if fraction := next((text for text in texts if _FRACTION.search(text)), None):
+        return f"numbers with fractions, such as {in_quotes(fraction)}"
+    if extent := next((text for text in texts if not _WHOLE.fullmatch(text)), None):
+        return f"a fact may lie between whole numbers in {in_quotes(extent)}"
+    return "its name tells of something that is measured" if _is_measure(name) else None
+
+
+def _is_measure(name: str) -> bool:
+    """Whether a name has a unit in brackets, or a word for a unit or a quantity: "Speed (m/s)", target_dist, timeToImpact."""
+    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
+    return bool(_UNIT.search(name)) or any(map(_MEASURE.fullmatch, words))
 
 
 def _runs_backwards(text: str) -> bool:
@@ -135,9 +195,14 @@ def _can_be_declared(names: Iterable[str]) -> bool:
     return not any(map(wrong_name, names))
 
 
-def _names(said: _Said) -> Proposal:
+def _is_short(text: str) -> bool:
+    """Whether a text with blanks in it is as short as a name, and no sentence."""
+    return _SHORT.fullmatch(text.strip()) is not None
+
+
+def _names(said: _Said, are_names: bool) -> Proposal:
     """An enum of the names there are, where those are few and come back; a text; or, of whole sentences, no condition at all."""
-    if not said.mostly(TEXT):
+    if not are_names:
         return Proposal(None, "the cells are no names, numbers or tags: data for the game, or a note")
     names: dict[str, None] = {}
     for cell in _cells(said, TEXT):
@@ -157,7 +222,7 @@ def _in_order(accepts: ValueSet) -> list[str]:
 
 def _cells(said: _Said, domain: Domain) -> list[Cell]:
     cells = []
-    for text in said.texts[:MOST_EXAMINED]:
+    for text in said.texts:
         try:
             cells.append(parse_cell(text, domain, wants_mend=False))
         except CellError:
@@ -170,6 +235,12 @@ def names_of(column: TextColumn) -> list[str]:
     cells = _cells(_Said.by(column), TEXT)
     names = {name for cell in cells if isinstance(cell.accepts, ValueSet) for name in _in_order(cell.accepts)}
     return sorted(name for name in names if not wrong_name(name))
+
+
+def pair_in(texts: Iterable[str]) -> str:
+    """What is said of a number with a comma and no blank behind it, which could be meant as 1.5; empty where there is none."""
+    found = next((text for text in texts if _PAIR.fullmatch(text)), None)
+    return "" if found is None else f"; {in_quotes(found)} is taken as centre and tolerance"
 
 
 def n_unreadable(column: TextColumn, domain: Domain) -> tuple[int, str]:

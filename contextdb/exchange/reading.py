@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cell_words import ANY_WORDS, quoted
 from contextdb.columns import TextColumn
 from contextdb.errors import shown
 from contextdb.files import AnySource
 from contextdb.schema import EMPTY, Schema
+
+ERRORS = frozenset(
+    (
+        "#N/A",
+        "#REF!",
+        "#VALUE!",
+        "#DIV/0!",
+        "#NAME?",
+        "#NULL!",
+        "#NUM!",
+        "#SPILL!",
+        "#CALC!",
+        "#GETTING_DATA",
+        "#FIELD!",
+        "#BLOCKED!",
+    )
+)
+"""What Excel shows in a cell whose formula failed. No cell of ours reads it, so that it is never taken for a value or for Any."""
 
 MOST_REMARKS = 20
 """Remarks of one kind that are listed; then how many more there are is told."""
@@ -45,6 +67,10 @@ class Reading:
     """The sheets of a workbook that hold cells."""
     outputs: tuple[str, ...] = field(default=())
     """Columns that the format says are data and no conditions."""
+    has_whole_names: bool = False
+    """Whether a text is one name, blanks and all, as other programs mean it; else it is a cell of ours, where blanks part names."""
+    sets: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    """Of a column the rows in which the format has a set of names: there the text is a cell of ours all the same."""
 
     @property
     def n_rows(self) -> int:
@@ -59,6 +85,23 @@ class Reading:
     def column(self, name: str) -> TextColumn:
         """A column by its name."""
         return next(column for column in self.columns if column.name == name)
+
+    def whole_names(self, column: TextColumn) -> TextColumn | None:
+        """A column as cells in which each text is one name, quoted where need be; None where that changes nothing."""
+        if not self.has_whole_names:
+            return None
+        whole = [_whole_name(text) for text in column.texts]
+        if whole == list(column.texts):
+            return None
+        are_sets = self.sets.get(column.name, np.zeros(column.n_rows, np.bool_))
+        codes = zip(column.codes.tolist(), are_sets.tolist(), strict=True)
+        return TextColumn.of(column.name, (column.texts[code] if is_set else whole[code] for code, is_set in codes))
+
+
+def _whole_name(text: str) -> str:
+    """A text of another program as a cell that accepts this one name; what says Any stays, and so does an error of Excel."""
+    name = text.strip()
+    return text if name.casefold() in ANY_WORDS or name in ERRORS or quoted(name) == name else quoted(name)
 
 
 def capped(remarks: Sequence[Remark], what: str) -> tuple[Remark, ...]:

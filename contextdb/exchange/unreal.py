@@ -12,13 +12,16 @@ import csv
 import io
 import json
 import re
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from contextdb.cell_words import quoted
 from contextdb.columns import TextColumn
-from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.reading import Reading, Remark, capped
 from contextdb.table import Table
 
@@ -27,7 +30,8 @@ JSON_NAME = "Name"
 _SET = re.compile(r'\(\s*(?:"(?:[^"\\]|\\.)*"|[\w.:/\-]+)(?:\s*,\s*(?:"(?:[^"\\]|\\.)*"|[\w.:/\-]+))*\s*\)')
 _ITEM = re.compile(r'"((?:[^"\\]|\\.)*)"|([\w.:/\-]+)')
 _STRUCT = re.compile(r"\(\s*\w+\s*=")
-_LOCALISED = re.compile(r'(?:NSLOCTEXT|INVTEXT|LOCTEXT)\(.*?"((?:[^"\\]|\\.)*)"\s*\)')
+_LOCALISED = ("NSLOCTEXT(", "INVTEXT(", "LOCTEXT(")
+_STRING = re.compile(r'"((?:[^"\\]|\\.)*)("?)', re.DOTALL)
 
 
 def is_unreal_header(names: Sequence[str]) -> bool:
@@ -48,12 +52,15 @@ def from_json(reading: Reading) -> Reading:
 def _from_unreal(reading: Reading, kind: str) -> Reading:
     first, *rest = reading.columns
     remarks = [Remark("the row names of an Unreal DataTable name the assets.", f"column {in_quotes(first.name)}")]
-    columns = [first.renamed("Asset Name")]
+    columns, sets = [first.renamed("Asset Name")], dict[str, NDArray[np.bool_]]()
     for column in rest:
         texts, lost = _cells(column)
-        columns.append(TextColumn.of(column.name.replace("__", "."), (texts[code] for code in column.codes.tolist())))
+        name = column.name.replace("__", ".")
+        columns.append(TextColumn.of(name, (texts[code] for code in column.codes.tolist())))
+        are_sets = np.array([_is_set(text) for text in column.texts], np.bool_)[column.codes]
+        sets[name] = are_sets | reading.sets.get(column.name, False)
         remarks += lost
-    return replace(reading, columns=tuple(columns), format=kind, remarks=(*reading.remarks, *remarks))
+    return replace(reading, columns=tuple(columns), format=kind, remarks=(*reading.remarks, *remarks), sets=sets)
 
 
 def _cells(column: TextColumn) -> tuple[list[str], tuple[Remark, ...]]:
@@ -67,13 +74,25 @@ def _cells(column: TextColumn) -> tuple[list[str], tuple[Remark, ...]]:
 
 
 def _cell(text: str) -> str:
-    if found := _LOCALISED.fullmatch(text.strip()):
-        return found[1].replace('\\"', '"')
+    if text.lstrip().startswith(_LOCALISED) and (said := _localised(text)) is not None:
+        return said
     if text == "()":
         return ""
-    if _SET.fullmatch(text.strip()) and ".." not in text:  # (10..30) is an open interval
+    if _is_set(text):
         return " ".join(quoted(bare or inner.replace('\\"', '"')) for inner, bare in _ITEM.findall(text))
     return text
+
+
+def _is_set(text: str) -> bool:
+    """Whether a text is a set as Unreal writes it; (10..30) is an open interval of ours."""
+    return ".." not in text and _SET.fullmatch(text.strip()) is not None
+
+
+def _localised(text: str) -> str | None:
+    """The last string of NSLOCTEXT("space", "key", "text"), which is what people read; None where it is written otherwise."""
+    last = next(iter(deque(_STRING.finditer(text), maxlen=1)), None)
+    is_sound = last is not None and last[2] and text[last.end() :].strip() == ")"
+    return last[1].replace('\\"', '"') if last is not None and is_sound else None
 
 
 # ---- writing
@@ -129,7 +148,11 @@ def _require_unique(table: Table) -> None:
     faults, rows = [], dict[str, int]()
     for row, asset in enumerate(table.assets):
         if not asset.strip() or asset in rows:
-            said = f"the asset {in_quotes(asset)} stands in row {rows[asset]} too." if asset in rows else "the row names no asset."
+            said = (
+                f"the asset {in_quotes(asset)} stands in {row_name(rows[asset])} too."
+                if asset in rows
+                else "the row names no asset."
+            )
             faults.append(
                 Fault(said, "a name of its own for each row, as Unreal wants it", place=Place(row=row, column=table.asset_column))
             )

@@ -14,17 +14,16 @@ from typing import TYPE_CHECKING, Any
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes, nearest, plural, shown, some
 from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
-from contextdb.exchange.reading import Reading, Remark, capped, listed
+from contextdb.exchange.reading import ERRORS, Reading, Remark, capped, listed
 from contextdb.exchange.values import DATES, text_of_value
 from contextdb.exchange.xlsx_parts import FIRST_LINE, TYPES_SHEET
-from contextdb.exchange.xlsx_scan import formulas_of, require_workbook
+from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook
 from contextdb.schema import EMPTY, Schema, read_schema
 
 if TYPE_CHECKING:
     from python_calamine import CalamineWorkbook
 
 INSTALL = 'to install it: pip install "contextdb[xlsx]"'
-_ERRORS = frozenset(("#N/A", "#REF!", "#VALUE!", "#DIV/0!", "#NAME?", "#NULL!", "#NUM!"))
 _TEXT = {str}
 
 
@@ -48,16 +47,21 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     names = [name for name in book.sheet_names if name.casefold() != TYPES_SHEET]
     name, block = _wanted(sheet, names, file)
     sheets = {each: _Sheet.read(book, each, file) for each in ([name] if name else names)}
-    name = name or _only(sheets, file)
-    values = sheets[name].values
+    name, told = (name, []) if name else _only(sheets, _hidden_sheets(book), file)
+    values, marks = sheets[name].values, marks_of(raw, name)
     kept, remarks = _kept_types(book, file)
-    remarks = [*remarks, *_oddities(values, raw, name)]
-    grid = [row if {*map(type, row)} == _TEXT else [text_of_value(value) for value in row] for row in values]
-    remarks += _fill_merged(grid, sheets[name].merged)
+    remarks = [*remarks, *_dates(values), *_formulas(marks.formulas)]
+    grid = [list(row) if {*map(type, row)} == _TEXT else [text_of_value(value) for value in row] for row in values]
+    remarks += _fill_errors(grid, marks, is_old(raw))
+    remarks += _fill_merged(grid, sheets[name].merged, file)
+    remarks += _hidden(grid, marks)
     own = _own_block(grid) if kept is not None and block is None else None
-    columns, more = (_own_columns(grid, own), []) if own else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block)
-    told = [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
-    return Reading(tuple(columns), "xlsx", (*told, *remarks, *more), kept or EMPTY, sheets=tuple(names))
+    columns, more = (
+        (_own_columns(grid, own), []) if own else columns_of(grid, f"{file}, sheet {in_quotes(name)}", block, "sheet row", name)
+    )
+    told += [Remark(f"the sheet {in_quotes(name)} of {len(names)}.")] if len(names) > 1 else []
+    told = [*told, *remarks, *more]
+    return Reading(tuple(columns), "xlsx", tuple(told), kept or EMPTY, sheets=tuple(names), has_whole_names=kept is None)
 
 
 def sheets_of(raw: bytes, file: str) -> list[str]:
@@ -114,13 +118,24 @@ def _wanted(sheet: str | None, names: Sequence[str], file: str) -> tuple[str | N
     raise TableError(Fault(f"there is no sheet {in_quotes(sheet)}.", some(names), in_quotes(near) if near else "", Place(file)))
 
 
-def _only(sheets: dict[str, _Sheet], file: str) -> str:
-    """The only sheet that has cells in it."""
+def _hidden_sheets(book: CalamineWorkbook) -> frozenset[str]:
+    """The sheets that Excel does not show."""
+    return frozenset(one.name for one in book.sheets_metadata if not str(one.visible).endswith(".Visible"))
+
+
+def _only(sheets: dict[str, _Sheet], hidden: frozenset[str], file: str) -> tuple[str, list[Remark]]:
+    """The only sheet that has cells in it, and what is said of hidden ones: these are left out where another can be seen."""
     filled = [name for name, sheet in sheets.items() if any(value != "" for row in sheet.values for value in row)]
-    if len(filled) > 1:
-        found = f"{len(filled)} sheets hold cells: {listed(filled)}."
-        raise TableError(Fault(found, "one of them", f"to name it: --sheet {in_quotes(filled[0])}", Place(file)))
-    return filled[0] if filled else next(iter(sheets))
+    seen = [name for name in filled if name not in hidden]
+    if len(seen or filled) > 1:
+        found = f"{len(seen or filled)} sheets hold cells: {listed(seen or filled)}."
+        raise TableError(Fault(found, "one of them", f"to name it: --sheet {in_quotes((seen or filled)[0])}", Place(file)))
+    if not filled:
+        return next(iter(sheets)), []
+    if not seen:
+        return filled[0], [Remark("the sheet is hidden.", f"sheet {in_quotes(filled[0])}")]
+    left = [name for name in filled if name not in seen]
+    return seen[0], [Remark("left out: it is hidden; --sheet reads it.", f"sheet {in_quotes(name)}", True) for name in left]
 
 
 @dataclass(frozen=True)
@@ -176,27 +191,29 @@ def _own_columns(grid: Sequence[Sequence[str]], block: Block) -> list[TextColumn
 # ---- what a person should know
 
 
-def _fill_merged(grid: list[list[str]], merged: Sequence[tuple[tuple[int, int], tuple[int, int]]]) -> list[Remark]:
-    """Give every cell of a merged area the value of its first, and say so."""
-    remarks = []
+def _fill_merged(grid: list[list[str]], merged: Sequence[tuple[tuple[int, int], tuple[int, int]]], file: str) -> list[Remark]:
+    """Give every cell of a merged area the value of its first, and say so. Areas that lie over each other are refused."""
+    remarks, n_left = [], sum(map(len, grid))
     for (top, left), (bottom, right) in merged:
         if top >= len(grid) or left >= len(grid[top]):
             continue
         block, text = Block(top, left, min(bottom + 1, len(grid)), min(right + 1, len(grid[0]))), grid[top][left]
+        n_left -= (block.bottom - block.top) * (block.right - block.left)
+        if n_left < 0:
+            fault = Fault("the workbook is broken: merged areas lie over each other.", "a workbook as Excel saves it")
+            raise TableError(fault.at(Place(file)))
         for row in grid[block.top : block.bottom]:
             row[block.left : block.right] = [text] * (block.right - block.left)
         remarks.append(Remark(f"merged cells; each now holds {in_quotes(text)}.", f"cells {block}"))
     return list(capped(remarks, "merged areas"))
 
 
-def _oddities(values: Sequence[Sequence[Any]], raw: bytes, name: str) -> list[Remark]:
-    dates, errors = list[Remark](), list[Remark]()
+def _dates(values: Sequence[Sequence[Any]]) -> Sequence[Remark]:
+    dates = list[Remark]()
     for at, row in enumerate(values, 1):
         if {*map(type, row)} > _TEXT:  # a row of texts alone, as most are, costs nothing
             dates += [_date(value, at, column) for column, value in enumerate(row) if isinstance(value, DATES)]
-        if not _ERRORS.isdisjoint(row):
-            errors += [_error(value, at, column) for column, value in enumerate(row) if value in _ERRORS]
-    return [*capped(dates, "dates"), *capped(errors, "errors"), *_formulas(formulas_of(raw, name))]
+    return capped(dates, "dates")
 
 
 def _date(value: object, row: int, column: int) -> Remark:
@@ -204,8 +221,38 @@ def _date(value: object, row: int, column: int) -> Remark:
     return Remark(told, f"cell {column_letters(column)}{row}", is_loss=True)
 
 
-def _error(value: object, row: int, column: int) -> Remark:
-    return Remark(f"an error of Excel, {value}.", f"cell {column_letters(column)}{row}", is_loss=True)
+def _fill_errors(grid: list[list[str]], marks: Marks, is_old: bool) -> Sequence[Remark]:
+    """Write the errors of Excel into their cells, which the reader of workbooks leaves empty, and say where they stand."""
+    if is_old:
+        told = "errors of Excel in an .xls cannot be told from empty cells, which say Any; saved as .xlsx they are named."
+        return [Remark(told, is_loss=True)]
+    for row, column, error in marks.errors:
+        if row < len(grid) and column < len(grid[row]):
+            grid[row][column] = error
+    found = [
+        Remark(f"an error of Excel, {text}; no type reads it.", f"cell {column_letters(column)}{at}", is_loss=True)
+        for at, row in enumerate(grid, 1)
+        if not ERRORS.isdisjoint(row)
+        for column, text in enumerate(row)
+        if text in ERRORS
+    ]
+    return capped(found, "errors")
+
+
+def _hidden(grid: Sequence[Sequence[str]], marks: Marks) -> list[Remark]:
+    """Rows and columns with texts in them that Excel does not show: they come in, and are named."""
+    rows = [row for row in marks.hidden_rows if row < len(grid) and any(grid[row])]
+    width = len(grid[0]) if grid else 0
+    columns = sorted(
+        {at for some in marks.hidden_columns for at in range(some.start, min(some.stop, width)) if any(row[at] for row in grid)}
+    )
+    found = []
+    if rows:
+        found.append(Remark(f"{plural(len(rows), 'hidden row')} read like all others.", f"sheet row {rows[0] + 1}"))
+    if columns:
+        letters = ", ".join(map(column_letters, columns[:8])) + (", …" if len(columns) > 8 else "")
+        found.append(Remark(f"{plural(len(columns), 'hidden column')} read like all others.", f"column {letters}"))
+    return found
 
 
 def _formulas(found: Iterable[tuple[str, str, bool]]) -> list[Remark]:

@@ -11,6 +11,8 @@ import re
 import struct
 import zipfile
 import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from posixpath import join, normpath
 
 from contextdb.errors import Fault, Place, TableError
@@ -18,6 +20,8 @@ from contextdb.exchange.grid import column_number
 
 MOST_BYTES = 4 << 30
 MOST_CELLS = 30_000_000
+FEW_CELLS, MOST_EMPTY = 1_000_000, 16
+"""A sheet of more cells than FEW_CELLS may have so many for each filled one: a small file must not cost what a large one does."""
 MOST_SEARCHED = 50_000_000
 MOST_RATIO = 1_000
 """No sheet packs better than this; a bomb does."""
@@ -27,12 +31,20 @@ _BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, ValueError, KeyError, O
 
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _ENCRYPTED = "EncryptedPackage".encode("utf-16-le")
-_FORMULA = re.compile(rb'<c\b[^>]*?\br="([A-Z]{1,3}\d+)"[^>]*>\s*<f\b[^>]*?(?:/>|>([^<]*)</f>)(\s*<v>[^<]*</v>|\s*<v/>)?')
+# A tag ends before the next "<", so that none of these looks at a byte once for each tag before it.
+_FORMULA = re.compile(rb"<c\b([^<>]*)>\s*<f\b[^<>]*>(?:([^<]*)</f>)?(\s*<v>[^<]*</v>|\s*<v/>)?")
+_ERROR = re.compile(rb"<(?:\w+:)?c\b([^<>]*)>(?:\s*<(?:\w+:)?f\b[^<>]*>(?:[^<]*</(?:\w+:)?f>)?)?\s*<(?:\w+:)?v>([^<]*)</")
+_IS_ERROR = re.compile(rb"\bt=[\"']e[\"']")
+_IS_HIDDEN = re.compile(rb"\bhidden=[\"'](?:1|true)[\"']")
+_ROW = re.compile(rb"<(?:\w+:)?row\b([^<>]*)>")
+_COLUMN = re.compile(rb"<(?:\w+:)?col\b([^<>]*)>")
+_NUMBER = re.compile(rb"\b(r|min|max)=[\"'](\d{1,7})[\"']")
+_CELL = re.compile(rb"\br=[\"']([A-Z]{1,3})(\d{1,9})[\"']")
 _HAS_FORMULA = re.compile(rb"<f[\s/>]")
-_SHEET = re.compile(r"<(?:\w+:)?sheet\b([^>]*)/?>")
-_RELATION = re.compile(r"<(?:\w+:)?Relationship\b([^>]*)/?>")
-_ATTRIBUTE = re.compile(r'([\w:]+)="([^"]*)"')
-_REFERENCE = re.compile(rb'<(?:\w+:)?c\b[^>]*?\br=["\']([A-Z]{1,3})(\d{1,9})')
+_SHEET = re.compile(r"<(?:\w+:)?sheet\b([^<>]*)>")
+_RELATION = re.compile(r"<(?:\w+:)?Relationship\b([^<>]*)>")
+_ATTRIBUTE = re.compile(r'(?<![\w:])([\w:]+)="([^"]*)"')
+_REFERENCE = re.compile(rb'<(?:\w+:)?c\b[^<>]*?\br=["\']([A-Z]{1,3})(\d{1,9})')
 _ENTITY = re.compile(rb"<!(?:DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
@@ -115,10 +127,15 @@ def _far_cell(xml: bytes) -> Fault | None:
     column = max({letters for letters, _ in refs}, key=lambda word: (len(word), word)).decode()
     row = max(int(number) for _, number in refs)
     n_cells = row * column_number(column)
-    if n_cells <= MOST_CELLS:
+    most = min(MOST_CELLS, FEW_CELLS + MOST_EMPTY * (xml.count(b"<c ") + xml.count(b":c ")))
+    if n_cells <= most:
         return None
     found = f"the sheet reaches to cell {column}{row}, {n_cells:,} cells in all."
-    return Fault(found, f"at most {MOST_CELLS:,}", "to delete the rows and columns beyond the table, and save it again")
+    return Fault(
+        found,
+        f"at most {most:,}, as so few are filled" if most < MOST_CELLS else f"at most {most:,}",
+        "to delete the rows and columns beyond the table, and save it again",
+    )
 
 
 def _last_of_rows(xml: bytes) -> list[tuple[bytes, bytes]]:
@@ -128,20 +145,61 @@ def _last_of_rows(xml: bytes) -> list[tuple[bytes, bytes]]:
     return [(ref[1], ref[2]) for ref in found if ref]
 
 
-def formulas_of(raw: bytes, sheet: str) -> list[tuple[str, str, bool]]:
-    """The formulas of a sheet of an XLSX: the cell, the formula, and whether a value was saved with it."""
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """What a sheet of an XLSX says beside its values. Rows and columns count from 0."""
+
+    formulas: Sequence[tuple[str, str, bool]] = ()
+    """The cell, the formula, and whether a value was saved with it."""
+    errors: Sequence[tuple[int, int, str]] = ()
+    """Row, column, and the error that stands there as a value."""
+    hidden_rows: Sequence[int] = ()
+    hidden_columns: Sequence[range] = ()
+
+
+def is_old(raw: bytes) -> bool:
+    """Whether a workbook is an .xls, of which nothing but the values is known."""
+    return raw.startswith(_OLE)
+
+
+def marks_of(raw: bytes, sheet: str) -> Marks:
+    """What a sheet says beside its values; nothing of an .xls."""
     if not raw.startswith(b"PK"):
-        return []
+        return Marks()
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             path = _path_of(archive, sheet)
             xml = archive.read(path) if path else b""
     except _BROKEN:
-        return []
-    if not _HAS_FORMULA.search(xml):
-        return []
-    found = _FORMULA.finditer(xml)
-    return [(m[1].decode(), (m[2] or b"").decode(errors="replace"), bool(m[3] and b"<v/>" not in m[3])) for m in found]
+        return Marks()
+    formulas = list(_formulas(xml)) if _HAS_FORMULA.search(xml) else []
+    errors = list(_errors(xml)) if _IS_ERROR.search(xml) else []
+    if not _IS_HIDDEN.search(xml):
+        return Marks(formulas, errors)
+    rows = [said[b"r"] - 1 for said in _hidden(_ROW, xml) if b"r" in said]
+    columns = [range(said[b"min"] - 1, said[b"max"]) for said in _hidden(_COLUMN, xml) if b"min" in said and b"max" in said]
+    return Marks(formulas, errors, rows, columns)
+
+
+def _formulas(xml: bytes) -> Iterator[tuple[str, str, bool]]:
+    for found in _FORMULA.finditer(xml):
+        if cell := _CELL.search(found[1]):
+            has_value = bool(found[3] and b"<v/>" not in found[3])
+            yield (cell[1] + cell[2]).decode(), (found[2] or b"").decode(errors="replace"), has_value
+
+
+def _errors(xml: bytes) -> Iterator[tuple[int, int, str]]:
+    for found in _ERROR.finditer(xml):
+        cell = _CELL.search(found[1])
+        if cell and _IS_ERROR.search(found[1]):
+            yield int(cell[2]) - 1, column_number(cell[1].decode()) - 1, found[2].decode(errors="replace").strip()
+
+
+def _hidden(tag: re.Pattern[bytes], xml: bytes) -> Iterator[dict[bytes, int]]:
+    """The numbers that the hidden ones of some tags say."""
+    for found in tag.finditer(xml):
+        if _IS_HIDDEN.search(found[1]):
+            yield {name: int(number) for name, number in _NUMBER.findall(found[1])}
 
 
 def _path_of(archive: zipfile.ZipFile, sheet: str) -> str | None:

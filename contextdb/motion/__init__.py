@@ -10,6 +10,7 @@ Metres, seconds, y up; angles are positive to the left. numba makes the search f
 """
 
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
+from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
 from contextdb.motion.clips.mirror import mirrored, mirrored_path, partners_of
 from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, local_poses, poses_of, resampled
@@ -59,6 +60,7 @@ __all__ = [
     "Choice",
     "Clip",
     "ClipFeatures",
+    "ClipFinding",
     "Controller",
     "ControllerSettings",
     "ControllerState",
@@ -110,6 +112,7 @@ __all__ = [
     "build_databases",
     "clip_features",
     "descriptions",
+    "doubts_of",
     "features_of",
     "footfalls",
     "forward_kinematics",

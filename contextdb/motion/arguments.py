@@ -17,7 +17,10 @@ NO_BIASES: Floats = np.empty(0)
 
 
 class HasAssets(Protocol):
-    """What a table's query answers: something with the names of the valid assets."""
+    """What a table's query answers: something with the names of the valid assets.
+
+    Where it has an attribute `mirrored`, that is the same for animations that are played mirrored.
+    """
 
     @property
     def assets(self) -> Sequence[str]:
@@ -119,6 +122,8 @@ def for_each(valid: Valid | Sequence[Valid | None] | None, n_queries: int) -> li
 def _is_one_for_each(valid: object) -> bool:
     if isinstance(valid, np.ndarray):
         return valid.ndim == 2
+    if hasattr(valid, "lists"):  # a table's answers for many contexts
+        return True
     if not isinstance(valid, (list, tuple)) or hasattr(valid, "assets"):
         return False
     return any(mask is None or hasattr(mask, "assets") or np.ndim(mask) for mask in valid)

@@ -78,7 +78,7 @@ class FlatTable(Table):
         """The table itself."""
         return self
 
-    def save(self, path: str | Path | None = None) -> Table:
+    def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
         """Refuse: a flat table is worked out from others."""
         raise TableError(Fault("a table with its inner tables' rows is no file.", "the tables that it is made of"))
 

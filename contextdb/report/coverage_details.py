@@ -8,11 +8,12 @@ from collections.abc import Iterator
 from contextdb.console import aligned, printable
 from contextdb.covering import Gap, format_percent
 from contextdb.covering.inside import facts_inside
-from contextdb.errors import plural
+from contextdb.errors import plural, row_name
 from contextdb.report.coverage_results import Measured
 from contextdb.report.coverage_words import nearest_sentence
 from contextdb.report.render_text import wrapped
 from contextdb.table import Table
+from contextdb.variety import VARIETY
 
 
 def gap_details(measured: Measured, gap: Gap, table: Table, width: int) -> str:
@@ -53,12 +54,13 @@ def row_details(measured: Measured, row: int, width: int) -> str:
 
 def _row_lines(measured: Measured, row: int, width: int) -> Iterator[str]:
     report = measured.report
-    yield printable(f"{measured.named(row)} of {report.table} (row {row})")
+    yield printable(f"{measured.named(row)} of {report.table} ({row_name(row)})")
     share = report.hits[row]
     yield f"valid in {format_percent(share)} of the contexts" if share else "valid in no context, or in single points only"
     if measured.telemetry is not None:
         yield f"valid in {measured.telemetry.hits[row]:,} of {measured.telemetry.moments:,} recorded moments"
-    found = [finding for finding in report.findings if finding.row == row]
+    findings = [f for f in (*report.findings, *report.needless) if f.rule != VARIETY]
+    found = [finding for finding in findings if finding.row == row]
     for finding in found:
         yield ""
         yield from wrapped(printable(f"{finding.level} {finding.rule}: {finding.message}"), width)
@@ -69,7 +71,7 @@ def _row_lines(measured: Measured, row: int, width: int) -> Iterator[str]:
         yield ""
         sure = "" if report.findings_complete else ", as far as the work allowed to tell"
         yield f"Nothing is wrong with it: no other rows are valid wherever it is{sure}."
-    needed_by = [f for f in report.findings if row in f.by]
+    needed_by = [f for f in findings if row in f.by]
     if needed_by:
         yield ""
         yield f"It is among what makes {plural(len(needed_by), 'row')} needless:"

@@ -70,7 +70,7 @@ def _data(pairs: PairTable, order: list[int], squares: list[tuple[int, int]]) ->
 
 def _slices(slices: list[Slice]) -> Iterator[list[object]]:
     """For each slice its colour, the text of its square, its sentence, and whether it is among the worst."""
-    measured = sorted((s for s in slices if s.covered is not None and s.covered < 1.0), key=lambda s: (s.covered, -s.share))
+    measured = sorted((s for s in slices if s.covered is not None and s.covered < 1.0), key=lambda s: s.rank)
     worst = [id(s) for s in measured[:MOST_TOLD]]
     for found in slices:
         yield [colour_of(found), short_percent(found), printable(_sentence(found)), id(found) in worst]

@@ -13,7 +13,7 @@ from contextdb import __version__
 from contextdb.console import printable
 from contextdb.covering import CoverageReport, format_percent
 from contextdb.report.coverage_heat import heat_map
-from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
+from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
 from contextdb.report.coverage_words import (
     assumed_sentences,
@@ -25,6 +25,7 @@ from contextdb.report.coverage_words import (
     overlap_sentence,
 )
 from contextdb.report.results import as_path
+from contextdb.variety import VARIETY
 
 MOST_ROWS = 5_000
 """Rows that are listed, those with findings before others."""
@@ -38,7 +39,7 @@ def render(results: CoverageResults) -> str:
     title = f"Coverage of {names[0]}" if len(names) == 1 else f"Coverage of {len(names)} tables"
     summary = _summary(results.tables) if len(names) > 1 else ""
     verdict = f'<p class="{"passed" if results.passed else "failed"}">{escape(results.verdict)}</p>' if results.verdict else ""
-    gone = f"<p>No longer there: {escape(printable(', '.join(results.gone)))}.</p>" if results.gone else ""
+    gone = _gates(results.gone.values()) if results.gone else ""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
@@ -99,12 +100,16 @@ def _head(measured: Measured) -> Iterator[str]:
     yield f"{_bar(report)}\n"
     yield from (_paragraph(sentence, "muted") for sentence in assumed_sentences(report))
     if measured.gates:
-        items = (
-            f'<li><span class="{"passed" if g.passed else "failed"}">{"Passed" if g.passed else "Failed"}</span> '
-            f"{escape(g.name)}: {_text(g.message)}</li>"
-            for g in measured.gates
-        )
-        yield f'<ul class="gates">{"".join(items)}</ul>\n'
+        yield _gates(measured.gates)
+
+
+def _gates(gates: Iterable[Gate]) -> str:
+    items = (
+        f'<li><span class="{"passed" if g.passed else "failed"}">{"Passed" if g.passed else "Failed"}</span> '
+        f"{escape(g.name)}: {_text(g.message)}</li>"
+        for g in gates
+    )
+    return f'<ul class="gates">{"".join(items)}</ul>\n'
 
 
 def _change(measured: Measured) -> Iterator[str]:
@@ -196,8 +201,8 @@ def _rows(measured: Measured) -> Iterator[str]:
     if not measured.assets:
         return
     rules: dict[int, list[str]] = {}
-    for finding in report.findings:
-        if finding.row is not None:
+    for finding in (*report.findings, *report.needless):
+        if finding.row is not None and finding.rule != VARIETY:
             rules.setdefault(finding.row, []).append(finding.rule)
     order = sorted(range(len(measured.assets)), key=lambda row: (row not in rules, row))[:MOST_ROWS]
     seen = measured.telemetry
@@ -210,7 +215,8 @@ def _rows(measured: Measured) -> Iterator[str]:
     columns[3:3] = [("recorded moments", True)] if seen else []
     lines = []
     for row in sorted(order):
-        place = measured.lines[row] if measured.lines[row] is not None else row
+        line = measured.lines[row]
+        place = row + 1 if line is None else line
         hits = [_cell(f"{seen.hits[row]:,}", seen.hits[row])] if seen else []
         share = _cell(format_percent(report.hits[row]), report.hits[row])
         lines.append([_cell(str(place), place), _cell(measured.assets[row]), share, *hits, _cell(", ".join(rules.get(row, [])))])

@@ -6,7 +6,7 @@ from xml.etree import ElementTree as ET
 
 from contextdb.console import printable
 from contextdb.covering import Gap
-from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments
+from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments
 from contextdb.report.coverage_words import gaps_sentence
 from contextdb.report.results import as_path
 
@@ -16,6 +16,7 @@ MOST_GAPS = 20
 def render(results: CoverageResults) -> str:
     """The bars as a JUnit document."""
     root = ET.Element("testsuites", name="contextdb coverage")
+    root.extend(_gone_suite(name, gate) for name, gate in results.gone.items())
     root.extend(_suite(measured) for measured in results.tables)
     for name in ("tests", "failures", "errors", "skipped"):
         root.set(name, str(sum(int(suite.get(name, "0")) for suite in root)))
@@ -28,23 +29,39 @@ def _suite(measured: Measured) -> ET.Element:
     suite = ET.Element("testsuite", name=label)
     said = "\n".join(_lines(measured))
     for gate in measured.gates:
-        case = _case(suite, label, gate.name, measured)
-        if gate.passed:
-            ET.SubElement(case, "system-out").text = f"{printable(gate.message)}\n{said}"
-        else:
-            ET.SubElement(case, "failure", type=gate.name, message=printable(gate.message)).text = said
+        _told(_case(suite, label, gate.name, measured.file), gate, said)
     if not measured.gates:
-        ET.SubElement(_case(suite, label, "coverage", measured), "system-out").text = said
-    n_failed = sum(not gate.passed for gate in measured.gates)
-    for name, count in {"tests": len(suite), "failures": n_failed, "errors": 0, "skipped": 0}.items():
+        ET.SubElement(_case(suite, label, "coverage", measured.file), "system-out").text = said
+    return _counted(suite)
+
+
+def _gone_suite(table: str, gate: Gate) -> ET.Element:
+    """A table of the baseline that is not there any more: one case."""
+    label = printable(table)
+    suite = ET.Element("testsuite", name=label)
+    _told(_case(suite, label, gate.name, None), gate, "")
+    return _counted(suite)
+
+
+def _told(case: ET.Element, gate: Gate, said: str) -> None:
+    message = printable(gate.message)
+    if gate.passed:
+        ET.SubElement(case, "system-out").text = "\n".join(filter(None, [message, said]))
+    else:
+        ET.SubElement(case, "failure", type=gate.name, message=message).text = said
+
+
+def _counted(suite: ET.Element) -> ET.Element:
+    counts = {"tests": len(suite), "failures": len(suite.findall("testcase/failure")), "errors": 0, "skipped": 0}
+    for name, count in counts.items():
         suite.set(name, str(count))
     return suite
 
 
-def _case(suite: ET.Element, label: str, name: str, measured: Measured) -> ET.Element:
+def _case(suite: ET.Element, label: str, name: str, file: str | None) -> ET.Element:
     case = ET.SubElement(suite, "testcase", classname=label, name=name, time="0")
-    if measured.file:
-        case.set("file", as_path(measured.file))
+    if file:
+        case.set("file", as_path(file))
     return case
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from contextdb.covering import Gap, format_percent
 from contextdb.covering.baseline import EarlierGap
 from contextdb.errors import plural
-from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
+from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_text import by_rule
 from contextdb.report.coverage_words import (
     assumed_sentences,
@@ -18,8 +18,10 @@ from contextdb.report.coverage_words import (
     gaps_sentence,
     nearest_sentence,
     overlap_sentence,
+    rows_words,
 )
 from contextdb.report.render_markdown import MOST_BYTES, escaped
+from contextdb.variety import VARIETY
 
 STEPS = (10, 5, 3, 1, 0)
 """So many gaps, pairs and rows of a rule are listed, the first that fits."""
@@ -49,7 +51,7 @@ def _document(results: CoverageResults, most: int, n_tables: int) -> str:
     if n_tables < len(results.tables):
         parts.append(f"{len(results.tables) - n_tables:,} more tables are not shown; `contextdb coverage --all` shows every one.\n")
     if results.gone:
-        parts.append(f"No longer there: {escaped(', '.join(results.gone))}.\n")
+        parts.append(_gates(results.gone.values()))
     return "\n".join(parts)
 
 
@@ -63,9 +65,8 @@ def _row(measured: Measured) -> str:
 def _section(measured: Measured, most: int) -> str:
     parts = [f"### {escaped(measured.report.table)}\n", f"{escaped(measured.report.headline)}\n"]
     parts += [f"{escaped(sentence)}\n" for sentence in assumed_sentences(measured.report)]
-    gates = [f"- {'✓' if g.passed else '✗'} {g.name}: {escaped(g.message)}" for g in measured.gates]
-    if gates:
-        parts.append("\n".join(gates) + "\n")
+    if measured.gates:
+        parts.append(_gates(measured.gates))
     for lines in (
         _telemetry(measured, most),
         _change(measured, most),
@@ -76,6 +77,10 @@ def _section(measured: Measured, most: int) -> str:
         parts += ["\n".join(found) + "\n" for found in [list(lines)] if found]
     parts.append(f"Rows valid at once: {escaped(overlap_sentence(measured.report))}.\n")
     return "\n".join(parts)
+
+
+def _gates(gates: Iterable[Gate]) -> str:
+    return "".join(f"- {'✓' if gate.passed else '✗'} {gate.name}: {escaped(gate.message)}\n" for gate in gates)
 
 
 def _telemetry(measured: Measured, most: int) -> Iterator[str]:
@@ -135,6 +140,7 @@ def _findings(measured: Measured, most: int) -> Iterator[str]:
     if blocks:
         yield "| level | finding | rows |\n| --- | --- | --- |"
     for rule, found in blocks.items():
-        named = [measured.named(f.row) if f.row is not None else f.message for f in found[:most]]
+        named = [rows_words(measured, f) for f in found[:most]]
+        noun = "group" if rule == VARIETY else "row"
         more = [f"… and {len(found) - len(named):,} more"] if len(named) < len(found) else []
-        yield f"| {found[0].level} | {escaped(rule)}, {plural(len(found), 'row')} | {escaped(', '.join(named + more))} |"
+        yield f"| {found[0].level} | {escaped(rule)}, {plural(len(found), noun)} | {escaped(', '.join(named + more))} |"

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
-from contextdb.covering.baseline import Change
+from contextdb.covering.baseline import Change, digest_of
 from contextdb.covering.shares import told_apart
-from contextdb.errors import plural
+from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.findings import Finding
 from contextdb.report.results import CheckReport, TableSummary
 
@@ -64,7 +65,7 @@ class Measured:
         """A row as people find it: its line, else its number, and its asset; of an inner table's row also the file."""
         line = self.lines[row]
         file = f" in {self.inside[row]}" if row in self.inside else ""
-        return f"{f'row {row}' if line is None else f'line {line}'} {self.assets[row]}".rstrip() + file
+        return f"{row_name(row) if line is None else f'line {line}'} {self.assets[row]}".rstrip() + file
 
     @property
     def seen_elsewhere(self) -> tuple[SeenGap, ...]:
@@ -78,7 +79,7 @@ class Measured:
             return []
         worst = [self.pairs.worst(i, j) for i, j in self.pairs.pairs()]
         measured = [s for s in worst if s is not None and s.covered is not None and s.covered < 1.0 and s.share > 0.0]
-        return sorted(measured, key=lambda s: (s.covered, -s.share, *s.cells.items()))[:most]
+        return sorted(measured, key=lambda s: (*s.rank, *s.cells.items()))[:most]
 
     def to_json(self) -> dict[str, object]:
         """One entry of `tables` in the JSON document."""
@@ -99,18 +100,21 @@ class CoverageResults:
     """All measured tables."""
 
     tables: tuple[Measured, ...]
-    gone: tuple[str, ...] = ()
-    """Tables of the baseline that are not there any more."""
+    gone: Mapping[str, Gate] = field(default_factory=dict)
+    """For each table of the baseline that is not there any more the bar that this misses, or keeps where it is intended."""
 
     @property
     def passed(self) -> bool:
-        """Whether every table keeps every bar."""
-        return all(gate.passed for measured in self.tables for gate in measured.gates)
+        """Whether every bar is kept."""
+        return all(gate.passed for gate in self._gates())
+
+    def _gates(self) -> list[Gate]:
+        return [*self.gone.values(), *(gate for measured in self.tables for gate in measured.gates)]
 
     @property
     def verdict(self) -> str:
         """Whether the bars are kept, in one sentence; "" where there are none."""
-        gates = [gate for measured in self.tables for gate in measured.gates]
+        gates = self._gates()
         n_failed = sum(not gate.passed for gate in gates)
         if n_failed:
             return f"{n_failed} of {plural(len(gates), 'bar')} missed."
@@ -118,12 +122,19 @@ class CoverageResults:
 
     def to_json(self) -> dict[str, object]:
         """The JSON document."""
-        tables = [measured.to_json() for measured in self.tables]
-        return {"format": 1, "passed": self.passed, "tables": tables, "gone": list(self.gone)}
+        document: dict[str, object] = {
+            "format": 1,
+            "passed": self.passed,
+            "tables": [measured.to_json() for measured in self.tables],
+            "gone": list(self.gone),
+            "gates": [gate.to_json() for gate in self.gone.values()],
+        }
+        return document | {"digest": digest_of(document)}
 
     def as_check(self) -> CheckReport:
         """Missed bars, findings and the largest gaps as findings, for formats that know nothing else."""
-        return CheckReport(tuple(m.summary for m in self.tables), tuple(f for m in self.tables for f in _findings(m)))
+        gone = [Finding(gate.rule, "error", gate.message, name) for name, gate in self.gone.items() if not gate.passed]
+        return CheckReport(tuple(m.summary for m in self.tables), (*gone, *(f for m in self.tables for f in _findings(m))))
 
 
 def reaches(value: float, limit: float) -> bool:
@@ -153,6 +164,24 @@ def max_drop(change: Change, limit: float) -> Gate:
         f"the covered share fell by {points}, {verb} the {allowed} allowed.",
         rule="coverage-dropped",
     )
+
+
+def table_gone(name: str, is_intended: bool, new: Sequence[str] = ()) -> Gate:
+    """Require that a table of the baseline is still there; `new` are the tables that the baseline does not have."""
+    found = f"the table {in_quotes(name)} of the baseline is not there any more"
+    renamed = f" New since the baseline: {some(new)}." if new else ""
+    return _still_there(name, found, is_intended, renamed)
+
+
+def table_emptied(name: str, n_rows: int, is_intended: bool) -> Gate:
+    """Require that a table that had rows in the baseline still has some."""
+    return _still_there(name, f"the table had {plural(n_rows, 'row')} in the baseline and has none now", is_intended)
+
+
+def _still_there(name: str, found: str, is_intended: bool, more: str = "") -> Gate:
+    how = f"--gone={name}" if re.fullmatch(r"[\w.-]+", name) else f"--gone={in_quotes(name)}"
+    message = f"{found}, as --gone says." if is_intended else f"{found}.{more} Where that is intended: {how}."
+    return Gate("gone", 0.0, 1.0, is_intended, message, rule="table-gone")
 
 
 def fail_under_telemetry(telemetry: Observed, limit: float) -> Gate:

@@ -9,7 +9,7 @@ from contextdb.console import printable, styled, width_of
 from contextdb.covering import Gap, format_percent
 from contextdb.errors import plural
 from contextdb.findings import LEVELS, Finding
-from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
+from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments
 from contextdb.report.coverage_words import (
     assumed_sentences,
     cells_text,
@@ -18,6 +18,7 @@ from contextdb.report.coverage_words import (
     gaps_sentence,
     nearest_sentence,
     overlap_sentence,
+    rows_words,
     slice_sentence,
 )
 from contextdb.report.render_text import STYLES, wrapped
@@ -36,8 +37,8 @@ def render(results: CoverageResults, colour: bool = False, width: int = 100, sho
     """The coverage of one table in about 40 lines; of several, a few lines each, unless all is asked for."""
     is_one = len(results.tables) == 1
     sections = [_fitted(m, colour, width, shows_all, is_one) for m in results.tables]
-    tail = [styled(results.verdict, "green" if results.passed else "red", colour)] if results.verdict else []
-    tail += [f"No longer there: {printable(', '.join(results.gone))}."] if results.gone else []
+    tail = [line for gate in results.gone.values() for line in _gate(gate, colour, width)]
+    tail += [styled(results.verdict, "green" if results.passed else "red", colour)] if results.verdict else []
     if not is_one and not shows_all:
         tail.append("contextdb coverage TABLE tells more of one; --all tells all.")
     return "\n".join([*sections, *("".join(f"{line}\n" for line in [part]) for part in tail)])
@@ -148,7 +149,7 @@ def _findings(findings: Sequence[Finding], measured: Measured, colour: bool, wid
         room = f"{rule} {len(found):>{max(1, widest - len(rule) - 1)},}"
         head = f"{INDENT}{styled(room, STYLES[found[0].level], colour)}  "
         shown = found[:most]
-        named = ", ".join(measured.named(f.row) if f.row is not None else f.message for f in shown)
+        named = ", ".join(rows_words(measured, f) for f in shown)
         more = f" and {len(found) - len(shown):,} more" if len(shown) < len(found) else ""
         lines = list(hanging(" " * (len(INDENT) + widest + 2), named + more, width))
         yield head + lines[0].lstrip() if lines[0].strip() else head.rstrip()
@@ -205,7 +206,11 @@ def _change(measured: Measured, colour: bool, width: int) -> Iterator[str]:
 
 def _gates(measured: Measured, colour: bool, width: int) -> Iterator[str]:
     for gate in measured.gates:
-        word, style = ("passed", "green") if gate.passed else ("FAILED", "red")
-        first, *rest = hanging(f"{word}  {gate.name}  ", gate.message, width)
-        yield styled(word, style, colour) + first.removeprefix(word)
-        yield from rest
+        yield from _gate(gate, colour, width)
+
+
+def _gate(gate: Gate, colour: bool, width: int) -> Iterator[str]:
+    word, style = ("passed", "green") if gate.passed else ("FAILED", "red")
+    first, *rest = hanging(f"{word}  {gate.name}  ", gate.message, width)
+    yield styled(word, style, colour) + first.removeprefix(word)
+    yield from rest

@@ -9,7 +9,9 @@ from contextdb.covering import CoverageReport, Gap, Slice, format_percent
 from contextdb.covering.baseline import Change
 from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, nearest, plural
+from contextdb.findings import Finding
 from contextdb.report.coverage_results import Measured, has_moments
+from contextdb.variety import VARIETY
 
 if TYPE_CHECKING:
     from contextdb.telemetry.observed import FactNote, Observed
@@ -32,6 +34,14 @@ def assumed_sentences(report: CoverageReport) -> Iterator[str]:
         yield f"Known to samples only: {_some(report.sampled, '; ')}."
     if report.assumed:
         yield f"Without bounds: {_some([f'{name} ({text})' for name, text in report.assumed.items()], '; ')}."
+
+
+def rows_words(measured: Measured, finding: Finding) -> str:
+    """The row of a finding in a list; of a group how many more rows it has."""
+    if finding.row is None:
+        return finding.message
+    more = f" with {plural(len(finding.by), 'other')}" if finding.rule == VARIETY and finding.by else ""
+    return measured.named(finding.row) + more
 
 
 def _some(texts: tuple[str, ...] | list[str], between: str) -> str:

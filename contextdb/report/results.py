@@ -12,7 +12,7 @@ from itertools import chain, count
 from pathlib import PurePath
 
 from contextdb.console import printable
-from contextdb.errors import plural
+from contextdb.errors import plural, row_name
 from contextdb.findings import LEVELS, Finding, Level, worst
 
 Block = tuple[Level, str, tuple[Finding, ...]]
@@ -93,7 +93,7 @@ def place_of(finding: Finding) -> str:
 
 def told(finding: Finding, names_asset: bool = True) -> str:
     """The message on one printable line, after what it is about: the row where no line is known, the asset, the column."""
-    about = [f"row {finding.row}"] if finding.line is None and finding.row is not None else []
+    about = [row_name(finding.row)] if finding.line is None and finding.row is not None else []
     if names_asset and finding.asset:
         about.append(f'"{finding.asset}"')
     if finding.column is not None:

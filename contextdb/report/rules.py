@@ -99,8 +99,8 @@ RULES: dict[str, Rule] = {
     ),
     "identical-rows": Rule(
         "warning",
-        "Every condition of a row is the same as in another row, so the two are always valid together.",
-        "Tell the rows apart by a condition, or keep both where the game should have a choice.",
+        "Every condition of a row is the same as in another row, and the policy, or the asset, leaves no choice between the two.",
+        "Tell the rows apart by a condition, delete one of them, or set the policy collect where the game should have a choice.",
     ),
     "undeclared-condition": Rule(
         "warning",
@@ -112,6 +112,11 @@ RULES: dict[str, Rule] = {
         "A table has no rows, so no context has an asset.",
         "Add rows, or take the table out of the folder until it is needed.",
     ),
+    "unportable-name": Rule(
+        "warning",
+        "Another system cannot have a table's file under its name, or takes it for another file.",
+        "Rename the file, or write its name in contextdb.toml as the folder has it.",
+    ),
     "mixed-line-ends": Rule(
         "info",
         "Some lines of a file end in LF and some in CRLF.",
@@ -121,6 +126,11 @@ RULES: dict[str, Rule] = {
         "error",
         "The folder holds no table.",
         "Name the folder that holds contextdb.toml and the tables.",
+    ),
+    "not-a-table": Rule(
+        "info",
+        "A file beside the tables looks like something else than a table, so it is not read as one.",
+        "Declare the file in contextdb.toml where it is a table; else nothing need be done, or move it out of the folder.",
     ),
     "case-failed": Rule(
         "error",
@@ -135,12 +145,17 @@ RULES: dict[str, Rule] = {
     "subsumed-row": Rule(
         "warning",
         "Wherever a row is valid, one other row is valid too, and elsewhere besides.",
-        "Narrow the other row, widen this one, or keep both where the game should have a choice.",
+        "Narrow the other row, widen this one, or set the policy collect where the game should have a choice.",
     ),
     "equal-row": Rule(
         "warning",
         "A row is valid in just the contexts of another row, though its cells are written otherwise.",
-        "Tell the rows apart by a condition, or keep both where the game should have a choice.",
+        "Tell the rows apart by a condition, or set the policy collect where the game should have a choice.",
+    ),
+    "variety": Rule(
+        "info",
+        "Several assets are valid in the same contexts, in a table whose policy lets the game choose.",
+        "Nothing need be done; `weight` says how often each is picked. Where one row was to play, set the policy first or unique.",
     ),
     "redundant-row": Rule(
         "info",
@@ -187,6 +202,21 @@ RULES: dict[str, Rule] = {
         "A rule is false in every context of the declared values and bounds, so its row never matches.",
         "Correct the rule, or widen `min`, `max` or `values` of its conditions. To switch a row off, use an `enabled` column.",
     ),
+    "inferred-mirror": Rule(
+        "info",
+        "Angles are negated for clips that are played mirrored, though contextdb.toml does not declare it.",
+        'Nothing need be done; declare `mirror = "negate"`, or `mirror = "none"` for an angle that is the same in a mirror.',
+    ),
+    "undeclared-mirror": Rule(
+        "info",
+        "A condition has names of both sides, its clips are played mirrored, and it does not declare how its facts change.",
+        'Declare `mirror = { Left = "Right" }`, or `mirror = "none"` where its facts are the same in a mirror.',
+    ),
+    "uneven-mirror": Rule(
+        "warning",
+        "A number is negated for clips that are played mirrored, and its min is not the opposite of its max.",
+        'Correct `min` or `max`; where the number is no side, such as a speed, take `mirror = "negate"` out.',
+    ),
     "undecided-rows": Rule(
         "info",
         "Some rows were not compared with all others, because that would have taken longer than a check may.",
@@ -212,6 +242,11 @@ RULES: dict[str, Rule] = {
         "A smaller share of the contexts is covered than `--fail-under` demands.",
         "Fill the largest gaps, rule out what cannot happen by `assume`, or lower the bar.",
     ),
+    "table-gone": Rule(
+        "error",
+        "A table of the baseline is not there any more, or has no rows any more.",
+        "Bring the table back; where it was renamed or removed on purpose, name it with `--gone`, or make a new baseline.",
+    ),
     "coverage-dropped": Rule(
         "error",
         "The covered share fell by more than `--max-drop` allows since the baseline.",
@@ -225,10 +260,12 @@ RULES: dict[str, Rule] = {
 }
 """Every rule that a check, or coverage, may break, by name."""
 
-OF_COVERAGE = ("gap", "new-gap", "coverage-below", "coverage-dropped", "telemetry-below")
+OF_COVERAGE = ("gap", "new-gap", "coverage-below", "table-gone", "coverage-dropped", "telemetry-below")
 """The rules that only `contextdb coverage` tells of."""
 
 TABLE_RULES: tuple[str, ...] = tuple(
-    name for name in RULES if name not in ("unreadable", "no-such-path", "no-tables", "unused-condition", *OF_COVERAGE)
+    name
+    for name in RULES
+    if name not in ("unreadable", "no-such-path", "no-tables", "unused-condition", "unportable-name", "not-a-table", *OF_COVERAGE)
 )
 """The rules that every table which can be read is held to by a check."""

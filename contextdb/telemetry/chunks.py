@@ -16,7 +16,7 @@ import polars as pl
 from polars.selectors import by_name
 
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes
-from contextdb.files import read_texts
+from contextdb.files import scanned_parquet
 from contextdb.foreign import UTF8_BOM, line_of, require_text
 from contextdb.record_faults import record_faults
 from contextdb.records import Records, fields_of, find_records, text_of
@@ -73,8 +73,7 @@ class TelemetryFile:
 
 
 def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple[str, ...], Chunk]]:
-    try:
-        scan = pl.scan_parquet(path, glob=False, low_memory=True)
+    with scanned_parquet(path) as scan:
         names = tuple(scan.collect_schema().names())
         n_rows = int(scan.select(pl.len()).collect().item())
         asked = [name for name in names if name in wanted]
@@ -93,9 +92,6 @@ def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple
                 part = batch.slice(start, ROWS)
                 yield names, Chunk(len(part), part, done, False, min(1.0, (done + len(part)) / n_rows))
                 done += len(part)
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
-        read_texts(path)  # says what is wrong with the file
-        raise TableError(Fault(f"cannot read the file: {error}.", "a whole Parquet file", place=Place(str(path)))) from None
     if done != n_rows:
         raise TableError(Fault(f"only {done:,} of {n_rows:,} rows came.", "a whole Parquet file", place=Place(str(path))))
 

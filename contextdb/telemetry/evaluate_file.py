@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Callable, Iterator
@@ -103,16 +104,29 @@ def _answers_folder(folder: Path | None, path: Path) -> Iterator[Path | None]:
         return
     whole, growing = folder / _name(path), folder / f"{_name(path)}.{secrets.token_hex(4)}"
     try:
-        growing.mkdir()  # not the folders above: they are gone where the run has ended
-        yield growing
-        if not whole.exists():  # else an earlier worker finished it, and died before it could say so
-            os.rename(growing, whole)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise FileError(
-            Fault(f"the answers cannot be written: {error}.", "room in that folder", place=Place(str(folder)))
-        ) from None
+        with answers_written(folder):
+            growing.mkdir()  # not the folders above: they are gone where the run has ended
+            yield growing
+            if not whole.exists():  # else an earlier worker finished it, and died before it could say so
+                os.rename(growing, whole)
     finally:
         shutil.rmtree(growing, ignore_errors=True)
+
+
+@contextmanager
+def answers_written(place: Path) -> Iterator[None]:
+    """Turn what the system or polars refuses into a `FileError` at that place."""
+    try:
+        yield
+    except (OSError, pl.exceptions.PolarsError) as error:
+        why = error.strerror if isinstance(error, OSError) and error.strerror else _without_paths(str(error))
+        fault = Fault(f"the answers cannot be written: {why}.", "room in that folder", place=Place(str(place)))
+        raise FileError(fault) from None
+
+
+def _without_paths(said: str) -> str:
+    """The first line of what polars says, without the names of files that nobody asked for."""
+    return re.sub(r"\s*:?\s*\S*\.contextdb-\S*", "", said.strip().splitlines()[0] if said.strip() else "no room").rstrip(".:")
 
 
 def _facts(compiled: CompiledTable, names: tuple[str, ...], chunk: Chunk, file: str) -> pl.DataFrame:

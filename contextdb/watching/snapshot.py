@@ -6,7 +6,7 @@ columns that changed are compiled. The disk is touched only to say why a file th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,10 +15,11 @@ from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError
 from contextdb.nesting.links import reached
 from contextdb.parquet import read_parquet
-from contextdb.project import SCHEMA_FILE, Project, around_each_other, twice_named
+from contextdb.project import SCHEMA_FILE, ByName, Project, around_each_other, settings_of, twice_named
 from contextdb.schema import EMPTY, Schema, read_schema
 from contextdb.source import read_csv
 from contextdb.table import Table
+from contextdb.unchanging import Unchanging
 from contextdb.watching.sharing import table_like
 from contextdb.watching.stamps import Digests, digests_of
 
@@ -27,8 +28,9 @@ Found = Sequence[tuple[str, Path]]
 
 
 @dataclass(frozen=True, eq=False)
-class Snapshot:
-    """One version of a project, compiled. It never changes, so that a game can ask several tables of one and the same version."""
+class Snapshot(Unchanging, ByName[CompiledTable]):
+    """One version of a project, compiled: a mapping of compiled tables by name. It never changes, so that a game can ask several
+    tables of one and the same version."""
 
     number: int
     """1 for the version that the watch began with, one more for each that came after it."""
@@ -43,8 +45,14 @@ class Snapshot:
     """The tables as their files have them, knowing nothing of each other."""
 
     def __getitem__(self, name: str) -> CompiledTable:
-        """One compiled table; a name that is not there raises TableError and names the nearest."""
+        """One compiled table; a name that is not there raises NoSuchTable, which is a KeyError too, and names the nearest."""
         return self.tables[self.project[name].name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def __len__(self) -> int:
+        return len(self.tables)
 
 
 def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Schema:
@@ -94,12 +102,13 @@ def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents
     project.require_sound()
     before = last.alone if last else {}
     changed = tuple(n for n, t in tables.items() if any(before.get(m) is not inner for m, inner in reached(t, tables).items()))
-    compiled = {n: last.tables[n] if last and n not in changed else _compiled(t) for n, t in project.tables.items()}
+    older = last.tables if last else {}
+    compiled = {n: older[n] if last and n not in changed else _compiled(t, older.get(n)) for n, t in project.tables.items()}
     return Snapshot(last.number + 1 if last else 1, project, compiled, changed, digests, tables)
 
 
 def _table(path: Path, folder: Path, schema: Schema, contents: Contents, digests: Digests, last: Snapshot | None) -> Table:
-    settings = schema.settings_for(path.relative_to(folder).as_posix())
+    settings = settings_of(path, folder, schema)
     old = last.alone.get(settings.name) if last else None
     if path not in contents:
         read_bytes(path)  # raises FileError, which says why it cannot be read
@@ -114,9 +123,12 @@ def _table(path: Path, folder: Path, schema: Schema, contents: Contents, digests
     return table
 
 
-def _compiled(table: Table) -> CompiledTable:
-    """The table compiled, and made ready for the first query, which else would wait for it."""
+def _compiled(table: Table, older: CompiledTable | None) -> CompiledTable:
+    """The table compiled, and made ready for the first query, which else would wait for it; it remembers what was picked of the
+    older version."""
     compiled = table.compile()
+    if older is not None:
+        compiled.remember_as(older)
     compiled.query({}, unknown="any")
     return compiled
 

@@ -15,14 +15,15 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
+from contextdb.arguments import require_callable, require_number, require_path
 from contextdb.compiled import CompiledTable
 from contextdb.errors import ContextDBError, Fault, FileError, Place
-from contextdb.project import SCHEMA_FILE, Project, folder_of, table_files
+from contextdb.project import SCHEMA_FILE, ByName, Project, folder_of, table_files
 from contextdb.schema import Schema
 from contextdb.watching.rest import Rest
 from contextdb.watching.snapshot import Contents, Snapshot, next_snapshot, schema_from
@@ -69,13 +70,18 @@ def watch(
     ContextDBError
         The files cannot be used as they are now, with every fault: there is no good version to begin with.
     """
-    watch = Watch(folder_of(Path(path)), on_change, on_error, settle_s, clock)
+    require_callable(on_change, "on_change")
+    require_callable(on_error, "on_error")
+    require_callable(clock, "clock")
+    if poll_s is not None:
+        require_number(poll_s, "poll_s")
+    watch = Watch(folder_of(require_path(path)), on_change, on_error, require_number(settle_s, "settle_s"), clock)
     if poll_s is not None:
         watch.start(poll_s)
     return watch
 
 
-class Watch:
+class Watch(ByName[CompiledTable]):
     """The newest good version of a folder of tables. Get one from `contextdb.watch`; close it, or use it in a `with`."""
 
     def __init__(
@@ -105,8 +111,14 @@ class Watch:
         return self._snapshot
 
     def __getitem__(self, name: str) -> CompiledTable:
-        """One compiled table of the newest good version; TableError names the nearest when there is none of that name."""
+        """One compiled table of the newest good version; NoSuchTable names the nearest when there is none of that name."""
         return self._snapshot[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._snapshot)
+
+    def __len__(self) -> int:
+        return len(self._snapshot)
 
     @property
     def faults(self) -> tuple[Fault, ...]:

@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
+from contextdb.check import identical_rows
 from contextdb.commands.check_command import check_path
 from contextdb.covering import coverage
 from contextdb.covering.check_rows import check_rows
+from contextdb.schema import TableSettings
 
 TOML = """
 [conditions.speed]
@@ -81,24 +83,32 @@ def test_a_check_finds_of_small_tables_what_coverage_finds(seed):
     rng = random.Random(seed)
     table = random_table(rng, rng.choice(["collect", "first", "priority", "unique"]))
     found = [f for f in check_rows(table) if f.rule != "always-any"]
-    assert found == [f for f in coverage(table, samples=0).findings if f.rule != "identical-rows"]
+    report = coverage(table, samples=0)
+    of_cells = {f.row for f in identical_rows(table)}
+    told = [*report.findings, *report.needless]
+    groups = [f for f in told if f.rule == "variety"]
+    assert [f for f in found if f.rule != "variety"] == [f for f in report.findings if f.rule not in ("variety", "identical-rows")]
+    assert all(any(f.row == g.row and set(f.by) <= set(g.by) for g in groups) for f in found if f.rule == "variety")
+    needless = {f.row for f in report.needless} - of_cells
+    assert needless <= {row for f in found if f.rule == "variety" for row in (f.row, *f.by)}
 
 
 def test_of_a_rule_that_many_rows_break_the_first_are_named_and_how_many_more(monkeypatch):
     monkeypatch.setattr("contextdb.check.MOST_ROWS", 3)
     columns = {"Asset": [f"a{i}" for i in range(9)], "speed": ["Any", *(f"{i}..{i + 3}" for i in range(8))]}
-    table = cdb.Table.from_columns(columns, {"speed": {"type": "number", "min": 0.0, "max": 20.0}})
+    speed = {"speed": {"type": "number", "min": 0.0, "max": 20.0}}
+    table = cdb.Table.from_columns(columns, speed, TableSettings("table", policy="first"))
     found = [f for f in check_rows(table) if f.rule == "subsumed-row"]
     assert [f.row for f in found] == [1, 2, 3, 4]
     assert "(5 rows like this one are not listed.)" in found[-1].message
 
 
 def test_a_row_that_one_row_alone_makes_redundant_names_it(tmp_path: Path):
-    (tmp_path / "contextdb.toml").write_text(f'{TOML}\n[tables.jog]\nwhen = "When"\n', encoding="utf-8")
-    rows = "Asset,speed,tired,When\nwide,Any,Any,tired or speed > 5\nin it,6..8,True,\n"
+    (tmp_path / "contextdb.toml").write_text(f'{TOML}\n[tables.jog]\nwhen = "When"\npolicy = "first"\n', encoding="utf-8")
+    rows = "Asset,speed,tired,When\nin it,6..8,True,\nwide,Any,Any,tired or speed > 5\n"
     (tmp_path / "jog.csv").write_text(rows, encoding="utf-8")
     told = [f.message for f in check_rows(cdb.load(tmp_path / "jog.csv")) if f.rule == "redundant-row"]
-    assert told == ['wherever it is valid, line 2 ("wide") is valid too.']
+    assert told == ['wherever it is valid, line 3 ("wide") is valid too.']
 
 
 def test_rows_that_the_work_does_not_decide_are_counted_in_one_finding_that_fails_nothing():

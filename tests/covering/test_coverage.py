@@ -12,8 +12,10 @@ from strategies import examples
 
 import contextdb as cdb
 from contextdb.cells import parse_cell
+from contextdb.check import identical_rows
 from contextdb.covering import coverage
 from contextdb.covering.space import Space
+from contextdb.variety import NEEDLESS
 
 SEEDS = st.integers(0, 2**32)
 
@@ -110,7 +112,7 @@ def expected_findings(brute: Brute, policy: str) -> set[tuple[str, int | None]]:
     whole = {row: frozenset(i for i, rows in enumerate(everywhere.valid) if row in rows) for row in range(table.n_rows)}
     of = {row: frozenset(i for i, rows in enumerate(brute.valid) if row in rows) for row in range(table.n_rows)}
     alive = [row for row in range(table.n_rows) if whole[row]]
-    identical = {f.row for f in cdb_check(table) if f.rule == "identical-rows"}
+    identical = {f.row for f in identical_rows(table)}
     found = {("identical-rows", row) for row in identical}
     for row in alive:
         if not of[row]:
@@ -133,22 +135,40 @@ def expected_findings(brute: Brute, policy: str) -> set[tuple[str, int | None]]:
     return found
 
 
-def cdb_check(table: cdb.Table) -> list[cdb.Finding]:
-    from contextdb.check import check
-
-    return check(table)
-
-
 @examples(6)
 @given(SEEDS, st.sampled_from(["collect", "first", "priority", "unique"]))
 def test_every_finding_is_right_and_none_is_missing(seed, policy):
     brute, report = made(seed, policy)
     assert report.findings_complete
-    assert {(f.rule, f.row) for f in report.findings} == expected_findings(brute, policy)
-    for finding in report.findings:
+    told = [f for f in (*report.findings, *report.needless) if f.rule != "variety"]
+    assert {(f.rule, f.row) for f in told} == expected_findings(brute, policy)
+    for finding in told:
         if finding.rule in ("subsumed-row", "redundant-row", "never-chosen"):
             assert all(set(finding.by) & rows for rows in brute.valid if finding.row in rows)
             assert finding.row not in finding.by
+
+
+@examples(6)
+@given(SEEDS, st.sampled_from(["collect", "first", "priority", "unique"]), st.integers(1, 4))
+def test_variety_is_said_once_of_rows_that_share_their_contexts_and_only_where_several_may_play(seed, policy, n_assets):
+    table = random_table(random.Random(seed), policy)
+    for row in range(table.n_rows):
+        table = table.with_cell(row, "Asset", f"A{row % n_assets}" if n_assets < 4 else f"A{row}")
+    brute = Brute(table, random_boxes(random.Random(seed), table))
+    report = coverage(table, impossible=brute.impossible, samples=0)
+    groups = [f for f in report.findings if f.rule == "variety"]
+    rules = {f.rule for f in report.findings if f.level == "warning"}
+    assert not (groups and policy in ("first", "unique"))
+    assert rules.isdisjoint(NEEDLESS) or policy in ("first", "unique") or n_assets < 4, "only one asset twice is a warning"
+    valid = {row: frozenset(i for i, rows in enumerate(brute.valid) if row in rows) for row in range(table.n_rows)}
+    for group in groups:
+        assert group.level == "info"
+        if "same contexts" in group.message:
+            assert all(valid[row] == valid[group.row] for row in group.by)
+        elif "only where this row" in group.message:
+            assert all(valid[row] <= valid[group.row] for row in group.by)
+    named = [row for group in groups for row in (group.row, *group.by)]
+    assert {f.row for f in report.needless} <= set(named)
 
 
 @examples(2)

@@ -34,8 +34,7 @@ def reads_or_refuses(name: str, raw: bytes) -> None:
         assert [c.n_rows for c in table.columns] == [reading.n_rows] * len(table.columns)
 
 
-# polars ends the whole process on some damage inside a Parquet file, so that one is only cut and grown
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "parquet"])
+@pytest.mark.parametrize("name", NAMES)
 @given(data=st.data())
 def test_a_file_with_some_bytes_changed_is_read_or_refused(name: str, data: st.DataObject):
     raw = bytearray(whole(name))

@@ -203,9 +203,9 @@ def test_what_cannot_be_said_in_dmn_is_listed_with_its_place():
     table = Table.from_columns(columns, settings=TableSettings("t", enabled="Enabled", fallback="jog"))
     raw, remarks = write(table, FORMATS["dmn"])
     said = "\n".join(map(str, remarks))
-    assert 'row 0, "jog", column "speed": "5 ~2" becomes -: DMN has no penalties.' in said
-    assert 'row 2, "off": left out: it is disabled.' in said
-    assert 'row 3, "never": left out: its cell of "speed" accepts nothing.' in said
+    assert 'row 1, "jog", column "speed": "5 ~2" becomes -: DMN has no penalties.' in said
+    assert 'row 3, "off": left out: it is disabled.' in said
+    assert 'row 4, "never": left out: its cell of "speed" accepts nothing.' in said
     assert 'column "tags": tags become an annotation' in said
     assert texts(read(raw, "x.dmn"))["tags"] == ["+A", "-B"]
 
@@ -213,7 +213,7 @@ def test_what_cannot_be_said_in_dmn_is_listed_with_its_place():
 def test_an_entry_that_no_cell_can_say_is_told_and_becomes_no_other_meaning():
     reading = dishes(old="&lt;= 8", new="maximum(guests)")
     assert texts(reading)["guests"][0] == "= maximum(guests)"
-    assert 'rule 1, column "guests": "maximum(guests)" is no test that a cell can say' in told(reading)
+    assert 'rule 1, column "guests": "maximum(guests)" is no test that a cell or a rule can say' in told(reading)
     table, _ = table_of(reading, propose(reading, EMPTY, TableSettings("dish")), EMPTY, TableSettings("dish"))
     assert [fault.place.row for fault in table.faults] == [0]
     reading = dishes(old='"Roast"</text>', new="price * 2</text>")

@@ -58,7 +58,7 @@ def test_nan_is_empty_and_infinity_is_a_number():
     ("text", "said"),
     [
         ("", "the file is empty"),
-        ("[1, 2]", "row 0 is a number, no object."),
+        ("[1, 2]", "row 1 is a number, no object."),
         ('[{"a": 1},\n {"a": }]', "line 2: this is no JSON: Expecting value at character 8."),
         ('{"a": 1}\n{"a": \n', "line 2: this is no JSON"),
         ('[{"a": 1, "a": 2}]', 'the key "a" stands twice in one object'),
@@ -92,7 +92,7 @@ def test_an_unreal_table_keeps_structs_as_text_and_says_so():
 
 def test_unreal_wants_each_asset_once():
     table = Table.from_columns({"Asset": ["jog", "jog"], "speed": ["5", "6"]})
-    with pytest.raises(TableError, match='row 1, column "Asset": the asset "jog" stands in row 0 too'):
+    with pytest.raises(TableError, match='row 2, column "Asset": the asset "jog" stands in row 1 too'):
         write(table, FORMATS["unreal-csv"])
 
 

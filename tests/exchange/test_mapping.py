@@ -5,15 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import examples
 
+from contextdb.cells import reads
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError
+from contextdb.exchange import mapping
 from contextdb.exchange.importing import plan_import
 from contextdb.exchange.mapping import Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.proposals import propose_type
 from contextdb.exchange.reading import Reading
 from contextdb.project import Project
-from contextdb.schema import TableSettings, read_schema
+from contextdb.schema import TableSettings, conditions_from_dict, read_schema
 
 TOML = """# our game
 [conditions.speed]        # how fast
@@ -40,11 +45,18 @@ def mapped(read: Reading, settings: TableSettings | None = None, **renames: str)
     [
         ("on", ["True", "no", "Any"], {"type": "bool"}),
         ("n", ["0", "1", "1"], {"type": "int"}),
-        ("n", ["5", "1..3", "20, 9"], {"type": "int"}),
+        ("n", ["5", "=7", "1 | 3"], {"type": "int"}),
+        ("n", ["5", "0..4"], {"type": "number"}),
+        ("n", ["5", "20, 9"], {"type": "number"}),
+        ("n", ["5", ">=3"], {"type": "number"}),
+        ("Speed (m/s)", ["5", "6"], {"type": "number"}),
+        ("target_dist", ["5", "6"], {"type": "number"}),
+        ("timeToImpact", ["0", "1"], {"type": "number"}),
+        ("n_speedsters", ["5", "6"], {"type": "int"}),
         ("n", ["5", "1.5..3"], {"type": "number"}),
         ("n", ["1e-3"], {"type": "number"}),
         ("dir_to_target", ["20, 9.99", "-20, 9"], {"type": "angle"}),
-        ("Direction", ["400..500"], {"type": "int"}),
+        ("Direction", ["400..500"], {"type": "number"}),
         ("x", ["170..-170", "5"], {"type": "angle"}),
         ("heading", ["170..-170", "2026-01-02", "-30..30"], {"type": "angle"}),
         ("pos", ['"5"', "CB", "FS", "CB"], {"type": "enum", "values": ["5", "CB", "FS"]}),
@@ -76,6 +88,55 @@ def test_a_few_cells_that_cannot_be_read_do_not_change_the_type_and_are_counted(
     proposal = propose_type(TextColumn.of("n", [*(str(i) for i in range(19)), "5;3"]))
     assert (proposal.declared, proposal.n_unreadable) == ({"type": "int"}, 1)
     assert "1 cell cannot be read so" in proposal.why
+
+
+SAYS = {
+    "bool": ["True", "no"],
+    "int": [str(i) for i in range(2, 60)],
+    "number": [f"{i}.5..{i + 1}" for i in range(60)],
+    "angle": ["170..-170"],
+    "tags": [f"+T{i}" for i in range(60)],
+    "text": [f"N{i}" for i in range(60)],
+    "note": ["walk, then run!", "a; b"],
+}
+
+
+def mixture(parts: list[tuple[str, int, bool]]) -> list[str]:
+    """Rows of several kinds, each kind a number of times, of texts that repeat or all differ."""
+    rows = []
+    for kind, n, is_distinct in parts:
+        texts = SAYS[kind]
+        rows += [texts[i % len(texts)] + (" " * (1 + i // len(texts)) if is_distinct else "") for i in range(n)]
+    return rows
+
+
+@examples(0.3)
+@given(
+    parts=st.lists(st.tuples(st.sampled_from(sorted(SAYS)), st.sampled_from([1, 3, 20, 63, 65, 250]), st.booleans()), max_size=4)
+)
+def test_a_proposed_type_reads_the_cells_that_decided_it_and_counts_all_others(parts: list[tuple[str, int, bool]]):
+    column = TextColumn.of("x", mixture(parts))
+    proposal = propose_type(column)
+    if proposal.declared is None:
+        return
+    domain = conditions_from_dict({"x": proposal.declared})["x"].domain
+    n_unread = sum(not reads(text, domain) for text in column.to_list())
+    assert proposal.n_unreadable == n_unread
+    assert 2 * n_unread <= column.n_rows
+
+
+@pytest.mark.parametrize("n_rows", [1_999, 2_001, 9_999, 10_001, 10_002, 20_000])
+def test_columns_of_very_many_different_cells_get_the_type_that_few_of_them_would(n_rows: int):
+    kinds = {"{}.5": "number", "{}": "int", "2026-{}": "output", "+T{}": "tags", "id{}": "output"}
+    for form, kind in kinds.items():
+        proposal = propose_type(TextColumn.of("x", [form.format(i) for i in range(n_rows)]))
+        found = proposal.declared["type"] if proposal.declared else "output"
+        assert (found, proposal.n_unreadable) == (kind, 0), form
+
+
+def test_a_slip_among_very_many_cells_is_counted_wherever_it_stands():
+    proposal = propose_type(TextColumn.of("x", [*(f"{i}.5" for i in range(12_000)), "5;3"]))
+    assert (proposal.declared, proposal.n_unreadable) == ({"type": "number"}, 1)
 
 
 def test_columns_are_matched_by_name_whatever_their_case_and_spaces():
@@ -164,3 +225,11 @@ def test_a_table_needs_one_column_that_names_the_assets(tmp_path: Path):
     columns = [as_job(column, "output") for column in propose(read, SCHEMA, TableSettings("t"))]
     with pytest.raises(ContextDBError, match="no column names the assets"):
         plan_import(read, tmp_path / "jog.csv", mapped=columns)
+
+
+def test_names_are_not_compared_with_very_many_declared_ones_and_that_is_said(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(mapping, "MOST_COMPARED", 3)
+    found = mapped(reading(Name=["x"], sped=["5"]))["sped"]
+    assert found.near is None
+    assert "not compared with the 2 declared names, which are too many" in found.why
+    assert mapped(reading(Name=["x"], SPEED=["5"]))["SPEED"].name == "speed"

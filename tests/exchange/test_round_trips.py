@@ -99,7 +99,7 @@ def test_a_csv_of_our_own_is_exported_byte_for_byte(file: CsvFile):
 @examples(0.5)
 @given(file=csv_files())
 def test_a_csv_of_our_own_is_imported_byte_for_byte(tmp_path_factory: pytest.TempPathFactory, file: CsvFile):
-    reading = read(file.raw, "x.csv")
+    reading = read(file.raw, "x.csv", ReadOptions(has_whole_names=False))  # --names words: its cells are cells of ours
     assume(reading.source is not None)  # one column with a semicolon in its name is told as another dialect
     path: Path = tmp_path_factory.mktemp("tables") / "x.csv"
     mapped = propose(reading, EMPTY, TableSettings("x"))

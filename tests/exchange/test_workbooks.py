@@ -122,7 +122,7 @@ def test_a_text_that_excel_cannot_hold_is_refused_with_its_place(text: str, why:
     table = Table.from_columns({"Asset": ["x", "y"], "speed": ["5", "6"]}, settings=TableSettings("t", outputs=("speed",)))
     with pytest.raises(TableError, match=why) as caught:
         write(table.with_cell(1, "speed", text), FORMATS["xlsx"])
-    assert 'row 1, column "speed"' in str(caught.value)
+    assert 'row 2, column "speed"' in str(caught.value)
 
 
 # ---- what others write
@@ -178,7 +178,7 @@ def test_a_title_above_the_table_is_left_out_and_told():
     reading = read_book(book(moves=[["Moves of 2026"], [], ["Asset", "speed"], ["jog", 1], [], ["run", 2]]))
     assert texts(reading) == {"Asset": ["jog", "run"], "speed": ["1", "2"]}
     assert 'cells A1: left out, as it is no table: "Moves of 2026".' in told(reading)
-    assert "row 5: 1 blank row left out." in told(reading)
+    assert "sheet row 5: 1 blank sheet row left out." in told(reading)
 
 
 def test_two_tables_on_one_sheet_are_named_and_one_is_chosen_by_its_cells():

@@ -186,10 +186,11 @@ REFUSED = {
     "no frame time": (changed("Frame Time: 0.0333333\n", ""), '"Frame Time:" and the seconds between two frames.'),
     "a negative frame time": (
         changed("0.0333333", "-0.0333333"),
-        'time is "-0.0333333". Accepted: seconds between two frames, more than 0 and at most 60. Did you mean "0.0333333"?',
+        'time is "-0.0333333". Accepted: seconds between two frames, more than 0 and at most 1. Did you mean "0.0333333"?',
     ),
     "a frame time of nothing": (changed("0.0333333", "0"), 'the frame time is "0".'),
-    "a frame time in milliseconds": (changed("0.0333333", "33.3e2"), 'the frame time is "33.3e2"'),
+    "a frame time in milliseconds": (changed("0.0333333", "33.3"), 'the frame time is "33.3". Accepted: seconds between'),
+    "a frame time in milliseconds, meant in seconds": (changed("0.0333333", "33.3"), 'Did you mean "0.0333"?'),
     "a frame time that is nan": (changed("0.0333333", "nan"), 'the frame time is "nan".'),
     "a missing frame time": (changed("Frame Time: 0.0333333", "Frame Time:"), "the frame time is the end of the file."),
     "more frames than lines": (

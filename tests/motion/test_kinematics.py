@@ -20,6 +20,7 @@ from contextdb.motion import (
     resampled,
 )
 from contextdb.motion.clips import quaternions
+from contextdb.motion.clips.bone_names import meant_bone, nearest_bones
 from contextdb.motion.clips.skeleton import sided_pairs
 
 ANGLES = st.floats(-360.0, 360.0)
@@ -166,3 +167,24 @@ def test_a_skeleton_without_sides_has_its_root_as_hips():
 def test_a_missing_bone_is_told_with_the_nearest_one():
     with pytest.raises(MotionError, match=r'there is no bone "LeftFot".*Did you mean "LeftFoot"\?'):
         make_clip("walk").clip.skeleton.index("LeftFot")
+
+
+@pytest.mark.parametrize(
+    ("wanted", "meant"),
+    [
+        ("LeftFoot", "Foot_L"),
+        ("mixamorig:RightUpLeg", "UpperLeg_R"),
+        ("Bip01 L Hand", "Hand_L"),
+        ("l_forearm", "LowerArm_L"),
+        ("rfoot", "Foot_R"),
+        ("Pelvis", "Hips"),
+        ("RightToeBase", "Toes_R"),
+        ("head", "Head"),
+        ("LeftWing", None),
+        ("Ωμος", None),
+    ],
+)
+def test_a_bone_that_another_rig_calls_otherwise_is_guessed_by_its_side_and_its_words(wanted, meant):
+    names = ("Hips", "Spine", "Head", "Foot_L", "Foot_R", "UpperLeg_R", "Hand_L", "Hand_R", "LowerArm_L", "LowerArm_R", "Toes_R")
+    assert meant_bone(wanted, names) == meant
+    assert meant is None or nearest_bones(wanted, names, 3)[0] == meant

@@ -25,6 +25,7 @@ from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.trace.filter_rows import filter_row
 from contextdb.motion.trace.rows import TIMINGS, context_json
 from contextdb.motion.trace.session import CHUNK, Trace
 
@@ -87,6 +88,7 @@ def as_told(decision):
     """A decision as something to compare: arrays as lists, and of candidates all but the reason of every frame."""
     told = {field.name: getattr(decision, field.name) for field in fields(decision)}
     told["query"] = None if decision.query is None else decision.query.tolist()
+    told["filters"] = [filter_row(name, chosen) for name, chosen in decision.filters]
     told["candidates"] = [(name, found.rows, found.counts) for name, found in decision.candidates]
     return told
 
@@ -262,7 +264,8 @@ def test_the_file_tells_any_reader_of_parquet_what_it_holds(tmp_path: Path):
     metadata = pl.read_parquet_metadata(tmp_path / "session.parquet")
     assert metadata["contextdb.trace"] == "1"
     assert json.loads(metadata["about"]) == {
-        name: {"rate": None, "features": ["feature 0"], "channels": ["features"]} for name in ("walks", "runs")
+        name: {"rate": None, "features": ["feature 0"], "channels": ["features"], "digest": trace.about[name]["digest"]}
+        for name in ("walks", "runs")
     }
     assert Trace.load(tmp_path / "session.parquet").about == trace.about
 
@@ -295,9 +298,8 @@ def test_files_that_are_no_session_are_refused_with_the_reason(tmp_path: Path):
 
 def altered(change, **metadata):
     raw = recorded()[0].to_bytes()
-    known = {
-        key: value for key, value in pl.read_parquet_metadata(io.BytesIO(raw)).items() if key not in ("ARROW:schema", "digest")
-    }
+    saved = pl.read_parquet_metadata(io.BytesIO(raw))
+    known = {key: value for key, value in saved.items() if key not in ("ARROW:schema", "contextdb.seal")}
     out = io.BytesIO()
     change(pl.read_parquet(io.BytesIO(raw))).write_parquet(out, metadata={**known, **metadata})
     return out.getvalue()

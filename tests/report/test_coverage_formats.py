@@ -21,7 +21,7 @@ from contextdb.covering.baseline import compared, read_baseline
 from contextdb.covering.report import Overlap
 from contextdb.report import coverage_formats
 from contextdb.report.coverage_formats import FORMATS
-from contextdb.report.coverage_results import CoverageResults, Measured, fail_under, fail_under_telemetry, max_drop
+from contextdb.report.coverage_results import CoverageResults, Measured, fail_under, fail_under_telemetry, max_drop, table_gone
 from contextdb.report.coverage_text import bar
 from contextdb.schema import TableSettings
 from contextdb.table import Table
@@ -63,7 +63,8 @@ def sample(name: str = "jog", assets: tuple[str, ...] = ("walk", "run", "jog")) 
 
 
 def texts_of(found: Measured) -> dict[str, str]:
-    results = CoverageResults((found,), ("gone",))
+    name = found.report.table
+    results = CoverageResults((found,), {name: table_gone(name, False), "kept": table_gone("kept", True)})
     return {name: coverage_formats.render(name, results) for name in FORMATS}
 
 
@@ -109,12 +110,12 @@ def test_hostile_names_leave_every_other_format_whole(name: str, asset: str):
     texts = texts_of(sample(name, (asset, "run", "jog")))
     plain = texts_of(PLAIN)
     assert len(json.loads(texts["json"])["tables"]) == 1
-    assert [len(suite) for suite in ET.fromstring(texts["junit"].encode())] == [3]
+    assert [len(suite) for suite in ET.fromstring(texts["junit"].encode())] == [1, 1, 3]
     assert len(json.loads(texts["sarif"].encode())["runs"][0]["results"]) == len(json.loads(plain["sarif"])["runs"][0]["results"])
     assert texts["github"].count("\n") == plain["github"].count("\n")
     assert all(line.startswith(("::error ", "::warning ", "::notice ")) for line in texts["github"].splitlines())
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", texts["text"] + texts["markdown"])
-    assert "<" not in texts["markdown"].replace("\\<", "")
+    assert "<" not in texts["markdown"].replace("\\<", "").replace("<!-- -->", "")
 
 
 def test_a_page_of_several_tables_begins_with_all_of_them():
@@ -143,14 +144,15 @@ def test_sarif_keeps_to_the_official_schema():
     log = json.loads(texts_of(PLAIN)["sarif"])
     assert [e.message for e in Draft4Validator(schema).iter_errors(log)] == []
     rules = {result["ruleId"] for result in log["runs"][0]["results"]}
-    assert {"coverage-below", "coverage-dropped", "new-gap", "subsumed-row", "gap"} <= rules
+    assert {"coverage-below", "coverage-dropped", "new-gap", "variety", "gap"} <= rules
 
 
 def test_junit_has_one_case_for_each_table_and_bar():
-    (suite,) = ET.fromstring(texts_of(PLAIN)["junit"])
+    gone, kept, suite = ET.fromstring(texts_of(PLAIN)["junit"])
+    assert [(case.get("name"), case.find("failure") is not None) for case in (*gone, *kept)] == [("gone", True), ("gone", False)]
     failed = {case.get("name"): case.find("failure") is not None for case in suite}
     assert failed == {"fail-under": True, "max-drop": True, "fail-under-telemetry": False}
-    (plain,) = ET.fromstring(texts_of(replace(PLAIN, gates=()))["junit"])
+    *_, plain = ET.fromstring(texts_of(replace(PLAIN, gates=()))["junit"])
     assert [case.get("name") for case in plain] == ["coverage"]
 
 

@@ -49,7 +49,7 @@ def test_annotations_look_as_github_documents_them():
         '::error file=tables/jog.csv,line=5,title=contextdb empty-cell::"Jog_Fast", column "speed": "5..3" accepts no value.',
         '::error file=tables/jog.csv,line=10,title=contextdb empty-cell::"Jog_Slow", column "speed": "9..1" accepts no value.',
         "::error file=tables/jump.csv,title=contextdb unreadable::the file is empty.",
-        '::warning file=tables/run.parquet,title=contextdb identical-rows::row 2, "Run_2": the same as row 0: 50%25, a|b.',
+        '::warning file=tables/run.parquet,title=contextdb identical-rows::row 3, "Run_2": the same as row 0: 50%25, a|b.',
         '::notice file=tables/jog.csv,title=contextdb undeclared-condition::column "IsLeft": its cells read as bool.',
     ]
 

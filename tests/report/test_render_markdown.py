@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 from hypothesis import given
+from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from report_strategies import EXAMPLE, TEXTS, many, reports
@@ -20,9 +22,35 @@ def parsed(text: str) -> list[Token]:
 
 
 def plain(token: Token) -> str:
-    """The text of a block that holds nothing but text."""
-    assert {child.type for child in token.children or ()} <= {"text"}
-    return "".join(child.content for child in token.children or ())
+    """The text of a block that holds nothing but text, and empty comments that no reader sees."""
+    children = [child for child in token.children or () if child.content != render_markdown.DEAD]
+    assert {child.type for child in children} <= {"text"}
+    return "".join(child.content for child in children)
+
+
+def texts_seen(text: str) -> list[str]:
+    """The pieces of text in which a forge looks for mentions and addresses."""
+    (_, inline, _) = parsed(render_markdown.escaped(text))
+    return [child.content for child in inline.children or () if child.type == "text"]
+
+
+LIVE = re.compile(
+    r"[@#!%~&$][\w\"]|https?://|ftp://|www\.\w|mailto:\w|\bGH-\d|\b(?=[0-9]*[a-f])[0-9a-f]{7,40}\b|[\w.+-]+@[\w-]+\.\w",
+    re.IGNORECASE,
+)
+"""What GitHub and GitLab make a link or a mention of."""
+
+
+WORDS = (
+    "@user @org/team #12 org/repo#12 GH-7 !3 %4 ~bug &2 $1 a@b.de 1a2b3c4d5e https://evil.example/x HTTP://x "
+    "www.evil.example mailto:a@b.de ftp://x _ walk *"
+)
+
+
+@given(st.lists(st.sampled_from([*WORDS.split(), " ", '~"a b"']), min_size=1))
+def test_names_mention_and_link_nobody(parts: list[str]):
+    text = "".join(parts)
+    assert not [piece for piece in texts_seen(f"x {text} x") if LIVE.search(piece)]
 
 
 def tables_of(tokens: list[Token]) -> list[list[list[str]]]:
@@ -45,7 +73,7 @@ def test_every_finding_is_a_row_of_six_cells_that_say_what_was_found(report: Che
     assert len(tables) == len(faulty)
     for rows, group in zip(tables, faulty, strict=True):
         found = [f for _, _, findings in group.blocks() for f in findings]
-        place = [f"line {f.line}" if f.line else f"row {f.row}" if f.row is not None else "" for f in found]
+        place = [f"line {f.line}" if f.line else f"row {f.row + 1}" if f.row is not None else "" for f in found]
         said = [(f.level, f.rule, p, f.asset or "", f.column or "", f.message) for f, p in zip(found, place, strict=True)]
         assert rows == [
             ["level", "rule", "place", "asset", "column", "finding"],
@@ -92,7 +120,7 @@ def test_a_report_reads_as_written():
         "3 rows, 1 condition, in tables/run.parquet\n\n"
         "| level | rule | place | asset | column | finding |\n"
         "| --- | --- | --- | --- | --- | --- |\n"
-        "| warning | identical-rows | row 2 | Run_2 |  | the same as row 0: 50%, a\\|b. |\n\n"
+        "| warning | identical-rows | row 3 | Run_2 |  | the same as row 0: 50%, a\\|b. |\n\n"
         "Nothing found in walk (1 row, 2 conditions).\n"
     )
 

@@ -70,7 +70,7 @@ def test_a_report_reads_as_written():
         "\n"
         "run: 3 rows, 1 condition\n"
         "  warning  identical-rows\n"
-        "    tables/run.parquet  row 2: the same as row 0: 50%, a|b.\n"
+        "    tables/run.parquet  row 3: the same as row 0: 50%, a|b.\n"
         "\n"
         "walk: 1 row, 2 conditions, nothing found\n"
         "\n"

@@ -101,7 +101,7 @@ def test_a_finding_says_what_it_is_about():
     by_row = Finding("empty-cell", "error", "it is empty.", "run", "tables/run.parquet", 3, None, None, "speed")
     assert (place_of(by_line), told(by_line)) == ("tables/jog.csv:5", r'"Jog\n1", column "speed": it is empty.')
     assert told(by_line, names_asset=False) == 'column "speed": it is empty.'
-    assert (place_of(by_row), told(by_row)) == ("tables/run.parquet", 'row 3, column "speed": it is empty.')
+    assert (place_of(by_row), told(by_row)) == ("tables/run.parquet", 'row 4, column "speed": it is empty.')
     assert (place_of(Finding("odd", "info", "nowhere.")), told(Finding("odd", "info", "nowhere."))) == ("", "nowhere.")
 
 

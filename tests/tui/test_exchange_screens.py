@@ -115,7 +115,7 @@ def test_new_columns_are_added_with_their_declarations(table: Table):
 
 def test_a_column_can_be_left_out_or_become_another_condition(table: Table):
     found = draft(table, "name;velocity\nrun;5\n")
-    assert found.becomes(1) == "+ velocity (new, int)"
+    assert found.becomes(1) == "+ velocity (new, number)"
     labels = [choice.label for choice in found.choices(1)]
     assert labels[:3] == ["(left out)", "Asset Name (asset)", "speed"]
     assert labels[-1] == "new column of data"

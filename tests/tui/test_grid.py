@@ -86,6 +86,27 @@ def part(strip: Strip, text: str) -> tuple[str, str]:
 # ---- painting
 
 
+def test_backspace_edits_one_cell_empty_and_never_clears_a_block_where_ctrl_h_comes_as_backspace(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text(TABLES["ordinary"])
+
+    async def script(app, pilot):
+        await press(pilot, "shift+right", "shift+down", "backspace")
+        is_open = app.main.assets.editor is not None
+        await press(pilot, "escape")
+        is_modified = app.main.session.sheet.is_modified
+        await press(pilot, "escape", "right", "backspace", "enter")
+        sheet = app.main.session.sheet
+        one = [sheet.text(row, column) for row in range(2) for column in range(2)]
+        await press(pilot, "shift+up", "delete")
+        return is_open, is_modified, one, [sheet.text(row, 1) for row in range(3)]
+
+    is_open, is_modified, one, column = with_editor(path, script)
+    assert (is_open, is_modified) == (True, False)
+    assert one == ["walk", "", "run", "2..6"]
+    assert column == ["", "", "Any"]
+
+
 def test_three_lines_of_headers_say_name_type_unit_and_how_many_rows_the_fact_leaves():
     sheet = sheet_of()
     sheet.set_fact("hit", "True")
@@ -101,7 +122,7 @@ def test_each_mark_says_without_colour_what_a_row_or_a_cell_is():
     sheet.set_fact("hit", "False")
     assert lines(sheet)[3:6] == [
         "1    walk     │ 0..2     │×True     │ Walk     │ True     │",
-        "2 ●  run      │ Any      │ Any      │ Run      │ True     │",
+        "2 ◉  run      │ Any      │ Any      │ Run      │ True     │",
         "3 –  jump     │!5; 9     │ False    │          │ False    │",
     ]
 

@@ -120,7 +120,21 @@ def test_an_altered_line_ends_the_journal(tmp_path):
         sheet.apply(edits.delete_rows(sheet.table, [row]))
     journal = journal_path(sheet.path)
     journal.write_bytes(journal.read_bytes().replace(b"Delete run", b"Delete rum"))
-    assert recover(cdb.load(sheet.path)).history.table.assets == ["walk", "run"]
+    altered = journal.read_bytes()
+    found = recover(cdb.load(sheet.path))
+    assert found.history.table.assets == ["walk", "run"]
+    assert "line 3 was altered, so 2 edits from there on could not be made again" in found.problem.found
+    assert (journal.parent / "t.csv.damaged").read_bytes() == altered
+
+
+def test_a_journal_whose_first_line_is_altered_is_kept_and_told(tmp_path):
+    sheet = open_sheet(tmp_path)
+    sheet.apply(edits.delete_rows(sheet.table, [0]))
+    journal = journal_path(sheet.path)
+    journal.write_bytes(b"0" + journal.read_bytes()[1:])
+    found = recover(cdb.load(sheet.path))
+    assert (found.n_edits, "line 1 was altered" in found.problem.found) == (0, True)
+    assert (journal.parent / "t.csv.damaged").exists()
 
 
 def test_a_journal_whose_edit_does_not_fit_says_how_far_it_came(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from terminal import press, said, screen_text, with_editor
 
 from contextdb.errors import FileError
+from tui.messages import FillGap
 
 
 @pytest.fixture
@@ -87,6 +88,40 @@ def test_the_tabs_go_round(path):
         return tabs
 
     assert with_editor(path, script) == ["options", "priorities", "coverage", "problems", "assets", "problems"]
+
+
+def test_the_tabs_go_round_also_where_the_table_is_wider_than_the_screen(path):
+    names = [f"condition_{at}" for at in range(30)]
+    path.write_text(f"Asset,{','.join(names)}\nwalk{',Any' * 30}\n")
+
+    async def script(app, pilot):
+        tabs = []
+        for key in ["ctrl+pagedown", "ctrl+pageup", "ctrl+pageup"]:
+            await press(pilot, key)
+            tabs.append(app.main.tab)
+        return tabs
+
+    assert with_editor(path, script) == ["options", "assets", "problems"]
+
+
+def test_the_row_for_a_gap_is_named_where_it_stands_also_when_one_was_in_the_test_row(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "f6", "t", "enter", "alt+4")
+        app.main.post_message(FillGap({"hit": "False"}))
+        await press(pilot, *"new", "enter")
+        sheet = app.main.session.sheet
+        return sheet.table.assets[1], sheet.table.text(1, "hit"), dict(sheet.query.texts)
+
+    assert with_editor(path, script) == ("new", "False", {"hit": "True"})
+
+
+def test_a_row_inserted_from_the_test_row_is_where_one_types_next(path):
+    async def script(app, pilot):
+        await press(pilot, "f6", "ctrl+n", "home", *"new", "enter")
+        return list(app.main.session.sheet.table.assets), dict(app.main.session.sheet.query.texts)
+
+    assets, facts = with_editor(path, script)
+    assert (assets[1], facts) == ("new", {})
 
 
 def test_leaving_without_edits_asks_nothing(path):

@@ -56,7 +56,7 @@ def test_the_row_of_the_cursor_is_told_cell_by_cell(size: tuple[int, int]):
 def test_a_row_that_is_valid_says_so_and_the_nearest_rows_are_a_key_away():
     app = Stage(2, speed="7", gait="Walk")
     text = pressed(app, "tab")
-    assert "✓ Row 3, idle: valid" in text
+    assert "◉ Row 3, idle: valid; picked" in text
     text = pressed(Stage(2, speed="7", gait="Walk"))
     assert "1 of 3 rows valid" in text
 

@@ -32,7 +32,7 @@ def test_a_click_on_the_mark_goes_into_the_table_and_a_key_comes_back(path):
         await pilot.click(offset=(x, y + 1))
         await settled(pilot)
         inside = place(app)
-        await press(pilot, "alt+b")
+        await press(pilot, "alt+q")
         back = place(app)
         await pilot.click(offset=(x, y))
         await settled(pilot)
@@ -65,9 +65,9 @@ def test_an_edit_inside_that_is_not_saved_counts_outside(path):
     async def script(app, pilot):
         await press(pilot, "f6", "right", "7", "enter", "f6", "ctrl+home", "down")
         before = app.main.session.sheet.query.inside(1).text
-        await press(pilot, "alt+o", "up", "right", *"0..8", "enter", "alt+b")
+        await press(pilot, "alt+o", "up", "right", *"0..8", "enter", "alt+q")
         between = app.main.session.sheet.query.inside(1).text
-        await press(pilot, "alt+o", "ctrl+z", "alt+b")
+        await press(pilot, "alt+o", "ctrl+z", "alt+q")
         return before, between, app.main.session.sheet.query.inside(1).text
 
     assert with_editor(path, script) == ("1 of 2 rows", "2 of 2 rows", "1 of 2 rows")
@@ -75,7 +75,7 @@ def test_an_edit_inside_that_is_not_saved_counts_outside(path):
 
 def test_an_edit_outside_still_is_one_step_after_a_look_inside(path):
     async def script(app, pilot):
-        await press(pilot, "right", *"1..2", "enter", "left", "alt+o", "down", "x", "enter", "alt+b", "ctrl+z")
+        await press(pilot, "right", *"1..2", "enter", "left", "alt+o", "down", "x", "enter", "alt+q", "ctrl+z")
         outer = app.main.session.sheet
         return outer.text(0, 1), outer.is_modified, app.workspace.unsaved
 
@@ -104,7 +104,7 @@ def test_rows_that_open_nowhere_say_so(path):
         plain = said(app)
         await press(pilot, "down", "down", "alt+o")
         gone = said(app)
-        await press(pilot, "alt+b")
+        await press(pilot, "alt+q")
         return plain, gone, said(app), place(app)[0]
 
     plain, gone, back, name = with_editor(path, script)
@@ -142,7 +142,7 @@ def test_another_table_chosen_inside_does_not_lose_the_way_back(path):
     async def script(app, pilot):
         await press(pilot, "down", "alt+o", "ctrl+o")
         is_choosing = isinstance(app.screen, ChooseDialog)
-        await press(pilot, "escape", "alt+b")
+        await press(pilot, "escape", "alt+q")
         return is_choosing, place(app)
 
     assert with_editor(path, script) == (True, ("moves", (1, 0)))

@@ -241,3 +241,40 @@ def test_a_form_says_again_what_its_condition_says(name: str):
     said, wrong = form.declared()
     assert not wrong
     assert ConditionForm.of(Table.from_columns({"A": [], name: []}, {name: said}).condition(name).condition) == form
+
+
+def sided() -> Table:
+    columns = {"Asset": ["walk", "run"], "side": ["Left", "Right"], "lean": ["1..2", "Any"]}
+    schema = {"side": {"type": "enum", "values": ["Left", "Right", "Far Left", "Far Right"]}, "lean": {"type": "number"}}
+    return Table.from_columns(columns, schema)
+
+
+def test_how_a_condition_mirrors_is_typed_as_pairs_or_a_word_and_a_wrong_one_stays_with_the_reason():
+    app = PaneApp(sided())
+
+    async def script(pilot):
+        await submit(pilot, "#condition-mirror", 'Left = Right, "Far Left" = "Far Right"')
+        side = app.sheet.table.condition("side").condition
+        assert side.mirror == (("Left", "Right"), ("Far Left", "Far Right"))
+        assert app.query_one("#condition-mirror", Input).value == 'Left = Right, "Far Left" = "Far Right"'
+        await submit(pilot, "#condition-mirror", "Left = Rigth")
+        assert 'there is no value "Rigth"' in wrong(app, "mirror")
+        await submit(pilot, "#condition-mirror", "negate")
+        assert "has no sign" in wrong(app, "mirror")
+        assert app.sheet.table.condition("side").condition.mirror == side.mirror
+        await submit(pilot, "#condition-mirror", "")
+        assert app.sheet.table.condition("side").condition.mirror is None
+
+    drive(app, script)
+
+
+def test_a_mirror_that_has_no_place_under_another_type_goes_with_the_old_one():
+    form = ConditionForm.of(
+        Table.from_columns({"A": ["a"], "x": ["1"]}, {"x": {"type": "number", "mirror": "negate"}}).conditions[0].condition
+    )
+    assert form.mirror == "negate"
+    assert form.of_kind("angle").declared() == ({"type": "angle", "mirror": "negate"}, {})
+    assert form.of_kind("text").declared() == ({"type": "text"}, {})
+    pairs = ConditionForm("text", mirror="L = R")
+    assert pairs.of_kind("tags").declared()[0] == {"type": "tags", "mirror": {"L": "R"}}
+    assert pairs.of_kind("bool").declared()[0] == {"type": "bool"}

@@ -195,7 +195,7 @@ def test_a_large_table_is_checked_beside_the_keys():
 
     app, screen = shown(large, script=wait)
     n_found = len(cell_findings(large)) + len(row_findings(large))
-    assert screen.splitlines()[0].strip() == f"{n_found:,} warnings."
+    assert screen.splitlines()[0].strip() == "1 warning, 1 information."
     assert len(app.pane.lines) == n_found
 
 
@@ -203,6 +203,8 @@ def test_the_tab_shows_what_the_command_check_finds(tmp_path):
     """Needless rows and saved contexts that fail stand in it, as in the report that a build sees."""
     (tmp_path / "contextdb.toml").write_text(TOML)
     file = tmp_path / "a.csv"
+    with (tmp_path / "contextdb.toml").open("a") as toml:
+        toml.write('[tables.a]\npolicy = "first"\n')
     file.write_text("Asset,speed,gait\nslow,0..5,Walk\nslower,0..2,Walk\nrun,0..99,Run\n")
     (tmp_path / "a.cases.csv").write_text("Case,Expected,speed,gait\nat rest,run,0,Walk\n")
     reported = check_path(str(file)).findings
@@ -226,7 +228,7 @@ def test_the_filter_on_problems_leaves_the_rows_that_the_tab_names(tmp_path):
         await settled(pilot)
         return named, app.main.session.sheet.view.rows.tolist()
 
-    assert with_editor(file, script) == ({1}, [1])
+    assert with_editor(file, script) == ({0}, [0])
 
 
 def test_the_rows_of_a_larger_table_are_looked_at_beside_the_keys(table, monkeypatch):
@@ -244,6 +246,13 @@ def test_the_rows_of_a_larger_table_are_looked_at_beside_the_keys(table, monkeyp
 def test_while_the_rows_are_looked_at_that_is_said(table):
     _, screen = shown(table, script=_half_known)
     assert screen.splitlines()[0].strip() == "4 errors, 1 warning, 1 information. Looking at the rows …"
+
+
+def test_while_the_rows_are_looked_at_no_empty_list_says_that_there_is_nothing():
+    _, screen = shown(cdb.Table.from_columns({"Asset": ["a"], "up": ["True"]}, {"up": {"type": "bool"}}), "2", script=_half_known)
+    assert "Still checking …" in screen
+    assert "2 Errors …" in screen
+    assert "Nothing" not in screen
 
 
 async def _half_known(pilot: Pilot[None]) -> None:

@@ -13,10 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb import edits
+from contextdb.disk import staged
 from contextdb.errors import ContextDBError, FileError, TableError
+from contextdb.folder_lock import temporary_name
 from contextdb.parquet import rewritten_parquet
 from contextdb.source import read_csv
 from contextdb.table import Table, load
+from tui.model import session as session_module
 from tui.model.journal import _line as line_of
 from tui.model.journal import journal_path
 from tui.model.lock import Holder, Lock
@@ -503,12 +506,11 @@ def test_an_editor_from_which_the_table_was_taken_is_told_and_saves_no_more(path
 
 
 def test_what_a_killed_save_left_behind_is_cleared_away_but_not_what_is_being_written(path):
-    old, young = path.with_name(".contextdb-0123456789abcdef.tmp"), path.with_name(".contextdb-fedcba9876543210.tmp")
-    for file in (old, young):
-        file.write_bytes(b"half")
-    os.utime(old, (1_000_000_000, 1_000_000_000))
-    Session(path).close()
-    assert (old.exists(), young.exists()) == (False, True)
+    dead = path.with_name(temporary_name())
+    dead.write_bytes(b"half")
+    with staged(path.with_name("other.csv"), b"half") as living:
+        Session(path).close()
+        assert (dead.exists(), living.temporary.exists()) == (False, True)
 
 
 # ---- bytes
@@ -538,3 +540,59 @@ def test_what_is_announced_to_the_journal_is_what_a_save_writes(data, name):
         session.close()
         assert file.read_bytes() == announced
         shutil.rmtree(file.parent / ".contextdb-journal")
+
+
+def test_what_somebody_writes_in_the_moment_of_a_save_is_merged(path, monkeypatch):
+    real = session_module.new_source
+
+    def meanwhile(*given):
+        monkeypatch.setattr(session_module, "new_source", real)
+        load(path, strict=False).with_cell(2, "speed", "7").save()
+        return real(*given)
+
+    session = Session(path)
+    type_into(session, 0, 0, "stroll")
+    monkeypatch.setattr(session_module, "new_source", meanwhile)
+    session.save()
+    assert not session.sheet.is_modified
+    session.close()
+    assert path.read_bytes() == RAW.replace(b"walk", b"stroll").replace(b"jump,Any", b"jump,7")
+
+
+def test_an_edit_saved_in_python_while_the_editor_is_open_is_merged_by_either(path):
+    session = Session(path)
+    table = load(path, strict=False)
+    type_into(session, 0, 0, "stroll")
+    session.save()
+    table.with_cell(2, "speed", "7").save()
+    type_into(session, 1, 0, "sprint")
+    session.save()
+    session.close()
+    assert [row.split(b",")[0] for row in path.read_bytes().split(b"\n")[1:4]] == [b"stroll", b"sprint", b"jump"]
+    assert b"jump,7" in path.read_bytes()
+
+
+def test_table_and_contextdb_toml_are_both_as_they_were_when_one_of_them_cannot_be_saved(path, monkeypatch):
+    toml = path.with_name("contextdb.toml")
+    toml.write_text('[conditions.speed]\ntype = "number"\n', encoding="utf-8")
+    before = path.read_bytes(), toml.read_bytes()
+    session = Session(path)
+    session.sheet.apply(edits.set_cells(session.sheet.table, [(0, "speed", "1")]))
+    session.sheet.apply(edits.set_settings(session.sheet.table, policy="first"))
+    real = os.replace
+
+    def refused(source, target):
+        if Path(target).name == toml.name:
+            raise PermissionError(13, "no")
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", refused)
+    with pytest.raises(FileError, match=r"contextdb\.toml"):
+        session.save()
+    assert (path.read_bytes(), toml.read_bytes()) == before
+    assert session.sheet.is_modified
+    monkeypatch.setattr(os, "replace", real)
+    session.save()
+    session.close()
+    assert b'walk,"1",' in path.read_bytes()
+    assert b'policy = "first"' in toml.read_bytes()

@@ -112,11 +112,11 @@ def test_what_kills_left_behind_is_gone_after_the_next_opening(path):
     start = digest_of(path.read_bytes())
     told = Told(start, start)
     with editors(path) as process:
-        for seed in range(12):
-            kill_one(process, told, seed, 12 + seed, 0)
-    left = [*path.parent.glob(".contextdb-*.tmp"), *path.parent.glob(".contextdb-journal/.contextdb-*.tmp")]
+        for seed in range(60):  # a save sweeps what kills before it left
+            kill_one(process, told, seed, 12 + seed % 12, 0)
+            left = [*path.parent.glob(".contextdb-*.tmp"), *path.parent.glob(".contextdb-journal/.contextdb-*.tmp")]
+            if left:
+                break
     assert left
-    for file in left:
-        os.utime(file, (1_000_000_000, 1_000_000_000))
     Session(path).close()
     assert not [file for file in left if file.exists()]

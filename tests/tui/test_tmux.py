@@ -15,9 +15,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from textual.binding import Binding
+
+from tui.commands import COMMANDS
+from tui.widgets.editing.keys import KEYS as CELL_KEYS
 
 ROOT = Path(__file__).parent.parent.parent
 RAW = b"Asset,speed,hit\r\n" + b"".join(b"clip_%02d,%d,True\r\n" % (i, i) for i in range(40))
+WIDE = b"Asset" + b"".join(b",condition_%02d" % i for i in range(30)) + b"\r\n" + (b"clip_00" + b",Any" * 30 + b"\r\n") * 40
+"""A table wider and higher than the screen."""
 DEADLINE_S = 30.0
 
 pytestmark = pytest.mark.skipif(shutil.which("tmux") is None, reason="tmux is not installed")
@@ -36,7 +42,7 @@ class Terminal:
         )
         return done.stdout
 
-    def start(self, term: str, **more: str) -> None:
+    def start(self, term: str, *, program: str = "-m contextdb edit t.csv", **more: str) -> None:
         environment = {
             "TERM": term,
             "PYTHONPATH": str(ROOT),
@@ -44,7 +50,7 @@ class Terminal:
             "XDG_CONFIG_HOME": str(self.folder),
         }
         said = [f"{name}={value}" for name, value in (environment | more).items()]
-        command = f"env -u COLORTERM {' '.join(said)} {sys.executable} -m contextdb edit t.csv; echo exit code $?; cat"
+        command = f"env -u COLORTERM {' '.join(said)} {sys.executable} {program}; echo exit code $?; cat"
         self.tmux("new-session", "-d", "-x", "80", "-y", "24", "-c", str(self.folder), command)
 
     def resize(self, columns: int, rows: int) -> None:
@@ -150,8 +156,74 @@ def test_a_terminal_that_changes_its_size_while_the_editor_starts_and_later_is_f
     terminal.wait("row 2 · Asset")
 
 
-def test_alt_with_a_letter_is_a_command_and_types_nothing(terminal):
+def test_keys_that_come_in_one_packet_type_nothing_and_the_same_signs_typed_come_through(terminal):
     terminal.start("xterm-256color")
     terminal.wait("clip_00", "F2 Edit")
-    terminal.keys("M-z")
+    terminal.raw("\x1bg\x1b[B\x1br\x1b\x1b[B\x1bw\x1bw\x1b[B\x1b\x1bz")
     assert "Enter Take" not in terminal.wait("the table as it was opened")
+    terminal.keys("Escape", "M-5")
+    terminal.wait("What is wrong")
+    terminal.keys("M-1")
+    terminal.wait("row 4 · Asset")
+    terminal.raw("^¡™£∞")
+    terminal.keys("Enter", "C-s")
+    terminal.wait("Saved t.csv.")
+    assert (terminal.folder / "t.csv").read_bytes() == RAW.replace(b"clip_03", "^¡™£∞".encode())
+
+
+# ---- every key of the help
+
+
+TMUX_NAMES = {"pageup": "PageUp", "pagedown": "PageDown", "insert": "IC", "delete": "DC", "backspace": "BSpace"}
+PLAIN_ONLY = ("enter", "escape", "backspace", "space", "tab")
+"""Keys that send the same with Ctrl, Shift or Alt held, or nothing."""
+
+
+def tmux_name(key: str) -> str | None:
+    """What tmux calls a key of which a terminal without extended keys sends something of its own; None for other keys."""
+    *held, last = key.split("+")
+    if key == "ctrl+@":
+        return "C-Space"
+    if len(last) == 1:
+        taken = {("ctrl",): "him", ("alt",): "fb"}.get(tuple(held), last)  # Backspace, Tab and Enter; Ctrl+Right and Ctrl+Left
+        name = None if last in taken else last
+    else:
+        name = None if last in PLAIN_ONLY and held else TMUX_NAMES.get(last, last.capitalize())
+    return name and "".join({"ctrl": "C-", "alt": "M-", "shift": "S-"}[one] for one in held) + name
+
+
+KEYS = [(command, key) for command in COMMANDS for key in command.keys.split(",") if key and tmux_name(key)]
+
+
+def test_the_first_key_of_each_command_is_one_that_every_terminal_sends():
+    assert [command.id for command in COMMANDS if command.keys and tmux_name(command.keys.split(",")[0]) is None] == []
+
+
+def test_the_keys_on_the_key_line_are_ones_that_every_terminal_sends():
+    for binding in (one for one in CELL_KEYS if isinstance(one, Binding) and one.show):
+        assert tmux_name(binding.key.split(",")[0]) is not None
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Terminal, Path]]:
+    """An editor in which keys only tell what they would do, for all of the keys."""
+    folder = tmp_path_factory.mktemp("recorded")
+    (folder / "t.csv").write_bytes(WIDE)
+    made = Terminal(str(folder / "socket"), folder)
+    made.start("screen-256color", program=f"{ROOT / 'tests' / 'tui' / 'recording_editor.py'} t.csv told.txt")
+    made.wait("clip_00", "F2 Edit")
+    yield made, folder / "told.txt"
+    subprocess.run(["tmux", "-S", made.socket, "kill-server"], capture_output=True, check=False)
+
+
+@pytest.mark.parametrize(("command", "key"), KEYS, ids=[key for _, key in KEYS])
+def test_each_key_that_the_help_names_does_in_a_terminal_what_it_says(recorded, command, key):
+    terminal, told = recorded
+    before = told.read_text("utf-8").splitlines() if told.exists() else []
+    binding = command.binding()
+    terminal.keys(tmux_name(key))
+    end = time.monotonic() + DEADLINE_S
+    while len(lines := told.read_text("utf-8").splitlines() if told.exists() else []) == len(before):
+        assert time.monotonic() < end, f"{key} does nothing"
+        time.sleep(0.01)
+    assert lines[len(before) :] == [binding.action]

@@ -1,4 +1,4 @@
-"""What stands behind the rows of a sheet that stand for other tables, and how much of it is valid for the test row.
+"""What stands behind the rows of a sheet that stand for other tables, where not all of these can be read together.
 
 A row behind is valid when its own cells hold and those of the row that stands for its table. Each table is asked by itself, so that
 a cell that cannot be read takes away its own row only. Tables that come back to themselves are not gone into.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.nesting.links import inner_rows, nesting_faults
@@ -34,12 +34,22 @@ class Inside:
         return plural(self.n_rows, "row") if self.n_valid is None else f"{self.n_valid:,} of {plural(self.n_rows, 'row')}"
 
 
+class Counts(NamedTuple):
+    """The rows of a table, those behind its rows counted instead of them."""
+
+    n_rows: int
+    n_valid: int
+    """Of these the valid ones."""
+    n_decided: int
+    """Of those the ones that are valid whatever is not known."""
+
+
 class Counted(Protocol):
     """A table that was asked."""
 
     @property
-    def n_behind(self) -> tuple[int, int]:
-        """Its rows, those behind its rows counted instead of them, and how many of these are valid."""
+    def counts(self) -> Counts:
+        """Its rows and those behind them."""
         ...
 
     def answers(self) -> Iterator[tuple[str, bool]]:
@@ -69,6 +79,15 @@ class Behind:
                 bits &= ~(1 << row)
         return bits
 
+    @property
+    def decided(self) -> int:
+        """Those of them that have a row behind them that is valid whatever is not known."""
+        bits = self.bits
+        for row, name in self._rows.items():
+            if name not in self._asked or not self._asked[name].counts.n_decided:
+                bits &= ~(1 << row)
+        return bits
+
     def items(self) -> Iterator[tuple[int, Inside]]:
         """The rows that stand for tables, each with what stands behind it."""
         return ((row, self._found[name]) for row, name in self._rows.items())
@@ -87,7 +106,7 @@ class Behind:
             inner = (table.around or {})[name]
             inner = inner if inner.around is not None else replace(inner, around=table.around)
             asked = self._asked[name] = ask(inner)
-            n_rows, n_valid = asked.n_behind
+            n_rows, n_valid, _ = asked.counts
         except ContextDBError as error:
             return Inside(name, fault=error.faults[0])
         return Inside(name, n_rows, n_valid)

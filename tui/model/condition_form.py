@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from contextdb.cell_words import quoted
 from contextdb.cells import format_number
-from contextdb.conditions import Condition
+from contextdb.conditions import Condition, Mirror
 from contextdb.domains import KINDS
 from contextdb.errors import Fault, SchemaError
+from contextdb.mirroring import SWAPPED_KINDS
 from contextdb.schema import conditions_from_dict
 from contextdb.sections import has_place
 
@@ -41,6 +42,8 @@ class ConditionForm:
     values: str = ""
     """Names, with spaces or commas between them; one with a space in it stands in quotes."""
     description: str = ""
+    mirror: str = ""
+    """"negate", "none", or names that change places: Left = Right, Up = Down."""
 
     @classmethod
     def of(cls, condition: Condition) -> ConditionForm:
@@ -48,7 +51,13 @@ class ConditionForm:
         domain = condition.domain
         low, high = (format_number(x) if math.isfinite(x) else "" for x in (domain.minimum, domain.maximum))
         values = " ".join(quoted(value) for value in domain.values or ())
-        return cls(domain.kind, low, high, condition.unit, values, condition.description)
+        return cls(domain.kind, low, high, condition.unit, values, condition.description, _mirror_text(condition.mirror))
+
+    def of_kind(self, kind: str) -> ConditionForm:
+        """The same for another type, without a mirror that has no place there."""
+        has_names = isinstance(_mirror(self.mirror), dict)
+        fits = self.mirror.strip() in ("", "none") or has_names is (kind in SWAPPED_KINDS)
+        return replace(self, kind=kind, mirror=self.mirror if fits else "")
 
     def declared(self) -> tuple[dict[str, object], dict[str, str]]:
         """What `[conditions.NAME]` would say, and for each field that cannot be read why; fields without a place are left out."""
@@ -62,6 +71,7 @@ class ConditionForm:
                     wrong[key] = f'"{text.strip()}" is no number.'
         if has_place("values", self.kind) and self.values.strip():
             said["values"] = list(dict.fromkeys(names_in(self.values)))
+        said["mirror"] = _mirror(self.mirror)
         said = {key: value for key, value in said.items() if value not in ("", None)}
         return said, wrong or _faults(said)
 
@@ -69,6 +79,21 @@ class ConditionForm:
 def names_in(text: str) -> Iterable[str]:
     """The names that a person typed: with spaces, commas or semicolons between them, those in quotes as they are."""
     return (match[1].replace('""', '"') if match[1] is not None else match[2] for match in _NAME.finditer(text))
+
+
+def _mirror_text(mirror: Mirror | None) -> str:
+    if isinstance(mirror, tuple):
+        return ", ".join(f"{quoted(left)} = {quoted(right)}" for left, right in mirror)
+    return mirror or ""
+
+
+def _mirror(text: str) -> str | dict[str, str]:
+    """What a person typed: pairs of names with "=" between them, or a word, as it is."""
+    parts = [re.split(r"\s*=\s*", part.strip()) for part in text.split(",")]
+    names = [[name for side in part for name in names_in(side)] for part in parts]
+    is_pairs = all(len(part) == len(found) == 2 for part, found in zip(parts, names, strict=True))
+    pairs = {pair[0]: pair[1] for pair in names} if is_pairs else {}
+    return pairs if pairs and len(pairs) == len(names) else text.strip()
 
 
 def _number(text: str) -> float | int | None:
@@ -89,7 +114,7 @@ def _faults(said: dict[str, object]) -> dict[str, str]:
 
 
 def _field_of(fault: Fault) -> str:
-    key = re.match(r"\[conditions\.x\] (min|max|values|unit|description)\b", fault.found)
+    key = re.match(r"\[conditions\.x\] (min|max|values|unit|description|mirror)\b", fault.found)
     return key[1] if key else "values" if "values" in fault.found + fault.accepted else "type"
 
 

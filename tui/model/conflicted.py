@@ -12,7 +12,7 @@ from contextdb.diffing.markers import versions_of
 from contextdb.diffing.reading import merged_bytes, table_of
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError
-from contextdb.project import schema_for
+from contextdb.project import schema_for, settings_of
 
 
 def conflicts_in(path: str | Path) -> Merge | None:
@@ -21,8 +21,8 @@ def conflicts_in(path: str | Path) -> Merge | None:
         versions = versions_of(read_bytes(path))
         if versions is None:
             return None
-        schema = schema_for(Path(path))[1]
-        settings = schema.settings_for(Path(path).name)
+        folder, schema = schema_for(Path(path))
+        settings = settings_of(Path(path), folder, schema)
         base, ours, theirs = (table_of(raw, str(path), schema, settings) for raw in versions)
     except ContextDBError:
         return None

@@ -6,7 +6,7 @@ contexts stay in their file until they are looked at. An edge: this reads and wr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from operator import or_
@@ -35,10 +35,11 @@ from contextdb.cases import (
 )
 from contextdb.compiled import CompiledTable
 from contextdb.conditions import Condition
+from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, some
-from contextdb.project import CASES_SUFFIX
 from contextdb.recordings import Recording, fact_text, open_recording
 from contextdb.table import Table
+from tui.model.wanted import wanted_by
 
 BLOCK = 256
 """Rows of a recording that are read in one go."""
@@ -163,7 +164,7 @@ class ContextList:
         """
         if path.name.lower().endswith(CASES_SUFFIX):
             return cls(table, SavedRows(path))
-        names = [c.condition.name for c in table.conditions]
+        names = list(wanted_by(table).given)
         recording = open_recording(path, names)
         if not recording.facts:
             raise TableError(Fault("no column is a fact of the table.", some(names), place=Place(str(path))))
@@ -172,10 +173,11 @@ class ContextList:
     def show(self, table: Table) -> None:
         """Stand on this table from now on; what is expected is judged anew."""
         self.table = table
-        self.conditions = {c.condition.name: c.condition for c in table.conditions}
+        self.conditions = wanted_by(table).given
+        """The conditions whose facts are kept: those that a person may give, computed ones not among them."""
         self._verdicts: dict[int, Verdict] = {}
-        self._compiled: CompiledTable | None = None
-        self._readable = 0
+        self._compiled: tuple[CompiledTable, int] | None = None
+        """The table compiled, and its rows whose cells can all be read."""
 
     # ---- where one is
 
@@ -228,7 +230,10 @@ class ContextList:
         if not self.cases:
             return None
         if i not in self._verdicts:
-            self._verdicts[i] = judge(self.compiled, self.cases[i], self._readable)
+            try:
+                self._verdicts[i] = judge(self.compiled[0], self.cases[i], self.compiled[1])
+            except TableError as error:  # a table inside it cannot be used
+                self._verdicts[i] = Verdict(faults=tuple(error.faults))
         return self._verdicts[i]
 
     @property
@@ -237,28 +242,39 @@ class ContextList:
         return sum(verdict is not None and verdict.holds is False for verdict in map(self.verdict, range(len(self.cases))))
 
     @property
-    def compiled(self) -> CompiledTable:
-        """The table compiled; rows with cells that cannot be read are left out of what is valid."""
+    def compiled(self) -> tuple[CompiledTable, int]:
+        """The table compiled, with those inside it, and its rows whose cells can all be read.
+
+        Raises
+        ------
+        TableError
+            A table inside it cannot be used.
+        """
         if self._compiled is None:
-            try:
-                flat = self.table.flat()
-            except TableError:  # a table inside it cannot be used: said in Problems
-                flat = self.table
-            self._compiled = CompiledTable.of(flat)
-            self._readable = readable_rows(self.table) if flat is self.table else (1 << flat.n_rows) - 1
+            flat = self.table.flat()
+            readable = readable_rows(self.table) if flat is self.table else (1 << flat.n_rows) - 1
+            self._compiled = CompiledTable.of(flat), readable
         return self._compiled
+
+    @property
+    def assets(self) -> Sequence[str]:
+        """The assets of the table and of those inside it; none where one of these cannot be used."""
+        try:
+            return self.compiled[0].assets
+        except TableError:
+            return ()
 
     def valid_assets(self, facts: Mapping[str, str]) -> list[str]:
         """The assets that are valid now, each once, in the order of the table.
 
         Raises
         ------
-        ContextError
-            A fact cannot be read.
+        ContextError, TableError
+            A fact cannot be read; a table inside this one cannot be used.
         """
-        compiled = self.compiled
+        compiled, readable = self.compiled
         known = {name: text for name, text in facts.items() if name in self.conditions}
-        verdict = judge(compiled, Case("", known, NONE), self._readable)
+        verdict = judge(compiled, Case("", known, NONE), readable)
         if verdict.faults:
             raise ContextError(*verdict.faults)
         valid = set(verdict.extra)
@@ -327,7 +343,9 @@ def expectation_fault(text: str) -> Fault | None:
 
 def readable_rows(table: Table) -> int:
     """The rows whose cells can all be read, as bits."""
-    broken = [np.isin(c.texts.codes, list(c.faults)) for c in table.conditions if c.faults]
+    read = [(column.texts, column.faults) for column in table.conditions]
+    read += [(table.when.texts, table.when.faults)] if table.when is not None else []
+    broken = [np.isin(texts.codes, list(faults)) for texts, faults in read if faults]
     return bitmask.to_int(bitmask.pack(~reduce(or_, broken, np.zeros(table.n_rows, np.bool_))))
 
 

@@ -22,6 +22,7 @@ TITLES = {
     "identical-rows": "written like another row",
     "subsumed-row": "inside another row",
     "redundant-row": "inside others together",
+    "variety": "shares contexts: variety",
     "dead-row": "only impossible contexts",
     "never-chosen": "never chosen",
     "policy-overlap": "valid with another row",
@@ -43,6 +44,18 @@ def state_text(run: CoverageRun, table: Table) -> str:
         return f"Which contexts have no valid row? R works it out ({size})."
     headline = run.result.report.headline
     return headline if state == "done" else f"The table has changed since. R works it out anew. Before: {headline}"
+
+
+def unknown_text(run: CoverageRun) -> str:
+    """What is said instead of an empty list while nothing is known of the table as it is; empty once it is measured."""
+    said = {
+        "none": "Not counted yet: R counts.",
+        "running": "Counting …",
+        "stale": "The table has changed since it was counted.",
+        "failed": "Not known.",
+        "done": "",
+    }
+    return said[run.state]
 
 
 def summary_text(report: CoverageReport) -> str:

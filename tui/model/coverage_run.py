@@ -56,10 +56,11 @@ def with_rows_of_file(report: CoverageReport, table: Table) -> CoverageReport:
     own = flat.expansion.rows[0].tolist()
     gaps = [replace(g, nearest=replace(g.nearest, row=own[g.nearest.row])) if g.nearest else g for g in report.gaps]
     crowded = [replace(crowd, rows=tuple(own[row] for row in crowd.rows)) for crowd in report.crowded]
-    findings = [
-        replace(f, row=own[f.row] if f.row is not None else None, by=tuple(own[row] for row in f.by)) for f in report.findings
-    ]
-    return replace(report, gaps=tuple(gaps), crowded=tuple(crowded), findings=tuple(findings))
+    findings, needless = (
+        tuple(replace(f, row=None if f.row is None else own[f.row], by=tuple(own[row] for row in f.by)) for f in part)
+        for part in (report.findings, report.needless)
+    )
+    return replace(report, gaps=tuple(gaps), crowded=tuple(crowded), findings=findings, needless=needless)
 
 
 @dataclass(eq=False)

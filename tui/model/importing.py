@@ -151,7 +151,7 @@ class Draft:
             yield Choice(name, f"{self._schema.conditions[name].domain.kind}, {where}{wrong}", found)
         yield from self._other_columns(plain)
         if column.name not in self._names and column.name not in self._schema.conditions:
-            for kind in (kind for kind in KINDS if kind != "enum" or names_of(column)):
+            for kind in (kind for kind in KINDS if kind != "enum" or names_of(mapped.names or column)):
                 found = as_type(plain, column, kind)
                 wrong = f"{plural(found.n_unreadable, 'cell')} cannot be read" if found.n_unreadable else "every cell can be read"
                 yield Choice(f"new condition, {kind}", wrong, found)
@@ -185,7 +185,7 @@ class Draft:
         """
         taken = self._taken()
         came_from, target = self._rows()
-        texts = {self._name(column): (self.reading.columns[at], target) for at, column in taken}
+        texts = {self._name(column): (column.cells or self.reading.columns[at], target) for at, column in taken}
         names = [*self._names, *(name for name in texts if name not in self._names)]
         columns = [self._column(name, came_from, texts.get(name)) for name in names]
         schema, settings = self._said([column for _, column in taken])

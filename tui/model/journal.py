@@ -18,14 +18,11 @@ say, the edits come back on the file as it was, and are then merged with what st
 
 from __future__ import annotations
 
-import json
 import os
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -34,6 +31,7 @@ from contextdb.edits import Edit, edit_between
 from contextdb.errors import ContextDBError, Fault, Place, plural
 from contextdb.files import AnySource
 from contextdb.history import History, Step
+from contextdb.journal_lines import Record, line_of, n_lost, read_records
 from contextdb.parquet import read_parquet
 from contextdb.schema_file import SchemaChange
 from contextdb.source import read_csv
@@ -42,8 +40,6 @@ from tui.model.lock import FOLDER, own_folder
 from tui.model.watched import digest_of
 
 FORMAT = 1
-
-Record = Mapping[str, Any]
 
 
 def journal_path(table: Path) -> Path:
@@ -77,6 +73,8 @@ class Journal:
         self._n_edits = len(recovered.names) if recovered else 0
         """How many edits a reader of the journal knows, those taken back too."""
         self._is_begun = self._n_edits > 0
+        self._is_broken = False
+        """Whether an edit could not be written: those after it would be made again without it."""
 
     def did(self, edit: Edit) -> None:
         """Write an edit that was made."""
@@ -108,6 +106,7 @@ class Journal:
         """The file has these bytes, at this position of the history: begin anew with the next edit."""
         self._digest, self._first, self._is_straight = digest_of(raw), position, True
         self._position = self._n_edits = self._least = 0
+        self._is_broken = False
         self.discard()
         self.keep_base()
 
@@ -119,8 +118,9 @@ class Journal:
             return
         self._digest, self._first, self._is_straight = digest_of(raw), position - 1, True
         self._position = self._n_edits = self._least = 1
+        self._is_broken = False
         with self._told():
-            self._begin(_line({"do": unsaved.to_json()}))
+            self._begin(line_of({"do": unsaved.to_json()}))
         self.keep_base()
 
     def keep_base(self) -> None:
@@ -139,14 +139,16 @@ class Journal:
                 path.unlink(missing_ok=True)
 
     def _write(self, record: Record) -> None:
+        if self._is_broken:
+            return
         with self._told():
             if not self._is_begun:
                 self._begin()
-            _append(self.path, _line(record))
+            _append(self.path, line_of(record))
 
     def _begin(self, first: bytes = b"") -> None:
         own_folder(self.path.parent)
-        head = _line({"format": FORMAT, "file": self._table.name, "digest": self._digest})
+        head = line_of({"format": FORMAT, "file": self._table.name, "digest": self._digest})
         write_atomic(self.path, head + first)
         self._is_begun = True
 
@@ -156,13 +158,9 @@ class Journal:
         try:
             yield
         except (OSError, ContextDBError) as error:
+            self._is_broken = True
             why = error.strerror if isinstance(error, OSError) else str(error)
             self.problem = Fault(f"unsaved edits are not kept: {why}.", mend="to save often", place=Place(str(self.path)))
-
-
-def _line(record: Record) -> bytes:
-    body = json.dumps(record, ensure_ascii=True, separators=(",", ":")).encode()
-    return b"%08x %s\n" % (zlib.crc32(body), body)
 
 
 def set_aside(table: Path) -> Path:
@@ -199,22 +197,6 @@ class Recovery:
     """The table that the edits were made for, where the file on the disk is another by now: the two are then to be merged."""
 
 
-def read_records(raw: bytes) -> tuple[list[Record], int]:
-    """The records of a journal up to the first line that is cut or altered, and how many bytes they take."""
-    records, at = [], 0
-    for line in raw.splitlines(keepends=True):
-        body = line[9:-1]
-        try:
-            if not line.endswith(b"\n") or int(line[:8], 16) != zlib.crc32(body) or line[8:9] != b" ":
-                break
-            record = json.loads(body)
-        except ValueError:
-            break
-        records.append(record)
-        at += len(line)
-    return records, at
-
-
 def recover(table: Table) -> Recovery | None:
     """Bring back the unsaved edits of a table as it was just loaded; None when there are none.
 
@@ -225,8 +207,9 @@ def recover(table: Table) -> Recovery | None:
     path, digest = journal_path(table.path), digest_of(table.source.raw)
     raw = path.read_bytes()
     records, n_bytes = read_records(raw)
-    if not records or not any("do" in r for r in records):
-        return None
+    if not any("do" in r for r in records):
+        problem = _cut_off(path, raw, len(records), n_bytes) if n_bytes < len(raw) else None
+        return Recovery(History(table), 0, problem) if problem else None
     if any(r.get("saving") == digest for r in records):
         return None  # killed between the save and the end of the journal: all of it is in the file
     base = table if records[0].get("digest") == digest else _base_of(table, records[0].get("digest"))
@@ -234,11 +217,23 @@ def recover(table: Table) -> Recovery | None:
         n_edits = sum("do" in r for r in records)
         found = f"the file has changed since {plural(n_edits, 'unsaved edit')} of it were kept, so they cannot be made again."
         return Recovery(History(table), 0, Fault(found, "the file as it was then", place=Place(str(path))))
-    if n_bytes < len(raw):
-        with suppress(OSError):
-            os.truncate(path, n_bytes)
     found_again = _replayed(History(base), records[1:], path)
+    if n_bytes < len(raw):
+        found_again = replace(found_again, problem=found_again.problem or _cut_off(path, raw, len(records), n_bytes))
     return found_again if base is table else replace(found_again, base=base)
+
+
+def _cut_off(path: Path, raw: bytes, n_records: int, n_bytes: int) -> Fault | None:
+    """Cut a journal at its last whole line; where more than an unfinished line goes, keep the journal as it was, and say so."""
+    n_lines = n_lost(raw, n_bytes)
+    with suppress(OSError):
+        if n_lines:
+            write_atomic(path.with_suffix(".damaged"), raw)
+        os.truncate(path, n_bytes)
+    if not n_lines:
+        return None
+    found = f"line {n_records + 1} was altered, so {plural(n_lines, 'edit')} from there on could not be made again."
+    return Fault(found, mend=f"to look into {path.with_suffix('.damaged').name}, which keeps them", place=Place(str(path)))
 
 
 def finish_save(table: Table) -> bool:

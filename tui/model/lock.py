@@ -83,7 +83,8 @@ class Lock:
         if last is not None and last.host and not takes_over:
             os.close(descriptor)
             return last
-        self._write(descriptor, {"pid": os.getpid(), "id": self.id, "host": self._host})
+        with suppress(OSError):  # a full disk: the lock holds, and does not say whose it is
+            self._write(descriptor, {"pid": os.getpid(), "id": self.id, "host": self._host})
         self._descriptor = descriptor
         return None
 
@@ -107,7 +108,8 @@ class Lock:
             with suppress(OSError):
                 if self.taken_by() is None:
                     os.truncate(self._descriptor, 0)
-            os.close(self._descriptor)
+            with suppress(OSError):  # a network drive may refuse at last; let go of it is
+                os.close(self._descriptor)
             self._descriptor = -1
 
     def __enter__(self) -> Lock:

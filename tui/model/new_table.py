@@ -10,6 +10,7 @@ import numpy as np
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import in_quotes
+from contextdb.file_names import alike, why_unportable
 from contextdb.files import write_texts
 
 ASSET = "Asset Name"
@@ -23,7 +24,9 @@ def name_fault(folder: Path, name: str, taken: Iterable[str]) -> str:
         return "A table needs a name that does not begin with a dot."
     if any(c in _FORBIDDEN or not c.isprintable() for c in stem):
         return 'The name is that of a file, so it has no / \\ : * ? " < > |.'
-    if stem in taken or any((folder / f"{stem}{suffix}").exists() for suffix in TABLE_SUFFIXES):
+    if why := why_unportable(f"{stem}.csv"):
+        return f"{why}."
+    if alike(stem) in map(alike, taken) or any((folder / f"{stem}{suffix}").exists() for suffix in TABLE_SUFFIXES):
         return f"There is a table {in_quotes(stem)} already."
     return ""
 

@@ -7,26 +7,24 @@ into the sheet as one step, and `reload_schema` reads contextdb.toml anew. Unsav
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from contextdb.diff import Merge, diff, merge
-from contextdb.diffing.alignment import align
-from contextdb.disk import path_in_quotes, read_bytes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, plural
+from contextdb.disk import Was, path_in_quotes, read_bytes, write_atomic
+from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
+from contextdb.files import new_source
+from contextdb.folder_lock import sweep
 from contextdb.history import History
-from contextdb.parquet import ParquetSource, rewritten_parquet
 from contextdb.project import SCHEMA_FILE, load_table, schema_for
-from contextdb.rewrite import rewritten
+from contextdb.saving import require_related
 from contextdb.schema_file import schema_change
-from contextdb.source import Source
 from contextdb.table import Table
+from contextdb.together import NewFile, write_together
 from tui.model.journal import Journal, finish_save, recover, set_aside
-from tui.model.leftovers import clear_leftovers
 from tui.model.lock import Holder, Lock
 from tui.model.read_only import why_read_only
 from tui.model.schemas import under_schema, with_settings
@@ -136,10 +134,7 @@ class Session:
         if self._schema_file.state != "same":
             self.reload_schema()
         on_disk = load_table(self.path, strict=False)
-        if self.saved_table.n_rows and not (align(self.saved_table, on_disk).rows >= 0).any():
-            said = "what stands in the file now has no row in common with the table that was read from it."
-            mend = "to open it anew, or to save over it"
-            raise TableError(Fault(said, "the table as it was, with changes", mend, Place(str(self.path)), "merge-conflict"))
+        require_related(self.saved_table, on_disk, "to open it anew, or to save over it")
         found = merge(self.saved_table, self.sheet.table, on_disk)
         if not found.conflicts:
             self.take(found)
@@ -207,22 +202,33 @@ class Session:
         is_own = target == self.path
         if is_own:
             self._require_own()
-            if not overwrite:
-                self._merge_first()
-        table = self.sheet.table
-        schema = schema_change(self.saved_table if is_own else None, replace(table, path=target))
-        if is_own:
-            self.journal.saving(bytes_for(table, target), schema)
-        saved = table.save(target)
-        if schema is not None:
-            schema.write()
-            self.schema_written()
+        while (saved := self._written(target, is_own, overwrite)) is None:
+            pass  # somebody wrote in this moment: once more, with what they wrote
         assert saved.source is not None
         self.sheet.saved(saved)
         self._moved_to(target)
         self.saved_table = self.sheet.table
         self._file.know(digest_of(saved.source.raw))
         self.journal.saved(saved.source.raw, self.sheet.history.position)
+
+    def _written(self, target: Path, is_own: bool, overwrite: bool) -> Table | None:
+        """The table as it now stands in the file, with contextdb.toml; None where others wrote one of them meanwhile."""
+        is_merged = is_own and not overwrite
+        if is_merged:
+            self._merge_first()
+        was: Was = "any" if not is_merged else None if self._file.state == "gone" else self._raw
+        table = self.sheet.table
+        schema = schema_change(self.saved_table if is_own else None, replace(table, path=target))
+        source = new_source(target, table.columns, table.source, table.origin)
+        if is_own:
+            self.journal.saving(source.raw, schema)
+        if schema is None:
+            is_written = write_atomic(target, source.raw, was)
+        else:
+            is_written = write_together(schema.path.parent, [NewFile(target, source.raw, was), schema.new_file])
+            if is_written:
+                self.schema_written()
+        return replace(table, path=target, source=source, origin=np.arange(table.n_rows)) if is_written else None
 
     def close(self, keep_journal: bool = False) -> None:
         """Let go of the table. Unsaved edits are gone then, unless the journal is kept for the next time."""
@@ -260,12 +266,9 @@ class Session:
         self.sheet.version += 1
 
     def _clear_leftovers(self) -> None:
-        if not self.lock.is_held:
-            return
-        with suppress(OSError):
-            now_s = self.lock.path.stat().st_mtime  # just written: the time of that disk, whatever the clock here says
+        if self.lock.is_held:
             for folder in (Path(os.path.realpath(self.path)).parent, self.lock.path.parent):
-                clear_leftovers(folder, now_s)
+                sweep(folder)
 
     def _is_free(self) -> bool:
         with Lock(self.path) as other:
@@ -305,11 +308,7 @@ class Session:
 
 def bytes_for(table: Table, path: Path) -> bytes:
     """The bytes that `Table.save` writes."""
-    fresh = np.full(table.n_rows, -1)
-    write: Callable[..., Source | ParquetSource] = rewritten if path.suffix.lower() == ".csv" else rewritten_parquet
-    kind = Source if path.suffix.lower() == ".csv" else ParquetSource
-    is_same = isinstance(table.source, kind)
-    return write(table.columns, table.source if is_same else None, table.origin if is_same else fresh).raw
+    return new_source(path, table.columns, table.source, table.origin).raw
 
 
 def _schema_path(table: Path) -> Path:

@@ -18,7 +18,7 @@ from contextdb.changes import Cells, Change
 from contextdb.edits import Edit, Job
 from contextdb.errors import Fault, TableError, in_quotes, plural, shown
 from contextdb.history import History, Step
-from contextdb.schema_file import users_of
+from contextdb.renaming import uses_of
 from contextdb.table import Table
 from tui.model.clipboard import format_tsv, parse_tsv, place_paste
 from tui.model.find import Search, find, next_hit, replace_all
@@ -204,11 +204,12 @@ class Sheet(ShownTable):
         return self._do(edits.move_column(self.table, self.table.columns[at].name, at + right + (right > 0)))
 
     def rename_column(self, name: str) -> Done:
-        """Give the cursor's column another name."""
+        """Give the cursor's column another name, as a step of this table alone; where others speak of the condition see
+        `Workspace.rename`."""
         return self._rename(self.table.columns[self.selection.column].name, name)
 
     def _rename(self, column: str, name: str) -> Done:
-        keeps = self.table.path is not None and bool(users_of(self.table, column))
+        keeps = self.table.path is not None and bool(uses_of(self.table, column).text)
         return self._do(edits.rename_column(self.table, column, name, keep_declared=keeps))
 
     # ---- find and replace

@@ -6,7 +6,7 @@ anew by an edit, so that a row does not jump away under the fingers: `refresh` d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from contextdb import edits
 from contextdb.columns import TextColumn
 from contextdb.condition_column import ConditionColumn
+from contextdb.conditions import Condition
 from contextdb.errors import Fault
 from contextdb.findings import Finding
 from contextdb.history import History, Step, where_now
@@ -23,6 +24,8 @@ from contextdb.nesting.links import nesting_faults
 from contextdb.nesting.names import inner_name
 from contextdb.schema import TableSettings
 from contextdb.table import Table
+from tui.model.asked import Offered
+from tui.model.fact_steps import FactSteps
 from tui.model.query_row import QueryRow
 from tui.model.selection import Block, Selection, Shape
 from tui.model.views import Filter, Sort, View, shown_rows
@@ -42,6 +45,10 @@ class Header:
     """What is wrong with that fact."""
     n_actors: int = 0
     """How many actors are offered for its role, whose facts are asked instead."""
+    is_extra: bool = False
+    """It is no column of the table, but a fact that its rules, expressions or inner tables need."""
+    how: str = ""
+    """Of a fact that is computed: its expression."""
 
 
 class ShownTable:
@@ -51,6 +58,7 @@ class ShownTable:
         self.history = history or History(table)
         self.selection = Selection()
         self.query = QueryRow(self.table)
+        self.fact_steps = FactSteps()
         self.sort: Sort | None = None
         self.filter = Filter()
         self.view = View.of(self.table)
@@ -139,16 +147,31 @@ class ShownTable:
         texts = self.table.columns[column]
         return next((c for c in self.table.conditions if c.texts is texts), None)
 
+    @property
+    def extra(self) -> tuple[Condition, ...]:
+        """The facts that the test row has behind those of the columns: see `QueryRow.extra`."""
+        return self.query.extra
+
+    def fact_of(self, column: int) -> Condition | None:
+        """The condition that a field of the test row is a fact of: a column's, or behind the last column one of `extra`."""
+        n_columns = len(self.table.columns)
+        if column >= n_columns:
+            return self.extra[column - n_columns] if column - n_columns < len(self.extra) else None
+        found = self.condition(column)
+        return None if found is None else found.condition
+
     def header(self, column: int) -> Header:
-        """What stands over a column."""
-        name, found = self.table.columns[column].name, self.condition(column)
-        if found is not None:
-            condition = found.condition
-            leaves = self.query.leaves(name)
+        """What stands over a column, or over a fact that is none."""
+        condition = self.fact_of(column)
+        if condition is not None:
+            name = condition.name
             role = self.query.role_of(name)
             n_actors = len(self.query.actors[role]) if role is not None else 0
             fault = self.query.faults.get(name) if role is None else None
-            return Header(name, condition.domain.kind, condition.unit, leaves, fault, n_actors)
+            is_extra, how = column >= len(self.table.columns), (condition.expr or "") if self.query.is_computed(name) else ""
+            leaves = self.query.leaves(name)
+            return Header(name, condition.domain.kind, condition.unit, leaves, fault, n_actors, is_extra, how)
+        name = self.table.columns[column].name
         settings = self.table.settings
         jobs = {settings.enabled: "enabled", settings.priority: "priority", settings.weight: "weight", settings.when: "rule"}
         return Header(name, "asset" if name == self.table.asset_column else jobs.get(name, "output"))
@@ -176,11 +199,15 @@ class ShownTable:
         return found
 
     def said_of(self, row: int) -> str:
-        """Who is cast for a row of the file, or how much is valid of the table that it stands for."""
+        """Who is cast for a row of the file, whether it is picked, and how much is valid of the table that it stands for."""
         said = [f"{role}: {actor}" for role, actor in self.query.casting(row).items()]
         if (inside := self.query.inside(row)) is not None:
             fault = inside.fault.found.rstrip(".") if inside.fault is not None else ""
             said.append(fault or f"▸ {inside.text}{'' if inside.n_valid is None else ' valid'} · Alt+O goes in")
+        if not self.query.is_empty and self.query.bits >> row & 1:
+            outcome = self.query.outcome
+            tells = outcome.prefers_some or outcome.refusal is not None or self.query.undecided >> row & 1
+            said += filter(None, (self.query.doubt(row), self.query.standing(row) if tells else ""))
         return " · ".join(said)
 
     def is_filled(self, row: int, column: int) -> bool:
@@ -243,9 +270,31 @@ class ShownTable:
         self._place_selection(rows)
 
     def set_fact(self, condition: str, text: str) -> Fault | None:
-        """Write one fact of the test row; gives what is wrong with it."""
+        """Write one fact of the test row; gives what is wrong with it. One that is computed cannot be written."""
+        if why := self.query.wanted.why_computed(condition):
+            return Fault(why, rule="wrong-fact")
+        self._ask(f"the fact of {condition}", lambda: self.query.set(condition, text))
+        return self.query.faults.get(condition)
+
+    def ask(self, name: str, facts: Mapping[str, str] | None = None, actors: Offered | None = None) -> None:
+        """Ask for other facts, of other actors, or both, as one step of the test row; None leaves them as they are."""
+
+        def change() -> None:
+            if actors is not None:
+                self.query.offer(actors)
+            if facts is not None:
+                self.query.load(facts)
+
+        self._ask(name, change)
+
+    def _ask(self, name: str, change: Callable[[], object]) -> None:
         self.version += 1
-        return self.query.set(condition, text)
+        self.fact_steps.do(self.query, name, change)
+
+    def undo_fact(self, is_redo: bool = False) -> str | None:
+        """Take back the last change of the test row, or make it again; gives its name, None where there is none."""
+        self.version += 1
+        return self.fact_steps.redo(self.query) if is_redo else self.fact_steps.undo(self.query)
 
     # ---- after a step
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from contextdb.conditions import Condition
-from contextdb.disk import read_bytes, write_atomic
+from contextdb.disk import ACTORS_SUFFIX, read_bytes, write_atomic
 from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes
 from contextdb.facts import Fact, read_fact_text
 from contextdb.recordings import fact_text
@@ -20,19 +20,19 @@ from contextdb.schema import TableSettings
 from contextdb.table import Table
 from tui.model.sheet import Done, Sheet
 from tui.model.shown import Header
+from tui.model.wanted import wanted_by
 
 NAME = "Actor"
-SUFFIX = ".actors.json"
 FIXED = "The facts of a role are columns of the table, and stay as they are here."
 
 
 def roles_of(table: Table) -> dict[str, list[Condition]]:
-    """The roles of a table, each with the conditions that belong to it: those named `Role.fact`."""
+    """The roles of a table, each with the conditions that its actors give facts of: those named `Role.fact`, and not computed."""
     found: dict[str, list[Condition]] = {}
-    for column in table.conditions:
-        role, dot, fact = column.condition.name.partition(".")
+    for condition in wanted_by(table).given.values():
+        role, dot, fact = condition.name.partition(".")
         if role and dot and fact:
-            found.setdefault(role, []).append(column.condition)
+            found.setdefault(role, []).append(condition)
     return found
 
 
@@ -187,7 +187,7 @@ class Teams:
 
 def teams_path(table: Table) -> Path | None:
     """The file of a table's teams; None for a table without a file."""
-    return None if table.path is None else table.path.with_name(table.path.stem + SUFFIX)
+    return None if table.path is None else table.path.with_name(table.path.stem + ACTORS_SUFFIX)
 
 
 def _read(text: str, condition: Condition) -> Fact:

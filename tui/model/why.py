@@ -1,7 +1,8 @@
 """Why rows are not valid in the test row's context: cell by cell, with the cell that would mend each.
 
 What is said of a row is what `contextdb query --explain` says, with two reasons more that an editor meets: cells that cannot be
-read, and rows that are disabled. For a role with actors the fact is the actor who plays it, or the one whose fact is in the way.
+read, and rows that are disabled. Of a valid row it is said whether it is picked, in the words of `contextdb.pick`. For a role with
+actors the fact is the actor who plays it, or the one whose fact is in the way.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Literal
 
 from contextdb.condition_column import ConditionColumn
 from contextdb.edits import check_cell
+from contextdb.errors import some
 from contextdb.explain import describe_fact, mended
 from contextdb.table import Table
 from contextdb.when import has_no_rule
@@ -19,7 +21,8 @@ from tui.model.query_row import QueryRow
 
 NEEDED = "(needed)"
 """What stands for the cell of a role that is not filled."""
-State = Literal["fails", "unreadable", "disabled", "holds", "not asked"]
+State = Literal["fails", "unreadable", "disabled", "open", "holds", "not asked"]
+"""Of a cell that is open it is not known whether it holds: its rule lacks a fact, or it accepts some values of a set only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +38,9 @@ class CellWhy:
     state: State
     mend: str | None = None
     """The cell with which the row would pass; None where there is nothing to mend, or no telling."""
+
+    is_of_rule: bool = False
+    """The cell is the row's own rule; the fact names the facts that it needs, where it is open, or says with which it fails."""
 
     is_cast: bool = False
     """The fact is the actor who plays the role of the condition."""
@@ -52,6 +58,12 @@ class RowWhy:
     row: int
     asset: str
     cells: tuple[CellWhy, ...]
+    doubt: str = ""
+    """Why the row only may be valid: "may be valid: its rule needs target"."""
+    standing: str = ""
+    """Of a valid row: "picked, chance 40 %", "outranked by B (priority 5)"."""
+    is_picked: bool = False
+    """It is valid, and the policy may pick it."""
 
     @property
     def is_valid(self) -> bool:
@@ -69,7 +81,9 @@ def why_row(query: QueryRow, table: Table, row: int) -> RowWhy:
     fails = query.failing([row])[0].tolist()
     cells = [*_switch(table, row), *_rule(query, table, row), *_behind(query, table, row), *_roles(query, row)]
     cells += [_cell(query, c, row, wrong) for c, wrong in zip(table.conditions, fails, strict=True)]
-    return RowWhy(row, table.text(row, table.asset_column), tuple(sorted(cells, key=lambda cell: not cell.is_wrong)))
+    cells.sort(key=lambda cell: (not cell.is_wrong, cell.state != "open"))
+    asset, is_picked = table.text(row, table.asset_column), bool(query.picked >> row & 1)
+    return RowWhy(row, asset, tuple(cells), query.doubt(row), query.standing(row), is_picked)
 
 
 def nearest_rows(query: QueryRow, table: Table, most: int = 20) -> list[RowWhy]:
@@ -88,9 +102,11 @@ def _cell(query: QueryRow, column: ConditionColumn, row: int, fails: bool) -> Ce
     if code in column.faults:
         return CellWhy(row, condition.name, text, said, "unreadable")
     if fact is None:
-        return CellWhy(row, condition.name, text, said, "not asked")
+        lacking = query.lacking([condition.name]) if query.is_computed(condition.name) else ()
+        return CellWhy(row, condition.name, text, f"needs {some(lacking)}" if lacking else "", "not asked")
     if not fails:
-        return CellWhy(row, condition.name, text, said, "holds")
+        state: State = "holds" if query.accepts_every(condition.name, row) else "open"
+        return CellWhy(row, condition.name, text, said, state)
     return CellWhy(row, condition.name, text, said, "fails", mended(text, fact, condition.domain))
 
 
@@ -120,8 +136,11 @@ def _rule(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:
     name = table.settings.when
     if name is not None and table.when is not None and not has_no_rule(text := table.text(row, name)):
         is_unread = check_cell(table, name, text) is not None
-        fails: State = "fails" if query.excluded_by_rule([row])[0] else "holds"
-        yield CellWhy(row, name, text, "", "unreadable" if is_unread else fails if not query.is_empty else "not asked")
+        lacking, failure = query.open_facts(row), next((f for f in query.failures(row) if f.condition == name), None)
+        state: State = "fails" if query.excluded_by_rule([row])[0] else "holds" if lacking is None else "open"
+        state = "unreadable" if is_unread else "not asked" if query.is_empty else state
+        said = some(lacking) if lacking else failure.fact if failure is not None else ""
+        yield CellWhy(row, name, text, said, state, is_of_rule=True)
 
 
 def _behind(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from contextdb.cells import Cell
 from contextdb.condition_column import ConditionColumn
 from tui.model.shown import ShownTable
@@ -18,6 +16,10 @@ MARKS: dict[Kind, str] = {"text": " ", "any": " ", "failing": "×", "fault": "!"
 """What stands before the text of a cell, so that no colour is needed to tell them apart."""
 
 
+PICKED, VALID, MAY_BE = "◉", "●", "◐"
+"""What stands beside a valid row: the policy may pick it; it picks others; it is not known whether the row is valid."""
+
+
 @dataclass(frozen=True, slots=True)
 class WindowRow:
     """A row on the screen: what the gutter says of it."""
@@ -27,6 +29,17 @@ class WindowRow:
     is_enabled: bool
     is_valid: bool
     """For a test row that asks for something."""
+    is_undecided: bool = False
+    """It only may be valid."""
+    is_picked: bool = False
+    """It is valid, and the table's policy may pick it."""
+
+    @property
+    def mark(self) -> str:
+        """The sign in the gutter."""
+        if self.is_valid:
+            return MAY_BE if self.is_undecided else PICKED if self.is_picked else VALID
+        return " " if self.is_enabled else "–"
 
 
 class Window:
@@ -39,10 +52,13 @@ class Window:
         self._sheet = sheet
         self._rows = rows
         is_asked = not sheet.query.is_empty
-        valid = sheet.query.valid[rows] if is_asked else np.zeros(len(rows), np.bool_)
         self._failing = sheet.failing(top, top + n_rows) if is_asked else None
         enabled = sheet.table.enabled[rows]
-        self.rows = [WindowRow(r + 1, e, v) for r, e, v in zip(rows.tolist(), enabled.tolist(), valid.tolist(), strict=True)]
+        self.rows = [WindowRow(r + 1, e, False) for r, e in zip(rows.tolist(), enabled.tolist(), strict=True)]
+        if is_asked:
+            query = sheet.query
+            marks = (query.flags(bits)[rows].tolist() for bits in (query.bits, query.undecided, query.picked))
+            self.rows = [WindowRow(r.number, r.is_enabled, *said) for r, *said in zip(self.rows, *marks, strict=True)]
         self._notes = [sheet.notes(row) for row in rows.tolist()] if sheet.query.has_notes else []
         self._columns: dict[int, list[tuple[str, Kind]]] = {}
 

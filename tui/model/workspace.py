@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from contextdb.disk import TABLE_SUFFIXES
-from contextdb.errors import Fault, FileError, Place
+from contextdb.errors import Fault, FileError, Place, TableError, some
 from contextdb.nesting.links import Neighbours
 from contextdb.places import table_path
 from contextdb.project import read_folder_schema, schema_for, table_files
+from contextdb.renaming import renaming
 from contextdb.table import Table
 from tui.model.session import Session
 
@@ -96,6 +97,30 @@ class Workspace:
         session.close()
         del self.sessions[name]
         self.files[other] = path
+
+    def rename(self, name: str, old: str, new: str, only_here: bool = False) -> tuple[str, ...]:
+        """Give a condition of a table another name, in the files of the project or of this table; gives which were written.
+
+        The tables whose files are written are opened anew: what was edited before cannot be taken back any more.
+
+        Raises
+        ------
+        TableError, SchemaError, FileError
+            A table that is to be written has unsaved edits; else as `contextdb.renaming`. Nothing has changed then.
+        """
+        found = renaming(self.sessions[name].sheet.table, old, new, only_here)
+        paths = {file.path.resolve() for file in found.files}
+        open_here = [one for one, session in self.sessions.items() if session.path.resolve() in paths or one == name]
+        if waiting := [one for one in open_here if one in self.unsaved]:
+            said = f"{some(waiting)} {'has' if len(waiting) == 1 else 'have'} unsaved edits, and the rename is written at once."
+            raise TableError(Fault(said, "tables that are saved", "to save first: Ctrl+S"))
+        if held := [one for one in open_here if self.sessions[one].is_read_only]:
+            raise FileError(Fault(f"{some(held)} can be read only.", "tables that can be written"))
+        found.write()
+        for one in open_here:
+            query = self.sessions[one].sheet.query
+            self.reopen(one).sheet.query.load({new if fact == old else fact: text for fact, text in query.texts.items()})
+        return tuple(file.path.name for file in found.files)
 
     @property
     def unsaved(self) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -17,7 +17,8 @@ from contextdb.errors import ContextDBError, ContextError, Fault, TableError, pl
 from contextdb.facts import read_fact_text
 from contextdb.nesting.names import MARK
 from tui.clipboard import Clipboard
-from tui.messages import Edited, Told
+from tui.messages import Edited, RenameWanted, Told
+from tui.model.asked import Offered
 from tui.model.find import PatternError, Search
 from tui.model.problems import findings_at_once
 from tui.model.sheet import Done, Sheet
@@ -97,7 +98,7 @@ class AssetsPane(Pane):
         parts = []
         if not sheet.query.is_empty:
             where = f" for {self.grid.test_name}" if self.grid.test_name else ""
-            parts.append(f"{sheet.query.n_valid:,} valid{where}")
+            parts.append(f"{sheet.query.said}{where}")
         if len(sheet.view) < sheet.table.n_rows:
             parts.append(f"{len(sheet.view):,} of {plural(sheet.table.n_rows, 'row')} shown")
         if sheet.sort is not None:
@@ -112,11 +113,12 @@ class AssetsPane(Pane):
     def _show_cell(self) -> None:
         sheet = self.sheet
         row, column = sheet.cursor
-        name = sheet.table.columns[column].name
-        condition = sheet.condition(column)
-        about = condition.condition.description if condition is not None else ""
+        column = self.grid.field
+        header, condition = sheet.header(column), sheet.fact_of(column)
+        name, about = header.name, condition.description if condition is not None else ""
         if self.grid.is_in_test_row:
             fault = sheet.query.faults.get(name)
+            about = " · ".join(filter(None, (f"computed: {header.how}" if header.how else "", about)))
             self.query_one(CellLine).show(f"test row · {name}", self.grid.cell_text(), _short(fault), about)
         elif len(sheet.view):
             place = f"row {sheet.row_number(row)} · {name}"
@@ -133,14 +135,15 @@ class AssetsPane(Pane):
         if self.editor is not None:
             return
         row, column = self.sheet.cursor
+        column = self.grid.field
         self._edited = _Place(row, column, self.grid.is_in_test_row)
-        found, texts = self.sheet.condition(column), self.sheet.table.columns[column]
+        columns = self.sheet.table.columns
         editor = CellEditor(
-            found.condition if found is not None else None,
+            self.sheet.fact_of(column),
             self.sheet.header(column).kind,
             event.text,
             check=self._check_fact if self._edited.is_fact else lambda text: self.sheet.check_at(column, text),
-            known=self._known(texts),
+            known=self._known(columns[column]) if column < len(columns) else [],
             is_fact=self._edited.is_fact,
             is_typing=event.is_typing,
             open_list=event.opens_list,
@@ -163,11 +166,11 @@ class AssetsPane(Pane):
         return [*Priorities(self.sheet).clips_without_row(), *known]
 
     def _check_fact(self, text: str) -> Fault | None:
-        found = self.sheet.condition(self._edited.column)
+        found = self.sheet.fact_of(self._edited.column)
         if found is None or not text.strip():
             return None
         try:
-            read_fact_text(text, found.condition)
+            read_fact_text(text, found)
         except ContextError as error:
             return error.faults[0]
         return None
@@ -177,9 +180,10 @@ class AssetsPane(Pane):
         """Take the text for the cell that was edited, wherever a click has put the cursor meanwhile."""
         event.stop()
         place, clicked = self._edited, self.sheet.selection
-        is_elsewhere = self.sheet.cursor != (place.row, place.column) or self.grid.is_in_test_row != place.is_fact
+        is_elsewhere = (self.sheet.cursor[0], self.grid.field) != (place.row, place.column)
+        is_elsewhere = is_elsewhere or self.grid.is_in_test_row != place.is_fact
         if place.is_fact:
-            self.sheet.set_fact(self.sheet.table.columns[place.column].name, event.text)
+            self.sheet.set_fact(self.sheet.header(place.column).name, event.text)
             self._close_editor()
             self.grid.post_message(Grid.FactChanged())
             if not is_elsewhere and event.right:
@@ -235,13 +239,14 @@ class AssetsPane(Pane):
 
     def action_clear_context(self) -> None:
         """Ask for nothing, of nobody."""
-        self.sheet.query.offer({})
-        self.set_context({}, "")
+        self._ask_for("all facts", {}, {}, "")
 
     def set_context(self, facts: dict[str, str], name: str) -> None:
         """Make these the facts of the test row."""
-        self.sheet.query.load(facts)
-        self.sheet.version += 1
+        self._ask_for(f"the facts of {name}", facts, None, name)
+
+    def _ask_for(self, step: str, facts: Mapping[str, str], actors: Offered | None, name: str) -> None:
+        self.sheet.ask(step, facts, actors)
         self.refresh_valid()
         self.grid.test_name = name
         self.show()
@@ -396,7 +401,7 @@ class AssetsPane(Pane):
 
         def renamed(text: str | None) -> None:
             if text is not None and text != name:
-                self._try(lambda: self.sheet.rename_column(text))
+                self.post_message(RenameWanted(name, text))
 
         self.app.push_screen(AskDialog("Rename the column", f"Another name for {name}", name, self._check_name), renamed)
 

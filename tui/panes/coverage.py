@@ -16,11 +16,11 @@ from textual.widget import Widget
 from textual.widgets import ContentSwitcher, Static
 
 from contextdb.covering import CoverageReport, format_percent
-from contextdb.covering.inside import facts_inside
 from contextdb.errors import ContextDBError, in_quotes
 from tui.messages import FillGap, GoToCell, SetContext, Told
 from tui.model import coverage_lines as lines
 from tui.model.coverage_run import CoverageRun, Result, is_quick
+from tui.model.moment import moment_inside
 from tui.model.sheet import Sheet
 from tui.panes.pair_map import PairMap
 from tui.panes.pane import Pane
@@ -30,6 +30,12 @@ from tui.widgets.line_list import LineList, ListCell, ListColumn
 
 SECTIONS = ("gaps", "pairs", "crowded", "rows", "about")
 NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About")
+EMPTY = {
+    "gaps": "No gap is known.",
+    "crowded": "Nowhere are two rows valid at once, as far as is known.",
+    "rows": "No row is said to be too many.",
+}
+"""What a list without lines says once the table is measured."""
 
 
 class GapList(LineList):
@@ -91,18 +97,18 @@ class CoveragePane(Pane):
             columns = [ListColumn("Share", 8, 0, True), ListColumn("New", 8, 0, True)]
             yield GapList(
                 [*columns, ListColumn("Contexts without a valid row", 27, 3), ListColumn("Nearest row", 13, 2)],
-                empty="No gap is known.",
+                empty=EMPTY["gaps"],
                 id="gaps",
             )
             yield PairMap(id="pairs")
             yield RowList(
                 [ListColumn("Rows", 5, 0, True), ListColumn("Share", 8, 0, True), ListColumn("Contexts", 30, 1)],
-                empty="Nowhere are two rows valid at once, as far as is known.",
+                empty=EMPTY["crowded"],
                 id="crowded",
             )
             yield RowList(
                 [ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2), ListColumn("What is said of it", 22, 2)],
-                empty="No row is said to be too many.",
+                empty=EMPTY["rows"],
                 id="rows",
             )
             with VerticalScroll(id="about"):
@@ -146,6 +152,9 @@ class CoveragePane(Pane):
             self._shown = run.result
             if run.result is not None:
                 self._fill(run.result)
+        unknown = lines.unknown_text(run)
+        for name, text in EMPTY.items():
+            self.query_one(f"#{name}", LineList).say_empty(unknown or text)
         self.set_class(run.state == "stale", "-stale")
         self._show_section()
 
@@ -302,7 +311,7 @@ class CoveragePane(Pane):
             return
         name, cells = found
         try:
-            facts = facts_inside(cells, [c.condition for c in self.sheet.table.conditions])
+            facts = moment_inside(cells, self.sheet.query.wanted)
         except ContextDBError as error:
             self.post_message(Told(str(error.faults[0]), "error"))
             return

@@ -39,7 +39,7 @@ WIDE = 120
 """From so many columns on the condition stands beside the table's settings."""
 
 _BY_COLUMN = ("asset", *JOBS)
-_FORM = {"min": "minimum", "max": "maximum", "unit": "unit", "values": "values", "description": "description"}
+_FORM = {"min": "minimum", "max": "maximum", "unit": "unit", "values": "values", "mirror": "mirror", "description": "description"}
 """The keys of a condition that are typed, and the fields of the form that hold them."""
 
 
@@ -102,6 +102,8 @@ class OptionsPane(Pane):
             )
             meaning = "The names there are, with spaces between them; one with a space in it in quotes."
             yield Field("Values", Input(compact=True, placeholder="none", id="condition-values"), meaning, "values")
+            meaning = "For clips played mirrored: negate, none, or names that change places, such as Left = Right."
+            yield Field("Mirror", Input(compact=True, placeholder="none", id="condition-mirror"), meaning, "mirror")
             yield Field(
                 "Description",
                 Input(compact=True, placeholder="none", id="condition-description"),
@@ -200,6 +202,7 @@ class OptionsPane(Pane):
         )
         form = ConditionForm.of(column.condition)
         self.query_one("#condition-type", Select).value = form.kind
+        self.query_one("#condition-mirror", Input).placeholder = "negate" if form.kind == "angle" else "none"
         for key, name in _FORM.items():
             self.query_one(f"#condition-{key}", Input).value = getattr(form, name)
             self._field(key).display = has_place(key, form.kind)
@@ -276,6 +279,8 @@ class OptionsPane(Pane):
         if column is None or self._condition != column.condition.name:
             return
         before, form = ConditionForm.of(column.condition), self._form()
+        if key == "type":
+            form = form.of_kind(form.kind)
         for other in _FORM:
             self._field(other).display = has_place(other, form.kind)
         said, wrong = form.declared()

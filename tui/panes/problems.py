@@ -137,9 +137,10 @@ class ProblemsPane(Pane):
     def _show_lines(self, keep: bool = False) -> None:
         counts, lines = self.problems.counts, self.lines
         numbers = [len(self.problems.items), *counts.values()]
-        labels = [f"{at + 1} {name} {numbers[at]:,}" for at, name in enumerate(NAMES)]
+        labels = [f"{at + 1} {name} {_count(numbers[at], self.is_all)}" for at, name in enumerate(NAMES)]
         self.query_one(ChoiceLine).show(labels, FILTERS.index(self.level))
         shown = self.query_one(LineList)
+        shown.say_empty("Nothing." if self.is_all else "Still checking …")
         shown.show(len(lines), lambda at: _line(lines[at]), shown.index if keep else 0)
 
     @property
@@ -193,6 +194,11 @@ class ProblemsPane(Pane):
             self.post_message(Told("That is about a saved context: F9 lists them."))
         else:
             self.post_message(Told("That is about the whole table, not about a cell."))
+
+
+def _count(n: int, is_all: bool) -> str:
+    """How many there are; while they are still looked for, how many at least."""
+    return f"{n:,}" if is_all else f"{n:,}+" if n else "…"
 
 
 def _line(problem: Problem) -> Sequence[ListCell]:

@@ -50,8 +50,8 @@ class ActorsDialog(Dialog[Teams]):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("ctrl+s", "save", "Save", priority=True),
-        Binding("ctrl+pagedown,alt+right", "turn(1)", "Next role", show=False, priority=True),
-        Binding("ctrl+pageup,alt+left", "turn(-1)", "Role before", show=False, priority=True),
+        Binding("alt+right,ctrl+pagedown", "turn(1)", "Next role", show=False, priority=True),
+        Binding("alt+left,ctrl+pageup", "turn(-1)", "Role before", show=False, priority=True),
         Binding("alt+x", "clear", "No actors", priority=True),
     ]
     DEFAULT_CSS = """

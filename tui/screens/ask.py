@@ -62,13 +62,16 @@ class ChooseDialog(Dialog[int]):
     ]
     keys_text = "↑↓ choose · Enter take · Esc cancel"
 
-    def __init__(self, title: str, lines: Sequence[str], chosen: int = 0) -> None:
+    def __init__(self, title: str, lines: Sequence[str], chosen: int = 0, about: str = "") -> None:
+        """`about`: what one should know before choosing."""
         super().__init__()
-        self.title_text = title
+        self.title_text, self._about = title, about
         self._lines = list(lines)
         self._chosen = chosen
 
     def compose_body(self) -> ComposeResult:
+        if self._about:
+            yield Static(Text(self._about))
         yield Input(compact=True, placeholder="type to filter")
         yield OptionList()
 

@@ -44,7 +44,7 @@ class TestRow:
                 self._load()
 
         sheet = self.session.sheet
-        self.screen.app.push_screen(ContextsDialog(sheet.table, sheet.query.texts, self.list), loaded)
+        self.screen.app.push_screen(ContextsDialog(sheet.table, sheet.query.texts, self.list, bool(sheet.query.actors)), loaded)
 
     def step(self, by: int) -> None:
         """Load the next context, or the one before; of the saved ones where none were looked at yet."""
@@ -72,8 +72,7 @@ class TestRow:
 
         def decided(teams: Teams | None) -> None:
             if teams is not None:
-                sheet.query.offer(teams.offered)
-                sheet.version += 1
+                sheet.ask("the actors", actors=teams.offered)
                 self.screen.assets.refresh_valid()
                 self.screen.show()
 

@@ -59,9 +59,11 @@ class KeepDialog(Dialog[Kept]):
     title_text = "Save the test row"
     keys_text = "Enter save · Tab next field · Esc cancel"
 
-    def __init__(self, contexts: ContextList, facts: Mapping[str, str], kept: Kept | None = None) -> None:
-        """`kept` is the case that is to be written anew; its name may be changed all the same."""
+    def __init__(self, contexts: ContextList, facts: Mapping[str, str], kept: Kept | None = None, has_actors: bool = False) -> None:
+        """`kept` is the case that is to be written anew; its name may be changed all the same. `has_actors` as in
+        `ContextsDialog`."""
         super().__init__()
+        self.about_actors = "The actors are not kept: these assets are valid without them." if has_actors else ""
         self.facts = facts
         self.kept = kept or Kept("", "")
         self.is_new = kept is None
@@ -84,7 +86,12 @@ class KeepDialog(Dialog[Kept]):
             "Name", Input(self.kept.name, id="keep-name", compact=True), "Says in messages which context fails.", key="name"
         )
         labels = ("Nothing: only to be looked at", f"Exactly the assets that are valid now ({len(self.valid)})", "As written below")
-        yield Field("Expected", RadioSet(*(Choice(label, compact=True) for label in labels), id="keep-choice"), key="choice")
+        yield Field(
+            "Expected",
+            RadioSet(*(Choice(label, compact=True) for label in labels), id="keep-choice"),
+            self.about_actors,
+            key="choice",
+        )
         text = self.kept.expected or exactly(self.valid)
         meaning = 'Assets: exactly these. "+walk -run": walk is valid and run is not. "(none)": no asset.'
         yield Field("", Input(text, id="keep-expected", compact=True), meaning, key="expected")

@@ -99,10 +99,13 @@ class ContextsDialog(Dialog[Loaded]):
     title_text = "Contexts"
     keys_text = "type to filter · Esc close"
 
-    def __init__(self, table: Table, facts: Mapping[str, str], contexts: ContextList | None = None) -> None:
-        """`facts` are those of the test row; `contexts` the list that is being stepped through, if there is one."""
+    def __init__(
+        self, table: Table, facts: Mapping[str, str], contexts: ContextList | None = None, has_actors: bool = False
+    ) -> None:
+        """`facts` are those of the test row; `contexts` the list that is being stepped through, if there is one. `has_actors`: the
+        test row is asked with actors, which a saved context does not keep."""
         super().__init__()
-        self.table, self.facts = table, facts
+        self.table, self.facts, self.has_actors = table, facts, has_actors
         self.message = ""
         """What went wrong, or what was done; shown until the cursor moves on."""
         self._told_at = -1
@@ -295,7 +298,7 @@ class ContextsDialog(Dialog[Loaded]):
 
     def action_keep(self) -> None:
         """Save the test row."""
-        self.app.push_screen(KeepDialog(self.contexts, self.facts), self._keep)
+        self.app.push_screen(KeepDialog(self.contexts, self.facts, has_actors=self.has_actors), self._keep)
 
     def action_update(self) -> None:
         """Save the test row in the place of the chosen case."""
@@ -303,7 +306,9 @@ class ContextsDialog(Dialog[Loaded]):
         if i is None or not self.contexts.cases:
             return
         case = self.contexts.cases[i]
-        self.app.push_screen(KeepDialog(self.contexts, self.facts, Kept(case.name, case.expected, case.note)), self._keep)
+        self.app.push_screen(
+            KeepDialog(self.contexts, self.facts, Kept(case.name, case.expected, case.note), self.has_actors), self._keep
+        )
 
     def _keep(self, kept: Kept | None) -> None:
         if kept is None:
@@ -412,7 +417,7 @@ def detail_of(contexts: ContextList, i: int) -> str:
     if verdict is None:
         return facts
     case = contexts.cases[i]
-    lines = [outcome(verdict, contexts.compiled.assets), f"Expected: {case.expected.strip() or 'nothing'}", facts]
+    lines = [outcome(verdict, contexts.assets), f"Expected: {case.expected.strip() or 'nothing'}", facts]
     return "\n".join([*([case.note] if case.note else []), *lines])
 
 

@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 from textual.widgets import Static
 
-from tui.commands import COMMANDS, Command, key_name
+from tui.commands import COMMANDS, Command, key_names
 from tui.screens.dialog import Dialog
 
 CELLS = (
@@ -29,7 +29,10 @@ CELLS = (
     ("… ~2.5", "soft: a row that does not match costs 2.5 more in a search"),
 )
 MARKS = (
-    ("●", "the row is valid for the test row's context"),
+    ("◉", "the row is valid for the test row's context, and the policy may pick it"),
+    ("●", "the row is valid, and others outrank it: F12 says which"),
+    ("◐", "the row may be valid: its rule lacks a fact, or a fact is a set of values"),
+    ("=", "in the test row: this fact is computed from others"),
     ("×", "this cell does not accept its fact"),
     ("▸", "the row stands for another table: Alt+O goes into it"),
     ("!", "this cell cannot be read"),
@@ -65,7 +68,7 @@ class HelpDialog(Dialog[None]):
         self.query_one(VerticalScroll).focus()
 
     def _keys_of(self, command: Command) -> str:
-        return " ".join(key_name(k) for k in self._keys.get(command.id, command.keys).split(",") if k and k != "ctrl+@")
+        return "  ".join(key_names(self._keys.get(command.id, command.keys)))
 
 
 def _section(title: str, lines: tuple[tuple[str, str], ...] | list[tuple[str, str]]) -> Table:

@@ -16,11 +16,12 @@ from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
 from contextdb.edits import Edit
-from contextdb.errors import ContextDBError, in_quotes, plural
+from contextdb.errors import ContextDBError, in_quotes, plural, some
+from contextdb.renaming import Uses, uses_of
 from contextdb.table import Table
 from tui.clipboard import Clipboard
 from tui.commands import ASSETS, BY_ID, SCREEN, bindings
-from tui.messages import Edited, FillGap, GoToCell, SetContext, Told
+from tui.messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, Told
 from tui.model.coverage_run import CoverageRun
 from tui.model.new_table import make_table, name_fault
 from tui.model.session import Session
@@ -84,6 +85,8 @@ class MainScreen(Screen[None]):
         self.test_row = TestRow(self)
         self.came_from = ""
         """The table from a row of which this one was gone into."""
+        self.renamed = ""
+        """What is said of a rename, after which the table was opened anew."""
         self._said = ("", "information")
         self.care = DiskCare(self, self.session, self.say, self.show)
         self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
@@ -341,6 +344,33 @@ class MainScreen(Screen[None]):
         sheet = self.session.sheet
         self.app.push_screen(AddColumn(sheet.table, sheet.selection.column), self._answered)
 
+    @on(RenameWanted)
+    def _rename(self, event: RenameWanted) -> None:
+        """Rename a column; where others speak of its condition, ask whether they go along."""
+        sheet, old, new = self.session.sheet, event.old, event.new
+        uses = uses_of(sheet.table, old) if sheet.path is not None and old in sheet.query.wanted.conditions else Uses()
+        if not uses.text:
+            self.try_to(lambda: self._edited(Edited(sheet.rename_column(new))))
+            return
+        written = (
+            "A rename is written to the files at once, and no step before it can be undone then: to take it back, rename back."
+        )
+        lines = ["Rename everywhere: in all that uses it"]
+        lines += [f"Only here: this table, its rules and saved contexts; others keep {old}"] if uses.is_elsewhere else []
+
+        def chosen(at: int | None) -> None:
+            if at is not None and at < len(lines):
+                self.try_to(lambda: self._rename_files(old, new, at == 1))
+
+        title, about = f"Rename {old} to {new}", f"{old} is used by {uses.text}.\n{written}"
+        self.app.push_screen(ChooseDialog(title, [*lines, "Cancel"], about=about), chosen)
+
+    def _rename_files(self, old: str, new: str, only_here: bool) -> None:
+        files = self.workspace.rename(self.table_name, old, new, only_here)
+        self.app.open_table(self.table_name)
+        where = "here" if only_here else "everywhere"
+        self.app.main.renamed = f"Renamed {old} to {new} {where}, in {some(files)}. To take it back, rename it back."
+
     def action_blueprints(self) -> None:
         """Insert the conditions of a blueprint, or keep the selected ones as one."""
         from tui.screens.blueprints import Blueprints
@@ -393,8 +423,10 @@ class MainScreen(Screen[None]):
             self.say(f"{plural(session.n_recovered, 'unsaved edit')} brought back from the last time.", "warning")
         elif session.problem is not None:
             self.say(str(session.problem), "warning")
+        elif self.renamed:
+            self.say(self.renamed)
         elif self.came_from:
-            self.say(f"The table that a row of {self.came_from} stands for. Alt+Up goes back.")
+            self.say(f"The table that a row of {self.came_from} stands for. Alt+Q goes back.")
             self.assets.grid.test_name = self.came_from if not session.sheet.query.is_empty else ""
         elif why := session.why_read_only:
             self.say(f"This table can be read, not saved: {why}.", "warning")
@@ -417,9 +449,10 @@ class MainScreen(Screen[None]):
 
     @on(FillGap)
     def _fill_gap(self, event: FillGap) -> None:
-        done = self.session.sheet.insert_rows(below=True, texts=[dict(event.cells)])
-        self._switch_to("assets")
+        sheet = self.session.sheet
+        done = sheet.insert_rows(below=True, texts=[dict(event.cells)])
         self._edited(Edited(done))
+        self.go_to_cell(GoToCell(sheet.row_number(sheet.cursor[0]) - 1, sheet.table.asset_column))
         self.say("A new row fills the gap: name its asset.")
 
     @on(SetContext)

@@ -17,6 +17,7 @@ from contextdb.nesting.names import inner_name
 from contextdb.table import Table
 from tui.model.query_row import QueryRow
 from tui.model.why import NEEDED, CellWhy, RowWhy, State, nearest_rows, why_row
+from tui.model.window import MAY_BE, PICKED, VALID
 from tui.screens.dialog import Dialog
 from tui.widgets.choice_line import ChoiceLine
 from tui.widgets.line_list import LineList, ListCell, ListColumn
@@ -29,6 +30,7 @@ STATES: dict[State, tuple[str, str]] = {
     "fails": ("✗ fails", "error"),
     "unreadable": ("! unread", "error"),
     "disabled": ("✗ disabled", "error"),
+    "open": (f"{MAY_BE} open", "warning"),
     "holds": ("✓ holds", ""),
     "not asked": ("· not asked", "muted"),
 }
@@ -71,8 +73,10 @@ class NearestDialog(Dialog[CellAnswer]):
         self.why = why_row(query, table, row) if row is not None and 0 <= row < table.n_rows else None
         self.nearest = nearest_rows(query, table, MOST_ROWS)
         self.n_valid, self.n_rows, self.asks_nothing = query.n_valid, table.n_rows, query.is_empty
+        self.n_undecided = query.n_undecided
         self.faults = dict(query.faults)
-        self.is_nearest = self.why is None or (self.why.is_valid and bool(self.nearest))
+        is_plain = self.why is None or (self.why.is_valid and self.why.is_picked and not self.why.doubt)
+        self.is_nearest = self.why is None or (is_plain and bool(self.nearest))
         self.cells: list[CellWhy] = []
         self.names: dict[int, str] = {}
         self.firsts: set[int] = set()
@@ -141,7 +145,8 @@ class NearestDialog(Dialog[CellAnswer]):
         if self.asks_nothing:
             return f"The test row asks for nothing: every row that is enabled is valid.{unread}"
         if self.is_nearest or self.why is None:
-            return f"{self.n_valid:,} of {plural(self.n_rows, 'row')} valid{unread}"
+            may_be = f", {self.n_undecided:,} may be" if self.n_undecided else ""
+            return f"{self.n_valid - self.n_undecided:,} of {plural(self.n_rows, 'row')} valid{may_be}{unread}"
         return row_state(self.why) + unread
 
     @on(LineList.Moved)
@@ -184,7 +189,8 @@ def row_state(why: RowWhy) -> str:
     row = f"Row {why.row + 1:,}, {why.asset}"
     if why.is_valid:
         cast = ", ".join(dict.fromkeys(f"{c.column.partition('.')[0]} is {c.fact}" for c in why.cells if c.is_cast))
-        return f"✓ {row}: valid{'; ' if cast else ''}{cast}"
+        sign = MAY_BE if why.doubt else PICKED if why.is_picked else VALID
+        return f"{sign} {row}: {'; '.join(filter(None, (why.doubt or 'valid', why.standing, cast)))}"
     return f"✗ {row}: not valid, {plural(why.n_wrong, 'cell')} {'keeps' if why.n_wrong == 1 else 'keep'} it from that"
 
 
@@ -198,8 +204,12 @@ def cell_state(cell: CellWhy) -> str:
     if inner_name(cell.cell) is not None:
         n_valid = f"{cell.fact} valid" if " of " in cell.fact else cell.fact
         return f"The row stands for the table {inner_name(cell.cell)}: {n_valid}. Alt+O in the grid goes into it."
-    if cell.state == "fails" and not cell.fact:
-        return f"The row's own rule says {text}, and that does not hold."
+    if cell.state == "open" and not cell.is_of_rule:
+        return f"{cell.column} is {cell.fact}; the cell says {text} and accepts a part of that."
+    if cell.state == "open":
+        return f"The row's own rule says {text}, and {f'needs {cell.fact}' if cell.fact else 'has no finite value here'}."
+    if cell.state == "fails" and cell.is_of_rule:
+        return f"The row's own rule says {text}, and that {f'is {cell.fact}' if cell.fact else 'does not hold'}."
     match cell.state:
         case "fails":
             mend = f'\n"{cell.mend}" would accept it too.' if cell.mend is not None else ""
@@ -210,4 +220,6 @@ def cell_state(cell: CellWhy) -> str:
             return f"The row is disabled: {cell.column} says {text}."
         case "holds":
             return f"{cell.column} is {cell.fact}; the cell says {text} and accepts it."
+    if cell.fact:
+        return f"{cell.column} is computed, and {cell.fact}; the cell says {text}."
     return f"{cell.column} is not asked for; the cell says {text}."

@@ -189,7 +189,7 @@ class CellEditor(Widget):
         if self._completes:
             return f"Ctrl+T {cut(str(self._offer.rows[0]), 20).rstrip()} · F4 list"
         if self.is_numeric:
-            arrows = "Alt+↑ ↓ more, less" if self.is_typing else "↑ ↓ more, less"
+            arrows = "F2 then ↑ ↓ more, less" if self.is_typing else "↑ ↓ more, less"
             return f"{arrows} · F4 other form" if self._form() else arrows
         return "F4 list · Esc leave" if self._chooser.has_list else "Esc leave"
 

@@ -104,7 +104,20 @@ class Grid(GridView, can_focus=True):
         if down > 0 and is_last and not extend and self.has_test_row:
             self.is_in_test_row = True
             return
+        if self.is_in_test_row and self._move_fields(right):
+            return
         self.moving(lambda: self.sheet.move(down, right, extend and not self.is_in_test_row))
+
+    def _move_fields(self, right: int) -> bool:
+        """Move the cursor of the test row among the facts behind the last column, or onto the first of them; gives whether it
+        did."""
+        n_columns = self.sheet.shape[1]
+        to = self.field + right
+        if to < n_columns and self.field < n_columns:
+            return False
+        self.moving(lambda: self.go_to_field(max(min(to, n_columns + len(self.sheet.extra) - 1), 0)))
+        self.refresh()
+        return True
 
     def action_edge(self, down: int, right: int, extend: bool) -> None:
         """Ctrl and an arrow."""
@@ -115,6 +128,8 @@ class Grid(GridView, can_focus=True):
 
     def action_jump(self, jump: str, extend: bool) -> None:
         """Home, End, with Ctrl too."""
+        if self.is_in_test_row:
+            self.go_to_field(self.sheet.shape[1] + len(self.sheet.extra) - 1 if jump in ("end", "last") else 0)
         self.moving(lambda: self.sheet.select(lambda s, shape: JUMPS[jump](s, shape, extend)))
         if jump in ("home", "first"):  # the frozen columns are seen wherever one is: the others come back too
             self.scroll_to(0, self.look.top, animate=False, force=True, immediate=True)
@@ -154,19 +169,24 @@ class Grid(GridView, can_focus=True):
 
     def watch_is_in_test_row(self) -> None:
         if self.is_mounted:
-            if self.is_in_test_row and not self._is_condition():
+            if not self.is_in_test_row:
+                self._extra = None
+            elif not self._is_condition():
                 self._first_condition()
             self.show_cursor()
             self.refresh()
             self.post_message(self.Moved())
 
     def _is_condition(self) -> bool:
-        return self.sheet.condition(self.sheet.cursor[1]) is not None
+        return self.sheet.fact_of(self.field) is not None
 
     def _first_condition(self) -> None:
-        columns = [at for at in range(self.sheet.shape[1]) if self.sheet.condition(at) is not None]
-        if columns:
-            self.sheet.go(self.sheet.cursor[0], columns[0])
+        """To the first fact that a person may type."""
+        fields = range(self.sheet.shape[1] + len(self.sheet.extra))
+        facts = {at: fact.name for at in fields if (fact := self.sheet.fact_of(at)) is not None}
+        if facts:
+            typed = [at for at, name in facts.items() if not self.sheet.query.is_computed(name)]
+            self.go_to_field(next(iter([*typed, *facts])))
 
     # ---- editing
 
@@ -174,7 +194,10 @@ class Grid(GridView, can_focus=True):
         """Call the verb of a command; what cannot be done is said."""
         verb = BY_ID[name].verb
         assert verb is not None
-        self._do(lambda: verb(self.sheet))
+        if self.is_in_test_row and BY_ID[name].group in ("Edit", "Rows"):
+            self.post_message(Told("The cursor is in the test row. F6 goes back to the table.", "warning"))
+        else:
+            self._do(lambda: verb(self.sheet))
 
     def _do(self, verb: Callable[[], Done]) -> None:
         try:
@@ -187,10 +210,27 @@ class Grid(GridView, can_focus=True):
     def action_insert_rows(self, below: bool) -> None:
         """As many rows as are selected."""
         n_rows = max(self.sheet.block.shape[0], 1) if len(self.sheet.view) else 1
+        self.is_in_test_row = False  # what is typed next is meant for the new row
         self._do(lambda: self.sheet.insert_rows(n_rows, below))
+
+    def action_undo(self, is_redo: bool) -> None:
+        """Undo, or redo: in the test row a fact, else a step of the table."""
+        if not self.is_in_test_row:
+            self._do(self.sheet.redo if is_redo else self.sheet.undo)
+            return
+        verb = "redo" if is_redo else "undo"
+        name = self.sheet.undo_fact(is_redo)
+        if name is not None:
+            self.post_message(self.FactChanged())
+        said = f"{verb.capitalize()}: {name}." if name else f"There is no fact to {verb}. F6 goes back to the table, and its steps."
+        self.post_message(Told(said))
 
     def action_edit(self) -> None:
         self._want_edit(self.cell_text())
+
+    def action_edit_empty(self) -> None:
+        """Begin the one cell anew, empty. Terminals of old send Ctrl+H as Backspace: it must not clear what is selected."""
+        self._want_edit("", is_typing=True)
 
     def action_choose(self) -> None:
         self._want_edit(self.cell_text(), opens_list=True)
@@ -199,12 +239,16 @@ class Grid(GridView, can_focus=True):
         """The text under the cursor: of a cell, or of a fact of the test row."""
         row, column = self.sheet.cursor
         if self.is_in_test_row:
-            return self.sheet.query.texts.get(self.sheet.table.columns[column].name, "")
+            fact = self.sheet.fact_of(self.field)
+            return "" if fact is None else self.sheet.query.text(fact.name)
         return self.sheet.text(row, column) if len(self.sheet.view) else ""
 
     def _want_edit(self, text: str, is_typing: bool = False, opens_list: bool = False) -> None:
         if self.is_in_test_row and not self._is_condition():
-            self.post_message(Told("Only conditions have a fact to test with.", "warning"))
+            more = " Facts without a column stand at the right: End goes there." if self.sheet.extra else ""
+            self.post_message(Told(f"Only conditions have a fact to test with.{more}", "warning"))
+        elif self.is_in_test_row and (why := self._why_computed()):
+            self.post_message(Told(why, "warning"))
         elif not self.is_in_test_row and not len(self.sheet.view):
             self.post_message(Told("There is no row here. Ctrl+N makes one.", "warning"))
         else:
@@ -223,11 +267,17 @@ class Grid(GridView, can_focus=True):
             self._do(self.sheet.clear)
 
     def set_fact(self, text: str) -> None:
-        """Write the fact under the cursor."""
-        name = self.sheet.table.columns[self.sheet.cursor[1]].name
-        if self._is_condition():
-            self.sheet.set_fact(name, text)
+        """Write the fact under the cursor; one that is computed says why it cannot be written."""
+        fact = self.sheet.fact_of(self.field)
+        if why := self._why_computed():
+            self.post_message(Told(why, "warning"))
+        elif fact is not None:
+            self.sheet.set_fact(fact.name, text)
             self.post_message(self.FactChanged())
+
+    def _why_computed(self) -> str:
+        fact = self.sheet.fact_of(self.field)
+        return "" if fact is None else self.sheet.query.wanted.why_computed(fact.name)
 
     def action_copy(self) -> None:
         self.post_message(self.CopyWanted(self.cell_text() if self.is_in_test_row else self.sheet.copy()))

@@ -17,12 +17,14 @@ from contextdb.errors import plural
 from tui.model.layout import Layout, cut
 from tui.model.selection import Block
 from tui.model.shown import Header, ShownTable
-from tui.model.window import MARKS, Window
+from tui.model.window import MARKS, PICKED, Window
 
 N_HEADERS = 3
 LOWEST = 8
 """In a window of fewer lines only the names of the columns stand over the rows."""
 UP, DOWN, UNSORTED = "▲", "▼", "↕"
+COMPUTED = "="
+"""Stands before a fact of the test row that is computed from others."""
 OPENS = "▸"
 """Stands before the asset cell of a row that stands for another table."""
 LEAST_BESIDE = 6
@@ -50,6 +52,8 @@ class Look:
     is_in_test_row: bool
     has_focus: bool
     has_test_row: bool = True
+    field: int | None = None
+    """The column of the test row that the cursor is in, where that is not the sheet's: fields behind its last column count on."""
 
     @property
     def foot(self) -> int:
@@ -105,13 +109,19 @@ class Painter:
         gutter = ("#".rjust(look.layout.gutter - 3) + "   ") if y == 0 else " " * look.layout.gutter
 
         def cell(column: int) -> Iterator[Segment]:
-            chosen = "header-chosen" if block.left <= column < block.right else ground
+            is_chosen = (
+                column == look.field if look.is_in_test_row and look.field is not None else block.left <= column < block.right
+            )
+            chosen = "header-chosen" if is_chosen else ground
             yield from texts(column, look.layout.widths[column], chosen)
 
         return self._joined(Segment(gutter, self.style(ground, "muted")), cell, look, ground)
 
     def _name(self, column: int, width: int, ground: str) -> Iterator[Segment]:
         header, sort = self._header(column), self.sheet.sort
+        if header.is_extra:
+            yield Segment(" " + cut(header.name, width - 1), self.style(ground, "muted"))
+            return
         sign = UNSORTED
         if sort is not None and sort.column == header.name:
             sign = DOWN if sort.is_descending else UP
@@ -129,7 +139,7 @@ class Painter:
             yield Segment("!" + cut("cannot be read", width - 1), self.style(ground, "fault"))
             return
         text = "" if header.leaves is None else f"leaves {header.leaves:,}"
-        text = plural(header.n_actors, "actor") if header.n_actors else text
+        text = plural(header.n_actors, "actor") if header.n_actors else "no column" if header.is_extra else text
         yield Segment(" " + cut(text, width - 1), self.style(ground, "muted"))
 
     def _header(self, column: int) -> Header:
@@ -145,10 +155,15 @@ class Painter:
         asset = self.sheet.asset_at
         cursor = None if look.is_in_test_row or self.sheet.cursor[0] != row else self.sheet.cursor[1]
 
+        n_columns = len(self.sheet.table.columns)
+
         def cell(column: int) -> Iterator[Segment]:
+            if column >= n_columns:
+                yield Segment(" " * look.layout.widths[column], self.style(ground, "muted"))
+                return
             text, kind = window.cell(row, column)
             meant: str = kind if seen.is_enabled or kind == "fault" else "disabled"
-            under = ground if column >= look.layout.n_frozen or ground != "row" else "frozen"
+            under = ground if column >= look.layout.n_frozen or seen.is_valid else "frozen"
             if column == cursor:
                 under, meant = ("cursor", "on-cursor") if look.has_focus else ("cursor-away", "name")
             elif block is not None and block.holds(row, column):
@@ -162,8 +177,7 @@ class Painter:
             else:
                 yield Segment(mark + cut(text, width), self.style(under, meant))
 
-        mark = "●" if seen.is_valid else " " if seen.is_enabled else "–"
-        number = f"{seen.number:>{look.layout.gutter - 3}} {mark} "
+        number = f"{seen.number:>{look.layout.gutter - 3}} {seen.mark} "
         style = self.style("gutter", "valid" if seen.is_valid else "name" if cursor is not None else "muted")
         return self._joined(Segment(number, style), cell, look, ground)
 
@@ -175,7 +189,8 @@ class Painter:
         return self._window
 
     def _ground(self, row: int, window: Window) -> str:
-        return "row-valid" if window.row(row).is_valid else "row"
+        seen = window.row(row)
+        return "row-picked" if seen.mark == PICKED else "row-valid" if seen.is_valid else "row"
 
     def _block(self, look: Look) -> Block | None:
         block = self.sheet.block
@@ -192,21 +207,22 @@ class Painter:
     # ---- the test row
 
     def _test_line(self, look: Look) -> Strip:
-        query, names, asset = self.sheet.query, [c.name for c in self.sheet.table.columns], self.sheet.asset_at
-        has_fact = {c.condition.name for c in self.sheet.table.conditions}
+        query, asset = self.sheet.query, self.sheet.asset_at
 
         def cell(column: int) -> Iterator[Segment]:
-            width, name = look.layout.widths[column], names[column]
-            is_cursor = look.is_in_test_row and column == self.sheet.cursor[1]
+            width, condition = look.layout.widths[column], self.sheet.fact_of(column)
+            is_cursor = look.is_in_test_row and column == (self.sheet.cursor[1] if look.field is None else look.field)
             ground = ("cursor" if look.has_focus else "cursor-away") if is_cursor else "test"
             is_lit = is_cursor and look.has_focus
             if column == asset:
                 yield Segment(" " + cut(self._said(), width - 1), self.style(ground, "on-cursor" if is_lit else "name"))
                 return
-            role = query.role_of(name)
-            text = (query.texts.get(name, "") if role is None else "cast") if name in has_fact else ""
-            is_wrong = name in query.faults and role is None
-            meant, mark = ("fault", "!") if is_wrong else ("muted" if role is not None else "text", " ")
+            name = condition.name if condition is not None else ""
+            is_cast, is_computed = query.role_of(name) is not None, query.is_computed(name)
+            is_wrong = name in query.faults and not is_cast
+            text = "cast" if is_cast else query.text(name)
+            mark = "!" if is_wrong else COMPUTED if is_computed and not is_cast else " "
+            meant = "fault" if is_wrong else "muted" if is_cast or is_computed else "text"
             yield Segment(mark + cut(text, width - 1), self.style(ground, "on-cursor" if is_lit else meant))
 
         gutter = "?".rjust(look.layout.gutter - 3) + "   "
@@ -216,7 +232,8 @@ class Painter:
         query = self.sheet.query
         if query.is_empty:
             return "test row"
-        return f"{query.n_valid:,} of {plural(self.sheet.table.n_rows, 'row')} valid"
+        may_be = f", {query.n_undecided:,} may be" if query.n_undecided else ""
+        return f"{query.n_valid - query.n_undecided:,} of {plural(self.sheet.table.n_rows, 'row')} valid{may_be}"
 
     # ---- parts
 

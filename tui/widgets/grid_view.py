@@ -19,13 +19,13 @@ from tui.model.sheet import Sheet
 from tui.widgets.grid_paint import Look, Painter, n_headers
 
 GROUNDS = (
-    "row", "row-valid", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test", "selected", "cursor",
-    "cursor-away",
+    "row", "row-valid", "row-picked", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test",
+    "selected", "cursor", "cursor-away",
 )  # fmt: skip
 MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
 
 
-class GridView(ScrollView):
+class GridView(ScrollView, inherit_bindings=False):
     """A sheet as it is seen."""
 
     ALLOW_SELECT = False
@@ -37,7 +37,8 @@ class GridView(ScrollView):
         scrollbar-background: $panel; scrollbar-color: $foreground 25%; scrollbar-corner-color: $panel;
         scrollbar-background-hover: $panel; scrollbar-background-active: $panel;
         .grid--row { background: $surface; }
-        .grid--row-valid { background: $success 18%; }
+        .grid--row-valid { background: $success 8%; }
+        .grid--row-picked { background: $success 18%; }
         .grid--frozen { background: $surface; }
         .grid--header { background: $panel; }
         .grid--header-kind { background: $panel; }
@@ -75,6 +76,9 @@ class GridView(ScrollView):
         self._laid_out = sheet.table
         """The table that the layout is of: a step may have made another one before the screen is told."""
         self._said_shape = (-1, -1)
+        self._fields: tuple[str, ...] = ()
+        """The fields of the test row behind the columns, that the layout is of."""
+        self._extra: int | None = None
 
     def open(self, sheet: Sheet) -> None:
         """Show another table."""
@@ -83,6 +87,20 @@ class GridView(ScrollView):
         self._widths.clear()
         self.is_in_test_row = False
         self.changed()
+
+    @property
+    def field(self) -> int:
+        """The column of the test row that the cursor is in: a column of the table, or behind the last one a fact that is none."""
+        n_columns, extra = self.sheet.shape[1], self._extra
+        is_there = self.is_in_test_row and extra is not None and extra < len(self.sheet.extra)
+        return n_columns + extra if is_there and extra is not None else self.sheet.cursor[1]
+
+    def go_to_field(self, column: int) -> None:
+        """Put the cursor of the test row on a field."""
+        n_columns = self.sheet.shape[1]
+        self._extra = column - n_columns if column >= n_columns else None
+        if column < n_columns:
+            self.sheet.go(self.sheet.cursor[0], column)
 
     def changed(self) -> None:
         """Show the sheet as it is now, after an edit, a filter or another fact."""
@@ -106,7 +124,7 @@ class GridView(ScrollView):
 
     def set_width(self, column: int, width: int | None) -> None:
         """Make a column so wide; None: as wide as its texts."""
-        self._widths[self.sheet.table.columns[column].name] = self._fitted(column, WIDEST) if width is None else width
+        self._widths[self.sheet.header(column).name] = self._fitted(column, WIDEST) if width is None else width
         self.changed()
 
     @property
@@ -117,10 +135,12 @@ class GridView(ScrollView):
     @property
     def grid_layout(self) -> Layout:
         """Where the columns stand."""
-        if self._layout is None or self._layout.width != self.window.width or self._laid_out is not self.sheet.table:
-            self._laid_out = self.sheet.table
+        fields = tuple(c.name for c in self.sheet.extra) if self.has_test_row else ()
+        is_same = self._laid_out is self.sheet.table and self._fields == fields
+        if self._layout is None or self._layout.width != self.window.width or not is_same:
+            self._laid_out, self._fields = self.sheet.table, fields
             names = [c.name for c in self.sheet.table.columns]
-            widths = [self._width(at, name) for at, name in enumerate(names)]
+            widths = [self._width(at, name) for at, name in enumerate((*names, *fields))]
             n_frozen = names.index(self.sheet.table.asset_column) + 1
             self._layout = layout(widths, n_frozen if n_frozen <= 3 else 0, self.sheet.table.n_rows, self.window.width)
         return self._layout
@@ -129,11 +149,12 @@ class GridView(ScrollView):
     def look(self) -> Look:
         """Where the grid stands at present."""
         x, y = self.scroll_offset
-        return Look(self.grid_layout, self.window.height, x, y, self.is_in_test_row, self.has_focus, self.has_test_row)
+        height, is_in_test_row = self.window.height, self.is_in_test_row
+        return Look(self.grid_layout, height, x, y, is_in_test_row, self.has_focus, self.has_test_row, self.field)
 
     def cell_region(self) -> Region:
         """Where the cell of the cursor stands on the screen, without its mark."""
-        look, (row, column) = self.look, self.sheet.cursor
+        look, row, column = self.look, self.sheet.cursor[0], self.field
         y = look.foot if self.is_in_test_row else look.n_headers + row - look.top
         x = look.layout.place(column, look.left)
         return Region(self.content_region.x + x + 1, self.content_region.y + y, look.layout.widths[column] - 1, 1)
@@ -153,6 +174,8 @@ class GridView(ScrollView):
     def _fitted(self, at: int, widest: int) -> int:
         header = self.sheet.header(at)
         kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
+        if header.is_extra:
+            return min(max(len("no column"), cell_len(header.name), cell_len(kind)) + 2, widest)
         fitted = fitted_width(self.sheet.table.columns[at], [header.name + " ↕", kind], widest)
         return min(max(fitted, self._beside(at)), WIDEST)
 
@@ -198,7 +221,7 @@ class GridView(ScrollView):
         """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again."""
         if not self.size:
             return
-        look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else self.sheet.cursor
+        look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else (0, self.field)
         top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
         left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
         if (top, left) != (look.top, look.left):

@@ -111,6 +111,12 @@ class LineList(ScrollView, can_focus=True):
         self.go(index)
         self.refresh()
 
+    def say_empty(self, text: str) -> None:
+        """Say something else where there is no line."""
+        if text != self.empty:
+            self.empty = text
+            self.refresh()
+
     def go(self, index: int) -> None:
         """Put the cursor on a line."""
         before, self.index = self.index, max(0, min(index, self.n_lines - 1))

@@ -39,8 +39,9 @@ class Pointer:
         if event.y < look.n_headers:
             self._press_header(event, column, look)
         elif event.y == look.foot:
-            grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0], column))
             grid.is_in_test_row = True
+            grid.moving(lambda: grid.go_to_field(column))
+            grid.refresh()
         elif self._is_cell_line(event.y, look):
             grid.is_in_test_row = False
             grid.moving(lambda: grid.sheet.go(row, column, event.shift))
@@ -102,6 +103,9 @@ class Pointer:
         if separator is not None:
             self._column = separator
             self._begin("width")
+        elif column >= grid.sheet.shape[1]:
+            grid.is_in_test_row = True
+            grid.moving(lambda: grid.go_to_field(column))
         elif event.y == 0 and event.x >= look.layout.place(column, look.left) + look.layout.widths[column] - 2:
             grid.sort_by(column)
         else:

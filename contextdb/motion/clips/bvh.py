@@ -23,8 +23,8 @@ from contextdb.motion.clips.skeleton import CHANNELS, POSITIONS, Skeleton
 
 MOST_FAULTS = 8
 """A file's first faulty lines are told one by one, the rest counted."""
-LONGEST_FRAME_S = 60.0
-"""A longer frame time is taken for a mistake, such as milliseconds."""
+LONGEST_FRAME_S = 1.0
+"""A longer frame time is a mistake, such as milliseconds: nobody records a body less than once a second."""
 
 IN_JOINT = '"OFFSET", "CHANNELS", "JOINT", "End Site" or "}"'
 JOINT_WORDS = ("OFFSET", "CHANNELS", "JOINT", "End Site", "}")
@@ -44,6 +44,11 @@ def read(text: str, file: str | None = None) -> tuple[Skeleton, float, Floats]:
     skeleton = _read_hierarchy(words)
     n_frames, frame_time_s = _read_frame_counts(words)
     return skeleton, frame_time_s, _read_values(words, n_frames, skeleton.n_channels)
+
+
+def read_skeleton(text: str) -> Skeleton:
+    """The skeleton alone, of a text that was read before, as a whole."""
+    return _read_hierarchy(Words(text))
 
 
 def write(skeleton: Skeleton, frame_time_s: float, values: Floats, digits: int = 6) -> str:

@@ -15,6 +15,7 @@ from typing import Literal, TextIO, get_args
 
 import numpy as np
 
+from contextdb.disk import write_atomic
 from contextdb.errors import ClipError, Fault, FileError, Place, in_quotes, nearest, some
 from contextdb.motion.clips import bvh
 from contextdb.motion.clips.quaternions import Floats
@@ -133,16 +134,17 @@ def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int =
 
     Reading it again gives the same motion, to so many digits behind the point. The unit and the axis that points up are not in the
     format: read the file with the same ones.
+
+    Raises
+    ------
+    FileError
+        The disk refuses; the old file is then whole.
     """
     text = bvh.write(clip.skeleton, clip.frame_time_s, clip.values, digits)
     if not isinstance(target, (str, PathLike)):
         target.write(text)
         return
-    try:
-        Path(target).write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        place = Place(fspath(target))
-        raise FileError(Fault(f"the file cannot be written: {error.strerror or error}.", place=place, rule="file")) from error
+    write_atomic(fspath(target), text.encode())
 
 
 def text_of(raw: bytes, file: str) -> str:

@@ -4,13 +4,14 @@ A mirrored body is its reflection in the plane x = 0, with the bones of each pai
 right one did. Poses, paths and the features computed from them are those of a clip played in a mirror.
 
     position of bone b in the world     (-x, y, z) of the position of its partner
-    rotation of bone b in the world     M R M, of its partner's rotation R, where M reflects x: of the quaternion, (w, x, -y, -z)
+    rotation of bone b in the world     M R M D, of its partner's rotation R, where M reflects x; of a quaternion, M q M is
+                                        (w, x, -y, -z), and D is a turn of the bone about itself, the same in every pose
     heading                             -heading
 
 A bone without a partner is its own. M R M means that the bone's y and z axes are the mirror images of its partner's, and its x axis
 the opposite of the image of its partner's. That is what a skeleton wants whose bones are at rest aligned with the world, as in
-most BVH files. On others, whose right bones have axes unlike the left ones' images, places and turning are still mirrored exactly,
-but a bone is left with axes of its partner's kind: `has_even_axes` tells such skeletons by their offsets.
+most BVH files: D is nothing there. On others, whose right bones have axes unlike the left ones' images, D turns each bone so
+that its children lie at the skeleton's own offsets: see `contextdb.motion.clips.own_axes`.
 
 A declared pair is two names, or two patterns with one `*` each, which stands for the same rest of the name on both sides.
 """
@@ -24,7 +25,9 @@ from typing import TypeVar
 import numpy as np
 
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.motion.clips.own_axes import own_axes
 from contextdb.motion.clips.poses import LocalPoses, Poses
+from contextdb.motion.clips.quaternions import inverse, multiply, rotate
 from contextdb.motion.clips.skeleton import Ints, Skeleton, sided_pairs
 from contextdb.motion.clips.trajectory import Trajectory
 
@@ -33,12 +36,14 @@ Moved = TypeVar("Moved", LocalPoses, Poses)
 
 FLIPPED_X = np.array([-1.0, 1.0, 1.0])
 FLIPPED_ROTATION = np.array([1.0, 1.0, -1.0, -1.0])
-UNEVEN_SHARE = 0.1
-"""Left and right offsets that differ by more than this share of their lengths have unlike axes; measured bodies differ by 0.04."""
+PLAIN = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def mirrored(moved: Moved, pairs: Pairs) -> Moved:
     """The same poses in a mirror: local ones stay local, those in the world in the world; mirrored twice they are as they were.
+
+    Local rotations fit the rig: with the skeleton's own offsets they place its bones where the mirror shows them, but for what its
+    two sides differ by. With the local positions they place them there exactly.
 
     Parameters
     ----------
@@ -51,10 +56,19 @@ def mirrored(moved: Moved, pairs: Pairs) -> Moved:
     MotionError
         The pairs do not fit the skeleton; all faults together.
     """
-    partners = partners_of(moved.skeleton, pairs)
-    return replace(
-        moved, positions=moved.positions[:, partners] * FLIPPED_X, rotations=moved.rotations[:, partners] * FLIPPED_ROTATION
-    )
+    skeleton = moved.skeleton
+    partners = partners_of(skeleton, pairs)
+    turns = own_axes(skeleton, partners).turns
+    positions, rotations = moved.positions[:, partners] * FLIPPED_X, moved.rotations[:, partners] * FLIPPED_ROTATION
+    if (turns == PLAIN).all():
+        return replace(moved, positions=positions, rotations=rotations)
+    rotations = multiply(rotations, turns)
+    if isinstance(moved, LocalPoses):
+        children = np.flatnonzero(skeleton.parents >= 0)
+        back = inverse(turns[skeleton.parents[children]])
+        positions[:, children] = rotate(back, positions[:, children])
+        rotations[:, children] = multiply(back, rotations[:, children])
+    return replace(moved, positions=positions, rotations=rotations)
 
 
 def mirrored_path(path: Trajectory) -> Trajectory:
@@ -103,18 +117,19 @@ def facing_fault(skeleton: Skeleton, partners: Ints, facing: tuple[str, str] | N
     return Fault(found, "pairs that hold these two bones", f'["{left}", "{right}"]')
 
 
+def unevenness(skeleton: Skeleton, pairs: Pairs) -> dict[str, float]:
+    """How far from where the mirror shows it, seen from its parent, each bone lies when mirrored rotations are played with the
+    skeleton's own offsets: in the file's units, the farthest first, without those that lie there."""
+    apart = own_axes(skeleton, partners_of(skeleton, pairs)).apart
+    order = np.argsort(-apart, kind="stable")
+    return {skeleton.names[joint]: float(apart[joint]) for joint in order.tolist() if apart[joint] > 0.0}
+
+
 def undeclared(skeleton: Skeleton, schema: str) -> Fault:
     """What to say when a clip is to be mirrored and no pairs are declared."""
     guessed = sided_pairs(skeleton.names)
     mend = f'mirror = [["{guessed[0][0]}", "{guessed[0][1]}"], …]' if guessed else ""
     return Fault(f"[features.{schema}] declares no bone pairs to mirror by.", 'mirror = [["Left*", "Right*"]]', mend)
-
-
-def has_even_axes(skeleton: Skeleton, partners: Ints) -> bool:
-    """Whether offsets from bone to bone are mirror images of their partners', as far as bodies are even."""
-    offsets = skeleton.offsets[1:]
-    apart = np.abs(offsets - skeleton.offsets[partners[1:]] * FLIPPED_X).sum()
-    return bool(apart <= UNEVEN_SHARE * np.abs(offsets).sum())
 
 
 def _named_by(pair: tuple[str, str], skeleton: Skeleton, faults: list[Fault]) -> Iterator[tuple[str, str]]:

@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.errors import Fault, MotionError, in_quotes, nearest, plural, some
+from contextdb.errors import Fault, MotionError, in_quotes, plural, some
+from contextdb.motion.clips.bone_names import meant_bone, nearest_bones
 from contextdb.motion.clips.quaternions import Floats
 
 Ints = NDArray[np.int64]
@@ -22,6 +23,8 @@ POSITIONS = ("Xposition", "Yposition", "Zposition")
 ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
 CHANNELS = POSITIONS + ROTATIONS
 
+MOST_NAMED = 4
+"""So many bones are named where one is missing."""
 SIDES = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
 
 
@@ -93,9 +96,9 @@ class Skeleton:
 
     def missing_bone(self, bone: str) -> Fault:
         """What to say of a bone that the skeleton lacks."""
-        near = nearest(bone, self.names)
+        near = meant_bone(bone, self.names)
         mend = in_quotes(near) if near else ""
-        accepted = f"one of {plural(self.n_joints, 'bone')}: {some(self.names)}"
+        accepted = f"one of {plural(self.n_joints, 'bone')}, such as {some(nearest_bones(bone, self.names, MOST_NAMED))}"
         return Fault(f"there is no bone {in_quotes(bone)}.", accepted, mend, rule="unknown-bone")
 
     @cached_property
@@ -116,14 +119,15 @@ class Skeleton:
         if self.facing_pair is None:
             return 0
         left, right = self.facing_pair
-        above_right = set(self._ancestors(right))
-        return next((joint for joint in self._ancestors(left) if joint in above_right), 0)
+        above_right = set(self.ancestors(right))
+        return next((joint for joint in self.ancestors(left) if joint in above_right), 0)
 
     def _sided_joints(self) -> Iterator[tuple[int, int]]:
         for left, right in sided_pairs(self.names):
             yield self._index[left], self._index[right]
 
-    def _ancestors(self, joint: int) -> list[int]:
+    def ancestors(self, joint: int) -> list[int]:
+        """The joints above one, its parent first."""
         found: list[int] = []
         while (joint := int(self.parents[joint])) >= 0:
             found.append(joint)

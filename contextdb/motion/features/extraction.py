@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, nearest, plural, some
-from contextdb.motion.clips import mirror, quaternions
+from contextdb.motion.clips import mirror, own_axes, quaternions
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.feet import feet_of, footfalls_of, phases
 from contextdb.motion.clips.looping import three_rounds
@@ -330,7 +330,7 @@ def _mirror_faults(skeleton: Skeleton, schema: FeatureSchema) -> Iterator[Fault]
     if fault is not None:
         yield fault
     turned = [channel.name for channel in schema.channels if channel.type in ("direction", "orientation")]
-    if turned and not mirror.has_even_axes(skeleton, partners):
+    if turned and not own_axes.has_even_axes(skeleton, partners):
         found = f"the bones' own axes are not mirror images of each other, so channel {in_quotes(turned[0])} cannot be mirrored."
         yield Fault(found, "position, velocity, angular velocity, trajectory and phase, or no mirroring of this clip")
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from contextdb.errors import Fault, QueryError
 from contextdb.motion.clips.quaternions import Floats
@@ -98,6 +98,26 @@ def of(database: MotionDatabase, query: Floats, chosen: Filter, k: int, with_lef
     counted = np.bincount(why[in_ranges], minlength=len(LeftOut))
     counts: dict[LeftOut, int] = {reason: int(counted[reason]) for reason in LeftOut if reason != LeftOut.NO and counted[reason]}
     return Candidates(tuple(_candidates(database, query, chosen, frames[best], totals[best], why)), counts, why)
+
+
+def best_of_assets(database: MotionDatabase, query: ArrayLike, chosen: Filter, name: str) -> tuple[list[Candidate], Floats]:
+    """Of each range whose asset's name holds a text the best frame, chosen or not; and the costs of all frames that may be chosen.
+
+    A frame that may be chosen comes before one that may not. `query` is in the schema's units.
+    """
+    lay, kinds = database.layout, database.marks.kinds
+    wanted = database.normalised(query)
+    why = chosen.why(lay.frame_ranges, kinds)
+    frames = lay.frames
+    totals = scan.totals(lay, wanted, database.slices, database.weights, chosen, kinds, frames)
+    is_free, ranges = why[frames] == LeftOut.NO, lay.frame_ranges[frames]
+    best = []
+    for i in [i for i, asset in enumerate(database.assets) if name.casefold() in asset.casefold()]:
+        own = np.flatnonzero(ranges == i)
+        if len(own):
+            best.append(own[np.lexsort((frames[own], totals[own], ~is_free[own]))[0]])
+    at = np.array(best, np.int64)
+    return list(_candidates(database, wanted, chosen, frames[at], totals[at], why)), np.asarray(totals[is_free])
 
 
 def _least_first(totals: Floats, is_other: NDArray[np.bool_], k: int) -> Ints:

@@ -266,8 +266,8 @@ class MotionDatabase:
             One pose and trajectory: in the schema's units (m, m/s, unit vectors) for a database built from clips; as the features
             are for one made from features.
         valid : Matches or bool array, shape (R,), optional
-            Matches: the assets of those rows; names that the database lacks are passed over. An array: which ranges may play.
-            Default: all may.
+            Matches: the assets of those rows; names that the database lacks are passed over. Ranges that are played mirrored go by
+            `Matches.mirrored`, the answer with mirrored facts. An array: which ranges may play. Default: all may.
         tags : TagFilter or bool array, shape (N,), optional
             A filter: which tags frames must, must not or should have. An array: exactly these frames. Marks such as DoNotChoose
             always count.
@@ -334,7 +334,8 @@ class MotionDatabase:
         ----------
         queries : float array, shape (Q, F)
         valid : optional
-            As for `search`, one for all; or one for each query: a list of Q Matches, arrays or None, or a bool array (Q, R).
+            As for `search`, one for all; or one for each query: a list of Q Matches, arrays or None, what `query_many` answers for
+            Q contexts, or a bool array (Q, R).
         current : sequence of Q frames, optional
             None or -1 for a character that plays none.
         tags : TagFilter or bool array, shape (N,), optional
@@ -377,6 +378,10 @@ class MotionDatabase:
     def raw(self, frame: Hit | int) -> Floats:
         """The features of one frame in the schema's units, as a query has them: float64 [F]."""
         return self.normalisation.undo(self.layout.take(np.array([self._number(frame)]))[0])
+
+    def normalised(self, query: ArrayLike) -> Floats:
+        """A query [F] in the schema's units, checked, as costs are computed with it: float64."""
+        return self._searcher.normalised(query)
 
     def time_s(self, hit: Hit) -> float:
         """Seconds from the start of the hit's range to its frame."""
@@ -423,7 +428,7 @@ class MotionDatabase:
 
     @cached_property
     def _filters(self) -> FilterMaker:
-        return FilterMaker(self.n_frames, self.assets, self.marks, self.biases)
+        return FilterMaker(self.n_frames, self.assets, self.mirrored, self.marks, self.biases)
 
     @cached_property
     def _searcher(self) -> Searcher:

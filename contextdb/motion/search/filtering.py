@@ -43,8 +43,9 @@ class SearchOptions(TypedDict, total=False):
 class FilterMaker:
     """Makes the filters of one database."""
 
-    def __init__(self, n_frames: int, assets: Sequence[str], marks: Marks, biases: Biases) -> None:
-        self.n_frames, self.assets, self.marks, self.biases = n_frames, assets, marks, biases
+    def __init__(self, n_frames: int, assets: Sequence[str], mirrored: Flags, marks: Marks, biases: Biases) -> None:
+        self.n_frames, self.assets, self.mirrored, self.marks, self.biases = n_frames, assets, mirrored, marks, biases
+        self._has_mirrored = bool(mirrored.any())
         self._all_ranges: Flags = np.ones(len(assets), np.bool_)
         self._range_biases: Floats = np.where(marks.looping, biases.base + biases.looping, biases.base)
         self._least_bias = float(self._range_biases.min(initial=np.inf))
@@ -103,27 +104,32 @@ class FilterMaker:
             return self._all_ranges, self._range_biases
         if type(valid) is np.ndarray and valid.dtype == np.bool_ and valid.shape == self._all_ranges.shape:
             return np.ascontiguousarray(valid), self._range_biases
-        if hasattr(valid, "table_assets"):
-            return self._of_matches(valid)
-        names = getattr(valid, "assets", None)
-        if names is None:
+        if not hasattr(valid, "assets"):
             return arguments.flags_of(valid, len(self.assets), "valid", "range"), self._range_biases
-        flags = np.zeros(len(self.assets), np.bool_)
-        for name in set(names):
-            flags[self._ranges_of_asset.get(name, [])] = True
-        return flags, self._range_biases
+        flags, costs = self._of_answer(valid)
+        if self._has_mirrored and (in_mirror := getattr(valid, "mirrored", valid)) is not valid:
+            mirrored_flags, mirrored_costs = self._of_answer(in_mirror)
+            flags = np.where(self.mirrored, mirrored_flags, flags)
+            if costs is not None and mirrored_costs is not None:
+                costs = np.where(self.mirrored, mirrored_costs, costs)
+        return flags, self._range_biases if costs is None else self._range_biases + np.where(flags, costs, 0.0)
 
-    def _of_matches(self, matches: Any) -> tuple[Flags, Floats]:
-        """The same for a table's answer; of several valid rows of one asset, the cheapest counts."""
-        rows, ranges = self._rows_of_table(matches.table_assets)
-        valid = matches.flags[rows]
+    def _of_answer(self, answer: Any) -> tuple[Flags, Floats | None]:
+        """The ranges of the valid assets of a table's answer, and what each costs beside, None where nothing does; of several valid
+        rows of one asset, the cheapest counts."""
         flags = np.zeros(len(self.assets), np.bool_)
+        if not hasattr(answer, "table_assets"):
+            for name in set(answer.assets):
+                flags[self._ranges_of_asset.get(name, [])] = True
+            return flags, None
+        rows, ranges = self._rows_of_table(answer.table_assets)
+        valid = answer.flags[rows]
         flags[ranges[valid]] = True
-        if not getattr(matches, "has_penalties", False):
-            return flags, self._range_biases
+        if not getattr(answer, "has_penalties", False):
+            return flags, None
         least = np.full(len(self.assets), np.inf)
-        np.minimum.at(least, ranges[valid], matches.penalties[rows[valid]])
-        return flags, self._range_biases + np.where(flags, least, 0.0)
+        np.minimum.at(least, ranges[valid], answer.penalties[rows[valid]])
+        return flags, least
 
     def _rows_of_table(self, table_assets: Sequence[str]) -> tuple[Ints, Ints]:
         """The pairs of a table's rows and the ranges of their assets: two int64 arrays."""

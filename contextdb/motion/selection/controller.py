@@ -25,6 +25,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.reading import as_number
 from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection import variation
 from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValid
 from contextdb.motion.selection.controller_settings import ControllerSettings
@@ -150,6 +151,7 @@ class Controller:
     def _decided(self, step: Step, cause: Trigger | None, context: Mapping[str, object] | None) -> Decision:
         search_us: float | None = None
         candidates: tuple[tuple[str, Candidates], ...] = ()
+        filters: tuple[tuple[str, Filter], ...] = ()
         if cause is None:
             assert step.ongoing is not None, "without anything playing there is a cause to search"
             outcome = step.unsearched(step.ongoing)
@@ -159,6 +161,7 @@ class Controller:
             outcome = step.searched(cause, wanted, self._rng)
             search_us = (self._clock() - began_s) * 1e6 if self._clock else None
             candidates = self._candidates(step.query, wanted)
+            filters = self._filters(wanted, candidates)
         return Decision(
             tick=self._state.tick,
             time_s=step.now_s,
@@ -176,6 +179,7 @@ class Controller:
             search_us=search_us,
             root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
             root_weight=self._root_weight(outcome.playing),
+            filters=filters,
         )
 
     def _state_after(self, step: Step, decision: Decision) -> ControllerState:
@@ -196,6 +200,11 @@ class Controller:
         best = self.selector.candidates(query, k, **wanted.options())
         all_of = dict(self.selector.candidates(query, k, left_out=True, **wanted.options()))
         return tuple((name, _merged(found, all_of[name])) for name, found in best)
+
+    def _filters(self, wanted: Asked, searched: tuple[tuple[str, Candidates], ...]) -> tuple[tuple[str, Filter], ...]:
+        """For the recorder, what could be chosen from in each database that was searched."""
+        databases = self.selector.databases
+        return tuple((name, databases[name].filter(**wanted.of(name))) for name, _ in searched)
 
     def _root_weight(self, playing: Playing | None) -> float:
         return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)

@@ -6,12 +6,13 @@ A `Decision` is data. A recorder is handed each one; a controller without a reco
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
 
@@ -87,6 +88,8 @@ class Decision:
         How the playing animation moved the body since the last update.
     root_weight : float
         How much of its movement is to come from the animation, from 0 to 1; the rest is the game's.
+    filters : tuple of (database name, Filter)
+        What could be chosen from in each database that was searched; empty where no candidates are asked for.
     """
 
     tick: int
@@ -105,6 +108,7 @@ class Decision:
     search_us: float | None = None
     root_motion: RootMotion = NO_MOTION
     root_weight: float = 1.0
+    filters: tuple[tuple[str, Filter], ...] = field(default=(), compare=False, repr=False)
 
 
 class Recorder(Protocol):

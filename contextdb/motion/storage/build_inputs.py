@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb.disk import read_bytes
-from contextdb.errors import ClipError, ContextDBError, FileError, MotionError
+from contextdb.errors import ClipError, ContextDBError, Fault, FileError, MotionError, Place, plural
 from contextdb.motion.features.schema_dict import schema_to_dict
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage import stored
@@ -24,8 +24,12 @@ from contextdb.motion.storage.database_settings import DatabaseSettings
 if TYPE_CHECKING:
     from contextdb.motion.storage.config import MotionConfig
 
+NOWHERE = Place()
 Assets = Mapping[str, Collection[str]]
 """For a table's name the assets in it."""
+
+Tolerates = Callable[[str, ContextDBError], bool]
+"""Called with a database's name and what is wrong with it or one of its clips: whether to go on without."""
 
 Keys = Mapping[str, list[list[str]]]
 """For a database's name and each of its clips the keys of its ranges; see `key_of`."""
@@ -55,44 +59,55 @@ class Inputs:
     markups: dict[str, Markup]
 
     @classmethod
-    def of(cls, config: MotionConfig, root: Path, assets: Assets, names: Collection[str] | None = None) -> Inputs:
-        """Find the files and read the markup; all faults together."""
+    def of(
+        cls, config: MotionConfig, root: Path, assets: Assets, names: Collection[str] | None = None, faults: Faults | None = None
+    ) -> Inputs:
+        """Find the files and read the markup; all faults together, or with others where they are collected.
+
+        A database of which something is wrong has no files.
+        """
         asked = config.databases if names is None else [config.database(name).name for name in names]
         wanted = [name for name in config.databases if name in asked]
         schemas = {config.databases[name].features for name in wanted}
-        faults = Faults()
+        collected = Faults() if faults is None else faults
         files, markups = {}, {}
         for name, settings in config.databases.items():
             if settings.features in schemas:
-                if settings.markup is not None:
-                    with faults:
+                with collected.of(name):
+                    if settings.markup is not None:
                         markups[name] = Markup.load(root / settings.markup)
-                with faults:
+                with collected.of(name):
                     found = assets.get(settings.table or "")
                     schema = config.features[settings.features]
                     files[name] = clip_files(settings, schema, root, found, config.file, markups.get(name))
-        faults.tell()
-        return cls(config, root, wanted, files, markups)
+        if faults is None:
+            collected.tell()
+        unmarked = {name for name in files if config.databases[name].markup is not None and name not in markups}
+        files = {name: found for name, found in files.items() if name not in unmarked}
+        return cls(config, root, [name for name in wanted if name in files], files, markups)
 
     @property
     def schemas(self) -> list[str]:
         """The names of their feature schemas."""
         return list(dict.fromkeys(self.config.databases[name].features for name in self.wanted))
 
-    def keys(self) -> Keys:
+    def keys(self, collected: Faults | None = None) -> Keys:
         """The keys of all clips, from the contents of their files."""
-        faults = Faults()
+        faults = Faults() if collected is None else collected
         found: dict[str, list[list[str]]] = {name: [] for name in self.files}
         for name, files in self.files.items():
             for file in files:
-                with faults:
+                with faults.of(name):
                     found[name].append(file.keys(read_bytes(file.path)))
-        faults.tell()
+        if collected is None:
+            faults.tell()
         return found
 
     def digests(self, keys: Keys) -> dict[str, str]:
         """The digest of each wanted database, from the keys of all clips; empty where a schema has functions."""
-        clips = {name: [[file.asset, *each] for file, each in zip(self.files[name], keys[name], strict=True)] for name in keys}
+        clips = {
+            name: [[file.asset, *each] for file, each in zip(self.files[name], keys[name], strict=True)] for name in self.files
+        }
         return {name: self._digest(self.config.databases[name], clips) for name in self.wanted}
 
     def _digest(self, settings: DatabaseSettings, clips: Mapping[str, object]) -> str:
@@ -109,25 +124,49 @@ class Inputs:
         return hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16).hexdigest()
 
 
-class Faults:
-    """Collects the faults of several things that are tried, to tell them together."""
+def told_once(faults: Iterable[Fault]) -> list[Fault]:
+    """The faults; one that all clips of a rig share is told of the first, with how many others have it. Each once."""
+    clips: dict[Fault, list[Place]] = {}
+    for fault in dict.fromkeys(faults):  # a clip may be in several databases
+        clips.setdefault(fault.at(NOWHERE) if fault.rule == "unknown-bone" else fault, []).append(fault.place)
+    return [fault if places == [fault.place] else _of_all(fault, places) for fault, places in clips.items()]
 
-    def __init__(self) -> None:
+
+def _of_all(fault: Fault, places: list[Place]) -> Fault:
+    more = f" ({plural(len(places) - 1, 'other clip')} lack it too.)" if len(places) > 1 else ""
+    return replace(fault, found=fault.found + more.replace("clip lack", "clip lacks"), place=places[0])
+
+
+class Faults:
+    """Collects the faults of several things that are tried, to tell them together. What is tolerated is left out, and no fault.
+
+    `tolerates` is called with the name of the database and the error.
+    """
+
+    def __init__(self, tolerates: Tolerates | None = None) -> None:
         self.errors: list[ContextDBError] = []
+        self.tolerates = tolerates
+        self.name = ""
+
+    def of(self, name: str) -> Faults:
+        """These faults, for something of a database that is tried next."""
+        self.name = name
+        return self
 
     def __enter__(self) -> None:
         pass
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
-        if isinstance(error, (MotionError, FileError)):
+        if not isinstance(error, (MotionError, FileError)):
+            return False
+        if self.tolerates is None or not self.tolerates(self.name, error):
             self.errors.append(error)
-            return True
-        return False
+        return True
 
     def tell(self) -> None:
         """Raise what was collected, if anything."""
         if not self.errors:
             return
-        faults = dict.fromkeys(fault for error in self.errors for fault in error.faults)  # a clip may be in several databases
+        faults = told_once(fault for error in self.errors for fault in error.faults)
         kinds = {type(error) for error in self.errors}
         raise (kinds.pop() if len(kinds) == 1 else ClipError if ClipError in kinds else MotionError)(*faults)

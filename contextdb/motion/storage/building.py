@@ -8,19 +8,20 @@ An edge: this touches the disk.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contextdb.errors import ArtefactError, Fault, FileError
+from contextdb.errors import ArtefactError, Fault, FileError, in_quotes, plural
+from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage import stored
-from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs
+from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, Tolerates
 from contextdb.motion.storage.clip_files import ClipFile, Extracted, extract
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.feature_cache import FeatureCache, file_name
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 CACHE_FOLDER = ".contextdb-cache"
 SAVED_SUFFIX = ".motion.safetensors"
+MOST_BONES = 4
+"""So many bones are named in a warning."""
 
 Progress = Callable[[int, int, str], None]
 """Called with how many clips are done, how many there are, and the name of the one done last."""
@@ -48,6 +51,10 @@ class Built:
         The clips whose features were computed, and those whose features came from the cache.
     markup_faults : tuple of Fault
         What of its markup does nothing; see `Markup.faults_for`.
+    mirror_faults : tuple of Fault
+        That its mirrored poses do not fit the rig, whose two sides differ.
+    doubts : tuple of ClipFinding
+        What is doubtful about its clips, such as their unit; see `contextdb.motion.clips.doubts`. None stops a build.
     """
 
     database: MotionDatabase
@@ -55,6 +62,8 @@ class Built:
     computed: tuple[str, ...]
     cached: tuple[str, ...]
     markup_faults: tuple[Fault, ...] = ()
+    mirror_faults: tuple[Fault, ...] = ()
+    doubts: tuple[ClipFinding, ...] = ()
 
 
 def build(
@@ -99,17 +108,27 @@ def build_all(
     *,
     names: Collection[str] | None = None,
     cache: str | PathLike[str] | None = CACHE_FOLDER,
+    tolerates: Tolerates | None = None,
 ) -> dict[str, Built]:
-    """Build as `build` does, and tell of each database what it was made of."""
+    """Build as `build` does, and tell of each database what it was made of.
+
+    `tolerates` is called with the name of a database and what is wrong with it or with one of its clips. Where it says True the
+    build goes on without. Of the databases of one schema, which share a normalisation, those that are not among `names` take part.
+    """
     root = Path(folder)
     kept = None if cache is None else FeatureCache(root / cache)
-    inputs = Inputs.of(config, root, assets or {}, names)
-    extracted = _extract_all(inputs.files, kept, progress)
+    faults, built = Faults(tolerates), {}
+    inputs = Inputs.of(config, root, assets or {}, names, faults)
+    extracted = _extract_all(inputs.files, kept, progress, faults)
+    faults.tell()
+    had_clips = {name: bool(files) for name, files in inputs.files.items()}
+    inputs = replace(inputs, files={name: [each.file for each in found] for name, found in extracted.items()})
     digests = inputs.digests({name: [each.keys for each in found] for name, found in extracted.items()})
     shared = {schema: _shared_normalisation(config, schema, extracted) for schema in inputs.schemas}
-    faults, built = Faults(), {}
     for name in inputs.wanted:
-        with faults:
+        if had_clips[name] and not extracted[name]:
+            continue  # nothing is left of it
+        with faults.of(name):
             built[name] = _built(inputs, name, extracted[name], shared, digests[name])
     faults.tell()
     if kept is not None:
@@ -123,8 +142,10 @@ def open_or_build(
     assets: Assets | None = None,
     progress: Progress | None = None,
     *,
+    names: Collection[str] | None = None,
     saved: str | PathLike[str] | None = None,
     cache: str | PathLike[str] | None = CACHE_FOLDER,
+    tolerates: Tolerates | None = None,
 ) -> dict[str, MotionDatabase]:
     """Open the saved databases that are up to date, and build the others in memory.
 
@@ -132,16 +153,29 @@ def open_or_build(
     ----------
     saved : path, optional
         Where `contextdb motion build` has put them; a relative one lies in `folder`. Default: `folder`.
-    config, folder, assets, progress, cache
-        As for `build`. All clips are read, as their contents say whether a saved database is up to date.
+    config, folder, assets, progress, names, cache, tolerates
+        As for `build_all`. All clips are read, as their contents say whether a saved database is up to date. What is tolerated is
+        told of databases that have to be built alone.
     """
     root = Path(folder)
-    inputs = Inputs.of(config, root, assets or {})
-    digests = inputs.digests(inputs.keys())
-    opened = {name: _open(saved_path(root / (saved or ""), name), digest) for name, digest in digests.items()}
+    opened = _opened(config, root, Path(root / (saved or "")), assets or {}, names)
     missing = [name for name, database in opened.items() if database is None]
-    built = build(config, root, assets, progress, names=missing, cache=cache) if missing else {}
-    return {name: built[name] if database is None else database for name, database in opened.items()}
+    built = build_all(config, root, assets, progress, names=missing, cache=cache, tolerates=tolerates) if missing else {}
+    kept = {name: built[name].database if database is None and name in built else database for name, database in opened.items()}
+    return {name: database for name, database in kept.items() if database is not None}
+
+
+def _opened(
+    config: MotionConfig, root: Path, saved: Path, assets: Assets, names: Collection[str] | None
+) -> dict[str, MotionDatabase | None]:
+    """The saved databases that are up to date, None for one that is not or of which something is wrong."""
+    faults = Faults(lambda name, error: True)
+    asked = config.databases if names is None else [config.database(name).name for name in names]
+    inputs = Inputs.of(config, root, assets, asked, faults)
+    keys = inputs.keys(faults)
+    whole = {name for name, files in inputs.files.items() if len(keys[name]) == len(files)}
+    digests = inputs.digests(keys) if whole == set(inputs.files) else {}
+    return {name: _open(saved_path(saved, name), digests.get(name, "")) for name in config.databases if name in asked}
 
 
 def saved_path(folder: Path, name: str) -> Path:
@@ -161,20 +195,18 @@ def _open(path: Path, digest: str) -> MotionDatabase | None:
 
 
 def _extract_all(
-    files: Mapping[str, list[ClipFile]], cache: FeatureCache | None, progress: Progress | None
+    files: Mapping[str, list[ClipFile]], cache: FeatureCache | None, progress: Progress | None, faults: Faults
 ) -> dict[str, list[Extracted]]:
-    """The features of all clips; the faults of all broken ones together."""
+    """The features of all clips that can be read."""
     total, done = sum(map(len, files.values())), 0
     found: dict[str, list[Extracted]] = {name: [] for name in files}
-    faults = Faults()
     for name, listed in files.items():
         for file in listed:
-            with faults:
+            with faults.of(name):
                 found[name].append(extract(file, cache))
             done += 1
             if progress is not None:
                 progress(done, total, file.asset)
-    faults.tell()
     return found
 
 
@@ -200,7 +232,21 @@ def _built(inputs: Inputs, name: str, found: list[Extracted], shared: Mapping[st
         tuple(each.file.asset for each in found if each.is_computed),
         tuple(each.file.asset for each in found if not each.is_computed),
         () if markup is None else tuple(_markup_faults(inputs, markup, settings, database)),
+        tuple(_mirror_faults(name, found)),
+        tuple(doubts((each.file.asset, str(each.file.path), each.measures) for each in found)),
     )
+
+
+def _mirror_faults(name: str, found: Sequence[Extracted]) -> Iterator[Fault]:
+    """One fault for all clips of a database whose rig has two sides that differ: of the clip in which they do most."""
+    uneven = [each for each in found if each.unevenness]
+    if uneven:
+        worst = max(uneven, key=lambda each: max(each.unevenness.values()))
+        told = ", ".join(f"{in_quotes(bone)} by {metres:.3f} m" for bone, metres in list(worst.unevenness.items())[:MOST_BONES])
+        more = f" and {len(worst.unevenness) - MOST_BONES} more" if len(worst.unevenness) > MOST_BONES else ""
+        differ = f"the two sides of the rig differ in {plural(len(uneven), 'clip')}, most in {in_quotes(worst.file.asset)}"
+        so = "So far off are mirrored rotations that are played on the rig; searches are not concerned."
+        yield Fault(f"[databases.{name}] mirror: {differ}: {told}{more}. {so}")
 
 
 def _markup_faults(inputs: Inputs, markup: Markup, settings: DatabaseSettings, database: MotionDatabase) -> list[Fault]:

@@ -12,13 +12,19 @@ from pathlib import Path
 
 from contextdb.disk import path_in_quotes, read_bytes
 from contextdb.errors import Fault, MotionError, Place, in_quotes
+from contextdb.motion.clips import bvh, mirror
 from contextdb.motion.clips import clip as clips
+from contextdb.motion.clips.doubts import Measures, measure
+from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.features.extraction import ClipFeatures, clip_features
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.reading import as_toml
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.feature_cache import FeatureCache, key_of
+
+UNEVEN_M = 0.005
+"""Sides that differ by more metres are told."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +55,16 @@ class ClipFile:
 
 @dataclass(frozen=True, eq=False)
 class Extracted:
-    """The features of a clip's ranges, with their keys, and whether any had to be computed."""
+    """The features of a clip's ranges and its measures, with the keys of the ranges, and whether any had to be computed."""
 
     file: ClipFile
     parts: list[ClipFeatures]
+    measures: Measures
     keys: list[str]
     is_computed: bool
+    unevenness: Mapping[str, float]
+    """Of a clip that is mirrored too, how far each bone is off when mirrored rotations are played with the rig's own offsets: in
+    metres, the farthest first."""
 
 
 def clip_files(
@@ -120,7 +130,7 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     Raises
     ------
     MotionError, FileError
-        The clip cannot be read, or lacks a bone of the schema.
+        The clip cannot be read, has no frame, or lacks a bone of the schema.
     """
     content = read_bytes(file.path)
     keys = file.keys(content)
@@ -128,16 +138,36 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     kept = [_kept(file, key, side, cache) for key, side in zip(keys, file.sides, strict=True)]
     parts = [part for part in kept if part is not None]
     if len(parts) == len(kept):
-        return Extracted(file, parts, keys, is_computed=False)
+        skeleton = _skeleton(file, content) if file.settings.mirror else None
+        unevenness = _unevenness(file, skeleton)
+        return Extracted(file, [part for part, _ in parts], parts[0][1], keys, is_computed=False, unevenness=unevenness)
     clip = _parsed(file, content)
+    if clip.n_frames == 0:
+        accepted = "a clip with at least one frame, and three for its velocities"
+        mend = "to export it again, or take it out of the folder"
+        raise MotionError(Fault("the clip has no frame (Frames: 0).", accepted, mend, Place(str(file.path))))
+    measures = measure(clip)
     computed = [clip_features(clip, file.schema, mirrored=side, looping=file.is_looping) for side in file.sides]
     if cache is not None:
         for key, part in zip(keys, computed, strict=True):
-            cache.write(file.settings.name, key, part)
-    return Extracted(file, computed, keys, is_computed=True)
+            cache.write(file.settings.name, key, part, measures)
+    skeleton = clip.skeleton if file.settings.mirror else None
+    return Extracted(file, computed, measures, keys, is_computed=True, unevenness=_unevenness(file, skeleton))
 
 
-def _kept(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | None) -> ClipFeatures | None:
+def _skeleton(file: ClipFile, content: bytes) -> Skeleton:
+    """The skeleton of a clip whose features are known, so that it could be read."""
+    return bvh.read_skeleton(clips.text_of(content, str(file.path)))
+
+
+def _unevenness(file: ClipFile, skeleton: Skeleton | None) -> dict[str, float]:
+    if skeleton is None:
+        return {}
+    apart = mirror.unevenness(skeleton, file.schema.mirror)
+    return {bone: metres for bone, units in apart.items() if (metres := units * file.settings.metres_per_unit) > UNEVEN_M}
+
+
+def _kept(file: ClipFile, key: str, is_mirrored: bool, cache: FeatureCache | None) -> tuple[ClipFeatures, Measures] | None:
     return None if cache is None else cache.read(file.settings.name, key, file.asset, mirrored=is_mirrored)
 
 

@@ -144,6 +144,14 @@ class MotionConfig:
         settings = _known("selectors", name, self.selectors, self.file)
         return Selector([Entry(database, databases.get(database), threshold) for database, threshold in settings.order])
 
+    def databases_of(self, selector: str) -> list[str]:
+        """The databases of the selector of a name, in order."""
+        return [database for database, _ in _known("selectors", selector, self.selectors, self.file).order]
+
+    def selector_of(self, controller: str) -> str:
+        """The selector of the controller of a name."""
+        return _known("controllers", controller, self.controllers, self.file)[0]
+
     def controller(self, name: str, databases: Mapping[str, MotionDatabase], **options: Unpack[ControllerOptions]) -> Controller:
         """The controller of a name over built databases; `recorder`, `rng` and `clock` are those of `Controller`."""
         selector, settings = _known("controllers", name, self.controllers, self.file)

@@ -1,6 +1,7 @@
 """Features of clips kept on the disk, so that building again computes only the clips that changed.
 
-    FOLDER/DATABASE.features/KEY.safetensors      one clip, as recorded or mirrored: features and root, in raw units
+    FOLDER/DATABASE.features/KEY.safetensors      one clip, as recorded or mirrored: features and root, in raw
+                                                  units; its measures in the metadata
 
 The key is a digest of all that the features depend on: the bytes of the BVH file, what the settings say of its unit and axis, the
 channels without their weights, and `EXTRACTION`. An entry is written in one step and checked when it is read; one that is missing,
@@ -14,7 +15,6 @@ import hashlib
 import json
 import os
 import re
-import secrets
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,8 +22,10 @@ from pathlib import Path
 
 import numpy as np
 
+from contextdb.disk import write_atomic
 from contextdb.errors import ArtefactError, FileError
 from contextdb.motion.clips.clip import Up
+from contextdb.motion.clips.doubts import Measures
 from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.features.schema_dict import unweighted
@@ -37,7 +39,7 @@ CLIP_FEATURES = FileKind(
 )
 FOLDER_SUFFIX = ".features"
 
-_ENTRY = re.compile(r"[0-9a-f]{32}\.safetensors|[0-9a-f]{16}\.tmp")
+_ENTRY = re.compile(r"[0-9a-f]{32}\.safetensors|(?:\.contextdb-[0-9a-f]{8}-)?[0-9a-f]{16}\.tmp")
 
 
 def key_of(content: bytes, schema: FeatureSchema, *, metres_per_unit: float, up: Up, mirrored: bool, looping: bool) -> str:
@@ -61,8 +63,8 @@ class FeatureCache:
 
     folder: Path
 
-    def read(self, database: str, key: str, asset: str, *, mirrored: bool) -> ClipFeatures | None:
-        """The features of a key; None when they are not there, or not whole."""
+    def read(self, database: str, key: str, asset: str, *, mirrored: bool) -> tuple[ClipFeatures, Measures] | None:
+        """The features of a key and the measures of its clip; None when they are not there, or not whole."""
         entry = self._entry(database, key)
         if not os.path.isfile(entry):  # the error of a missing file would look for the nearest name
             return None
@@ -70,26 +72,24 @@ class FeatureCache:
             tensors, metadata = read_tensors(entry, CLIP_FEATURES)
         except (ArtefactError, FileError, OSError):
             return None
-        is_whole = metadata.get("digest") == _digest(tensors, key)
-        return ClipFeatures(asset, mirrored, tensors["features"], tensors["root"]) if is_whole else None
+        said = metadata.get("measures", "")
+        if not said or metadata.get("digest") != _digest(tensors, key, said):
+            return None
+        return ClipFeatures(asset, mirrored, tensors["features"], tensors["root"]), Measures.of_json(json.loads(said))
 
-    def write(self, database: str, key: str, part: ClipFeatures) -> None:
-        """Keep the features of a key.
+    def write(self, database: str, key: str, part: ClipFeatures, measures: Measures) -> None:
+        """Keep the features of a key, and the measures of its clip.
 
         The system is not asked to put them on the disk at once, which would take longer than to compute them: an entry that a loss
         of power spoils is seen when it is read.
         """
         tensors = {"features": part.features, "root": part.root}
+        said = json.dumps(measures.to_json())
+        metadata = CLIP_FEATURES.metadata({"measures": said, "digest": _digest(tensors, key, said)})
         entry = self._entry(database, key)
-        temporary = entry.with_name(f"{secrets.token_hex(8)}.tmp")
-        with suppress(OSError, ValueError):  # ValueError: no system can have a file of this name
+        with suppress(FileError, OSError, ValueError):  # ValueError: no system can have a file of this name
             self._make(entry.parent)
-            try:
-                temporary.write_bytes(to_bytes(tensors, CLIP_FEATURES.metadata({"digest": _digest(tensors, key)})))
-                os.replace(temporary, entry)
-            except BaseException:  # also when the user interrupts
-                temporary.unlink(missing_ok=True)
-                raise
+            write_atomic(entry, to_bytes(tensors, metadata), syncs=False)
 
     def prune(self, database: str, keys: Collection[str]) -> None:
         """Remove all that is kept of a database but some keys."""
@@ -110,7 +110,7 @@ class FeatureCache:
     def _make(self, folder: Path) -> None:
         if not self.folder.exists():
             self.folder.mkdir(parents=True, exist_ok=True)
-            (self.folder / ".gitignore").write_text("*\n", encoding="utf-8")
+            write_atomic(self.folder / ".gitignore", b"*\n", syncs=False)
         folder.mkdir(exist_ok=True)
 
 
@@ -122,8 +122,8 @@ def _remove(folder: Path, kept: Collection[str] = ()) -> None:
                 entry.unlink(missing_ok=True)
 
 
-def _digest(tensors: Tensors, key: str) -> str:
-    return digest_of(tensors, key, np.__version__)
+def _digest(tensors: Tensors, key: str, measures: str) -> str:
+    return digest_of(tensors, key, np.__version__, measures)
 
 
 def file_name(name: str, suffix: str) -> str:

@@ -12,14 +12,16 @@ import numpy as np
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.selection.decision import Decision
+from contextdb.motion.trace.cost_views import Ranked
 
+LEFT = ("candidates", "filters")
 Json = dict[str, object]
 Events = Mapping[tuple[str, int], Sequence[str]]
 
 
 def decision_json(decision: Decision, events: Events | None = None) -> Json:
     """A decision; its candidates are a list of databases, each with its `rows` and how many frames were `left_out`."""
-    told = {field.name: as_plain(getattr(decision, field.name)) for field in fields(decision) if field.name != "candidates"}
+    told = {field.name: as_plain(getattr(decision, field.name)) for field in fields(decision) if field.name not in LEFT}
     told["candidates"] = [candidates_json(name, found, events) for name, found in decision.candidates]
     return told
 
@@ -28,6 +30,15 @@ def candidates_json(database: str, found: Candidates, events: Events | None = No
     """The candidates of one database."""
     rows = [_candidate_json(rank, row, (events or {}).get((database, row.frame), ())) for rank, row in enumerate(found, 1)]
     return {"database": database, "left_out": {reason.text: count for reason, count in found.counts.items()}, "rows": rows}
+
+
+def ranked_json(rows: Sequence[Ranked], events: Events | None = None) -> list[Json]:
+    """Frames with their ranks and databases."""
+    told = events or {}
+    return [
+        {"database": each.database, **_candidate_json(each.rank, each.row, told.get((each.database, each.row.frame), ()))}
+        for each in rows
+    ]
 
 
 def _candidate_json(rank: int, row: Candidate, events: Sequence[str]) -> Json:

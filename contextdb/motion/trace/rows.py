@@ -22,6 +22,7 @@ from contextdb.motion.search.database import NOTHING, Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.trace.filter_rows import filter_of, filter_row, filter_type
 
 if TYPE_CHECKING:
     from polars import DataType as PolarsType
@@ -31,7 +32,8 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 """What the markup says of a frame of a database."""
 Events = dict[tuple[str, int], tuple[str, ...]]
 
-TIMINGS = "search_us"
+TIMINGS, FILTERS = "search_us", "filters"
+"""The columns that a file may lack: another recording has other timings, and an older version kept no filters."""
 
 
 def columns() -> dict[str, PolarsType]:
@@ -81,6 +83,7 @@ def columns() -> dict[str, PolarsType]:
         "candidates": pl.List(pl.Struct(found)),
         "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
         "root_weight": number,
+        FILTERS: filter_type(),
         TIMINGS: number,
     }
 
@@ -107,6 +110,7 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         "candidates": [_candidates_row(name, found, events_of) for name, found in decision.candidates],
         "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
         "root_weight": float(decision.root_weight),
+        FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
         TIMINGS: _number(decision.search_us),
     }
 
@@ -226,6 +230,7 @@ def decision_of(row: Row) -> Decision:
         search_us=row.get(TIMINGS),
         root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
         root_weight=float(row["root_weight"]),
+        filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
     )
 
 

@@ -31,14 +31,15 @@ from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ArtefactError, Fault, MotionError, Place, in_quotes, plural
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Decision
-from contextdb.motion.trace.rows import TIMINGS, Events, Row, columns, decision_of, events_in, row_of
+from contextdb.motion.trace.filter_rows import fingerprint
+from contextdb.motion.trace.rows import FILTERS, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
+from contextdb.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
 
 if TYPE_CHECKING:
     import polars as pl
 
 FORMAT = 1
 FORMAT_KEY, ABOUT_KEY, DIGEST_KEY = "contextdb.trace", "about", "digest"
-MAGIC = b"PAR1"
 CHUNK = 512
 """So many decisions become Parquet at a time."""
 MOST = 108_000
@@ -65,7 +66,7 @@ class Trace(Sequence[Decision]):
     n_forgotten : int
         How many decisions came before the first that is kept.
     about : mapping
-        For the name of each database `rate`, `features` and `channels`.
+        For the name of each database `rate`, `features`, `channels`, and the `digest` of what costs come from.
     """
 
     def __init__(self, n_candidates: int = 12, databases: Mapping[str, MotionDatabase] | None = None, *, most: int = MOST) -> None:
@@ -103,8 +104,8 @@ class Trace(Sequence[Decision]):
 
     def brief(self) -> Iterator[Decision]:
         """The decisions in order without their queries and candidates: much faster than with them."""
-        for place, row in enumerate(self._every_row("query", "candidates")):
-            yield self._decision_of({**row, "query": None, "candidates": []}, place)
+        for place, row in enumerate(self._every_row("query", "candidates", FILTERS)):
+            yield self._decision_of({**row, "query": None, "candidates": [], FILTERS: []}, place)
 
     def events(self, index: int) -> Events:
         """What the markup says of the frames that a decision tells of, by (database, frame), as far as it says anything."""
@@ -135,7 +136,9 @@ class Trace(Sequence[Decision]):
             frames.append(part)
         whole = pl.concat(frames)
         frame, about = whole if timings else whole.drop(TIMINGS), json.dumps(self.about)
-        return _written(frame, {FORMAT_KEY: str(FORMAT), ABOUT_KEY: about, DIGEST_KEY: _digest(_written(frame, {}), about)})
+        out = io.BytesIO()
+        frame.write_parquet(out, metadata={FORMAT_KEY: str(FORMAT), ABOUT_KEY: about, **UNSEALED})
+        return sealed(out.getvalue())
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Trace:
@@ -202,7 +205,8 @@ class Trace(Sequence[Decision]):
 
 def _about(database: MotionDatabase) -> dict[str, object]:
     rate = None if database.schema is None else database.schema.rate
-    return {"rate": rate, "features": list(database.feature_names), "channels": list(database.channel_names)}
+    names = {"features": list(database.feature_names), "channels": list(database.channel_names)}
+    return {"rate": rate, **names, "digest": fingerprint(database)}
 
 
 def _packed(row: Row) -> bytes:
@@ -224,16 +228,9 @@ def _frame(rows: list[Row]) -> pl.DataFrame:
     return pl.DataFrame(rows, schema=columns())
 
 
-def _written(frame: pl.DataFrame, metadata: dict[str, str]) -> bytes:
-    out = io.BytesIO()
-    frame.write_parquet(out, metadata=metadata)
-    return out.getvalue()
-
-
-def _digest(raw: bytes, about: str) -> str:
-    """Of a Parquet file's columns, which stand before its footer whatever metadata is in there."""
-    end = len(raw) - 8 - int.from_bytes(raw[-8:-4], "little")
-    return hashlib.blake2b(raw[:end] + about.encode(), digest_size=16).hexdigest()
+def _old_digest(raw: bytes, frame: Frame) -> str:
+    """What the sessions of versions without a seal hold: the digest of the columns and of what the databases' features are."""
+    return hashlib.blake2b(raw[: frame.start] + frame.metadata[ABOUT_KEY].encode(), digest_size=16).hexdigest()
 
 
 def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, Mapping[str, Mapping[str, object]]]:
@@ -244,18 +241,22 @@ def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, Mapping[str, Mapping[str
     if why:
         raise _refused(why, file)
     try:
-        metadata = pl.read_parquet_metadata(io.BytesIO(raw))
+        parquet = require_whole(raw)
+        metadata = parquet.metadata
         _check_format(metadata, file)
-        if DIGEST_KEY in metadata and metadata[DIGEST_KEY] != _digest(raw, metadata[ABOUT_KEY]):
+        if metadata.get(DIGEST_KEY, expected := _old_digest(raw, parquet)) != expected:
             raise _refused("the file was altered after it was saved.", file)
         about = {name: dict(part) for name, part in json.loads(metadata[ABOUT_KEY]).items()}
         frame = pl.read_parquet(io.BytesIO(raw))
     except ArtefactError:
         raise
+    except DamagedFrame as error:
+        raise _refused(f"the file is damaged: {error}.", file) from None
     except (Exception, pl.exceptions.PanicException) as error:  # some damage makes polars stumble instead of complain
         raise _refused(f"the file is damaged ({type(error).__name__}).", file) from None
     _check_columns(frame, file)
-    return frame if TIMINGS in frame.columns else frame.with_columns(pl.lit(None, pl.Float64).alias(TIMINGS)), about
+    missing = [pl.lit(None, dtype).alias(name) for name, dtype in columns().items() if name not in frame.columns]
+    return frame.with_columns(missing).select(list(columns())), about
 
 
 def _no_parquet(raw: bytes) -> str:
@@ -277,9 +278,8 @@ def _check_format(metadata: Mapping[str, str], file: str) -> None:
 
 def _check_columns(frame: pl.DataFrame, file: str) -> None:
     wanted = columns()
-    wrong = [name for name, dtype in wanted.items() if name != TIMINGS and frame.schema.get(name) != dtype]
-    if TIMINGS in frame.columns and frame.schema[TIMINGS] != wanted[TIMINGS]:
-        wrong.append(TIMINGS)
+    present = [name for name in wanted if name in frame.columns or name not in (TIMINGS, FILTERS)]
+    wrong = [name for name in present if frame.schema.get(name) != wanted[name]]
     if wrong:
         found = f"{plural(len(wrong), 'column')} of the session missing, or of another type: {', '.join(map(in_quotes, wrong))}."
         raise _refused(found, file)

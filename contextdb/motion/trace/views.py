@@ -131,6 +131,7 @@ def decision_lines(
     name: str = "",
     events: EventTexts | None = None,
     width: int = WIDTH,
+    asked: Sequence[Ranked] | None = None,
 ) -> Iterator[str]:
     """One decision in full: what came of it, what was searched, and what the best candidates cost.
 
@@ -145,6 +146,8 @@ def decision_lines(
         What the markup says of frames.
     width : int
         Cells of a line.
+    asked : sequence of Ranked, optional
+        The frames to show instead of the candidates that were kept.
     """
     told = {} if events is None else events
     yield f"tick {decision.tick:,} at {decision.time_s:.2f} s: {decision.action}"
@@ -153,7 +156,10 @@ def decision_lines(
     yield from _status_lines(decision, told, width)
     if decision.choice is not None:
         yield from ("", "searches", "", *search_lines(decision, width))
-    if decision.candidates:
+    if asked is not None:
+        yield from ("", f"the best frames of assets whose name holds {in_quotes(name)} ({view})", "")
+        yield from candidate_lines(asked, view, told, width)
+    elif decision.candidates:
         yield from ("", f"top candidates ({view})", "", *_top_lines(decision, view, name, told, width))
 
 
@@ -271,10 +277,10 @@ def _ranked(decision: Decision) -> list[Ranked]:
     """The candidates of all databases, cheapest first."""
     every = [(row.cost, database, row) for database, found in decision.candidates for row in found]
     every.sort(key=lambda each: each[0])
-    return [Ranked(i, database, row, _role(decision, database, row.frame)) for i, (_, database, row) in enumerate(every, 1)]
+    return [Ranked(i, database, row, role_of(decision, database, row.frame)) for i, (_, database, row) in enumerate(every, 1)]
 
 
-def _role(decision: Decision, database: str, frame: int) -> str:
+def role_of(decision: Decision, database: str, frame: int) -> str:
     """What a candidate is to a decision."""
     here = (database, frame)
     playing, before = ((each.database, each.frame) if each else None for each in (decision.playing, decision.before))

@@ -1,0 +1,116 @@
+"""Check what a caller gives besides facts: rows, places, texts, numbers. Each error names the argument and what is accepted."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from operator import index
+from pathlib import Path
+from typing import Any
+
+from contextdb.errors import ContextError, Fault, FileError, NoSuchPlace, Place, in_quotes, plural
+
+MOST = 1e9
+"""The most seconds, or whatever else is waited for or counted."""
+
+
+def require_whole(value: object, what: str) -> int:
+    """A whole number, of numpy's too."""
+    try:
+        return index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise _wrong(value, what, "a whole number") from None
+
+
+def require_row(row: object, n_rows: int) -> int:
+    """The number of one of some rows."""
+    number = require_whole(row, "row")
+    if not 0 <= number < n_rows:
+        accepted = f"rows 0 to {n_rows - 1}" if n_rows else "no row: the table is empty"
+        raise NoSuchPlace(Fault(f"there is no row {number}.", accepted))
+    return number
+
+
+def require_place(place: object, length: int, what: str) -> int:
+    """A place in a sequence, counted from its end where it is negative; gives it from the beginning."""
+    number = require_whole(place, what)
+    if not -length <= number < length:
+        accepted = f"0 to {length - 1}" if length else "none: there is nothing"
+        raise NoSuchPlace(Fault(f"there is no {what} {number} among {plural(length, what)}.", accepted))
+    return number % length
+
+
+def require_text(value: object, what: str) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise _wrong(value, what, "a text")
+    return value
+
+
+def require_number(value: object, what: str) -> float:
+    """A number from 0 up, not infinite."""
+    if isinstance(value, (int, float)) and 0.0 <= value <= MOST:
+        return float(value)
+    raise _wrong(value, what, f"a number from 0 to {MOST:g}")
+
+
+def require_path(value: object, what: str = "path") -> Path:
+    """A path as a text or a `Path`, of which the system can make the name of a file.
+
+    Raises
+    ------
+    ContextError
+        It is of another type.
+    FileError
+        It holds a character that no name of a file can hold.
+    """
+    if not isinstance(value, (str, Path)):
+        raise _wrong(value, what, "a text or a pathlib.Path")
+    path = Path(value)
+    try:
+        is_name = b"\0" not in os.fsencode(path)
+    except UnicodeEncodeError:
+        is_name = False
+    if not is_name:
+        found = "the path holds a character that no name of a file can hold."
+        raise FileError(Fault(found, place=Place(str(path)), rule="no-such-path"))
+    return path
+
+
+def require_mapping(value: object, what: str, accepted: str) -> Mapping[Any, Any]:
+    """A mapping."""
+    if not isinstance(value, Mapping):
+        raise _wrong(value, what, accepted)
+    return value
+
+
+def require_many(value: object, what: str, accepted: str) -> Iterable[Any]:
+    """Something to go through that is no text."""
+    if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
+        raise _wrong(value, what, accepted)
+    return value
+
+
+def require_callable(value: object, what: str) -> None:
+    """Raise ContextError for what is neither a function nor None."""
+    if value is not None and not callable(value):
+        raise _wrong(value, what, "a function, or None")
+
+
+def require_kind(value: object, kinds: type | tuple[type, ...], what: str, accepted: str) -> None:
+    """Raise ContextError for what is of none of some types."""
+    if not isinstance(value, kinds):
+        raise _wrong(value, what, accepted)
+
+
+def _wrong(value: object, what: str, accepted: str) -> ContextError:
+    if isinstance(value, (str, int, float)):
+        return ContextError(Fault(f"{what} is {type(value).__name__} {in_quotes(_text_of(value))}.", accepted))
+    return ContextError(Fault(f"{what} is of type {type(value).__name__}.", accepted))
+
+
+def _text_of(value: object) -> str:
+    try:
+        return str(value)
+    except ValueError:  # a whole number of very many digits
+        return "…"

@@ -1,0 +1,63 @@
+"""Whether files are as they were written.
+
+Compiled tables, motion databases, recorded sessions, Parquet tables, coverage reports and the editor's journals hold a digest or
+check sums of their contents, and a single altered bit is found. Of a folder every such file below it is looked at. Tables in CSV
+and contextdb.toml hold no digest: they are read, and reported as readable.
+
+Exits with 1 when a file is damaged.
+
+  contextdb verify hit_mid_air.safetensors
+  contextdb verify coverage.json recorded/session.parquet
+  contextdb verify tables/ --json
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from contextdb.console import aligned, output, progress, wants_colour
+from contextdb.errors import Fault, FileError, Place
+from contextdb.exit_codes import ExitCode
+from contextdb.report.render_json import as_json
+from contextdb.verify import CHECKS, Verdict, files_under, verified
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("files", nargs="+", metavar="FILE", help="a file, or a folder of them")
+    parser.add_argument("--json", action="store_true", help="print one JSON document")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Verify files."""
+    paths = _paths(arguments.files)
+    verdicts = [verified(path) for path in progress(paths, "verifying")]
+    with output():
+        print(_as_json(verdicts) if arguments.json else _as_text(verdicts, wants_colour(sys.stdout)), end="")
+    return ExitCode.FOUND if any(v.state == "damaged" for v in verdicts) else ExitCode.OK
+
+
+def _paths(texts: Sequence[str]) -> list[Path]:
+    """The files that the arguments mean, each once."""
+    found: dict[Path, None] = {}
+    for text in texts:
+        below = files_under(Path(text)) if os.path.isdir(text) else [Path(text)]
+        if not below:
+            fault = Fault("the folder holds no file of contextdb.", f"a folder with {', '.join(CHECKS)}", place=Place(text))
+            raise FileError(fault)
+        found |= dict.fromkeys(below)
+    return list(found)
+
+
+def _as_json(verdicts: Sequence[Verdict]) -> str:
+    return as_json({"format": 1, "files": [verdict.to_json() for verdict in verdicts]})
+
+
+def _as_text(verdicts: Sequence[Verdict], colour: bool) -> str:
+    words = {"whole": "whole", "no-digest": "readable", "damaged": "DAMAGED"}
+    lines = aligned([[words[v.state], v.file, f"{v.kind}: {v.message}"] for v in verdicts])
+    return "".join(f"{line}\n" for line in lines)

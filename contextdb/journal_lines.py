@@ -1,0 +1,37 @@
+"""The lines of an editor's journal: a check sum, a space and JSON, so that a line that is cut or altered is found."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+Record = Mapping[str, Any]
+
+
+def line_of(record: Record) -> bytes:
+    """One line of a journal."""
+    body = json.dumps(record, ensure_ascii=True, separators=(",", ":")).encode()
+    return b"%08x %s\n" % (zlib.crc32(body), body)
+
+
+def read_records(raw: bytes) -> tuple[list[Record], int]:
+    """The records of a journal up to the first line that is cut or altered, and how many bytes they take."""
+    records, at = [], 0
+    for line in raw.splitlines(keepends=True):
+        body = line[9:-1]
+        try:
+            if not line.endswith(b"\n") or line[:9] != b"%08x " % zlib.crc32(body):
+                break
+            record = json.loads(body)
+        except ValueError:
+            break
+        records.append(record)
+        at += len(line)
+    return records, at
+
+
+def n_lost(raw: bytes, n_bytes: int) -> int:
+    """How many whole lines there are from the first damaged one on: 0 where only the last line was cut, as a kill leaves it."""
+    return raw.count(b"\n", n_bytes)

@@ -1,0 +1,72 @@
+"""Names of bones as rigs write them: which bone of one rig another rig calls otherwise.
+
+A name is a side and a core: `LeftFoot`, `Foot_L`, `l_foot`, `mixamorig:LeftFoot` and `Bip01 L Foot` are the left "foot".
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator
+
+SIDE_WORDS = {"l": "left", "left": "left", "lf": "left", "lt": "left", "r": "right", "right": "right", "rt": "right"}
+NO_WORDS = frozenset(("bone", "bip", "bip01", "bip001", "jnt", "joint", "rig", "def", "ctrl", "skel", "character"))
+"""Words that a rig puts before or behind all its names."""
+SAME = (
+    ("hips", "hip", "pelvis"),
+    ("upleg", "upperleg", "thigh"),
+    ("leg", "lowerleg", "lowleg", "shin", "calf", "knee"),
+    ("foot", "ankle"),
+    ("toe", "toes", "toebase", "ball"),
+    ("arm", "upperarm", "uparm"),
+    ("forearm", "lowerarm", "lowarm", "elbow"),
+    ("hand", "wrist"),
+    ("shoulder", "clavicle", "collar"),
+)
+"""Cores that rigs use for one bone."""
+_FIRST = {word: group[0] for group in SAME for word in group}
+_WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+
+LEAST_LIKE = 0.6
+MOST_CHARACTERS = 200
+"""Characters of a name that are looked at."""
+
+
+def nearest_bones(bone: str, names: Iterable[str], most: int) -> list[str]:
+    """The bones that are most like one that is missing, the nearest first: those of the same side and core, then by spelling."""
+    side, core = side_and_core(bone)
+
+    def likeness(name: str) -> float:
+        own_side, own_core = side_and_core(name)
+        alike = difflib.SequenceMatcher(None, core, own_core).ratio() if core != own_core else 1.0
+        return alike - (0.3 if own_side != side else 0.0)
+
+    return sorted(names, key=lambda name: -likeness(name))[:most]
+
+
+def meant_bone(bone: str, names: Iterable[str]) -> str | None:
+    """The bone that was probably meant: of the same side, and of the same or a similar core."""
+    side, core = side_and_core(bone)
+    for name in nearest_bones(bone, names, 1):
+        own_side, own_core = side_and_core(name)
+        if own_side == side and difflib.SequenceMatcher(None, core, own_core).ratio() >= LEAST_LIKE:
+            return name
+    return None
+
+
+def side_and_core(name: str) -> tuple[str, str]:
+    """The side of a name, "left", "right" or "", and what is left of it without side, namespace and the rig's own words."""
+    words = list(_words(name))
+    side = next((SIDE_WORDS[word] for word in words if word in SIDE_WORDS), "")
+    core = "".join(word for word in words if word not in SIDE_WORDS and word not in NO_WORDS)
+    if not side and len(words) == 1 and words[0][:1] in "lr" and words[0][1:] in _FIRST:  # lhip, rfoot
+        side, core = SIDE_WORDS[words[0][0]], words[0][1:]
+    return side, _FIRST.get(core, core)
+
+
+def _words(name: str) -> Iterator[str]:
+    stem = name.rpartition(":")[2][:MOST_CHARACTERS]
+    for word in _WORDS.findall(stem) if stem.isascii() else [stem]:
+        folded = word.casefold()
+        side = next((side for side in ("left", "right") if folded.startswith(side)), "")
+        yield from (part for part in (side, folded.removeprefix(side)) if part)

@@ -1,0 +1,384 @@
+"""Clips that read well and mean nonsense: another unit, another axis, a jump in the data. Data in, findings out.
+
+    measure(clip) ─► Measures, a few numbers ─► doubts(measures of all clips) ─► ClipFinding
+
+A finding is a doubt, never a refusal: a giant may be 4 m tall. What no body can be (no frame, a second and more between two frames)
+is refused where clips are read and built. Lengths are in metres, y up, as the settings have the clip's unit and axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from contextdb.errors import plural
+from contextdb.motion.clips import quaternions
+from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Skeleton
+
+LEAST_BODY_M, MOST_BODY_M = 0.3, 3.0
+USUAL_BODY_M = 1.7
+FASTEST_MPS = 15.0
+LEAST_RATE, MOST_RATE = 10.0, 240.0
+FEWEST_FRAMES = 3
+"""Two frames give one velocity, one frame none."""
+FAR_FROM_GROUND = 0.25
+"""Of the body's size: so far above or below the ground no foot stands."""
+LYING = 0.65
+"""A body whose extent upwards is less than this part of its largest lies."""
+LYING_SHARE = 0.5
+"""Of a clip's poses."""
+OTHER_SHAPE = 0.12
+"""Bones of another body: half the sum of the differences of all bones' shares of the length. Adults differ by 0.02 to 0.06."""
+MOST_POSES = 64
+"""So many poses of a clip are looked at for size, ground and axis."""
+UNITS = {1.0: "metres", 0.01: "centimetres", 0.001: "millimetres", 0.0254: "inches", 0.3048: "feet", 0.056444: "units of CMU"}
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, slots=True)
+class ClipFinding:
+    """A doubt about a clip: which rule, where, what was measured, what is expected, and the likely mend."""
+
+    rule: str
+    asset: str
+    found: str
+    expected: str
+    mend: str = ""
+    measure: float | None = None
+    """The number that the doubt is about, in the unit that `found` names."""
+    frame: int | None = None
+    """The frame of the clip, from 0, where it is about one."""
+    file: str | None = None
+
+    @property
+    def message(self) -> str:
+        """The finding without its file, on one line."""
+        return f"{self.found} Expected: {self.expected}.{f' Try {self.mend}.' if self.mend else ''}"
+
+    def __str__(self) -> str:
+        return f"{self.file or self.asset}: {self.message}"
+
+    def to_json(self) -> dict[str, Any]:
+        """The finding as plain data, every field in it."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """What is doubted of a clip, in a few numbers.
+
+    Attributes
+    ----------
+    n_frames : int
+    frame_time_s, metres_per_unit : float
+    up : str
+    extents : tuple of 3 floats
+        The median over poses of how far the joints reach along x, y (upwards) and z, in metres.
+    lying : float
+        The share of poses that reach less far upwards than `LYING` of their largest extent.
+    lowest : float
+        The height of the lowest joint of all poses, in metres.
+    fastest_mps, fastest_frame : float, int
+        The largest speed of the hips between two frames, and the earlier of the two.
+    farthest_m : float
+        How far the hips move between these.
+    n_unmoved, unmoved_frame : int, int
+        How many frames hold zeros only, and the first of these.
+    bones : mapping of str to float
+        The median distance of each joint below the hips from its parent, in metres, where there is one.
+    """
+
+    n_frames: int
+    frame_time_s: float
+    metres_per_unit: float
+    up: str
+    extents: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lying: float = 0.0
+    lowest: float = 0.0
+    fastest_mps: float = 0.0
+    fastest_frame: int = 0
+    farthest_m: float = 0.0
+    n_unmoved: int = 0
+    unmoved_frame: int = 0
+    bones: Mapping[str, float] | None = None
+
+    @property
+    def size_m(self) -> float:
+        """The body's largest extent."""
+        return max(self.extents)
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain data; `Measures.of_json` reads it."""
+        return asdict(self)
+
+    @classmethod
+    def of_json(cls, said: Mapping[str, Any]) -> Measures:
+        """What `to_json` wrote."""
+        return cls(**{**said, "extents": tuple(said["extents"])})
+
+
+def measure(clip: Clip) -> Measures:
+    """What is doubted of a clip; of one without frames, next to nothing."""
+    plain = Measures(clip.n_frames, clip.frame_time_s, clip.metres_per_unit, clip.up)
+    if clip.n_frames == 0:
+        return plain
+    with np.errstate(all="ignore"):  # numbers too large are refused where features are computed
+        joints = _body(clip.skeleton)
+        local = _some_poses(clip)
+        body = forward_kinematics(local).positions[:, joints]
+        lengths = np.median(np.linalg.norm(local.positions[:, joints[1:]], axis=-1), axis=0).tolist()
+        reach = np.ptp(body, axis=1)
+        hips = _hips(clip)
+        steps = np.linalg.norm(np.diff(hips, axis=0), axis=1)
+    fastest = int(np.argmax(steps)) if len(steps) else 0
+    zeros = np.flatnonzero(~clip.values.any(axis=1)) if clip.values.shape[1] else np.zeros(0, np.int64)
+    x, y, z = np.median(reach, axis=0).tolist()
+    step = float(steps[fastest]) if len(steps) else 0.0
+    return Measures(
+        clip.n_frames,
+        clip.frame_time_s,
+        clip.metres_per_unit,
+        clip.up,
+        extents=(x, y, z),
+        lying=float((reach[:, 1] < LYING * reach.max(axis=1)).mean()),
+        lowest=float(body[:, :, 1].min()),
+        fastest_mps=step / clip.frame_time_s,
+        fastest_frame=fastest,
+        farthest_m=step,
+        n_unmoved=len(zeros),
+        unmoved_frame=int(zeros[0]) if len(zeros) else 0,
+        bones={clip.skeleton.names[joint]: length for joint, length in zip(joints[1:], lengths, strict=True) if length > 0.0},
+    )
+
+
+def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFinding]:
+    """What is doubtful about the clips of one database.
+
+    Parameters
+    ----------
+    clips : iterable of (asset, file, Measures)
+        All of them: the shape of a body is compared with that of the others.
+
+    Returns
+    -------
+    list of ClipFinding
+        In the order of the clips. Of a clip whose unit is doubtful nothing else is told that is a length.
+    """
+    listed = list(clips)
+    usual = _usual_shape([measures for _, _, measures in listed])
+    found = []
+    for asset, file, measures in listed:
+        for rule, at in _rules(measures, usual):
+            found.append(ClipFinding(rule, asset, **at, file=file))
+    return found
+
+
+def doubts_of(clips: Iterable[Clip]) -> list[ClipFinding]:
+    """What is doubtful about some clips of one kind: `doubts` of their measures."""
+    return doubts((clip.name, None, measure(clip)) for clip in clips)
+
+
+def grouped(findings: Iterable[ClipFinding], n_clips: int) -> Iterator[str]:
+    """The findings as sentences: a rule that many clips break for one mend is told of the first, with how many others break it."""
+    groups: dict[tuple[str, str], list[ClipFinding]] = defaultdict(list)
+    for finding in findings:
+        groups[finding.rule, finding.mend].append(finding)
+    for group in groups.values():
+        others = len(group) - 1
+        more = f" ({others:,} of the {plural(n_clips - 1, 'other clip')} likewise.)" if others else ""
+        yield f"{group[0]}{more}"
+
+
+# ---- the rules
+
+
+Told = dict[str, Any]
+"""The fields of a finding beside its rule, asset and file."""
+Shape = Mapping[str, float]
+"""For each bone its share of the length of all."""
+
+
+def _rules(of: Measures, usual: Shape | None) -> Iterator[tuple[str, Told]]:
+    if of.n_frames < FEWEST_FRAMES:
+        yield "few-frames", _few_frames(of)
+    rate = 1.0 / of.frame_time_s
+    if not LEAST_RATE <= round(rate, 2) <= MOST_RATE and of.n_frames > 1:
+        yield "odd-rate", _odd_rate(of, rate)
+    if of.n_unmoved:
+        yield "zero-poses", _zero_poses(of)
+    if of.size_m == 0.0 or not math.isfinite(of.size_m):
+        return
+    if not LEAST_BODY_M <= of.size_m <= MOST_BODY_M:
+        yield "odd-size", _odd_size(of)
+        return
+    if of.fastest_mps > FASTEST_MPS:
+        yield "jump", _jump(of)
+    if of.lying >= LYING_SHARE:
+        yield "lying", _lying(of)
+    elif abs(of.lowest) > FAR_FROM_GROUND * of.size_m and of.n_unmoved < of.n_frames:
+        yield "off-ground", _off_ground(of)
+    difference = None if usual is None else _difference(_shape(of.bones or {}, usual), usual)
+    if difference is not None and difference > OTHER_SHAPE:
+        found = f"{100.0 * difference:.0f} % of the body's length is distributed otherwise than in the other clips."
+        mend = "the clips of one body for each database, or metres_per_unit where bones are of another unit"
+        yield (
+            "odd-proportions",
+            {"found": found, "expected": f"at most {100 * OTHER_SHAPE:g} %", "mend": mend, "measure": difference},
+        )
+
+
+def _few_frames(of: Measures) -> Told:
+    none = "so nothing moves and every velocity is 0" if of.n_frames == 1 else "so there is one velocity"
+    found = f"the clip has {plural(of.n_frames, 'frame')}, {none}."
+    return {
+        "found": found,
+        "expected": f"at least {FEWEST_FRAMES} frames",
+        "mend": "to export the whole take, or leave the clip where a still pose is meant",
+        "measure": float(of.n_frames),
+    }
+
+
+def _odd_rate(of: Measures, rate: float) -> Told:
+    found = f"the clip has {rate:.3g} frames a second (Frame Time: {of.frame_time_s:g})."
+    meant = next(
+        (
+            t
+            for t in (of.frame_time_s / 10, of.frame_time_s * 10, of.frame_time_s / 100, of.frame_time_s * 1000)
+            if 24.0 <= 1.0 / t <= 120.0
+        ),
+        None,
+    )
+    return {
+        "found": found,
+        "expected": f"{LEAST_RATE:g} to {MOST_RATE:g}",
+        "mend": f"Frame Time: {meant:.6g}" if meant else "to export it again at 30 or 60 frames a second",
+        "measure": rate,
+    }
+
+
+def _zero_poses(of: Measures) -> Told:
+    if of.n_unmoved == of.n_frames:
+        found = f"every value of all {plural(of.n_frames, 'frame')} is 0: the body stands in its rest pose at the origin."
+    else:
+        found = f"{plural(of.n_unmoved, 'frame')} of {of.n_frames:,} hold zeros only, first frame {of.unmoved_frame}."
+    return {
+        "found": found,
+        "expected": "frames with rotations",
+        "mend": "to export the clip again without these frames",
+        "measure": float(of.n_unmoved),
+        "frame": of.unmoved_frame,
+    }
+
+
+def _odd_size(of: Measures) -> Told:
+    unit = min(UNITS, key=lambda unit: abs(math.log(of.size_m / of.metres_per_unit * unit / USUAL_BODY_M)))
+    size = of.size_m / of.metres_per_unit * unit
+    fits = LEAST_BODY_M <= size <= MOST_BODY_M
+    return {
+        "found": f"the body is {_metres(of.size_m)} long, as one unit of the file is taken to be {of.metres_per_unit:g} m.",
+        "expected": f"{LEAST_BODY_M:g} to {MOST_BODY_M:g} m",
+        "mend": f"metres_per_unit = {unit:g} ({UNITS[unit]})" if fits else "",
+        "measure": of.size_m,
+    }
+
+
+def _jump(of: Measures) -> Told:
+    where = f"from frame {of.fastest_frame} to {of.fastest_frame + 1}"
+    return {
+        "found": f"the hips move {_metres(of.farthest_m)} {where}, which is {of.fastest_mps:,.0f} m/s.",
+        "expected": f"at most {FASTEST_MPS:g} m/s",
+        "mend": "to cut the clip there, or mend the frames",
+        "measure": of.fastest_mps,
+        "frame": of.fastest_frame,
+    }
+
+
+def _lying(of: Measures) -> Told:
+    longest = max(range(3), key=lambda axis: of.extents[axis])
+    # The settings turn "z" up into y up, so that the file's y lies along -z, and "x" up so that the file's y lies along x.
+    axis = {"y": AXES[longest], "z": {0: "x", 2: "y"}.get(longest, "z"), "x": {0: "y", 2: "z"}.get(longest, "x")}[of.up]
+    return {
+        "found": f"the body lies: it reaches {_metres(of.extents[1])} upwards and {_metres(of.size_m)} along the ground.",
+        "expected": f"a body that stands, as the file's {of.up} axis is taken to point up",
+        "mend": f'up = "{axis}", or nothing where the body is meant to lie',
+        "measure": of.extents[1],
+    }
+
+
+def _off_ground(of: Measures) -> Told:
+    side = "above" if of.lowest > 0.0 else "below"
+    what = "no joint comes nearer to it" if of.lowest > 0.0 else "a joint is so far below it"
+    return {
+        "found": f"the lowest joint is {_metres(abs(of.lowest))} {side} the ground (0 upwards): {what}.",
+        "expected": f"a foot within {_metres(FAR_FROM_GROUND * of.size_m)} of the ground in some frame",
+        "mend": "to export the clip with its floor at 0, or nothing where the body flies, climbs or dives",
+        "measure": of.lowest,
+    }
+
+
+def _metres(length_m: float) -> str:
+    """A length for people: three digits, and never 0 where it is none."""
+    return f"{length_m:,.0f} m" if length_m >= 100.0 else f"{length_m:.3g} m"
+
+
+# ---- measures
+
+
+def _body(skeleton: Skeleton) -> list[int]:
+    """The hips and all below: a root above them marks a place on the ground, and is no part of the body."""
+    found = {skeleton.hips}
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent in found:
+            found.add(joint)
+    return sorted(found)
+
+
+def _some_poses(clip: Clip) -> LocalPoses:
+    """Poses spread evenly over a clip."""
+    frames = np.unique(np.linspace(0, clip.n_frames - 1, min(clip.n_frames, MOST_POSES)).round().astype(np.int64))
+    few = Clip(clip.name, clip.skeleton, clip.frame_time_s, clip.values[frames], clip.metres_per_unit, clip.up)
+    return local_poses(few)
+
+
+def _hips(clip: Clip) -> Floats:
+    """Where the hips are in each frame: float64 [F, 3], from the joints above them alone."""
+    local, joint = local_poses(clip), clip.skeleton.hips
+    chain = [joint]
+    while clip.skeleton.parents[chain[-1]] >= 0:
+        chain.append(int(clip.skeleton.parents[chain[-1]]))
+    position, rotation = local.positions[:, chain[-1]], local.rotations[:, chain[-1]]
+    for below in reversed(chain[:-1]):
+        position = position + quaternions.rotate(rotation, local.positions[:, below])
+        rotation = quaternions.multiply(rotation, local.rotations[:, below])
+    return position
+
+
+def _shape(bones: Mapping[str, float], of: Mapping[str, float]) -> Shape:
+    """The share of each bone in the length of those that are looked at."""
+    total = math.fsum(length for bone, length in bones.items() if bone in of)
+    return {bone: length / total for bone, length in bones.items() if bone in of} if total else {}
+
+
+def _usual_shape(all_measures: Sequence[Measures]) -> Shape | None:
+    """The median share of each bone that most clips have; None for fewer than two clips."""
+    having = [measures.bones for measures in all_measures if measures.bones]
+    if len(having) < 2:
+        return None
+    names = [bone for bone in having[0] if sum(bone in bones for bones in having) > len(having) / 2]
+    shares = [_shape(bones, dict.fromkeys(names, 0.0)) for bones in having]
+    median = {bone: float(np.median([share[bone] for share in shares if bone in share])) for bone in names}
+    total = math.fsum(median.values())
+    return {bone: share / total for bone, share in median.items()} if total else None
+
+
+def _difference(shape: Shape, usual: Shape) -> float:
+    """Half the sum of the differences of all bones: 0 for the same shape, 1 where nothing is shared."""
+    return 0.5 * math.fsum(abs(shape.get(bone, 0.0) - share) for bone, share in usual.items())

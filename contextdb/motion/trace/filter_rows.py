@@ -1,0 +1,96 @@
+"""The filters of searches as rows of a recorded session, and back: with the query and the database they give every cost again.
+
+A filter is a few numbers for each range and each kind of frames, so that it is small; what a caller gives for each frame is kept
+too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contextdb.motion.markup.left_out import LeftOut, Skip
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import NO_FLAGS, Filter, Kinds
+
+if TYPE_CHECKING:
+    from polars import DataType as PolarsType
+
+Row = dict[str, Any]
+
+
+def filter_type() -> PolarsType:
+    """The type of the column `filters`."""
+    import polars as pl
+
+    flags, numbers = pl.List(pl.Boolean()), pl.List(pl.Float64())
+    skip = pl.Struct({"start": pl.Int64(), "stop": pl.Int64(), "why": pl.String()})
+    kinds = {"allowed": flags, "biases": numbers, "playable": flags, "left_out": pl.List(pl.Int64())}
+    fields: dict[str, PolarsType] = {
+        "database": pl.String(),
+        "ranges": flags,
+        "range_biases": numbers,
+        "kinds": pl.Struct(kinds),
+        "frames": flags,
+        "frame_biases": numbers,
+        "skips": pl.List(skip),
+        "current": pl.Int64(),
+        "continuing": pl.Float64(),
+    }
+    return pl.List(pl.Struct(fields))
+
+
+def filter_row(database: str, chosen: Filter) -> Row:
+    """The filter of one database's search."""
+    return {
+        "database": database,
+        "ranges": chosen.ranges.tolist(),
+        "range_biases": np.asarray(chosen.range_biases, np.float64).tolist(),
+        "kinds": {name: np.asarray(part).tolist() for name, part in chosen.kinds._asdict().items()},
+        "frames": chosen.frames.tolist(),
+        "frame_biases": np.asarray(chosen.frame_biases, np.float64).tolist(),
+        "skips": [{"start": int(skip.start), "stop": int(skip.stop), "why": skip.why.name} for skip in chosen.skips],
+        "current": int(chosen.current),
+        "continuing": float(chosen.continuing),
+    }
+
+
+def filter_of(row: Row) -> Filter:
+    """The filter that a row was made of.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError
+        The row was made of none.
+    """
+    ranges, biases = np.array(row["ranges"], np.bool_), np.array(row["range_biases"], np.float64)
+    kinds = row["kinds"]
+    return Filter(
+        ranges=ranges,
+        is_whole=bool(ranges.all()),
+        range_biases=biases,
+        least_of_ranges=float(biases.min(initial=np.inf)),
+        kinds=Kinds(
+            np.array(kinds["allowed"], np.bool_),
+            np.array(kinds["biases"], np.float64),
+            np.array(kinds["playable"], np.bool_),
+            np.array(kinds["left_out"], np.uint8),
+        ),
+        frames=np.array(row["frames"], np.bool_) if row["frames"] else NO_FLAGS,
+        frame_biases=np.array(row["frame_biases"], np.float64),
+        skips=tuple(Skip(int(skip["start"]), int(skip["stop"]), LeftOut[skip["why"]]) for skip in row["skips"]),
+        current=int(row["current"]),
+        continuing=float(row["continuing"]),
+    )
+
+
+def fingerprint(database: MotionDatabase) -> str:
+    """A digest of all that costs and reasons come from: features, ranges, weights, biases and markup."""
+    lay, digest = database.layout, hashlib.blake2b(digest_size=16)
+    scales = (database.weights, database.normalisation.offset, database.normalisation.scale)
+    for array in (lay.blocks, lay.frames, database.starts, database.stops, database.mirrored, database.marks.kinds, *scales):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    digest.update(repr((database.assets, database.channel_names, database.biases)).encode("utf-8", "surrogatepass"))
+    return digest.hexdigest()

@@ -1,0 +1,117 @@
+"""Variety: rows of different assets that are valid in the same contexts, where the table's policy wants a choice.
+
+A policy "first" or "unique" lets one row play: a row that others make needless is a slip there, and each has its warning. Under
+any other policy several valid rows are what the game chooses from. Such rows are gathered: one finding `variety` for each group,
+whose `row` and `by` are the rows of the group. A row that another row *of the same asset* makes needless adds no choice and keeps
+its warning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from contextdb.errors import plural
+from contextdb.findings import Finding
+
+VARIETY = "variety"
+"""The rule of the gathered findings."""
+ONE_CHOICE = ("first", "unique")
+"""The policies under which one row at most may play."""
+NEEDLESS = ("identical-rows", "equal-row", "subsumed-row", "redundant-row")
+"""The rules that tell of a row which others make needless."""
+MOST_NAMED = 3
+
+Named = Callable[[int, int], str]
+"""How a sentence about the second row names the first."""
+PlaceOf = Callable[[int], Finding]
+"""The finding `variety` of a row, without its message."""
+
+
+def lets_choose(policies: Iterable[str]) -> bool:
+    """Whether the game chooses among several valid rows, under the policies of a table and of those inside it."""
+    return not any(policy in ONE_CHOICE for policy in policies)
+
+
+def softened(findings: Iterable[Finding], assets: Sequence[str]) -> list[Finding]:
+    """The findings of single rows, those of variety as information."""
+    return [replace(f, level="info") if _is_variety(f, assets) else f for f in findings]
+
+
+def gathered(findings: Sequence[Finding], assets: Sequence[str], at: PlaceOf, named: Named) -> list[Finding]:
+    """The findings, those of variety in one for each group of rows.
+
+    Rows that are valid in the same contexts are a group; rows within one row and that row are another; rows that several others
+    make needless are the last. What one row holds, a row that holds this row holds too, so a group stands at the outermost.
+    """
+    told: list[Finding] = []
+    same: dict[int, list[int]] = {}
+    within: dict[int, list[int]] = {}
+    by_many: list[int] = []
+    holder = {f.row: f.by[0] for f in findings if f.rule == "subsumed-row" and f.row is not None and f.by}
+    for finding in findings:
+        row = finding.row
+        if row is None or not _is_variety(finding, assets):
+            told.append(finding)
+        elif finding.rule == "redundant-row" and len(finding.by) > 1:
+            by_many.append(row)
+        elif finding.rule in ("subsumed-row", "redundant-row"):
+            outer = _outermost(finding.by[0], holder)
+            if outer not in within.get(row, ()):  # of two that hold each other wherever contexts can happen, one stands for both
+                within.setdefault(outer, []).append(row)
+        else:
+            same.setdefault(finding.by[0], []).append(row)
+    sentences = (*_same(same, named), *_within(within, named), *_by_many(by_many, named))
+    told += [replace(at(row), message=message, by=by) for row, message, by in sentences]
+    return sorted(told, key=lambda f: (f.row is not None, f.row or 0))
+
+
+def needless(findings: Iterable[Finding], assets: Sequence[str]) -> list[Finding]:
+    """The findings that `gathered` puts into groups."""
+    return [f for f in findings if f.row is not None and _is_variety(f, assets)]
+
+
+def _is_variety(finding: Finding, assets: Sequence[str]) -> bool:
+    """Whether a finding says that rows of other assets make a row needless."""
+    return finding.rule in NEEDLESS and any(assets[row] != finding.asset for row in finding.by)
+
+
+def _outermost(row: int, holder: dict[int, int]) -> int:
+    while row in holder:
+        row = holder[row]
+    return row
+
+
+Sentence = tuple[int, str, tuple[int, ...]]
+"""The row of a finding, its message, and the other rows of the group."""
+
+
+def _same(groups: dict[int, list[int]], named: Named) -> Iterator[Sentence]:
+    for row, others in groups.items():
+        be = "is" if len(others) == 1 else "are"
+        yield row, f"{_rows(others, row, named)} {be} valid in the same contexts.", tuple(others)
+
+
+def _within(groups: dict[int, list[int]], named: Named) -> Iterator[Sentence]:
+    for row, others in groups.items():
+        be = "is" if len(others) == 1 else "are"
+        yield row, f"{_rows(others, row, named)} {be} valid only where this row is valid too.", tuple(others)
+
+
+def _by_many(rows: list[int], named: Named) -> Iterator[Sentence]:
+    if rows:
+        row, *others = rows
+        if others:
+            yield row, f"this row and {_rows(others, row, named)} are valid only where several others are.", tuple(others)
+        else:
+            yield row, "this row is valid only where several others are.", ()
+
+
+def _rows(others: list[int], row: int, named: Named) -> str:
+    """The rows of a group beside one of it: the first by their names, and how many there are."""
+    names = [named(other, row) for other in others[:MOST_NAMED]]
+    if len(others) == 1:
+        return names[0]
+    more = [f"{len(others) - MOST_NAMED:,} more"] if len(others) > MOST_NAMED else []
+    *first, last = [*names, *more]
+    return f"{plural(len(others), 'other row')} ({', '.join(first)} and {last})"

@@ -1,0 +1,153 @@
+"""Damage whole files at random and read them: `make fuzz`, or `python tests/fuzz.py --seconds 60 --seed 1 --reader csv`.
+
+Each input is read in a process of its own kind, so that one that ends the process, or never ends, is found too. What is found is
+written to tests/corpus/READER/, where `make test` reads it from then on. The same seed tries the same inputs in the same order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import random
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+TESTS = Path(__file__).resolve().parent
+sys.path[:0] = [str(TESTS), str(TESTS.parent)]
+
+CORPUS = TESTS / "corpus"
+BATCH = 100
+SLOW_CPU_S = 5.0
+"""An input of a few kilobytes that takes longer to read is a find; far above what a busy machine makes of a fast one."""
+HANG_S = 120.0
+TOKENS = [
+    *b"\0 \n \r\n , \" ' ( ) [ ] { } < > ; : = | ~ . .. - + * / \\ % # @".split(b" "),
+    *b"Any not and or in 1e999 -0 nan inf 170,20 9223372036854775808 ]]> <!-- null true".split(),
+    *(b"\xff\xfe", b"\xef\xbb\xbf", b"\xed\xa0\x80", b"\xe2\x80\xae"),
+    b" " * 100,
+    b"(" * 300,
+    b"9" * 400,
+    b'"' * 51,
+]
+
+
+def mutated(raw: bytes, others: Sequence[bytes], chance: random.Random) -> bytes:
+    """A file with a few places damaged."""
+    data = bytearray(raw)
+    for _ in range(chance.choice((1, 1, 1, 2, 3, 6))):
+        at = chance.randrange(len(data) + 1)
+        length = chance.choice((1, 1, 2, 8, 40))
+        match chance.randrange(8):
+            case 0 if at < len(data):
+                data[at] ^= 1 << chance.randrange(8)
+            case 1 if at < len(data):
+                data[at] = chance.choice((0, 1, 127, 128, 255, chance.randrange(256)))
+            case 2:
+                del data[at : at + length]
+            case 3:
+                data[at:at] = chance.choice(TOKENS)
+            case 4:
+                data[at : at + length] = chance.choice(TOKENS)
+            case 5:
+                start = chance.randrange(len(data) + 1)
+                data[at:at] = data[start : start + chance.choice((1, 10, 100, 1000))]
+            case 6 if chance.random() < 0.2:
+                del data[at:]
+            case _:
+                other = chance.choice(others)
+                start = chance.randrange(len(other) + 1)
+                data[at : at + length] = other[start : start + length]
+    return bytes(data)
+
+
+def input_of(reader: str, seed: int) -> bytes:
+    """The input that a seed means."""
+    from fuzz_readers import examples
+
+    chance = random.Random(f"{reader} {seed}")
+    whole = [*examples(reader), *(path.read_bytes() for path in sorted((CORPUS / reader).glob("*")))]
+    return mutated(chance.choice(whole), whole, chance)
+
+
+def child(reader: str, first: int, progress: Path) -> None:
+    """Read a batch, writing before each input which it is, and after it what was wrong, if anything."""
+    from fuzz_readers import read_bytes
+
+    with progress.open("w", encoding="utf-8", buffering=1) as told:
+        for seed in range(first, first + BATCH):
+            raw = input_of(reader, seed)
+            told.write(f"{seed} ")
+            start, why = time.process_time(), ""
+            try:
+                read_bytes(reader, raw)
+            except Exception as error:
+                frame = traceback.extract_tb(error.__traceback__)[-1]
+                why = f"{type(error).__name__} in {Path(frame.filename).name}:{frame.lineno}"
+            taken = time.process_time() - start
+            told.write(f"{why or (f'slow: {taken:.0f} s of CPU' if taken > SLOW_CPU_S else '')}\n")
+
+
+def batch(reader: str, first: int) -> tuple[int, list[tuple[int, str]]]:
+    """Run a batch in a process of its own; gives how many inputs were read, and the finds by their seeds."""
+    with tempfile.TemporaryDirectory() as folder:
+        progress = Path(folder) / "progress"
+        command = [sys.executable, __file__, "--child", reader, str(first), str(progress)]
+        try:
+            code = subprocess.run(command, stderr=subprocess.DEVNULL, timeout=HANG_S, check=False).returncode
+            end = f"the process ended with {code}" if code else ""
+        except subprocess.TimeoutExpired:
+            end = f"no answer after {HANG_S:.0f} s"
+        lines = [line.partition(" ") for line in progress.read_text("utf-8").splitlines()]
+    found = [(int(seed), why) for seed, _, why in lines if why]
+    if end:
+        found.append((int(lines[-1][0]), end))
+    return len(lines), found
+
+
+def keep(reader: str, seed: int) -> Path:
+    """Write an input to the corpus."""
+    raw = input_of(reader, seed)
+    path = CORPUS / reader / hashlib.blake2b(raw, digest_size=6).hexdigest()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(raw)
+    return path
+
+
+def main() -> int:
+    """Go round the readers until the time is up; exits with 1 where anything was found."""
+    from fuzz_readers import READERS
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, help="default: a fresh one, which is printed")
+    parser.add_argument("--reader", action="append", choices=sorted(READERS))
+    options = parser.parse_args()
+    first = random.SystemRandom().randrange(10**9) if options.seed is None else options.seed
+    readers = options.reader or list(READERS)
+    print(f"seed {first}, {options.seconds:.0f} s, {', '.join(readers)}")
+    until, n_read, causes = time.monotonic() + options.seconds, 0, {}
+    while time.monotonic() < until:
+        for reader in readers:
+            n, found = batch(reader, first)
+            n_read += n
+            for seed, why in found:
+                if (reader, why) not in causes:
+                    causes[reader, why] = keep(reader, seed)
+                    print(f"{reader}, seed {seed}: {why}; kept as {causes[reader, why].relative_to(TESTS.parent)}")
+            if time.monotonic() > until:
+                break
+        first += BATCH
+    print(f"{n_read:,} inputs read, {len(causes)} causes found")
+    return 1 if causes else 0
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--child"]:
+        child(sys.argv[2], int(sys.argv[3]), Path(sys.argv[4]))
+    else:
+        sys.exit(main())

@@ -1,0 +1,265 @@
+"""Every reader of the project, each with whole examples of what it reads: what `make fuzz` damages, and the corpus is read by.
+
+A reader takes a file. Whatever stands in it, it comes back, or raises a ContextDBError: a command ends with 0, 1 or 2.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import polars as pl
+from running import ROOT, run
+
+import contextdb as cdb
+from contextdb import motion
+from contextdb.cells import parse_cell
+from contextdb.conditions import Condition
+from contextdb.covering.baseline import read_baseline
+from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.errors import ContextDBError
+from contextdb.exchange.formats import FORMATS, write
+from contextdb.expressions import read_expression
+from contextdb.journal_lines import line_of
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.storage.stored import open_database, save_database
+from tui.model.journal import journal_path, recover
+from tui.model.watched import digest_of
+
+SCHEMA = {
+    "speed": {"type": "number", "min": 0, "max": 10},
+    "n": {"type": "int"},
+    "heading": {"type": "angle"},
+    "ok": {"type": "bool"},
+    "pos": {"type": "enum", "values": ["CB", "FS", "Half Back"]},
+    "tags": {"type": "tags", "values": ["Move.Run", "Stunned"]},
+}
+CELLS = {
+    "Asset": ["jog", "run", "von Hand"],
+    "speed": ["0..5 | 7", "20, 9.99 ~2", "Any"],
+    "n": ["not 3", ">=2", ""],
+    "heading": ["170, 20", "(30..-30]", "-"],
+    "ok": ["True", "no", "Any"],
+    "pos": ['CB "Half Back"', "not FS", "Any"],
+    "tags": ["+Move -Stunned", "Any", "+Move.Run"],
+}
+TOML = (ROOT / "tables/contextdb.toml").read_text(encoding="utf-8")
+DOMAINS = (BOOL, INT, NUMBER, ANGLE, Domain("enum", ("CB", "FS", "Half Back")), TEXT, TAGS)
+CONTEXTS = {"speed": [1.0, 2.5], "ok": [True, None], "pos": ["CB", "FS"], "tags": [["Move.Run"], []]}
+STICK = "time_s,speed_mps,turn_dps,ok\n0,1.5,0,True\n0.5,2,-30,False\n1.25,0,,True\n"
+MARKS = (ROOT / "tables/clips/marks.csv").read_bytes()
+
+
+EXPRESSIONS = (
+    b'speed > 2 and not (ok or pos in ["CB", "FS"])\nabs(heading - 90) <= 30\n"Move" in tags\nmin(speed, 3) * 2 % 5 // 1\n'
+)
+BVH = b"""HIERARCHY
+ROOT Hips
+{
+  OFFSET 0 90 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT LeftFoot
+  {
+    OFFSET 10 -90 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 0 10
+    }
+  }
+}
+MOTION
+Frames: 3
+Frame Time: 0.033333
+0 90 0 0 0 0 1 2 3
+0 90 5 0 0 0 1 2 3
+0 90 9 0 0 0 1.5e0 2 -3
+"""
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One reader, the suffix of its files, and whole files that it reads."""
+
+    suffix: str
+    examples: Callable[[], list[bytes]]
+    read: Callable[[Path], object]
+
+
+def table() -> cdb.Table:
+    return cdb.Table.from_columns(CELLS, SCHEMA)
+
+
+def commanded(*arguments: str | Path) -> None:
+    """Run a command; it must end with one of its exit codes and, where it refuses, with words."""
+    result = run(*arguments)
+    assert result.code in (0, 1, 2), result
+    assert result.out or result.err or result.code == 0, arguments
+
+
+def saved(save: Callable[[Path], object], suffix: str) -> bytes:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"x{suffix}"
+        save(path)
+        return path.read_bytes()
+
+
+def parquet(columns: Mapping[str, object]) -> bytes:
+    out = io.BytesIO()
+    pl.DataFrame(columns).write_parquet(out)
+    return out.getvalue()
+
+
+# ---- examples
+
+
+def csv_table() -> bytes:
+    rows = zip(*CELLS.values(), strict=True)
+    quoted = ([f'"{text.replace(chr(34), 2 * chr(34))}"' if set(text) & set(',"') else text for text in row] for row in rows)
+    return "".join(f"{','.join(row)}\n" for row in [list(CELLS), *quoted]).encode()
+
+
+def database() -> motion.MotionDatabase:
+    return motion.MotionDatabase.from_features(np.eye(5, 3, dtype=np.float32), [0, 2], [2, 5], ["jog", "run"])
+
+
+def save_motion(path: Path) -> None:
+    save_database(database(), path)
+
+
+def session() -> bytes:
+    return motion.Trace(databases={"loco": database()}).to_bytes()
+
+
+def baseline() -> bytes:
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "t.csv").write_text("Asset,ok\njog,True\n", encoding="utf-8")
+        return run("coverage", Path(folder) / "t.csv", "--json").out.encode()
+
+
+def parts(path: Path) -> list[bytes]:
+    """The lines of a file, a few at a time."""
+    lines = path.read_bytes().splitlines(keepends=True)
+    return [b"".join(lines[at : at + 5]) for at in range(0, len(lines), 5)]
+
+
+def foreign(name: str) -> list[bytes]:
+    return [write(table(), FORMATS[name])[0]]
+
+
+def journal() -> bytes:
+    head = {"format": 1, "file": "t.csv", "digest": digest_of(csv_table())}
+    return b"".join(map(line_of, [head, {"do": {"name": "x", "changes": []}}, {"go": 0}, {"saving": "0" * 32}]))
+
+
+# ---- readers
+
+
+def read_toml(path: Path) -> None:
+    (path.parent / "contextdb.toml").write_bytes(path.read_bytes())
+    (path.parent / "t.csv").write_bytes(csv_table())
+    commanded("check", path.parent)
+
+
+def read_cases(path: Path) -> None:
+    (path.parent / "t.csv").write_bytes(csv_table())
+    path.rename(path.parent / "t.cases.csv")
+    commanded("check", path.parent / "t.cases.csv")
+
+
+def read_artefact(path: Path) -> None:
+    compiled = cdb.CompiledTable.open(path)
+    compiled.query({"speed": 1.0, "n": 2, "heading": 0.0, "ok": True, "pos": "CB", "tags": {"Move.Run"}}, unknown="any")
+
+
+def read_database(path: Path) -> None:
+    opened = open_database(path, verify=True)
+    opened.search(np.zeros(opened.n_features, np.float32))
+
+
+def read_import(path: Path) -> None:
+    commanded("import", path, path.parent / "new.csv")
+
+
+def read_contexts(path: Path) -> None:
+    (path.parent / "t.csv").write_bytes(csv_table())
+    commanded("evaluate", path.parent / "t.csv", path, "--unknown", "any")
+
+
+def read_merge(path: Path) -> None:
+    (path.parent / "base.csv").write_bytes(csv_table())
+    (path.parent / "ours.csv").write_bytes(csv_table() + b"new,1,1,1,True,CB,Any\n")
+    commanded("merge", path.parent / "base.csv", path.parent / "ours.csv", path)
+
+
+def read_journal(path: Path) -> None:
+    (path.parent / "t.csv").write_bytes(csv_table())
+    journal_path(path.parent / "t.csv").parent.mkdir()
+    path.rename(journal_path(path.parent / "t.csv"))
+    recover(cdb.load(path.parent / "t.csv", strict=False))
+
+
+def read_cells(path: Path) -> None:
+    for text in path.read_bytes().decode("utf-8", "replace").split("\n"):
+        for domain in DOMAINS:
+            with suppress(ContextDBError):
+                parse_cell(text, domain)
+
+
+@cache
+def conditions() -> tuple[Condition, ...]:
+    return table().compile().conditions
+
+
+def read_expressions(path: Path) -> None:
+    for text in path.read_bytes().decode("utf-8", "replace").split("\n"):
+        with suppress(ContextDBError):
+            read_expression(text, conditions())
+
+
+READERS: dict[str, Reader] = {
+    "csv": Reader(".csv", lambda: [csv_table()], lambda path: commanded("check", path)),
+    "parquet": Reader(".parquet", lambda: [parquet(CELLS)], lambda path: commanded("check", path)),
+    "toml": Reader(".toml", lambda: [TOML.encode()], read_toml),
+    "cases": Reader(".csv", lambda: [(ROOT / "tables/locomotion.cases.csv").read_bytes()], read_cases),
+    "artefact": Reader(".safetensors", lambda: [saved(table().compile().save, ".safetensors")], read_artefact),
+    "database": Reader(
+        ".safetensors", lambda: [saved(lambda path: save_database(database(), path), ".safetensors")], read_database
+    ),
+    "session": Reader(".parquet", lambda: [session()], lambda path: commanded("motion", "replay", path)),
+    "baseline": Reader(".json", lambda: [baseline()], lambda path: read_baseline(path.read_text("utf-8", "replace"), str(path))),
+    "contexts": Reader(".csv", lambda: [b"speed,ok,pos\n1,True,CB\n2.5,,FS\n"], read_contexts),
+    "telemetry": Reader(".parquet", lambda: [parquet(CONTEXTS)], read_contexts),
+    "merge": Reader(".csv", lambda: [csv_table()], read_merge),
+    "journal": Reader(".journal", lambda: [journal()], read_journal),
+    "bvh": Reader(".bvh", lambda: [BVH], lambda path: motion.load_bvh(path)),
+    "marks": Reader(".csv", lambda: [MARKS], lambda path: Markup.load(path)),
+    "cells": Reader(".txt", lambda: parts(ROOT / "tests/cells.csv"), read_cells),
+    "expressions": Reader(".txt", lambda: [*parts(ROOT / "tests/expressions/refused.txt"), EXPRESSIONS], read_expressions),
+    **{
+        f"import-{name}": Reader(one.suffixes[0] if one.suffixes else ".csv", lambda name=name: foreign(name), read_import)
+        for name, one in FORMATS.items()
+        if one.is_read and one.suffixes
+    },
+}
+
+
+@cache
+def examples(name: str) -> list[bytes]:
+    """The whole files of a reader, made once."""
+    return READERS[name].examples()
+
+
+def read_bytes(name: str, raw: bytes) -> None:
+    """Read bytes as a file in a folder of its own; raises what is no answer in words."""
+    with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        path = Path(folder) / f"x{READERS[name].suffix}"
+        path.write_bytes(raw)
+        with suppress(ContextDBError):
+            READERS[name].read(path)

@@ -1,0 +1,208 @@
+"""Wrong arguments: no public call ends in an error that does not say what was wrong."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import contextdb as cdb
+from contextdb.schema import TableSettings
+from contextdb.table import Table
+
+CONDITIONS = {
+    "speed": {"type": "number"},
+    "gait": {"type": "enum", "values": ["Walk", "Run"]},
+    "heading": {"type": "angle"},
+    "count": {"type": "int"},
+    "is_hurt": {"type": "bool"},
+    "Defender.tags": {"type": "tags", "values": ["InAir"]},
+}
+TABLE = Table.from_columns(
+    {
+        "Asset": ["walk", "run"],
+        "speed": ["0..2", "Any ~2"],
+        "gait": ["Walk", "Any"],
+        "heading": ["Any", "0..90"],
+        "count": ["Any", "1..3"],
+        "is_hurt": ["False", "Any"],
+        "Defender.tags": ["+InAir", "Any"],
+    },
+    CONDITIONS,
+)
+COMPILED = TABLE.compile()
+FACTS = {"speed": 1.0, "gait": "Walk", "heading": 10.0, "count": 2, "is_hurt": False, "Defender.tags": {"InAir"}}
+PLAIN = {name: fact for name, fact in FACTS.items() if name != "Defender.tags"}
+ACTORS = {"Defender": [{"id": 1, "tags": {"InAir"}}]}
+MANY = {name: [fact] for name, fact in FACTS.items()}
+CAST = COMPILED.query(PLAIN, actors=ACTORS)
+EXPLAINED, EXPLAINED_CAST = COMPILED.explain(FACTS), COMPILED.explain(PLAIN, actors=ACTORS)
+ANSWERS, CAST_ANSWERS = COMPILED.query_many(MANY), COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=ACTORS)
+SAMPLES = Path(__file__).parent.parent / "tables"
+PROJECT = cdb.Project.load(SAMPLES)
+
+
+class Odd:
+    """Something that no function expects."""
+
+
+WRONG: list[object] = [
+    None, True, 0, -1, 1, 99, 2**70, 1.5, float("nan"), "", "x", "walk", "a\0b", "\ud800", b"x", [], [5], ["x"], [[]], [None], [{}],
+    {}, {5: 5}, {"x": 5}, {"x": [5]}, {"speed": Odd()}, {"Defender": 5}, {"Defender": [5]}, {"Defender": [{5: 5}]},
+    {"speed": [Odd()]}, {"speed": "abc"}, {"speed": [[1]], "gait": [1, 2]}, {"speed": np.zeros((2, 2))}, (1, 2, 3), {1},
+    np.zeros((2, 2)), np.arange(3), Odd(), Odd, len, Path("nowhere"), COMPILED.query(FACTS),
+]  # fmt: skip
+FUNCTIONS = ("prefer)", "on_change)", "on_error)")
+"""Arguments that are functions: what goes wrong in one that the caller gave is not ours to tell."""
+Call = Callable[[object], object]
+CALLS: dict[str, Call] = {
+    "load(path)": cdb.load,
+    "Project.load(path)": cdb.Project.load,
+    "watch(path)": lambda x: cdb.watch(x, poll_s=None),  # type: ignore[arg-type]
+    "watch(poll_s)": lambda x: cdb.watch(SAMPLES, poll_s=x).close(),  # type: ignore[arg-type]
+    "watch(settle_s)": lambda x: cdb.watch(SAMPLES, poll_s=None, settle_s=x).close(),  # type: ignore[arg-type]
+    "watch(on_change)": lambda x: cdb.watch(SAMPLES, on_change=x, poll_s=None).close(),  # type: ignore[arg-type]
+    "watch(on_error)": lambda x: cdb.watch(SAMPLES, on_error=x, poll_s=None).close(),  # type: ignore[arg-type]
+    "project[name]": lambda x: PROJECT[x],  # type: ignore[index]
+    "project.with_table(table)": lambda x: PROJECT.with_table(x),  # type: ignore[arg-type]
+    "from_columns(columns)": lambda x: Table.from_columns(x),  # type: ignore[arg-type]
+    "from_columns(schema)": lambda x: Table.from_columns({"A": ["a"], "speed": ["1"]}, x),  # type: ignore[arg-type]
+    "from_columns(settings)": lambda x: Table.from_columns({"A": ["a"]}, {}, x),  # type: ignore[arg-type]
+    "from_columns(name)": lambda x: Table.from_columns({"A": ["a"]}, name=x),  # type: ignore[arg-type]
+    "text(row)": lambda x: TABLE.text(x, "speed"),  # type: ignore[arg-type]
+    "text(column)": lambda x: TABLE.text(0, x),  # type: ignore[arg-type]
+    "condition(name)": lambda x: TABLE.condition(x),  # type: ignore[arg-type]
+    "place(row)": lambda x: TABLE.place(x),  # type: ignore[arg-type]
+    "with_cell(row)": lambda x: TABLE.with_cell(x, "speed", "1"),  # type: ignore[arg-type]
+    "with_cell(column)": lambda x: TABLE.with_cell(0, x, "1"),  # type: ignore[arg-type]
+    "with_cell(text)": lambda x: TABLE.with_cell(0, "speed", x),  # type: ignore[arg-type]
+    "with_cells(edits)": lambda x: TABLE.with_cells(x),  # type: ignore[arg-type]
+    "with_cells(edits), one": lambda x: TABLE.with_cells([x]),  # type: ignore[list-item]
+    "with_rows(at)": lambda x: TABLE.with_rows(x, [{"Asset": "new"}]),  # type: ignore[arg-type]
+    "with_rows(rows)": lambda x: TABLE.with_rows(0, x),  # type: ignore[arg-type]
+    "with_rows(rows), one": lambda x: TABLE.with_rows(0, [x]),  # type: ignore[list-item]
+    "with_rows(rows), a cell": lambda x: TABLE.with_rows(0, [{"Asset": x}]),  # type: ignore[dict-item]
+    "with_rows_taken(rows)": lambda x: TABLE.with_rows_taken(x),  # type: ignore[arg-type]
+    "with_rows_taken(rows), one": lambda x: TABLE.with_rows_taken([x]),  # type: ignore[list-item]
+    "compile(tables)": lambda x: Table.from_columns({"A": ["@inner"]}).compile(x),  # type: ignore[arg-type]
+    "compile(tables), one": lambda x: Table.from_columns({"A": ["@inner"]}).compile({"inner": x}),  # type: ignore[dict-item]
+    "open(path)": lambda x: cdb.CompiledTable.open(x),  # type: ignore[arg-type]
+    "save(path)": lambda x: isinstance(x, (str, Path)) or TABLE.save(x),  # type: ignore[arg-type]
+    "save(path), compiled": lambda x: isinstance(x, (str, Path)) or COMPILED.save(x),  # type: ignore[arg-type]
+    "way(row)": lambda x: COMPILED.way(x),  # type: ignore[arg-type]
+    "query(context)": lambda x: COMPILED.query(x),  # type: ignore[arg-type]
+    "query(unknown)": lambda x: COMPILED.query({}, x),  # type: ignore[arg-type]
+    "query(actors)": lambda x: COMPILED.query(PLAIN, actors=x),  # type: ignore[arg-type]
+    "query(prefer)": lambda x: COMPILED.query(PLAIN, actors=ACTORS, prefer=x),  # type: ignore[arg-type]
+    "query_many(contexts)": lambda x: list(COMPILED.query_many(x)),  # type: ignore[arg-type]
+    "query_many(unknown)": lambda x: COMPILED.query_many(MANY, x),  # type: ignore[arg-type]
+    "query_many(actors)": lambda x: COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=x),  # type: ignore[arg-type]
+    "query_many(actors), one": lambda x: COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=[x]),  # type: ignore[list-item]
+    "live(facts)": lambda x: COMPILED.live(x).matches(),  # type: ignore[arg-type]
+    "live(unknown)": lambda x: COMPILED.live({}, x),  # type: ignore[arg-type]
+    "live[name]": lambda x: COMPILED.live(FACTS)[x],  # type: ignore[index]
+    "live[name] =": lambda x: COMPILED.live(FACTS).__setitem__(x, 1.0),  # type: ignore[arg-type]
+    "live.update(facts)": lambda x: COMPILED.live(FACTS).update(x),  # type: ignore[arg-type]
+    "live.actors(actors)": lambda x: live_with(x).matches(),
+    "live.actors(prefer)": lambda x: live_with(ACTORS, x).matches(),
+    "encode(context)": lambda x: COMPILED.encode(x),  # type: ignore[arg-type]
+    "query_codes(codes)": lambda x: COMPILED.query_codes(x),  # type: ignore[arg-type]
+    "explain(context)": lambda x: COMPILED.explain(x),  # type: ignore[arg-type]
+    "explain(actors)": lambda x: COMPILED.explain(PLAIN, actors=x),  # type: ignore[arg-type]
+    "explain(unknown)": lambda x: COMPILED.explain({}, x),  # type: ignore[arg-type]
+    "pick(context)": lambda x: COMPILED.pick(x),  # type: ignore[arg-type]
+    "pick(rng)": lambda x: COMPILED.pick(FACTS, x),  # type: ignore[arg-type]
+    "pick(last)": lambda x: COMPILED.pick(FACTS, last=x),  # type: ignore[arg-type]
+    "pick(unknown)": lambda x: COMPILED.pick({}, unknown=x),  # type: ignore[arg-type]
+    "penalties(context)": lambda x: COMPILED.penalties(x),  # type: ignore[arg-type]
+    "penalties(unknown)": lambda x: COMPILED.penalties({}, x),  # type: ignore[arg-type]
+    "cell(text)": lambda x: COMPILED.query({**FACTS, "speed": cdb.cell(x)}),  # type: ignore[arg-type]
+    "matches.casting(row)": lambda x: CAST.casting(x),  # type: ignore[arg-type]
+    "matches.castings(row)": lambda x: CAST.castings(x),  # type: ignore[arg-type]
+    "matches.casting(row) without actors": lambda x: COMPILED.query(FACTS).casting(x),  # type: ignore[arg-type]
+    "in matches(row)": lambda x: x in CAST,
+    "many[context]": lambda x: ANSWERS[x],  # type: ignore[call-overload]
+    "many[context] with actors": lambda x: CAST_ANSWERS[x],  # type: ignore[call-overload]
+    "explanation[place]": lambda x: EXPLAINED[x],  # type: ignore[index]
+    "explanation.row(row)": lambda x: EXPLAINED.row(x),  # type: ignore[arg-type]
+    "explanation.row(row) with actors": lambda x: EXPLAINED_CAST.row(x),  # type: ignore[arg-type]
+    "explanation.asset(asset)": lambda x: EXPLAINED.asset(x),  # type: ignore[arg-type]
+    "explanation.nearest(most)": lambda x: EXPLAINED.nearest(x),  # type: ignore[arg-type]
+    "coverage(table)": lambda x: cdb.coverage(x),  # type: ignore[arg-type]
+    "coverage(seed)": lambda x: cdb.coverage(TABLE, seed=x, work=9, samples=9),  # type: ignore[arg-type]
+    "coverage(work)": lambda x: cdb.coverage(TABLE, work=x, samples=9),  # type: ignore[arg-type]
+    "coverage(samples)": lambda x: cdb.coverage(TABLE, samples=x, work=9),  # type: ignore[arg-type]
+    "coverage(max_gaps)": lambda x: cdb.coverage(TABLE, max_gaps=x, work=9, samples=9),  # type: ignore[arg-type]
+    "coverage(weights)": lambda x: cdb.coverage(TABLE, weights=x, work=9, samples=9),  # type: ignore[arg-type]
+    "coverage(impossible)": lambda x: cdb.coverage(TABLE, impossible=x, work=9, samples=9),  # type: ignore[arg-type]
+    **{f"a fact of {name}": lambda x, name=name: COMPILED.query({**FACTS, name: x}) for name in FACTS},  # type: ignore[misc]
+    **{f"a live fact of {name}": lambda x, name=name: COMPILED.live({**FACTS, name: x}).matches() for name in FACTS},  # type: ignore[misc]
+    **{f"many facts of {name}": lambda x, name=name: list(COMPILED.query_many({**MANY, name: [x]})) for name in FACTS},  # type: ignore[misc]
+}
+
+
+def live_with(actors: object, prefer: object = None) -> cdb.LiveContext:
+    live = COMPILED.live(PLAIN)
+    live.actors(actors, prefer)  # type: ignore[arg-type]
+    return live
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_wrong_argument_ends_in_an_error_that_says_what_was_wrong(name: str):
+    told = {}
+    for value in WRONG:
+        if (callable(value) and name.split("(")[-1] in FUNCTIONS) or (isinstance(value, np.ndarray) and "(unknown)" in name):
+            continue
+        with contextlib.suppress(cdb.ContextDBError):
+            try:
+                CALLS[name](value)
+            except Exception as error:
+                is_as_in_a_dict = "[name]" in name and "unhashable" in str(error)
+                if not isinstance(error, cdb.ContextDBError) and not is_as_in_a_dict:
+                    told[repr(value)] = f"{type(error).__name__}: {error}"
+    assert told == {}
+
+
+def test_every_public_method_is_asked_with_wrong_arguments():
+    api = (SAMPLES.parent / "docs" / "api.md").read_text(encoding="utf-8")
+    methods = re.findall(r"`(?:Project|Table|CompiledTable|Matches|LiveContext|Explanation)\.(\w+)\(\w", api)
+    assert len(methods) > 20
+    assert [n for n in methods if not any(f"{n}(" in call for call in CALLS)] == ["prepare"]  # which takes switches alone
+
+
+def test_a_seed_or_generator_that_is_none_is_refused_by_name():
+    with pytest.raises(cdb.ContextError, match=r"rng is of type str\. Accepted: a random.Random, a numpy.random.Generator"):
+        COMPILED.pick(FACTS, rng="x")  # type: ignore[arg-type]
+
+
+def test_an_asset_that_is_misspelt_is_refused_with_the_nearest():
+    with pytest.raises(cdb.ContextError) as caught:
+        EXPLAINED.asset("wlak")
+    assert str(caught.value) == 'the table "table" has no asset "wlak". Accepted: "walk", "run". Did you mean "walk"?'
+
+
+@pytest.mark.parametrize("row", [2, -1, 999])
+@pytest.mark.parametrize("explained", [EXPLAINED, EXPLAINED_CAST])
+def test_a_row_that_the_table_does_not_have_is_no_row_counted_from_the_end(explained: cdb.Explanation, row: int):
+    with pytest.raises(IndexError) as caught:
+        explained.row(row)
+    assert str(caught.value) == f"there is no row {row}. Accepted: rows 0 to 1."
+
+
+def test_a_folder_is_told_from_a_table_and_only_tables_are_suggested(tmp_path: Path):
+    for name in ("contested_catch.csv", "contested_catch.cases.csv", ".hidden.csv"):
+        (tmp_path / name).write_text("Asset\na\n", encoding="utf-8")
+    with pytest.raises(cdb.FileError) as caught:
+        cdb.load(tmp_path)
+    assert "cases" not in str(caught.value)
+    assert "contested_catch.csv" in str(caught.value)
+
+
+def test_settings_name_the_table():
+    assert Table.from_columns({"A": ["a"]}, settings=TableSettings("passes")).name == "passes"
+    assert Table.from_columns({"A": ["a"]}, settings=TableSettings("passes"), name="other").name == "other"
+    assert Table.from_columns({"A": ["a"]}).name == "table"

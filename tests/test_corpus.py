@@ -1,0 +1,31 @@
+"""What `make fuzz` once found stays mended: every file of the corpus is read, or refused in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from fuzz import BATCH, CORPUS, batch, input_of
+from fuzz_readers import READERS, examples, read_bytes
+
+FILES = sorted(path for path in CORPUS.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_a_file_of_the_corpus_is_read_or_refused(path: Path):
+    read_bytes(path.parent.name, path.read_bytes())
+
+
+def test_every_folder_of_the_corpus_has_its_reader():
+    assert {path.parent.name for path in FILES} <= READERS.keys()
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_reader_reads_its_whole_examples_and_some_damaged_ones(reader: str):
+    for raw in (*examples(reader), *(input_of(reader, seed) for seed in range(15))):
+        read_bytes(reader, raw)
+
+
+def test_a_seed_means_one_input_and_a_batch_finds_nothing_in_a_sound_reader():
+    assert input_of("cells", 7) == input_of("cells", 7) != input_of("cells", 8)
+    assert batch("journal", 0) == (BATCH, [])

@@ -1,0 +1,132 @@
+"""`contextdb verify`: a flipped bit in any file of ours is found, and files that hold no digest are said to hold none."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from running import ROOT, run
+
+import contextdb as cdb
+from contextdb import motion
+from contextdb.disk import write_atomic
+from contextdb.journal_lines import line_of
+from contextdb.motion.storage.stored import save_database
+
+TABLE = {"Asset": ["walk", "run"], "speed": ["0..4", "Any"]}
+SCHEMA = {"speed": {"type": "number", "min": 0, "max": 10}}
+
+
+def compiled(path: Path) -> None:
+    cdb.Table.from_columns(TABLE, SCHEMA).compile().save(path)
+
+
+def table(path: Path) -> None:
+    cdb.Table.from_columns(TABLE, SCHEMA).save(path)
+
+
+def database(path: Path) -> None:
+    features = motion.MotionDatabase.from_features([[0.0, 1.0], [1.0, 0.0], [0.5, 0.5]], [0, 2], [2, 3], ["walk", "run"])
+    save_database(features, path)
+
+
+def session(path: Path) -> None:
+    motion.Trace().save(path)
+
+
+def report(path: Path) -> None:
+    folder = path.parent / "tables"
+    folder.mkdir(exist_ok=True)
+    (folder / "t.csv").write_text("Asset,speed\nwalk,0..4\n", encoding="utf-8")
+    assert run("coverage", str(folder), "--format", "json", "-o", str(path)).code == 0
+
+
+def journal(path: Path) -> None:
+    write_atomic(path, line_of({"format": 1, "file": "t.csv"}) + line_of({"do": {"name": "x"}}) + line_of({"go": 0}))
+
+
+MAKERS: dict[str, Callable[[Path], None]] = {
+    "t.safetensors": compiled,
+    "t.parquet": table,
+    "jog.motion.safetensors": database,
+    "session.parquet": session,
+    "coverage.json": report,
+    "t.csv.journal": journal,
+}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made")
+    for name, make in MAKERS.items():
+        make(folder / name)
+    return folder
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_a_file_as_it_was_written_is_whole(name: str, made: Path):
+    result = run("verify", str(made / name), "--json")
+    assert (result.code, result.json["format"], [f["state"] for f in result.json["files"]]) == (0, 1, ["whole"])
+
+
+@pytest.mark.parametrize("name", MAKERS)
+@given(data=st.data())
+@settings(max_examples=40)
+def test_no_flipped_bit_passes_as_whole_unless_it_changes_nothing(name: str, data: st.DataObject, made: Path, tmp_path_factory):
+    raw = bytearray((made / name).read_bytes())
+    bit = data.draw(st.integers(0, 8 * len(raw) - 1))
+    raw[bit // 8] ^= 1 << bit % 8
+    altered = tmp_path_factory.mktemp("altered") / name
+    altered.write_bytes(raw)
+    result = run("verify", str(altered), "--json")
+    (verdict,) = result.json["files"]
+    if verdict["state"] == "whole":
+        assert name == "coverage.json"
+        assert json.loads(raw) == json.loads((made / name).read_text(encoding="utf-8"))
+    else:
+        assert result.code == (verdict["state"] == "damaged")
+
+
+def test_a_folder_is_looked_through_and_a_damaged_file_in_it_exits_with_1(made: Path, tmp_path: Path):
+    shutil.copytree(made, tmp_path / "all")
+    assert run("verify", str(tmp_path / "all")).code == 0
+    raw = (tmp_path / "all/t.parquet").read_bytes()
+    (tmp_path / "all/t.parquet").write_bytes(raw[:40] + bytes([raw[40] ^ 4]) + raw[41:])
+    result = run("verify", str(tmp_path / "all"))
+    assert result.code == 1
+    assert [line.split()[1:2] for line in result.lines if line.startswith("DAMAGED")] == [[str(tmp_path / "all/t.parquet")]]
+
+
+def test_tables_in_csv_are_readable_and_hold_no_digest():
+    result = run("verify", str(ROOT / "tables/locomotion.csv"))
+    assert result.code == 0
+    assert result.out.startswith("readable  ")
+    assert "hold no digest" in result.out
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("README.md", "not a file of contextdb"), ("nowhere.json", "no such file"), (".ci", "holds no file of contextdb")],
+)
+def test_what_is_no_file_of_ours_exits_with_2(name: str, said: str):
+    result = run("verify", str(ROOT / name))
+    assert (result.code, said in result.err) == (2, True)
+
+
+def test_a_document_of_another_program_is_neither_whole_nor_damaged(tmp_path: Path):
+    (tmp_path / "package.json").write_text('{"name": "x"}', encoding="utf-8")
+    result = run("verify", str(tmp_path / "package.json"), "--json")
+    assert (result.code, result.json["files"][0]["state"]) == (0, "no-digest")
+
+
+def test_a_journal_with_an_altered_line_says_how_many_edits_are_lost(tmp_path: Path):
+    journal(tmp_path / "t.csv.journal")
+    raw = (tmp_path / "t.csv.journal").read_bytes().replace(b'"x"', b'"y"')
+    (tmp_path / "t.csv.journal").write_bytes(raw)
+    result = run("verify", str(tmp_path / "t.csv.journal"))
+    assert (result.code, "line 2 is altered, and 2 lines cannot be used" in result.out) == (1, True)

@@ -178,7 +178,7 @@ def test_a_table_of_the_baseline_that_is_gone_fails_unless_it_is_named(name: str
     Path(f"tables/{name}.csv").rename("tables/dash.csv")
     result = run("coverage", "tables", "--baseline", "before.json", "--max-drop", "100")
     assert result.code == 1
-    assert f'FAILED  gone  the table "{name}" of the baseline is not there any more. New since the baseline: "dash".' in folded(
+    assert f'FAILED gone the table "{name}" of the baseline is not there any more. New since the baseline: "dash".' in folded(
         result.out
     )
     assert "1 of 2 bars missed." in result.out

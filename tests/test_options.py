@@ -15,7 +15,7 @@ SAID = re.compile(r"\(default(?:: (.+?))?\)|; default: (.+?)\)")
 COMPUTED = {
     "beside each table", "the sample tables", "those that came with contextdb", "tables/, or here", "told from its bytes",
     "told from the file", "told from the cells", "OURS", "beside contextdb.toml", "the features' rate", "the clip's own path",
-    "contextdb, or the Python that runs now",
+    "contextdb, or the Python that runs now", "where they were", "whole, but in our own workbooks",
 }  # fmt: skip
 """What is worked out by the command: the parsed value is then None."""
 

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", metavar="DST", help="the file to write; - for standard output")
     names = [name for name, one in FORMATS.items() if one.is_written]
     parser.add_argument("--as", dest="format", metavar="FORMAT", choices=names, help=f"the format of DST: {', '.join(names)}")
-    told = "cells of CSV and TSV that a spreadsheet may run as formulas: named (tell, default), kept, or with ' before each (quote)"
+    told = "cells of CSV and TSV that a spreadsheet may run as formulas: named, kept, or with ' before each (default: tell)"
     parser.add_argument("--formulas", choices=("tell", "keep", "quote"), default="tell", help=told)
     parser.add_argument("--force", action="store_true", help="write over a file that is there")
 

@@ -23,7 +23,7 @@ def table_of(*rows: tuple[str, str, str], policy: str = "collect") -> Table:
 
 def change(before: Table, after: Table) -> Change:
     document = json.dumps({"format": 1, "tables": [coverage(before).to_json()]})
-    return compared(opened(after), coverage(after), read_baseline(document, "b.json")["table"])
+    return compared(opened(after), coverage(after), read_baseline(document, "b.json")["t"])
 
 
 WALK, RUN = ("walk", "0..4", "Walk"), ("run", "4..10", "Run")
@@ -73,7 +73,7 @@ def test_rows_that_died_since_are_told_and_those_dead_before_are_not():
 def test_gaps_over_a_condition_that_is_gone_are_closed():
     document = coverage(table_of(WALK)).to_json()
     plain = Table.from_columns({"Asset": ["walk"], "speed": ["0..4"]}, SCHEMA, TableSettings("t"))
-    earlier = read_baseline(json.dumps({"format": 1, "tables": [document]}), "b.json")["table"]
+    earlier = read_baseline(json.dumps({"format": 1, "tables": [document]}), "b.json")["t"]
     found = compared(opened(plain), coverage(plain), earlier)
     assert [gap.cells for gap in found.closed] == [{"gait": "Run"}]
 

@@ -193,7 +193,7 @@ def test_crowded_contexts_name_the_rows_that_are_valid_at_once():
 def test_rows_that_are_too_many_are_listed_and_enter_goes_there():
     app, screen = shown(keys=("4", "enter"))
     assert "shares contexts: variety" in screen
-    assert "row 2 Anim_1: row 2" in screen
+    assert 'row 2 Anim_1: row 3 ("Anim_2") is valid only where this row is valid too.' in screen
     assert app.told == [GoToCell(1)]
 
 

@@ -16,11 +16,11 @@ from contextdb import edits
 from contextdb.disk import staged
 from contextdb.errors import ContextDBError, FileError, TableError
 from contextdb.folder_lock import temporary_name
+from contextdb.journal_lines import line_of
 from contextdb.parquet import rewritten_parquet
 from contextdb.source import read_csv
 from contextdb.table import Table, load
 from tui.model import session as session_module
-from tui.model.journal import _line as line_of
 from tui.model.journal import journal_path
 from tui.model.lock import Holder, Lock
 from tui.model.session import MERGE_NAME, OnDisk, Session, bytes_for

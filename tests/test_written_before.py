@@ -1,0 +1,89 @@
+"""Files that the version before the packages wrote: each still opens, and says what it said then.
+
+`tests/written_before` holds a project, its compiled table, a table in Parquet, a report of coverage, the journal of an editor
+that was killed, a motion database and a recorded session; `said.json` holds what that version itself read in them.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running import ROOT, run
+
+import contextdb as cdb
+from contextdb.motion.storage.stored import open_database
+from tui.model.session import Session
+
+WRITTEN = ROOT / "tests/written_before"
+CONTEXTS: list[dict[str, Any]] = [
+    {"stance": "Stand", "speed": 1.0, "heading": 175.0, "tags": ["wet"], "tired": False, "armed": True},
+    {"stance": "Crouch", "speed": 4.5, "heading": -175.0, "tags": [], "tired": True, "armed": False},
+    {"stance": "Air", "speed": 9.0, "heading": 0.0, "tags": ["wet", "night"], "tired": False, "armed": True},
+    {"stance": "Stand", "speed": 6.0, "heading": 90.0, "tags": ["night"], "tired": True, "armed": True},
+]
+
+
+def compiled(folder: Path) -> Any:
+    table = cdb.CompiledTable.open(folder / "moves.safetensors")
+    told = []
+    for context in CONTEXTS:
+        why = {row.asset: [[f.condition, f.cell] for f in row.failures] for row in table.explain(context)}
+        told.append([table.query(context).assets, why, table.penalties(context).tolist(), table.pick(context, 7)])
+    return told
+
+
+def parquet(folder: Path) -> Any:
+    table = cdb.load(folder / "dive.parquet")
+    return [
+        run("verify", str(folder / "dive.parquet"), "--json").json["files"][0]["state"],
+        table.assets,
+        *map(list, table.columns),
+    ]
+
+
+def baseline(folder: Path) -> Any:
+    result = run("coverage", str(folder / "moves.csv"), "--baseline", str(folder / "coverage.json"), "--format", "json")
+    (table,) = result.json["tables"]
+    return [result.code, *(table["covered"][key] for key in ("value", "lower", "upper")), table["baseline"]]
+
+
+def journal(folder: Path) -> Any:
+    home = folder / ".contextdb-journal"
+    home.mkdir()
+    shutil.copy(folder / "moves.csv.journal", home)
+    session = Session(folder / "moves.csv")
+    return [session.sheet.history.names, [list(column) for column in session.sheet.table.columns]]
+
+
+def database(folder: Path) -> Any:
+    frames = open_database(folder / "walk.database.safetensors")
+    hits = [frames.search(frames.raw(frame)) for frame in (40, 100)]
+    return [[hit.asset, hit.frame, round(hit.cost, 9)] for hit in hits]
+
+
+def trace(folder: Path) -> Any:
+    decisions = run("motion", "replay", str(folder / "session.parquet"), "--json").json["decisions"]
+    return [[d[key] for key in ("time_s", "action", "playing", "cost", "context", "root_motion")] for d in decisions[::6]]
+
+
+READERS: dict[str, Callable[[Path], Any]] = {
+    read.__name__: read for read in (compiled, parquet, baseline, journal, database, trace)
+}
+
+
+def what_is_said(name: str, folder: Path) -> Any:
+    """What a file says, as JSON has it."""
+    return json.loads(json.dumps(READERS[name](folder)))
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_file_written_before_the_packages_says_what_it_said(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    shutil.copytree(WRITTEN, tmp_path / "game")
+    monkeypatch.chdir(tmp_path)
+    said = json.loads((WRITTEN / "said.json").read_text(encoding="utf-8"))
+    assert what_is_said(name, Path("game")) == said[name]

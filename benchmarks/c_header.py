@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from benchmarks import generator, ours, timing
 from benchmarks.sections import print_aligned
-from contextdb.c_face import c_header_of
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.c_header import c_header_of
+from contextdb.compiled.table import CompiledTable
 
 N_CONTEXTS = 2000
 C_ROUNDS = 10

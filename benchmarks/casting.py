@@ -24,8 +24,8 @@ if __package__ in (None, ""):
 import contextdb as cdb
 from benchmarks import timing
 from benchmarks.sections import print_aligned
-from contextdb.cells import Cell
-from contextdb.compiled import CompiledTable
+from contextdb.cells.grammar import Cell
+from contextdb.compiled.table import CompiledTable
 
 N_ROWS, N_ACTORS = 1_000, 22
 ROLES = ("Defender", "Receiver", "Thrower")

@@ -28,10 +28,10 @@ import polars as pl
 import contextdb as cdb
 from benchmarks import generator, timing
 from benchmarks.sections import print_aligned
-from contextdb.changes import Cells
-from contextdb.diff import diff, merge
-from contextdb.edits import Edit
-from contextdb.table import Table
+from contextdb.edits.diffing import diff, merge
+from contextdb.edits.edits import Edit
+from contextdb.tables.changes import Cells
+from contextdb.tables.table import Table
 
 FULL = generator.Shape("100,000 x 60", 100_000, 36, 12, 12)
 QUICK = generator.Shape("10,000 x 60", 10_000, 36, 12, 12)

@@ -26,8 +26,8 @@ import numpy as np
 
 from benchmarks import generator, timing
 from benchmarks.sections import print_aligned
-from contextdb.project import Project
-from contextdb.watching import Watch, watch
+from contextdb.tables.project import Project
+from contextdb.tables.watching import Watch, watch
 
 
 class Edited:

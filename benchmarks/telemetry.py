@@ -33,7 +33,7 @@ if __package__ in (None, ""):
 
 from benchmarks.coverage_tables import made_table
 from benchmarks.telemetry_peers import with_duckdb, with_polars
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 FILE_ROWS = 1_000_000
 N_COMMON = 50_000

@@ -12,9 +12,9 @@ from typing import Any
 
 import polars as pl
 
-from contextdb.cells import NumberSet, ValueSet
-from contextdb.conditions import Condition
-from contextdb.table import Table
+from contextdb.cells.conditions import Condition
+from contextdb.cells.grammar import NumberSet, ValueSet
+from contextdb.tables.table import Table
 
 
 def table_frame(table: Table) -> tuple[pl.DataFrame, str]:

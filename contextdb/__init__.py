@@ -15,8 +15,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from contextdb.batch import ManyMatches
-    from contextdb.compiled import CompiledTable
+    from contextdb.cells.facts import cell
+    from contextdb.compiled.batch import ManyMatches
+    from contextdb.compiled.explain import Explanation, Failure, RowExplanation
+    from contextdb.compiled.live import LiveContext
+    from contextdb.compiled.matches import Matches
+    from contextdb.compiled.table import CompiledTable
     from contextdb.covering import CoverageReport, Gap, coverage
     from contextdb.errors import (
         ArtefactError,
@@ -36,20 +40,16 @@ if TYPE_CHECKING:
         SchemaError,
         TableError,
     )
-    from contextdb.explain import Explanation, Failure, RowExplanation
-    from contextdb.facts import cell
     from contextdb.findings import Finding
-    from contextdb.live import LiveContext
-    from contextdb.matches import Matches
-    from contextdb.project import Project
-    from contextdb.table import Table, load
-    from contextdb.watching import watch
+    from contextdb.tables.project import Project
+    from contextdb.tables.table import Table, load
+    from contextdb.tables.watching import watch
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "batch": ("ManyMatches",),
-    "compiled": ("CompiledTable",),
+    "compiled.batch": ("ManyMatches",),
+    "compiled.table": ("CompiledTable",),
     "covering": ("CoverageReport", "Gap", "coverage"),
     "errors": (
         "ArtefactError",
@@ -69,14 +69,14 @@ _HOMES = {
         "SchemaError",
         "TableError",
     ),
-    "explain": ("Explanation", "Failure", "RowExplanation"),
-    "facts": ("cell",),
+    "compiled.explain": ("Explanation", "Failure", "RowExplanation"),
+    "cells.facts": ("cell",),
     "findings": ("Finding",),
-    "live": ("LiveContext",),
-    "matches": ("Matches",),
-    "project": ("Project",),
-    "table": ("Table", "load"),
-    "watching": ("watch",),
+    "compiled.live": ("LiveContext",),
+    "compiled.matches": ("Matches",),
+    "tables.project": ("Project",),
+    "tables.table": ("Table", "load"),
+    "tables.watching": ("watch",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -17,9 +17,9 @@ from types import ModuleType
 from typing import IO, Any, NoReturn
 
 from contextdb.console import drop_output, printable
+from contextdb.disk.together import UnfinishedWarning
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
 from contextdb.exit_codes import ExitCode
-from contextdb.together import UnfinishedWarning
 
 COMMANDS = {
     "edit": "the terminal editor",

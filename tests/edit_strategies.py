@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from contextdb import edits
-from contextdb.edits import Edit
-from contextdb.table import Table
+from contextdb.edits import edits
+from contextdb.edits.edits import Edit
+from contextdb.tables.table import Table
 
 TEXTS = [
     "Any",

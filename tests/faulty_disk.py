@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from contextdb import disk, folder_lock, together
+from contextdb import disk
+from contextdb.disk import folder_lock, together
 from tui.model import journal, lock
 
 WRITERS: tuple[ModuleType, ...] = (disk, folder_lock, together, journal, lock)

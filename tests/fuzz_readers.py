@@ -19,14 +19,14 @@ from running import ROOT, run
 
 import contextdb as cdb
 from contextdb import motion
-from contextdb.cells import parse_cell
-from contextdb.conditions import Condition
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.grammar import parse_cell
 from contextdb.covering.baseline import read_baseline
-from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, write
 from contextdb.expressions import read_expression
-from contextdb.journal_lines import line_of
+from contextdb.files.journal_lines import line_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage.stored import open_database, save_database
 from tui.model.journal import journal_path, recover

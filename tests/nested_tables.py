@@ -9,10 +9,10 @@ import oracles
 import strategies
 from hypothesis import strategies as st
 
-from contextdb.conditions import Condition
-from contextdb.domains import KINDS
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.table import Table
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import KINDS
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.table import Table
 
 NAMES = ("outer", "dive", "low")
 Way = Sequence[tuple[Table, int]]

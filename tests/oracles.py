@@ -3,8 +3,8 @@
 Of contextdb only the data that a table is made of is used: texts, and what is declared of a condition. How cells are read, the
 intervals, the classes and the masks are done again here, slowly, with regular expressions and comparisons: their faults show.
 
-A fact is here as `contextdb.facts` would have it: bool, float, str or frozenset of tags; None is missing; a list holds the values
-of a set-valued fact.
+A fact is here as `contextdb.cells.facts` would have it: bool, float, str or frozenset of tags; None is missing; a list holds the
+values of a set-valued fact.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 
-from contextdb.domains import Domain
-from contextdb.table import Table
+from contextdb.cells.domains import Domain
+from contextdb.tables.table import Table
 
 Plain = bool | float | str | frozenset[str] | None
 Interval = tuple[float, bool, float, bool]

@@ -13,11 +13,11 @@ import oracles
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from contextdb.conditions import Condition
-from contextdb.domains import KINDS, Domain
-from contextdb.facts import cell
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.table import Table
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import KINDS, Domain
+from contextdb.cells.facts import cell
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.table import Table
 
 NAMES = ["CB", "FS", "Half Back", "Any", "not", "5", "-", 'say "no"', "A~2", "Move.Run", "a:b/c-d", "Größe", "1..2", "-x", "inf"]
 TAGS = ["InAir", "Move", "Move.Run", "Move.Run.Fast", "Moved", "Half Way"]

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import contextdb as cdb
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 
 CONDITIONS = {
     "speed": {"type": "number"},

@@ -21,12 +21,12 @@ from hypothesis import strategies as st
 from safetensors import safe_open
 from safetensors.numpy import save as as_safetensors
 
-from contextdb.classes import FLAT_BYTES, NumberMasks, TagMasks, ValueMasks, WideMasks
-from contextdb.compiled import CompiledTable
+from contextdb.cells.facts import cell
+from contextdb.compiled.classes import FLAT_BYTES, NumberMasks, TagMasks, ValueMasks, WideMasks
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ArtefactError, FileError
-from contextdb.facts import cell
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 
 COLUMNS = pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0], ids=["flat", "wide"])
 """How number columns are kept: in flat masks, or all of them in two digits as very long ones are."""
@@ -59,7 +59,7 @@ CONTEXT = {"ok": True, "n": 3, "speed": 21.5, "heading": -175, "state": "Ground"
 def full_table(flat_bytes: int = FLAT_BYTES) -> CompiledTable:
     """A table of every kind of column, with soft cells and a disabled row."""
     settings = TableSettings("names ünd 表", enabled="On", priority="P", weight="W", fallback="idle ☂", policy="priority")
-    with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
         return Table.from_columns(ROWS, SCHEMA, settings, settings.name).compile()
 
 
@@ -94,7 +94,7 @@ def patched_failure(name: str, code: int) -> Iterator[None]:
 @COLUMNS
 @given(strategies.tables(), st.data())
 def test_an_opened_table_answers_as_the_saved_one(tmp_path_factory, flat_bytes: int, table: Table, data: st.DataObject):
-    with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
         before = table.compile()
     after = CompiledTable.open(saved(before, tmp_path_factory.getbasetemp()))
     context, _ = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
@@ -112,7 +112,7 @@ def test_an_opened_table_answers_as_the_saved_one(tmp_path_factory, flat_bytes: 
 def test_an_opened_table_answers_many_contexts_as_the_saved_one(
     tmp_path_factory, flat_bytes: int, table: Table, data: st.DataObject
 ):
-    with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
         before = table.compile()
     after = CompiledTable.open(saved(before, tmp_path_factory.getbasetemp()))
     contexts = [data.draw(strategies.contexts(table))[0] for _ in range(3)]

@@ -19,13 +19,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import contextdb
-from contextdb import batch, bitmask, kernels
-from contextdb.batch import ManyMatches
-from contextdb.classes import FLAT_BYTES
-from contextdb.compiled import CompiledTable
-from contextdb.domains import NUMERIC, Domain
+from contextdb import bitmask
+from contextdb.cells.domains import NUMERIC, Domain
+from contextdb.compiled import batch, kernels
+from contextdb.compiled.batch import ManyMatches
+from contextdb.compiled.classes import FLAT_BYTES
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 ENGINES = pytest.mark.parametrize("engine", [kernels, None], ids=["numba", "numpy"])
 COLUMNS = pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0, 100], ids=["flat", "wide", "mixed"])
@@ -35,7 +36,10 @@ N_CONTEXTS = [0, 1, 2, 127, 128, 129, 300]
 @contextmanager
 def using(engine: object, flat_bytes: int = FLAT_BYTES) -> Iterator[None]:
     """With or without the compiled kernels, however little the work; number columns whose masks take more bytes are wide."""
-    with mock.patch.object(batch, "load_kernels", return_value=engine), mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+    with (
+        mock.patch.object(batch, "load_kernels", return_value=engine),
+        mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes),
+    ):
         yield
 
 
@@ -195,14 +199,14 @@ def test_no_contexts_have_no_answers(engine):
 
 def test_the_kernels_are_loaded_when_there_is_much_work_or_they_are_there_already(monkeypatch):
     assert batch.load_kernels(0) is kernels
-    monkeypatch.delitem(sys.modules, "contextdb.kernels")
+    monkeypatch.delitem(sys.modules, "contextdb.compiled.kernels")
     assert batch.load_kernels(batch.MUCH_WORK - 1) is None
     assert batch.load_kernels(batch.MUCH_WORK) is not None
 
 
 def test_without_numba_numpy_answers(monkeypatch):
-    monkeypatch.delattr(contextdb, "kernels")
-    monkeypatch.setitem(sys.modules, "contextdb.kernels", None)
+    monkeypatch.delattr(contextdb.compiled, "kernels")
+    monkeypatch.setitem(sys.modules, "contextdb.compiled.kernels", None)
     assert batch.load_kernels() is None
     compiled = big_table().compile()
     context = {"speed": 3, "state": "CB", "tags": []}

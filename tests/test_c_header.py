@@ -21,16 +21,16 @@ from hypothesis import strategies as st
 from nested_tables import Nest, nests
 from strategies import contexts, examples, tables
 
-from contextdb.c_face import c_header_of
-from contextdb.c_face.face import choices_of, face_of, names_left
-from contextdb.c_face.spelling import Names
-from contextdb.compiled import CompiledTable
-from contextdb.conditions import Condition
-from contextdb.domains import KINDS, wrap_angle
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import KINDS, wrap_angle
+from contextdb.compiled.c_header import c_header_of
+from contextdb.compiled.c_header.face import choices_of, face_of, names_left
+from contextdb.compiled.c_header.spelling import Names
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError
-from contextdb.project import Project
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.project import Project
+from contextdb.tables.table import Table
 
 ROOT = Path(__file__).parent.parent
 UNKNOWN = ("error", "any", "never")
@@ -208,7 +208,7 @@ def test_a_hundred_thousand_random_contexts_are_answered_as_python_answers_them(
     rng = random.Random(6)
     n_answered = n_valid = 0
     for flat_bytes, n_rows in ((2 << 20, 1), (0, 70), (2 << 20, 70), (0, 600), (2 << 20, 1100), (2 << 20, 64)):
-        with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+        with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
             names = rng.sample(list(SCHEMA), 8 if n_rows == 70 else 4)
             compiled = random_table(rng, n_rows, names)
         moments = [random_moment(rng, names) for _ in range(17_000)]
@@ -228,7 +228,7 @@ def test_a_table_of_any_kind_is_answered_as_python_answers_it(
     ask: Path, tmp_path_factory: pytest.TempPathFactory, table: Table, is_wide: bool, data: st.DataObject
 ):
     folder = tmp_path_factory.mktemp("any")
-    with mock.patch("contextdb.classes.FLAT_BYTES", 0 if is_wide else 2 << 20):
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", 0 if is_wide else 2 << 20):
         compiled = table.compile()
     moments, answers = assert_as_in_python(ask, folder, compiled, table, data)
     for (unknown, facts), (said, rows) in zip(moments, answers, strict=True):
@@ -281,7 +281,7 @@ def test_options_that_take_nan_and_infinity_for_granted_change_no_answer(tmp_pat
     fast = built(PROGRAMS / "ask.c", tmp_path / "fast.exe", C, "-O2", "-ffast-math")
     rng = random.Random(8)
     for flat_bytes in (0, 2 << 20):
-        with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+        with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
             compiled = random_table(rng, 130)
         moments = [random_moment(rng, SCHEMA, 0.1) for _ in range(500)]
         expected = [python_says(compiled, *moment) for moment in moments]
@@ -346,7 +346,7 @@ def test_thousands_of_damaged_files_are_refused_or_answered_and_never_crash_it(
     ask: Path, tmp_path: Path, flat_bytes: int, make: Callable[[random.Random, int], CompiledTable]
 ):
     rng = random.Random(flat_bytes)
-    with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
         compiled = make(rng, 70)
     whole = artefact(compiled, tmp_path)
     damaged = [mutated(rng, whole) for _ in range(3_000)]

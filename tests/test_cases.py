@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.cases import Case, cases_path, check_cases, delete_case, exactly, judge, keep_case, read_cases, rename_case
+from contextdb.checks.cases import Case, cases_path, check_cases, delete_case, exactly, judge, keep_case, read_cases, rename_case
 from contextdb.errors import TableError
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 SCHEMA = {"speed": {"type": "number"}, "hit": {"type": "bool"}}
 ROWS = {"Asset": ["walk", "run", "Half Way", "+odd"], "speed": ["0..2", "2..6", "Any", "9"], "hit": ["True", "Any", "False", "Any"]}
@@ -192,7 +192,7 @@ def test_a_condition_with_a_name_that_the_file_uses_itself_is_refused(tmp_path: 
 
 
 def test_a_case_that_somebody_else_keeps_in_the_same_moment_is_not_lost(tmp_path, monkeypatch):
-    from contextdb import cases
+    from contextdb.checks import cases
 
     path, real = tmp_path / "t.cases.csv", cases.new_source
     keep_case(path, Case("one", {"speed": "1"}, "walk"))

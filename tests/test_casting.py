@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import contextdb as cdb
 from contextdb.errors import ContextError
-from contextdb.schema import TableSettings
+from contextdb.schema.settings import TableSettings
 
 ROLES = ("Defender", "Receiver", "Thrower", "Judge")
 SLOTS = ("Mandatory_Slots", "Optional_Slots")

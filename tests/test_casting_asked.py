@@ -9,7 +9,7 @@ import pytest
 import contextdb as cdb
 from contextdb.cli import main
 from contextdb.errors import ContextError
-from contextdb.schema import TableSettings
+from contextdb.schema.settings import TableSettings
 
 SCHEMA = {
     "down": {"type": "int"},

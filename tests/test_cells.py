@@ -13,10 +13,10 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.cells import Cell, NumberSet, TagSet, ValueSet, format_cell, parse_cell
-from contextdb.domains import ANGLE, BOOL, INT, KINDS, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.domains import ANGLE, BOOL, INT, KINDS, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, format_cell, parse_cell
+from contextdb.cells.intervals import CIRCLE, arc, complement, union
 from contextdb.errors import CellError, Fault, in_quotes
-from contextdb.intervals import CIRCLE, arc, complement, union
 
 CELLS = Path(__file__).with_name("cells.csv")
 HEADER = ["rule", "type", "declared", "cell", "matches", "fails", "same as", "refused because", "did you mean"]

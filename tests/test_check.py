@@ -10,13 +10,13 @@ import pytest
 import strategies
 from hypothesis import given
 
-from contextdb import check as check_module
-from contextdb.check import check
+from contextdb.checks import run as check_module
+from contextdb.checks.run import check
 from contextdb.errors import Place
 from contextdb.findings import Finding, worst
-from contextdb.project import Project, load_table
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.project import Project, load_table
+from contextdb.tables.table import Table
 
 ROOT = Path(__file__).parent.parent
 TYPES = """

@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb import bitmask
-from contextdb.cells import Cell, parse_cell
-from contextdb.classes import NumberMasks, TagMasks, ValueMasks, WideMasks, column_masks
-from contextdb.conditions import Condition
-from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
-from contextdb.facts import cell, read_fact
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.facts import cell, read_fact
+from contextdb.cells.grammar import Cell, parse_cell
+from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks, column_masks
 
 DEPTH = Domain("enum", ("CB", "FS", "SS"))
 Masks = ValueMasks | NumberMasks | WideMasks | TagMasks
@@ -112,7 +112,7 @@ def test_a_cell_that_holds_everything_in_other_words_is_not_any_for_a_missing_fa
 def test_a_wide_column_answers_what_a_flat_one_does(domain, data):
     texts = data.draw(st.lists(strategies.cells(domain), min_size=1, max_size=12))
     flat = column(domain, *texts)
-    with mock.patch("contextdb.classes.FLAT_BYTES", 0):
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", 0):
         wide = column(domain, *texts)
     assert isinstance(flat, NumberMasks)
     assert isinstance(wide, WideMasks)

@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 from running import ROOT, Result, run
 
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.table import CompiledTable
 
 TOML = '[conditions.speed]\ntype = "number"\n[tables.running]\nfile = "run.csv"\n[tables.jog]\n'
 

@@ -19,13 +19,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import contextdb as cdb
-from contextdb import batch, bitmask, kernels
-from contextdb.classes import FLAT_BYTES, NumberMasks, WideMasks
-from contextdb.compiled import CompiledTable
+from contextdb import bitmask
+from contextdb.cells.facts import cell
+from contextdb.compiled import batch, kernels
+from contextdb.compiled.classes import FLAT_BYTES, NumberMasks, WideMasks
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError, TableError
-from contextdb.facts import cell
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 
 COLUMNS = pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0, 100], ids=["flat", "wide", "mixed"])
 """How number columns are kept: in flat masks, all of them in two digits as very long ones are, or some so and some so."""
@@ -36,7 +37,7 @@ UNKNOWN = st.sampled_from(["any", "never"])
 
 @contextmanager
 def keeping(flat_bytes: int) -> Iterator[None]:
-    with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
         yield
 
 

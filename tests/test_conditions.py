@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from contextdb.cells.conditions import Condition, infer_condition
+from contextdb.cells.domains import BOOL, NUMBER, TEXT
 from contextdb.columns import TextColumn
-from contextdb.conditions import Condition, infer_condition
-from contextdb.domains import BOOL, NUMBER, TEXT
-from contextdb.schema import EMPTY
-from contextdb.table import build_table
+from contextdb.schema.settings import EMPTY
+from contextdb.tables.table import build_table
 
 
 def inferred(*texts: str) -> str:

@@ -7,7 +7,7 @@ from running import run
 from contextdb.commands.demo_command import sample_folder
 from contextdb.commands.demo_teams import CATCH, cast_lines, players
 from contextdb.motion import RECIPES, Markup, load_bvh
-from contextdb.project import Project
+from contextdb.tables.project import Project
 
 
 def test_the_folder_it_keeps_is_a_project_with_clips_and_their_markup(tmp_path):

@@ -17,17 +17,17 @@ from hypothesis import strategies as st
 
 import contextdb as cdb
 from contextdb import bitmask
-from contextdb.cases import Case, judge
-from contextdb.cells import ANY
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import BOOL, NUMBER
+from contextdb.cells.facts import Fact
+from contextdb.cells.grammar import ANY
+from contextdb.checks.cases import Case, judge
 from contextdb.cli import main
-from contextdb.compiled import CompiledTable
-from contextdb.conditions import Condition
-from contextdb.domains import BOOL, NUMBER
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError, SchemaError
 from contextdb.expressions import derive
-from contextdb.facts import Fact
-from contextdb.schema import Schema, read_schema
-from contextdb.table import Table
+from contextdb.schema.settings import Schema, read_schema
+from contextdb.tables.table import Table
 
 CONDITIONS = """
 [conditions.speed]

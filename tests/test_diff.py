@@ -11,15 +11,15 @@ from edit_strategies import TEXTS, edits_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb import edits
-from contextdb.changes import Rows
 from contextdb.columns import TextColumn
-from contextdb.diff import Diff, diff
-from contextdb.edits import Edit
-from contextdb.rewrite import write_csv
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.source import read_csv
-from contextdb.table import Table, build_table
+from contextdb.edits import edits
+from contextdb.edits.diffing import Diff, diff
+from contextdb.edits.edits import Edit
+from contextdb.files.csv_rewrite import write_csv
+from contextdb.files.csv_source import read_csv
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.changes import Rows
+from contextdb.tables.table import Table, build_table
 
 NAMES = ["Asset", "speed", "hit", "Größe", "x,y"]
 RAW = 'Asset,speed,hit\nwalk,0..5,True\nrun,5..9,Any\njump,Any,False\ndive,"20, 9.99",True\n'

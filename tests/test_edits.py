@@ -11,17 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, tables
 
-from contextdb import edits
-from contextdb.conditions import Condition
-from contextdb.domains import Domain
-from contextdb.edits import Edit, edit_between
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
+from contextdb.edits import edits
+from contextdb.edits.edits import Edit, edit_between
+from contextdb.edits.history import History
 from contextdb.errors import SchemaError, TableError
-from contextdb.history import History
-from contextdb.rewrite import write_csv
-from contextdb.schema import EMPTY, TableSettings, read_schema
-from contextdb.sections import schema_to_dict
-from contextdb.source import read_csv
-from contextdb.table import Table, build_table
+from contextdb.files.csv_rewrite import write_csv
+from contextdb.files.csv_source import read_csv
+from contextdb.schema.sections import schema_to_dict
+from contextdb.schema.settings import EMPTY, TableSettings, read_schema
+from contextdb.tables.table import Table, build_table
 
 RAW = b'Asset Name,"speed",hit\r\nwalk,0..5,True\nrun,"5, 1", Any\r\n"a ""b""","Any",False\n'
 

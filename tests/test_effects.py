@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contextdb.cells import parse_cell
-from contextdb.effects import effects, merge_effects
-from contextdb.effects_boxes import meet
+from contextdb.cells.grammar import parse_cell
+from contextdb.checks.effects import effects, merge_effects
+from contextdb.checks.effects_boxes import meet
 from contextdb.errors import TableError
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 SCHEMA = {
     "air": {"type": "bool"},

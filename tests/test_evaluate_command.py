@@ -18,12 +18,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from running import ROOT, Result, run
 
+from contextdb.cells.facts import describe
 from contextdb.commands.evaluate_command import share
-from contextdb.contexts import read_contexts
 from contextdb.errors import ContextError
-from contextdb.facts import describe
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from contextdb.telemetry import evaluate_file
+from contextdb.telemetry.contexts import read_contexts
 
 TOML = """
 [conditions.state]

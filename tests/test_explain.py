@@ -13,15 +13,15 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.cells import parse_cell
-from contextdb.classes import ColumnMasks
-from contextdb.compiled import CompiledTable
-from contextdb.domains import Domain
+from contextdb.cells.domains import Domain
+from contextdb.cells.facts import cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.compiled.classes import ColumnMasks
+from contextdb.compiled.explain import Explanation
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError
-from contextdb.explain import Explanation
-from contextdb.facts import cell
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 
 UNKNOWN = st.sampled_from(["any", "never"])
 PLAY = {"state": {"type": "enum", "values": ["Ground", "Air"]}, "speed": {"type": "number", "min": 0, "max": 10, "unit": "m/s"}}
@@ -336,7 +336,7 @@ def test_details_are_worked_out_only_for_the_rows_that_are_asked_for():
     compiled = Table.from_columns(columns, {"x": {"type": "number"}}).compile()
     with (
         mock.patch.object(Explanation, "_failures", autospec=True, side_effect=Explanation._failures) as told,
-        mock.patch("contextdb.explain.parse_cell", side_effect=parse_cell) as read,
+        mock.patch("contextdb.compiled.explain.parse_cell", side_effect=parse_cell) as read,
     ):
         explanation = compiled.explain({"x": 20_000.0})
         assert read.call_count == told.call_count == 0
@@ -353,7 +353,7 @@ def test_the_nearest_of_many_rows_are_found_without_reading_those_that_fail_more
         "y": ["1" if i % 100 else "2" for i in range(n_rows)],
     }
     compiled = Table.from_columns(columns, {"x": {"type": "number"}, "y": {"type": "number"}}).compile()
-    with mock.patch("contextdb.explain.parse_cell", side_effect=parse_cell) as read:
+    with mock.patch("contextdb.compiled.explain.parse_cell", side_effect=parse_cell) as read:
         explanation = compiled.explain({"x": 2_049.5, "y": 2})
         assert [r.row for r in explanation.nearest(2)] == [2_000, 2_100]
     assert read.call_count <= n_rows / 100 + 4

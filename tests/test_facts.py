@@ -13,11 +13,11 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.cells import Cell, parse_cell
-from contextdb.conditions import Condition
-from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.facts import cell, check_mode, describe, missing_error, misspelt, read_fact, read_fact_text
+from contextdb.cells.grammar import Cell, parse_cell
 from contextdb.errors import ContextError
-from contextdb.facts import cell, check_mode, describe, missing_error, misspelt, read_fact, read_fact_text
 
 DEPTH = Domain("enum", ("CB", "FS", "Half Back", "5"))
 STATE = Domain("tags", ("InAir", "Stunned", "Move.Run"))

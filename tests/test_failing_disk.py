@@ -17,10 +17,10 @@ import pytest
 from faulty_disk import ERRORS, WRITERS, faulty
 from running import ROOT, Result, run
 
-from contextdb.edits import set_cells, set_settings
+from contextdb.edits.edits import set_cells, set_settings
 from contextdb.errors import ContextDBError
 from contextdb.motion import make_clip, write_bvh
-from contextdb.table import load
+from contextdb.tables.table import load
 from tui.model.session import Session
 
 RAW = b"Asset,speed,hit\r\nwalk,0..5,True\r\nrun,5..9,Any\r\n"
@@ -247,7 +247,7 @@ ALLOWED = {
     "contextdb/console.py": {"os.open"},  # nowhere
     "contextdb/telemetry/evaluate_file.py": {"os.rename", "write_parquet"},  # into the folder of what is not finished
     "contextdb/commands/evaluate_command.py": {"sink_csv", "sink_parquet"},
-    "contextdb/diffing/lines.py": {"write_bytes"},  # into a temporary folder, for git to read
+    "contextdb/edits/diffing/lines.py": {"write_bytes"},  # into a temporary folder, for git to read
     "contextdb/commands/demo_command.py": {"os.rename"},  # a whole folder
 }
 

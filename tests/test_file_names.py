@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from running import run
 
-from contextdb.file_names import alike, composed, confusable, spelled, why_unportable
-from contextdb.project import Project, settings_of, table_files
-from contextdb.schema import read_schema
-from contextdb.table import load
+from contextdb.files.file_names import alike, composed, confusable, spelled, why_unportable
+from contextdb.schema.settings import read_schema
+from contextdb.tables.project import Project, settings_of, table_files
+from contextdb.tables.table import load
 from tui.model.new_table import name_fault
 
 NAME = "mövès"
@@ -70,8 +70,8 @@ def test_an_undeclared_table_has_its_name_in_one_form_and_is_found_by_either(tmp
 @pytest.mark.parametrize("declared", FORMS)
 @pytest.mark.parametrize("disk", FORMS)
 def test_an_edit_of_the_settings_stays_in_the_section_of_the_file(tmp_path, disk, declared):
-    from contextdb.edits import set_settings
-    from contextdb.schema_file import write_schema
+    from contextdb.edits.edits import set_settings
+    from contextdb.edits.schema_file import write_schema
 
     table = load(put(tmp_path, FORMS[disk], FORMS[declared]))
     write_schema(table, set_settings(table, policy="first").apply(table))

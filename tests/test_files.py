@@ -18,9 +18,9 @@ import pytest
 from contextdb.columns import TextColumn
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import FileError, TableError
-from contextdb.files import read_texts, write_texts
-from contextdb.parquet import ParquetSource
-from contextdb.source import Source
+from contextdb.files.csv_source import Source
+from contextdb.files.parquet import ParquetSource
+from contextdb.files.texts import read_texts, write_texts
 
 ROOT = Path(__file__).parent.parent
 needs_links = pytest.mark.skipif(os.name == "nt", reason="links and modes as POSIX has them")

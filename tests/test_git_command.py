@@ -266,7 +266,8 @@ def driven(driver: str) -> None:
     if driver == "without git merge-file":
         program = Path("..", "a driver.py")
         broken = (
-            "import contextdb.diffing.lines as lines\nlines.subprocess.run = lambda *a, **b: (_ for _ in ()).throw(OSError())\n"
+            "import contextdb.edits.diffing.lines as lines\n"
+            "lines.subprocess.run = lambda *a, **b: (_ for _ in ()).throw(OSError())\n"
         )
         text = program.read_text(encoding="utf-8").replace("sys.exit(", broken + "sys.exit(")
         program.write_text(text, encoding="utf-8")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from running import Result, run
 
 from contextdb.errors import ContextError
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 TOML = """
 [conditions.speed]

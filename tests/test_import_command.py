@@ -11,7 +11,7 @@ from running import Result, run
 
 from contextdb import cli
 from contextdb.commands import import_command
-from contextdb.project import Project
+from contextdb.tables.project import Project
 
 TOML = '# ours\n[conditions.speed]\ntype = "number"\nunit = "m/s"\n'
 

@@ -12,11 +12,11 @@ import pytest
 
 import contextdb
 from contextdb import motion
-from contextdb.cells import reads
-from contextdb.domains import Domain
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import reads
 from contextdb.motion import MotionConfig
-from contextdb.schema import read_schema
-from contextdb.shapes import SECTIONS
+from contextdb.schema.settings import read_schema
+from contextdb.schema.shapes import SECTIONS
 
 ROOT = Path(__file__).parent.parent
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md"))]

@@ -14,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb import bitmask
-from contextdb.classes import FLAT_BYTES
+from contextdb.cells.facts import cell
+from contextdb.compiled.classes import FLAT_BYTES
+from contextdb.compiled.live import MOST_MOVING, LiveContext
+from contextdb.compiled.matches import Matches
 from contextdb.errors import ContextError
-from contextdb.facts import cell
-from contextdb.live import MOST_MOVING, LiveContext
-from contextdb.matches import Matches
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 TABLE = Table.from_columns(
     {
@@ -69,7 +69,10 @@ def steps(table: Table) -> st.SearchStrategy[tuple[str, strategies.Fact]]:
 @given(strategies.tables(least_conditions=1), st.sampled_from(["any", "never"]), st.data())
 @strategies.examples(0.6)
 def test_after_any_changes_a_live_context_answers_what_reading_every_cell_does(flat_bytes, most_moving, table, unknown, data):
-    with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes), mock.patch("contextdb.live.MOST_MOVING", most_moving):
+    with (
+        mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes),
+        mock.patch("contextdb.compiled.live.MOST_MOVING", most_moving),
+    ):
         live = table.compile().live(unknown=unknown)
         plain: dict[str, object] = {}
         for name, fact in data.draw(st.lists(steps(table), min_size=1, max_size=12)):

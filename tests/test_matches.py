@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb import bitmask
-from contextdb.matches import Answering, Matches, SetMatches
+from contextdb.compiled.matches import Answering, Matches, SetMatches
 
 N_ROWS = 130
 TABLE = Answering([f"Anim_{r % 100}" for r in range(N_ROWS)])

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 from strategies import INDEX, contexts, examples, quoted, tables
 
 import contextdb as cdb
-from contextdb.conditions import Condition
-from contextdb.domains import ANGLE, NUMBER
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import ANGLE, NUMBER
+from contextdb.cells.facts import read_fact
+from contextdb.cells.mirroring import mirrored_fact, way_of
 from contextdb.errors import ContextError
-from contextdb.facts import read_fact
-from contextdb.mirroring import mirrored_fact, way_of
-from contextdb.schema import EMPTY
-from contextdb.table import Table
+from contextdb.schema.settings import EMPTY
+from contextdb.tables.table import Table
 
 
 @st.composite

@@ -11,7 +11,7 @@ from running import Result, run
 from contextdb.commands.motion_stage import read_tags
 from contextdb.motion import MotionConfig, TagFilter, load_bvh, make_clip, open_or_build, query_from, steady_path, write_bvh
 from contextdb.motion.trace.session import Trace
-from contextdb.project import Project
+from contextdb.tables.project import Project
 
 TOML = """
 [tables.moves]

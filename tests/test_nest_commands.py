@@ -11,7 +11,7 @@ from running import run
 
 import contextdb as cdb
 from contextdb import motion
-from contextdb.nesting.flat import FlatTable
+from contextdb.tables.nesting.flat import FlatTable
 
 # ---- commands
 

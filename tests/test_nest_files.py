@@ -10,11 +10,11 @@ from nested_files import AIR, write
 from running import run
 
 import contextdb as cdb
-from contextdb.check import check
-from contextdb.covering.check_rows import check_rows
-from contextdb.nesting.flat import flat_rows, leaf_assets
-from contextdb.nesting.links import inner_rows
-from contextdb.schema import TableSettings
+from contextdb.checks.rows import check_rows
+from contextdb.checks.run import check
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.nesting.flat import flat_rows, leaf_assets
+from contextdb.tables.nesting.links import inner_rows
 
 
 def rules(findings: list[cdb.Finding]) -> dict[str, list[int | None]]:

@@ -17,11 +17,11 @@ from strategies import TAGS, contexts
 
 import contextdb as cdb
 from contextdb import bitmask
-from contextdb.cells import format_cell
-from contextdb.compiled import CompiledTable
-from contextdb.pick import Outcome
-from contextdb.project import Project, around_each_other
-from contextdb.schema import TableSettings
+from contextdb.cells.grammar import format_cell
+from contextdb.compiled.pick import Outcome
+from contextdb.compiled.table import CompiledTable
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.project import Project, around_each_other
 
 UNKNOWNS = st.sampled_from(["error", "any", "never"])
 

@@ -13,14 +13,14 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb import conditions
-from contextdb.cells import ANY, Cell, NumberSet, parse_cell, reads
-from contextdb.classes import column_masks
+from contextdb.cells import conditions
+from contextdb.cells.conditions import Condition, infer_condition
+from contextdb.cells.domains import ANGLE, INT, NUMBER, TEXT, Domain
+from contextdb.cells.grammar import ANY, Cell, NumberSet, parse_cell, reads
+from contextdb.cells.numbers import FEW, NumberCells, are_plain, doubtful, has_soft
 from contextdb.columns import TextColumn
-from contextdb.condition_column import ConditionColumn
-from contextdb.conditions import Condition, infer_condition
-from contextdb.domains import ANGLE, INT, NUMBER, TEXT, Domain
-from contextdb.number_cells import FEW, NumberCells, are_plain, doubtful, has_soft
+from contextdb.compiled.classes import column_masks
+from contextdb.tables.condition_column import ConditionColumn
 
 PADDING = tuple(f"{i}..{i + 1}" for i in range(1000, 1001 + FEW))
 """Texts enough to be read all at once."""
@@ -99,7 +99,7 @@ def test_masks_from_the_ends_are_masks_from_the_cells(kind, data):
     texts = data.draw(st.lists(LIKELY_TEXTS | strategies.cells(KINDS[kind]), max_size=20))
     column = column_of(texts, KINDS[kind])
     for flat_bytes in (2 << 20, 0):
-        with mock.patch("contextdb.classes.FLAT_BYTES", flat_bytes):
+        with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
             fast = column_masks(column.cells, column.texts.codes, KINDS[kind])
             slow = column_masks(list(column.cells), column.texts.codes, KINDS[kind])
         assert type(fast) is type(slow)
@@ -116,7 +116,7 @@ def test_the_type_of_a_column_is_the_same_with_many_texts_and_with_few(texts, n_
     column = TextColumn.of("x", [*texts, *map(str, range(n_numbers)), *texts, *PADDING[:n_numbers]])
     with mock.patch.object(conditions, "are_plain", return_value=None):
         expected = infer_condition(column)
-    with mock.patch("contextdb.number_cells.FEW", 0):
+    with mock.patch("contextdb.cells.numbers.FEW", 0):
         assert infer_condition(column) == expected
 
 
@@ -147,7 +147,7 @@ def test_new_texts_in_any_number_stand_behind_old_ones_in_any_number(n_before: i
 
 
 def test_what_can_be_read_is_not_read_before_it_is_asked_for():
-    with mock.patch("contextdb.number_cells._plain_ends", side_effect=AssertionError):
+    with mock.patch("contextdb.cells.numbers._plain_ends", side_effect=AssertionError):
         column = column_of(["5..3", "Any", "1 | 2", "oops"], NUMBER)
         assert (len(column.cells), list(column.faults)) == (len(PADDING) + 4, [3])
     assert column.cells[0].is_empty

@@ -8,7 +8,7 @@ import pytest
 from running import run
 
 from contextdb.motion import Trace
-from contextdb.project import Project
+from contextdb.tables.project import Project
 
 TOML = """
 [conditions.gait]

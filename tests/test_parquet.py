@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from contextdb.columns import TextColumn
 from contextdb.errors import TableError
-from contextdb.parquet import ParquetSource, read_parquet, rewritten_parquet
+from contextdb.files.parquet import ParquetSource, read_parquet, rewritten_parquet
 
 NAMES = st.text(st.characters(exclude_categories=["Cs"]), max_size=6)
 

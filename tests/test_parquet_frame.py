@@ -18,8 +18,8 @@ from running import run
 import contextdb as cdb
 from contextdb.columns import TextColumn
 from contextdb.errors import TableError
-from contextdb.parquet import read_parquet, rewritten_parquet
-from contextdb.parquet_frame import SEAL, DamagedFrame, require_whole, require_whole_file
+from contextdb.files.parquet import read_parquet, rewritten_parquet
+from contextdb.files.parquet_frame import SEAL, DamagedFrame, require_whole, require_whole_file
 
 CORPUS = sorted((Path(__file__).parent / "corpus/parquet").glob("*.parquet"))
 

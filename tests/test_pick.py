@@ -16,12 +16,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.pick import FEW, Memory, Outcome, Rng, pick_row
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError, PolicyError
-from contextdb.pick import FEW, Memory, Outcome, Rng, pick_row
-from contextdb.schema import TableSettings
-from contextdb.shapes import Policy
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.schema.shapes import Policy
+from contextdb.tables.table import Table
 
 
 def table_of(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from contextdb.errors import ContextDBError, FileError, TableError
-from contextdb.places import open_compiled, table_path
+from contextdb.tables.places import open_compiled, table_path
 
 TOML = '[conditions.speed]\ntype = "number"\n[tables.walking]\nfile = "walk.csv"\n'
 CSV = "Asset,speed\na,1..2\n"

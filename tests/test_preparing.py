@@ -15,7 +15,7 @@ import sys
 import contextdb as cdb
 table = cdb.load(sys.argv[1]).compile()
 table.prepare(casting=True, batches=True)
-kernels = sys.modules.get("contextdb.kernels")
+kernels = sys.modules.get("contextdb.compiled.kernels")
 def compiled():
     return {n: len(f.signatures) for n, f in vars(kernels).items() if hasattr(f, "signatures")} if kernels else {}
 modules, signatures = set(sys.modules), compiled()

@@ -10,7 +10,7 @@ from running import run
 from contextdb.commands.coverage_telemetry import MANY_CELLS, log_of
 from contextdb.covering import count, coverage
 from contextdb.covering.progress import PREPARING
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 
 def test_a_log_gets_one_line_for_each_tenth(capsys: pytest.CaptureFixture[str]):

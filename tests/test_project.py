@@ -10,8 +10,8 @@ import pytest
 
 import contextdb as cdb
 from contextdb.errors import ContextDBError, FileError, SchemaError, TableError
-from contextdb.project import Project, load_table, schema_for, table_files, twice_named
-from contextdb.schema import EMPTY
+from contextdb.schema.settings import EMPTY
+from contextdb.tables.project import Project, load_table, schema_for, table_files, twice_named
 
 ROOT = Path(__file__).parent.parent
 TOML = """

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from running import Result, run
 
-from contextdb.cells import Cell
+from contextdb.cells.facts import describe, read_fact
+from contextdb.cells.grammar import Cell
 from contextdb.commands.query_command import read_facts
 from contextdb.errors import ContextError
-from contextdb.facts import describe, read_fact
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 TOML = """
 [conditions.state]

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb import recordings
-from contextdb.conditions import Condition
-from contextdb.domains import BOOL, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import BOOL, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.facts import read_fact, read_fact_text
 from contextdb.errors import FileError, TableError
-from contextdb.facts import read_fact, read_fact_text
-from contextdb.recordings import fact_text, open_recording
+from contextdb.telemetry import recordings
+from contextdb.telemetry.recordings import fact_text, open_recording
 
 CSV = 'frame,gait,speed\n1,Walk,"1, 2"\n\n2,Run,\n3,Idle,0\n'
 

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from running import run
 
-from contextdb.cases import check_cases, read_cases
-from contextdb.check import check
+from contextdb.checks.cases import check_cases, read_cases
+from contextdb.checks.run import check
+from contextdb.edits.renaming import renaming, uses_of
 from contextdb.errors import ContextDBError, FileError
 from contextdb.expressions.names import names_in
-from contextdb.project import Project
-from contextdb.renaming import renaming, uses_of
-from contextdb.table import load
+from contextdb.tables.project import Project
+from contextdb.tables.table import load
 
 TOML = """# a game
 [conditions.speed]   # how fast
@@ -139,7 +139,7 @@ def test_a_file_that_changed_meanwhile_stops_the_rename_before_the_first_write(f
 
 
 def test_when_the_disk_refuses_a_file_those_before_it_are_put_back(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    from contextdb import renaming as module
+    from contextdb.edits import renaming as module
     from contextdb.errors import Fault
 
     found, real = renaming(load(folder / "a.csv"), "speed", "velocity"), module.write_atomic

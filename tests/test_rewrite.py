@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from contextdb.columns import TextColumn
 from contextdb.errors import TableError
-from contextdb.rewrite import rewritten, write_csv
-from contextdb.source import Source, read_csv
+from contextdb.files.csv_rewrite import rewritten, write_csv
+from contextdb.files.csv_source import Source, read_csv
 
 EDITS = st.one_of(CELLS, st.sampled_from(["<<<<<<< HEAD", "\ufeffx", "a;b", "x\r\ny", "-1"]))
 

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.conditions import Condition
-from contextdb.domains import KINDS, Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import KINDS, Domain
 from contextdb.errors import Fault, SchemaError
 from contextdb.expressions.tokens import written_text
-from contextdb.schema import EMPTY, Schema, TableSettings, conditions_from_dict, read_schema
-from contextdb.sections import condition_to_dict
-from contextdb.shapes import SECTIONS
-from contextdb.toml_lines import key_lines
+from contextdb.schema.sections import condition_to_dict
+from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, read_schema
+from contextdb.schema.shapes import SECTIONS
+from contextdb.schema.toml_lines import key_lines
 
 FULL = """
 [project]

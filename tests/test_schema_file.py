@@ -13,13 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb import edits, toml_edit
-from contextdb.edits import Edit
+from contextdb.edits import edits
+from contextdb.edits.edits import Edit
+from contextdb.edits.schema_file import schema_change, write_schema
 from contextdb.errors import FileError, SchemaError
-from contextdb.project import Project
-from contextdb.schema_file import schema_change, write_schema
-from contextdb.sections import schema_to_dict
-from contextdb.table import Table, load
+from contextdb.schema import toml_edit
+from contextdb.schema.sections import schema_to_dict
+from contextdb.tables.project import Project
+from contextdb.tables.table import Table, load
 
 TOML = """# a game
 [project]

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import TableError
-from contextdb.record_faults import MOST_CHARACTERS, MOST_FAULTS
-from contextdb.source import Source, read_csv
+from contextdb.files.csv_faults import MOST_CHARACTERS, MOST_FAULTS
+from contextdb.files.csv_source import Source, read_csv
 
 
 def as_python_reads(text: str) -> list[list[str]]:

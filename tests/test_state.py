@@ -18,10 +18,10 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
 import contextdb as cdb
 from contextdb import motion
-from contextdb.compiled import CompiledTable
-from contextdb.live import LiveContext
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.compiled.live import LiveContext
+from contextdb.compiled.table import CompiledTable
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 
 SPEED = {"speed": {"type": "number"}, "is_hurt": {"type": "bool"}}
 TABLE = Table.from_columns(

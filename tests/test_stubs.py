@@ -7,11 +7,11 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.stubs import stubs_of
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError
-from contextdb.project import Project
-from contextdb.stubs import stubs_of
-from contextdb.table import Table
+from contextdb.tables.project import Project
+from contextdb.tables.table import Table
 
 api = pytest.importorskip("mypy.api", reason="mypy is not installed")
 

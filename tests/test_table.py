@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMBER
 from contextdb.columns import TextColumn
-from contextdb.condition_column import MOST_MENDS
-from contextdb.conditions import Condition
-from contextdb.domains import NUMBER
 from contextdb.errors import SchemaError, TableError
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.table import Table, build_table
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.condition_column import MOST_MENDS
+from contextdb.tables.table import Table, build_table
 
 DECLARED = {"speed": {"type": "number"}, "state": {"type": "enum", "values": ["Ground", "Air"]}}
 TABLE = Table.from_columns(

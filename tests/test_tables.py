@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from contextdb.cells import Cell, parse_cell
+from contextdb.cells.grammar import Cell, parse_cell
 from contextdb.commands.demo_command import make_sample
 from contextdb.motion.made import recipes as made
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.selector import Selector
 from contextdb.motion.storage.config import MotionConfig
-from contextdb.schema import Schema, read_schema
+from contextdb.schema.settings import Schema, read_schema
 
 FOLDER = Path(__file__).parent.parent / "tables"
 SCHEMA = read_schema((FOLDER / "contextdb.toml").read_text(encoding="utf-8"), "tables/contextdb.toml")

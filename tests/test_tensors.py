@@ -18,7 +18,7 @@ from safetensors import safe_open
 from safetensors.numpy import save as as_safetensors
 
 from contextdb.errors import ArtefactError, FileError
-from contextdb.tensors import FileKind, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+from contextdb.files.tensors import FileKind, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
 
 KIND = FileKind("things", 3, "a thing", "a thing of this version", "to make the thing again")
 DTYPES = ("<u8", "<i8", "<f8", "<i4", "<f4", "<u2", "u1", "?", ">f4", ">i8")

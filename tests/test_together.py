@@ -13,15 +13,17 @@ import pytest
 from running import ROOT, run
 
 from contextdb.disk import staged, write_atomic
-from contextdb.folder_lock import UNFINISHED, folder_turn, sweep, temporary_folder, temporary_name
-from contextdb.project import Project
-from contextdb.together import NewFile, UnfinishedWarning, finish, write_together
+from contextdb.disk.folder_lock import UNFINISHED, folder_turn, sweep, temporary_folder, temporary_name
+from contextdb.disk.together import NewFile, UnfinishedWarning, finish, write_together
+from contextdb.tables.project import Project
 
 KILLED_AT_EACH_CALL = """
 import os, signal, sys, warnings
 from pathlib import Path
-from contextdb import disk, folder_lock, together
-from contextdb.together import NewFile, finish, write_together
+from contextdb import disk
+from contextdb.disk import folder_lock
+from contextdb.disk import together
+from contextdb.disk.together import NewFile, finish, write_together
 
 root, below = Path(sys.argv[1]), sys.argv[2]
 files = [root / below / "t.csv", root / "contextdb.toml"]

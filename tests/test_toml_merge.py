@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from running import run
 
 from contextdb import cli
-from contextdb.diffing.toml_merging import merge_toml
+from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.errors import SchemaError
 
 BASE = """# the project

@@ -15,7 +15,7 @@ from running import ROOT, run
 import contextdb as cdb
 from contextdb import motion
 from contextdb.disk import write_atomic
-from contextdb.journal_lines import line_of
+from contextdb.files.journal_lines import line_of
 from contextdb.motion.storage.stored import save_database
 
 TABLE = {"Asset": ["walk", "run"], "speed": ["0..4", "Any"]}

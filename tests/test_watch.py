@@ -15,8 +15,8 @@ import polars as pl
 import pytest
 
 import contextdb as cdb
-from contextdb.watching import Snapshot, Watch, table_like
-from contextdb.watching.rest import Rest
+from contextdb.tables.watching import Snapshot, Watch, table_like
+from contextdb.tables.watching.rest import Rest
 
 STEP_S = 0.06
 """Between two looks; the files have to rest for 0.1 s, so a change is taken at the third look that sees it."""
@@ -119,7 +119,7 @@ def test_files_that_are_touched_or_saved_without_an_edit_change_nothing(folder: 
 
 
 def test_a_change_that_the_file_times_do_not_show_is_found_while_they_are_coarse(folder: Folder, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("contextdb.watching.stamps._stamp", lambda path: (1, 2, 3, 4))
+    monkeypatch.setattr("contextdb.tables.watching.stamps._stamp", lambda path: (1, 2, 3, 4))
     folder.jog("one,1..3,Any")
     assert [folder.look(4), folder.assets()] == [1, ["one"]]
     folder.jog("two,1..3,Any")

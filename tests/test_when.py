@@ -13,19 +13,19 @@ from hypothesis import strategies as st
 from running import run
 
 import contextdb as cdb
-from contextdb.cases import Case, judge
-from contextdb.casting.roles import role_of
-from contextdb.check import check
-from contextdb.compiled import CompiledTable
-from contextdb.covering.check_rows import check_rows, unused_conditions
-from contextdb.diff import diff
-from contextdb.edits import check_cell
-from contextdb.effects import effects
+from contextdb.checks.cases import Case, judge
+from contextdb.checks.effects import effects
+from contextdb.checks.rows import check_rows, unused_conditions
+from contextdb.checks.run import check
+from contextdb.compiled.casting.roles import role_of
+from contextdb.compiled.stubs import stubs_of
+from contextdb.compiled.table import CompiledTable
+from contextdb.edits.diffing import diff
+from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextError, SchemaError, TableError
-from contextdb.schema import TableSettings, read_schema
-from contextdb.stubs import stubs_of
-from contextdb.when import WhenRules
-from contextdb.when.column import MOST_MENDS
+from contextdb.expressions.rules import WhenRules
+from contextdb.expressions.rules.column import MOST_MENDS
+from contextdb.schema.settings import TableSettings, read_schema
 
 SCHEMA = {
     "speed": {"type": "int", "min": 0, "max": 4},

@@ -16,7 +16,7 @@ from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES
 from textual.widget import Widget
 
-from contextdb.diff import Merge, Side
+from contextdb.edits.diffing import Merge, Side
 from contextdb.errors import ContextDBError
 from tui.commands import BY_ID, COMMANDS, bindings, key_names
 from tui.editor_settings import EditorSettings

@@ -17,18 +17,21 @@ from functools import partial
 from pathlib import Path
 
 from contextdb import report
-from contextdb.cases import cases_path, check_cases, read_cases
-from contextdb.check import check
+from contextdb.checks.cases import cases_path, check_cases, read_cases
+from contextdb.checks.rows import check_rows, unused_conditions
+from contextdb.checks.run import check
 from contextdb.commands.coverage_telemetry import Bar, log_of
 from contextdb.console import output, printable, progress, terminal_width, wants_colour
-from contextdb.covering.check_rows import check_rows, unused_conditions
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.exit_codes import ExitCode
-from contextdb.file_names import alike, composed, confusable, why_unportable
+from contextdb.files.file_names import alike, composed, confusable, why_unportable
 from contextdb.findings import LEVELS, Finding
-from contextdb.places import table_path
-from contextdb.project import (
+from contextdb.report.results import CheckReport, TableSummary
+from contextdb.schema.settings import Schema
+from contextdb.schema.toml_lines import key_lines
+from contextdb.tables.places import table_path
+from contextdb.tables.project import (
     SCHEMA_FILE,
     folder_of,
     load_table,
@@ -37,10 +40,7 @@ from contextdb.project import (
     table_files,
     twice_named,
 )
-from contextdb.report.results import CheckReport, TableSummary
-from contextdb.schema import Schema
-from contextdb.table import Table
-from contextdb.toml_lines import key_lines
+from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

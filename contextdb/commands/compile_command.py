@@ -17,16 +17,16 @@ import os
 import sys
 from pathlib import Path, PurePath
 
-from contextdb.artefact import SUFFIX
-from contextdb.c_face import c_header_of
+from contextdb.compiled.artefact import SUFFIX
+from contextdb.compiled.c_header import c_header_of
+from contextdb.compiled.stubs import stubs_of
 from contextdb.console import output, printable, progress
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural
 from contextdb.exit_codes import ExitCode
-from contextdb.places import table_path
-from contextdb.project import SCHEMA_FILE, Project, load_table
-from contextdb.stubs import stubs_of
-from contextdb.table import Table
+from contextdb.tables.places import table_path
+from contextdb.tables.project import SCHEMA_FILE, Project, load_table
+from contextdb.tables.table import Table
 
 SEPARATORS = ("/", "\\")
 STUBS = (".py", ".pyi")

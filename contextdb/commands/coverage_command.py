@@ -28,16 +28,16 @@ from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
 from contextdb.exit_codes import ExitCode
-from contextdb.nesting.flat import FlatTable
-from contextdb.places import table_path
-from contextdb.project import SCHEMA_FILE, Project, load_table
 from contextdb.report import coverage_formats
 from contextdb.report.results import as_path
+from contextdb.tables.nesting.flat import FlatTable
+from contextdb.tables.places import table_path
+from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 
 if TYPE_CHECKING:
     from contextdb.covering.baseline import Earlier
     from contextdb.report.coverage_results import CoverageResults, Measured
-    from contextdb.table import Table
+    from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,7 +16,7 @@ from contextdb.errors import ContextError, Fault
 if TYPE_CHECKING:
     from contextdb.covering import Gap
     from contextdb.report.coverage_results import Measured
-    from contextdb.table import Table
+    from contextdb.tables.table import Table
     from contextdb.telemetry import Observed
 
 ENGINES = ("local", "dask")

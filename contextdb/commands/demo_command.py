@@ -16,15 +16,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import contextdb
+from contextdb.cells.facts import Context
 from contextdb.commands.demo_teams import cast_lines
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.matches import Matches
+from contextdb.compiled.table import CompiledTable
 from contextdb.console import aligned, output, styled, wants_colour
 from contextdb.disk import make_folder, refused_writing
+from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
-from contextdb.facts import Context
-from contextdb.folder_lock import temporary_folder
-from contextdb.matches import Matches
 from contextdb.motion import (
     FeatureSchema,
     MotionConfig,
@@ -36,7 +36,7 @@ from contextdb.motion import (
     write_made_clips,
 )
 from contextdb.motion.features.extraction import Features
-from contextdb.project import SCHEMA_FILE, Project
+from contextdb.tables.project import SCHEMA_FILE, Project
 
 TACKLE = {
     "IsInMidAirAnim": False,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from contextdb.casting.explaining import CastExplanation
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.casting.explaining import CastExplanation
+from contextdb.compiled.table import CompiledTable
 from contextdb.console import aligned
 from contextdb.errors import plural
 

@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING
 from contextdb.commands.diff_views import as_markdown, as_text
 from contextdb.commands.effects_views import effects_json, effects_markdown, effects_text
 from contextdb.console import output, wants_colour
-from contextdb.diff import Diff, diff
+from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, Fault
 from contextdb.exit_codes import ExitCode
-from contextdb.nesting.names import inner_name
-from contextdb.places import table_path
-from contextdb.project import load_table
 from contextdb.report.render_json import as_json
+from contextdb.tables.nesting.names import inner_name
+from contextdb.tables.places import table_path
+from contextdb.tables.project import load_table
 
 if TYPE_CHECKING:
-    from contextdb.effects import Effects
+    from contextdb.checks.effects import Effects
 
 FORMATS = ("text", "markdown", "json")
 
@@ -60,7 +60,7 @@ def _may_matter(found: Diff) -> bool:
 
 def _effects(found: Diff) -> Effects | Fault:
     """What the change does, or why that cannot be told."""
-    from contextdb.effects import effects
+    from contextdb.checks.effects import effects
 
     try:
         return effects(found.before, found.after, changes=found)

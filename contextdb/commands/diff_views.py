@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 from itertools import accumulate, groupby
 
 from contextdb.console import aligned, printable, styled
-from contextdb.diff import CellChange, Diff
+from contextdb.edits.diffing import CellChange, Diff
 from contextdb.errors import row_name, shown
 from contextdb.report.render_markdown import MOST_BYTES, escaped
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 MARKS = {"added": ("+", "green"), "removed": ("-", "red"), "renamed": ("~", "yellow"), "moved": (">", "cyan")}
 MOST = 40

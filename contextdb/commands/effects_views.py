@@ -11,7 +11,7 @@ from contextdb.errors import Fault, plural, shown
 from contextdb.report.render_markdown import escaped
 
 if TYPE_CHECKING:
-    from contextdb.effects import Box, Effects, Reach
+    from contextdb.checks.effects import Box, Effects, Reach
     from contextdb.findings import Finding
 
 TITLE = "what it does"
@@ -78,7 +78,7 @@ def _told(effect: Effects | Fault, shows_all: bool) -> Iterator[Told]:
 
 
 def _covered(effect: Effects) -> str:
-    from contextdb.effects import covered_text
+    from contextdb.checks.effects import covered_text
 
     assert effect.before is not None
     assert effect.after is not None

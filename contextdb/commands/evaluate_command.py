@@ -27,18 +27,18 @@ import numpy as np
 import polars as pl
 
 from contextdb.bitmask import Rows
+from contextdb.cells.facts import UNKNOWN_MODES
 from contextdb.commands import missing_facts_by_option
 from contextdb.commands.coverage_telemetry import ENGINES, bar
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.table import CompiledTable
 from contextdb.console import aligned, output, printable, styled, wants_colour
-from contextdb.contexts import context_files
 from contextdb.disk import is_stream, path_in_quotes, refused_writing, write_atomic
+from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, plural
 from contextdb.exit_codes import ExitCode
-from contextdb.facts import UNKNOWN_MODES
-from contextdb.folder_lock import temporary_folder
-from contextdb.places import open_compiled
 from contextdb.report.render_json import as_json
+from contextdb.tables.places import open_compiled
+from contextdb.telemetry.contexts import context_files
 
 if TYPE_CHECKING:
     from contextdb.telemetry.evaluate_file import Answered

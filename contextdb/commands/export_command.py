@@ -20,8 +20,8 @@ from contextdb.disk import is_stream, write_atomic
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exchange.formats import FORMATS, format_of, write
 from contextdb.exit_codes import ExitCode
-from contextdb.places import table_path
-from contextdb.project import load_table
+from contextdb.tables.places import table_path
+from contextdb.tables.project import load_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,11 +12,11 @@ import sys
 from collections.abc import Iterator
 
 from contextdb.console import output, printable
-from contextdb.diffing.reading import table_of
 from contextdb.disk import read_bytes
 from contextdb.errors import TableError
 from contextdb.exit_codes import ExitCode
-from contextdb.table import Table
+from contextdb.tables.merging.reading import table_of
+from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

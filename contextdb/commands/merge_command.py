@@ -28,18 +28,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from contextdb.console import printable
-from contextdb.diff import Merge, Side, diff, merge
-from contextdb.diffing.lines import merged_lines
-from contextdb.diffing.markers import with_markers
-from contextdb.diffing.reading import PARQUET, merged_bytes, table_of
-from contextdb.diffing.toml_merging import merge_toml
 from contextdb.disk import read_bytes, write_atomic
+from contextdb.edits.diffing import Merge, Side, diff, merge
+from contextdb.edits.diffing.lines import merged_lines
+from contextdb.edits.diffing.markers import with_markers
+from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
 from contextdb.exit_codes import ExitCode
-from contextdb.parquet import ParquetSource
-from contextdb.project import neighbours, schema_for, settings_of
-from contextdb.schema import EMPTY, Schema, TableSettings
-from contextdb.table import Table
+from contextdb.files.parquet import ParquetSource
+from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.tables.merging.reading import PARQUET, merged_bytes, table_of
+from contextdb.tables.project import neighbours, schema_for, settings_of
+from contextdb.tables.table import Table
 
 MOST_TOLD = 20
 
@@ -98,8 +98,8 @@ def _tell_meaning(found: Merge, path: Path) -> bool:
     """Tell what the merge brings that neither side had, and whether that is anything."""
     if not (diff(found.base, found.ours) and diff(found.base, found.theirs)):
         return False
+    from contextdb.checks.effects import merge_effects
     from contextdb.covering import format_percent
-    from contextdb.effects import merge_effects
 
     try:
         around = neighbours(path)

@@ -36,8 +36,8 @@ from contextdb.motion.trace.json_form import decision_json, ranked_json
 from contextdb.motion.trace.reasked import reasked, require_known, why_not_asked
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.views import decision_lines, session_lines, summary_line
-from contextdb.project import SCHEMA_FILE, folder_of
 from contextdb.report.render_json import as_json
+from contextdb.tables.project import SCHEMA_FILE, folder_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from contextdb.cells.facts import UNKNOWN_MODES, Fact, Unknown
 from contextdb.commands import missing_facts_by_option
 from contextdb.commands.motion_bar import building_bar
 from contextdb.commands.motion_build_command import LeftOut, MotionProject, warn
 from contextdb.commands.query_command import read_facts
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.matches import Matches
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError, Fault, QueryError, in_quotes, nearest, some
-from contextdb.facts import UNKNOWN_MODES, Fact, Unknown
-from contextdb.matches import Matches
 from contextdb.motion import (
     FeatureSchema,
     MotionConfig,
@@ -32,7 +32,7 @@ from contextdb.motion.features.extraction import Features
 from contextdb.motion.markup.reserved import MOST_COST
 from contextdb.motion.reading import as_number
 from contextdb.motion.trace.cost_views import View
-from contextdb.project import SCHEMA_FILE, Project
+from contextdb.tables.project import SCHEMA_FILE, Project
 
 MOST_SPEED_MPS, MOST_SECONDS = 100.0, 1e6
 LEAST_REACH_S, MOST_REACH_S = 2.0, 60.0

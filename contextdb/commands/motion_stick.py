@@ -13,17 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
+from contextdb.cells.facts import Unknown
 from contextdb.columns import TextColumn
 from contextdb.commands import missing_facts_by_option
-from contextdb.compiled import CompiledTable
-from contextdb.contexts import read_contexts
+from contextdb.compiled.matches import Matches
+from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, some
-from contextdb.facts import Unknown
-from contextdb.files import AnySource, read_texts
-from contextdb.matches import Matches
+from contextdb.files.texts import AnySource, read_texts
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.reading import as_number
+from contextdb.telemetry.contexts import read_contexts
 
 BY_SPEED = ("speed_mps", "turn_dps", "strafe_deg")
 BY_VELOCITY = ("x_mps", "z_mps", "facing_deg")

@@ -15,18 +15,18 @@ import re
 import sys
 from collections.abc import Iterator
 
-from contextdb.casting.stage import CastMatches
+from contextdb.cells.conditions import Condition
+from contextdb.cells.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
 from contextdb.commands import missing_facts_by_option
-from contextdb.compiled import CompiledTable
-from contextdb.conditions import Condition
+from contextdb.compiled.casting.stage import CastMatches
+from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact
+from contextdb.compiled.pick import Outcome
+from contextdb.compiled.table import CompiledTable
 from contextdb.console import aligned, output, printable, styled, terminal_width, wants_colour, width_of
 from contextdb.errors import ContextError, Fault, in_quotes, plural
 from contextdb.exit_codes import ExitCode
-from contextdb.explain import Explanation, RowExplanation, describe_fact
-from contextdb.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
-from contextdb.pick import Outcome
-from contextdb.places import open_compiled
 from contextdb.report.render_json import as_json
+from contextdb.tables.places import open_compiled
 
 ACTOR_FACT = re.compile(r"([^=]+?)\[([0-9]{1,6})\]\.([^=]+)=(.*)", re.DOTALL)
 """Role[number].fact=value."""

@@ -19,11 +19,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from contextdb.checks.verify import CHECKS, Verdict, files_under, verified
 from contextdb.console import aligned, output, progress, wants_colour
 from contextdb.errors import Fault, FileError, Place
 from contextdb.exit_codes import ExitCode
 from contextdb.report.render_json import as_json
-from contextdb.verify import CHECKS, Verdict, files_under, verified
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from contextdb.arguments import require_kind, require_many
-from contextdb.compiled import CompiledTable
-from contextdb.conditions import Condition
+from contextdb.cells.arguments import require_kind, require_many
+from contextdb.cells.conditions import Condition
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.ruled import RuledTable, without_rules
 from contextdb.covering.space import CellBox, Space, WeightsOf, used_factors
 from contextdb.expressions import Assumptions, Derivation, Expression, assumptions_of
 from contextdb.expressions.tokens import written_name
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 
 @dataclass(frozen=True, eq=False)

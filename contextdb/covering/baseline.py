@@ -15,12 +15,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from contextdb.cells import Cell, parse_cell
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import Cell, parse_cell
 from contextdb.covering.assumed import Opened
 from contextdb.covering.report import CoverageReport, Gap
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
-from contextdb.domains import Domain
 from contextdb.errors import ContextDBError, ContextError, Fault, Place
 from contextdb.findings import Finding
 

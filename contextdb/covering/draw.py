@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells import covers
-from contextdb.conditions import Condition
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
+from contextdb.cells.grammar import covers
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor
 from contextdb.covering.parts import flags_of
 from contextdb.covering.space import Box, Space, factors_of
-from contextdb.domains import NUMERIC
 from contextdb.expressions import Derivation, Expression
 
 Codes = NDArray[np.int32]

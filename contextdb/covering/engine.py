@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.count import Bounds, is_prepared, prepare, uncovered_share
 from contextdb.covering.crowded import find_crowds
@@ -24,7 +24,7 @@ from contextdb.covering.sample import LITTLE, Counts, Sampler
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 WORK = 40_000_000
 SAMPLES = 200_000

@@ -24,13 +24,13 @@ from operator import and_
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb import intervals
-from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, format_cell, format_number, tags_above
-from contextdb.classes import Value
-from contextdb.domains import Domain
+from contextdb.cells import intervals
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, ValueSet, format_cell, format_number, tags_above
+from contextdb.cells.intervals import Span
+from contextdb.cells.nesting_cells import TagMeet
+from contextdb.compiled.classes import Value
 from contextdb.errors import Fault, TableError, plural
-from contextdb.intervals import Span
-from contextdb.nesting_cells import TagMeet
 
 Weights = NDArray[np.float64]
 MOST_ANSWERS = 1 << 14

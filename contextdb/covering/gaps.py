@@ -15,15 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from contextdb import bitmask
-from contextdb.cells import Cell, NumberSet, TagSet, ValueSet, format_cell
-from contextdb.compiled import CompiledTable
+from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, format_cell
+from contextdb.cells.intervals import union
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.count import Bounds, uncovered_share
 from contextdb.covering.factors import TagFactor
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.report import Gap, Nearest
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Point, Steps
-from contextdb.intervals import union
 
 Measure = Callable[[Box, Sequence[Box]], tuple[float, bool]]
 """Tells which share of the possible contexts is in a box and in none of some others, and whether it is exact."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from contextdb.cell_words import quoted
-from contextdb.cells import Cell, NumberSet, TagSet, ValueSet, format_number, parse_cell
-from contextdb.conditions import Condition
-from contextdb.domains import Domain
-from contextdb.intervals import Span
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, format_number, parse_cell
+from contextdb.cells.intervals import Span
+from contextdb.cells.words import quoted
 
 
 def facts_inside(cells: Mapping[str, str], conditions: Sequence[Condition]) -> dict[str, str]:

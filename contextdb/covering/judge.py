@@ -9,7 +9,7 @@
     no-context       no context at all is possible
 
 Single points count: a row that alone holds the number 5 is not redundant. A row has one of equal, subsumed, redundant and dead.
-What of these is variety, under the table's policy, is information: see `contextdb.variety`.
+What of these is variety, under the table's policy, is information: see `contextdb.tables.variety`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.check import identical_rows, named
-from contextdb.compiled import CompiledTable
+from contextdb.checks.run import identical_rows, named
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.questions import MANY, Questions
@@ -32,8 +32,8 @@ from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
 from contextdb.findings import Finding, Level
-from contextdb.table import Table
-from contextdb.variety import gathered, lets_choose, needless, softened
+from contextdb.tables.table import Table
+from contextdb.tables.variety import gathered, lets_choose, needless, softened
 
 MOST_CAUSES = 24
 """Up to so many rows the causes of a redundant row are thinned out to those that are needed."""

@@ -18,14 +18,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
 from contextdb.covering.parts import Sides, flags_of, parts_of
 from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.sample import Codes, Sampler, lookup
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 SAMPLES = 50_000
 DIGITS = 12

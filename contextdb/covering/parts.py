@@ -11,7 +11,7 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells import Cell, TagSet, format_cell
+from contextdb.cells.grammar import Cell, TagSet, format_cell
 from contextdb.covering.factors import TagFactor, ValueFactor
 from contextdb.covering.space import Space, runs_of
 

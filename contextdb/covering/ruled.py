@@ -11,20 +11,20 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from contextdb import bitmask
-from contextdb.cells import Accepted, Cell, TagSet, format_cell
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import BOOL
+from contextdb.cells.grammar import Accepted, Cell, TagSet, format_cell
 from contextdb.columns import TextColumn
-from contextdb.condition_column import ConditionColumn
-from contextdb.conditions import Condition
 from contextdb.covering.report import CoverageReport, Nearest
-from contextdb.domains import BOOL
 from contextdb.errors import shown
 from contextdb.expressions import constant_truth
 from contextdb.expressions.boxes import Box, shared
+from contextdb.expressions.rules import Rule, WhenRules
 from contextdb.expressions.tokens import written_name, written_text
 from contextdb.findings import Finding
-from contextdb.nesting.flat import FlatTable
-from contextdb.table import Table
-from contextdb.when import Rule, WhenRules
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.nesting.flat import FlatTable
+from contextdb.tables.table import Table
 
 _DEAD = "the row is valid in no context: its rule, its cells and what is assumed never hold together."
 MOST_NAMED = 200

@@ -18,15 +18,15 @@ from itertools import chain
 import numpy as np
 
 from contextdb import bitmask
-from contextdb.arguments import require_many, require_mapping, require_text
-from contextdb.cells import Accepted, Cell, NumberSet, TagSet, format_cell, parse_cell
-from contextdb.compiled import CompiledTable
-from contextdb.conditions import Condition
+from contextdb.cells.arguments import require_many, require_mapping, require_text
+from contextdb.cells.conditions import Condition
+from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, format_cell, parse_cell
+from contextdb.cells.nesting_cells import TagMeet
+from contextdb.cells.plain_ends import plain
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, some
-from contextdb.nesting_cells import TagMeet
-from contextdb.plain_ends import plain
 
 _WEIGHTS = "a mapping of conditions to mappings of cells to numbers"
 

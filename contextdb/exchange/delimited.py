@@ -20,7 +20,7 @@ from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.grid import MOST_ABOVE, Block, columns_of, is_header
 from contextdb.exchange.reading import Reading, Remark, listed
-from contextdb.record_faults import MOST_CHARACTERS
+from contextdb.files.csv_faults import MOST_CHARACTERS
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "vertical bars"}
 SAMPLE = 100

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from contextdb.sections import condition_to_dict, settings_to_dict
-from contextdb.table import Table
+from contextdb.schema.sections import condition_to_dict, settings_to_dict
+from contextdb.tables.table import Table
 
 
 def described(table: Table) -> str:

@@ -17,9 +17,9 @@ from itertools import count
 from typing import Any
 from xml.etree import ElementTree
 
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import TEXT, Domain
 from contextdb.columns import TextColumn
-from contextdb.conditions import Condition
-from contextdb.domains import TEXT, Domain
 from contextdb.errors import Fault, Place, TableError, in_quotes, nearest, plural, shown, some
 from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.dmn_types import InputType, Types, children_of, domain_of, tag_of, text_of
@@ -28,9 +28,9 @@ from contextdb.exchange.feel import cell_of, strings_of, value_of
 from contextdb.exchange.feel_rules import rule_of
 from contextdb.exchange.proposals import propose_type
 from contextdb.exchange.reading import Reading, Remark, capped, listed
-from contextdb.schema import Schema, TableSettings, conditions_from_dict
-from contextdb.source import name_faults
-from contextdb.when import check_rule
+from contextdb.expressions.rules import check_rule
+from contextdb.files.csv_source import name_faults
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 
 POLICIES: dict[str, Any] = {"UNIQUE": "unique", "FIRST": "first", "PRIORITY": "priority", "ANY": "collect", "COLLECT": "collect"}
 PRIORITY = "Priority"

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from contextdb.domains import BOOL, TEXT, Domain, Kind
+from contextdb.cells.domains import BOOL, TEXT, Domain, Kind
 from contextdb.errors import in_quotes
 from contextdb.exchange.feel import STRINGS, strings_of
 from contextdb.exchange.reading import Remark

@@ -9,15 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from contextdb.cells import format_number
-from contextdb.condition_column import ConditionColumn
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import format_number
 from contextdb.console import printable
-from contextdb.domains import Domain
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.feel import literal, unary_tests
 from contextdb.exchange.reading import Remark, capped
 from contextdb.exchange.xlsx_parts import DECLARATION, NEVER, attribute
-from contextdb.table import Table
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.table import Table
 
 NAMESPACE = "https://www.omg.org/spec/DMN/20191111/MODEL/"
 _POLICIES = {"unique": "UNIQUE", "first": "FIRST", "collect": "COLLECT", "priority": "PRIORITY"}

@@ -6,7 +6,7 @@ import codecs
 
 from contextdb.errors import Fault, Place, TableError, in_quotes, nearest
 from contextdb.exchange.reading import Remark
-from contextdb.foreign import line_of
+from contextdb.files.strangers import line_of
 
 BOMS = (
     (codecs.BOM_UTF8, "utf-8", "UTF-8 with a byte order mark"),

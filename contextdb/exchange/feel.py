@@ -19,9 +19,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from contextdb.cell_words import NUMBER_TEXT, quoted
-from contextdb.cells import Cell, NumberSet, ValueSet, format_cell
-from contextdb.domains import NUMBER
+from contextdb.cells.domains import NUMBER
+from contextdb.cells.grammar import Cell, NumberSet, ValueSet, format_cell
+from contextdb.cells.words import NUMBER_TEXT, quoted
 
 _PART = re.compile(r'"(?:[^"\\]|\\.)*"?|[^,"]+|,', re.DOTALL)
 """A string, also one that is not closed, so that no part of a text is looked at twice; a comma; or what stands between."""

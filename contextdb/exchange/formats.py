@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest
 from contextdb.exchange.reading import Reading, Remark
-from contextdb.foreign import seems_to_be
-from contextdb.table import Table
+from contextdb.files.strangers import seems_to_be
+from contextdb.tables.table import Table
 
 if TYPE_CHECKING:
     from contextdb.exchange.formulas import Formulas
@@ -160,7 +160,7 @@ def _read(kind: str, raw: bytes, name: str, options: ReadOptions) -> Reading:
 
 
 def _read_parquet(raw: bytes, name: str) -> Reading:
-    from contextdb.parquet import read_parquet
+    from contextdb.files.parquet import read_parquet
 
     source, columns = read_parquet(raw, name)
     return Reading(tuple(columns), "parquet", source=source)
@@ -170,7 +170,7 @@ def _own_csv(raw: bytes, name: str) -> Reading | None:
     """A CSV that contextdb reads as it stands, so that it is written as it stands; None for every other."""
     from contextdb.exchange.conflicts import begins_like_a_mark
     from contextdb.exchange.unreal import is_unreal_header
-    from contextdb.source import read_csv
+    from contextdb.files.csv_source import read_csv
 
     try:
         source, columns = read_csv(raw, name)
@@ -263,9 +263,9 @@ def _rewritten(table: Table, columns: Sequence[TextColumn], kind: str) -> bytes:
     """The table's own file as it would be saved: what nobody changed keeps its bytes."""
     import numpy as np
 
-    from contextdb.parquet import ParquetSource, rewritten_parquet
-    from contextdb.rewrite import rewritten
-    from contextdb.source import Source
+    from contextdb.files.csv_rewrite import rewritten
+    from contextdb.files.csv_source import Source
+    from contextdb.files.parquet import ParquetSource, rewritten_parquet
 
     fresh = np.full(table.n_rows, -1)
     if kind == "csv":

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells import reads
+from contextdb.cells.domains import NUMBER
+from contextdb.cells.grammar import reads
 from contextdb.columns import TextColumn
-from contextdb.domains import NUMBER
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange.reading import Remark, capped
-from contextdb.record_faults import MOST_CHARACTERS
-from contextdb.source import name_faults
+from contextdb.files.csv_faults import MOST_CHARACTERS
+from contextdb.files.csv_source import name_faults
 
 Grid = Sequence[Sequence[str]]
 """Rows of texts; all rows are equally wide."""

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
-from contextdb.conditions import Condition
 from contextdb.disk import write_atomic
+from contextdb.disk.together import NewFile, write_together
+from contextdb.edits.schema_file import SchemaChange, schema_change
 from contextdb.errors import Fault, FileError, Place, TableError
 from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, propose
 from contextdb.exchange.reading import Reading
-from contextdb.files import new_source
-from contextdb.project import schema_for, settings_of
-from contextdb.schema import Schema, TableSettings, conditions_from_dict
-from contextdb.schema_file import SchemaChange, schema_change
-from contextdb.sections import condition_to_dict, job_faults
-from contextdb.table import Table, build_table
-from contextdb.together import NewFile, write_together
+from contextdb.files.texts import new_source
+from contextdb.schema.sections import condition_to_dict, job_faults
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.tables.project import schema_for, settings_of
+from contextdb.tables.table import Table, build_table
 
 if TYPE_CHECKING:
-    from contextdb.files import AnySource
+    from contextdb.files.texts import AnySource
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.conflicts import require_no_conflicts
 from contextdb.exchange.reading import Reading, Remark, listed
 from contextdb.exchange.values import text_of_value
-from contextdb.record_faults import MOST_CHARACTERS
-from contextdb.shapes import what
-from contextdb.source import name_faults
+from contextdb.files.csv_faults import MOST_CHARACTERS
+from contextdb.files.csv_source import name_faults
+from contextdb.schema.shapes import what
 
 _ACCEPTED = 'a list of objects, [{"Asset Name": "jog", "speed": "2..4"}], or one object a line'
 MOST_FAULTS = 20

@@ -9,15 +9,15 @@ from typing import Literal
 
 import numpy as np
 
-from contextdb.cells import reads
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC, Domain
+from contextdb.cells.grammar import reads
 from contextdb.columns import TextColumn
-from contextdb.conditions import Condition
-from contextdb.domains import NUMERIC, Domain
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, plural, some
 from contextdb.exchange.proposals import n_unreadable, names_of, pair_in, propose_type
 from contextdb.exchange.reading import Reading
-from contextdb.schema import Schema, TableSettings, conditions_from_dict
-from contextdb.sections import condition_to_dict
+from contextdb.schema.sections import condition_to_dict
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 
 Job = Literal["asset", "condition", "output", "enabled", "priority", "weight", "when", "left out"]
 JOBS: tuple[Job, ...] = ("asset", "condition", "output", "enabled", "priority", "weight", "when", "left out")
@@ -238,8 +238,8 @@ def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> Job | 
 
 def _fits(column: TextColumn, job: Job) -> bool:
     """Whether every cell of a column can be read for a job."""
-    from contextdb.edits import check_cell
-    from contextdb.table import build_table
+    from contextdb.edits.edits import check_cell
+    from contextdb.tables.table import build_table
 
     settings = replace(TableSettings("table", asset="asset"), **{str(job): column.name})  # type: ignore[arg-type]
     empty = build_table("table", [TextColumn.of("asset", ()), TextColumn.of(column.name, ())], settings=settings)

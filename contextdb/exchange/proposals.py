@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contextdb.cell_words import ANY_WORDS
-from contextdb.cells import Cell, TagSet, ValueSet, parse_cell, reads
+from contextdb.cells.conditions import READABLE_SHARE
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.grammar import Cell, TagSet, ValueSet, parse_cell, reads
+from contextdb.cells.numbers import doubtful
+from contextdb.cells.words import ANY_WORDS
 from contextdb.columns import TextColumn
-from contextdb.conditions import READABLE_SHARE
-from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.errors import CellError, in_quotes, plural
 from contextdb.exchange.reading import ERRORS, listed
-from contextdb.number_cells import doubtful
-from contextdb.shapes import wrong_name
+from contextdb.schema.shapes import wrong_name
 
 MOST_ENUM_VALUES = 40
 """A column with more different names than this is a text: nobody wants to keep such a list."""

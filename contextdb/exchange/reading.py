@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cell_words import ANY_WORDS, quoted
+from contextdb.cells.words import ANY_WORDS, quoted
 from contextdb.columns import TextColumn
 from contextdb.errors import shown
-from contextdb.files import AnySource
-from contextdb.schema import EMPTY, Schema
+from contextdb.files.texts import AnySource
+from contextdb.schema.settings import EMPTY, Schema
 
 ERRORS = frozenset(
     (

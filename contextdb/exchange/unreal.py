@@ -19,11 +19,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cell_words import quoted
+from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.reading import Reading, Remark, capped
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 CSV_NAMES = ("---", "")
 JSON_NAME = "Name"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import datetime
 import math
 
-from contextdb.cell_words import quoted
-from contextdb.cells import format_number
+from contextdb.cells.grammar import format_number
+from contextdb.cells.words import quoted
 
 DATES = (datetime.date, datetime.time, datetime.datetime, datetime.timedelta)
 

@@ -18,7 +18,7 @@ from contextdb.exchange.reading import ERRORS, Reading, Remark, capped, listed
 from contextdb.exchange.values import DATES, text_of_value
 from contextdb.exchange.xlsx_parts import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook
-from contextdb.schema import EMPTY, Schema, read_schema
+from contextdb.schema.settings import EMPTY, Schema, read_schema
 
 if TYPE_CHECKING:
     from python_calamine import CalamineWorkbook

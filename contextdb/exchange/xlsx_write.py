@@ -14,14 +14,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from contextdb.cell_words import quoted
+from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.console import width_of
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange import xlsx_parts as parts
 from contextdb.exchange.described import described
 from contextdb.exchange.grid import column_letters
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 LEAST_WIDTH, MOST_WIDTH, WIDTH_SAMPLE = 8, 44, 2_000
 PAGE_WIDTH = 220

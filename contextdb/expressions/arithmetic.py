@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from contextdb.domains import wrap_angle
+from contextdb.cells.domains import wrap_angle
 from contextdb.expressions import trigonometry
 from contextdb.expressions.trigonometry import Doubles, Value
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells import NumberSet, ValueSet
-from contextdb.conditions import Condition
-from contextdb.domains import BOOL
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import BOOL
+from contextdb.cells.grammar import NumberSet, ValueSet
 from contextdb.errors import Fault, in_quotes
 from contextdb.expressions.boxes import Box, NoBoxes, Sets, all_of
 from contextdb.expressions.expression import Expression, read_expression
@@ -24,7 +24,7 @@ from contextdb.expressions.faults import ExpressionError
 from contextdb.expressions.tokens import written_name
 
 if TYPE_CHECKING:
-    from contextdb.table import Table
+    from contextdb.tables.table import Table
 
 _WANTS = Condition("", BOOL)
 

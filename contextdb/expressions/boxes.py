@@ -11,13 +11,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import chain, islice, product
 
-from contextdb import intervals
-from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, parse_cell
-from contextdb.conditions import Condition
-from contextdb.domains import Domain, Kind
+from contextdb.cells import intervals
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain, Kind
+from contextdb.cells.facts import Fact
+from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, ValueSet, parse_cell
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
 from contextdb.expressions.scalar import runner
-from contextdb.facts import Fact
 
 MOST_BOXES = 4096
 """With more boxes than this, also on the way, an expression has none."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import singledispatchmethod
 
-from contextdb.cells import format_number
-from contextdb.conditions import Condition
-from contextdb.domains import Kind
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Kind
+from contextdb.cells.grammar import format_number
 from contextdb.errors import in_quotes, nearest, plural, some
 from contextdb.expressions.faults import Refusal, UnknownName
 from contextdb.expressions.functions import FUNCTIONS, MOST_POWER, NEGATIVE, OPERATORS, Function, power_of

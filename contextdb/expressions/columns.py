@@ -17,12 +17,12 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from contextdb.cells import Cell
-from contextdb.conditions import Condition
-from contextdb.domains import NUMERIC, Kind
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC, Kind
+from contextdb.cells.facts import read_fact
+from contextdb.cells.grammar import Cell
 from contextdb.errors import ContextError, Fault, Place
 from contextdb.expressions.arithmetic import all_wrapped
-from contextdb.facts import read_fact
 
 Doubles = NDArray[np.float64]
 Truths = NDArray[np.int8]

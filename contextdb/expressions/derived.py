@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells import ANY, Cell
-from contextdb.conditions import Condition
-from contextdb.domains import NUMERIC
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
+from contextdb.cells.facts import describe, read_fact
+from contextdb.cells.grammar import ANY, Cell
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, shown, some
 from contextdb.expressions.arithmetic import all_wrapped, settled, wrapped
 from contextdb.expressions.columns import Coded, Column, as_facts, is_missing_in, read_column
@@ -29,7 +30,6 @@ from contextdb.expressions.expression import Expression, check_length, read_expr
 from contextdb.expressions.faults import ExpressionError
 from contextdb.expressions.frame import run_frame
 from contextdb.expressions.scalar import Value, is_missing
-from contextdb.facts import describe, read_fact
 
 NAN = math.nan
 _GIVE = 'a value for each of these, or unknown="any" or "never"'

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells import Cell
-from contextdb.conditions import Condition
-from contextdb.domains import NUMERIC, Kind
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC, Kind
+from contextdb.cells.facts import read_fact
+from contextdb.cells.grammar import Cell
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.expressions.boxes import Box, boxes_of
 from contextdb.expressions.check import Checker
@@ -23,7 +24,6 @@ from contextdb.expressions.parse import parse
 from contextdb.expressions.plan import Part, Type
 from contextdb.expressions.results import require_result
 from contextdb.expressions.scalar import Run, Value, is_missing, runner
-from contextdb.facts import read_fact
 
 NAN = float("nan")
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells import Cell, NumberSet
+from contextdb.cells.grammar import Cell, NumberSet
 from contextdb.expressions.arithmetic import all_wrapped, settled
 from contextdb.expressions.columns import NO, UNKNOWN, YES, Coded, Column, Doubles, Truths
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select

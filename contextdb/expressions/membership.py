@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from contextdb import intervals
-from contextdb.cells import ACCEPTED, Accepted, Cell, NumberSet, TagSet, ValueSet, covers, parse_cell
-from contextdb.conditions import Condition
-from contextdb.domains import Domain, wrap_angle
+from contextdb.cells import intervals
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain, wrap_angle
+from contextdb.cells.grammar import ACCEPTED, Accepted, Cell, NumberSet, TagSet, ValueSet, covers, parse_cell
 from contextdb.errors import CellError, in_quotes, nearest, some
 from contextdb.expressions.faults import Refusal
 from contextdb.expressions.plan import Const, Given, Held, Part, Type

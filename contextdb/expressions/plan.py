@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from contextdb.cells import Cell
-from contextdb.domains import NUMERIC, Kind
+from contextdb.cells.domains import NUMERIC, Kind
+from contextdb.cells.grammar import Cell
 from contextdb.expressions.functions import Function
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from contextdb.conditions import Condition
-from contextdb.domains import Kind
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Kind
 from contextdb.errors import in_quotes, nearest, some
 from contextdb.expressions.faults import Refusal
 from contextdb.expressions.membership import said

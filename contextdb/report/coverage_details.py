@@ -12,8 +12,8 @@ from contextdb.errors import plural, row_name
 from contextdb.report.coverage_results import Measured
 from contextdb.report.coverage_words import nearest_sentence
 from contextdb.report.render_text import wrapped
-from contextdb.table import Table
-from contextdb.variety import VARIETY
+from contextdb.tables.table import Table
+from contextdb.tables.variety import VARIETY
 
 
 def gap_details(measured: Measured, gap: Gap, table: Table, width: int) -> str:

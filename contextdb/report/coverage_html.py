@@ -25,7 +25,7 @@ from contextdb.report.coverage_words import (
     overlap_sentence,
 )
 from contextdb.report.results import as_path
-from contextdb.variety import VARIETY
+from contextdb.tables.variety import VARIETY
 
 MOST_ROWS = 5_000
 """Rows that are listed, those with findings before others."""

@@ -21,7 +21,7 @@ from contextdb.report.coverage_words import (
     rows_words,
 )
 from contextdb.report.render_markdown import MOST_BYTES, escaped
-from contextdb.variety import VARIETY
+from contextdb.tables.variety import VARIETY
 
 STEPS = (10, 5, 3, 1, 0)
 """So many gaps, pairs and rows of a rule are listed, the first that fits."""

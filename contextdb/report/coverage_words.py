@@ -11,7 +11,7 @@ from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, nearest, plural
 from contextdb.findings import Finding
 from contextdb.report.coverage_results import Measured, has_moments
-from contextdb.variety import VARIETY
+from contextdb.tables.variety import VARIETY
 
 if TYPE_CHECKING:
     from contextdb.telemetry.observed import FactNote, Observed

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from xml.etree import ElementTree as ET
 
+from contextdb.checks.rules import TABLE_RULES
 from contextdb.console import printable
 from contextdb.errors import plural
 from contextdb.findings import Finding, Level
 from contextdb.report.results import CheckReport, Group, as_path, place_of, told
-from contextdb.report.rules import TABLE_RULES
 
 MOST_LISTED = 200
 """A case lists so many findings, then says how many more there are: CI systems refuse reports that grow without end."""

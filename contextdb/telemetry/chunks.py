@@ -16,11 +16,11 @@ import polars as pl
 from polars.selectors import by_name
 
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes
-from contextdb.files import scanned_parquet
-from contextdb.foreign import UTF8_BOM, line_of, require_text
-from contextdb.record_faults import record_faults
-from contextdb.records import Records, fields_of, find_records, text_of
-from contextdb.source import name_faults, read_csv
+from contextdb.files.csv_faults import record_faults
+from contextdb.files.csv_records import Records, fields_of, find_records, text_of
+from contextdb.files.csv_source import name_faults, read_csv
+from contextdb.files.strangers import UTF8_BOM, line_of, require_text
+from contextdb.files.texts import scanned_parquet
 
 ROWS = 1 << 16
 BYTES = 1 << 24

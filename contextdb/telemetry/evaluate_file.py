@@ -20,14 +20,14 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from contextdb.batch import ManyMatches
 from contextdb.bitmask import Rows
-from contextdb.compiled import CompiledTable
+from contextdb.cells.facts import Unknown
+from contextdb.compiled.batch import ManyMatches
+from contextdb.compiled.table import CompiledTable
 from contextdb.console import printable
-from contextdb.contexts import fact_type, known_conditions, read_texts_as, without_facts
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place
-from contextdb.facts import Unknown
 from contextdb.telemetry.chunks import Chunk, TelemetryFile
+from contextdb.telemetry.contexts import fact_type, known_conditions, read_texts_as, without_facts
 from contextdb.telemetry.keys import rows_of
 
 MOST_ANSWERS = 1 << 21

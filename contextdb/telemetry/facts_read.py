@@ -14,11 +14,11 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
-from contextdb.cells import Cell
-from contextdb.conditions import Condition
-from contextdb.domains import NUMERIC
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
+from contextdb.cells.facts import Fact, describe, read_fact, read_fact_text
+from contextdb.cells.grammar import Cell
 from contextdb.errors import ContextError
-from contextdb.facts import Fact, describe, read_fact, read_fact_text
 
 PLAIN_NUMBER = r"^[ \t]*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?[ \t]*$"
 MOST_EXAMPLES = 5

@@ -1,7 +1,8 @@
 """How a context is written as a key: for each condition the class of its fact, in a few bits of one of K words.
 
-Two contexts of one key have the same valid rows, and lie in the same gaps. The fields of a key are the codes of `contextdb.stack`
-in their order, each as a class of its column, and behind them the classes of sets of tags that make gaps. A missing fact is a
+Two contexts of one key have the same valid rows, and lie in the same gaps. The fields of a key are the codes of
+`contextdb.compiled.stack` in their order, each as a class of its column, and behind them the classes of sets of tags that make
+gaps. A missing fact is a
 class of its own, the last.
 """
 
@@ -16,9 +17,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from contextdb.cells import covers
-from contextdb.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
-from contextdb.compiled import CompiledTable
+from contextdb.cells.grammar import covers
+from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.factors import TagFactor
 from contextdb.expressions.arithmetic import all_wrapped
 from contextdb.telemetry.facts_read import FactColumn

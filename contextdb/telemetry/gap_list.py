@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contextdb.cells import parse_cell
+from contextdb.cells.grammar import parse_cell
 from contextdb.covering.assumed import Opened
 from contextdb.covering.count import uncovered_share
 from contextdb.covering.gaps import SHARE_WORK, share_of

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from contextdb.kernels import _lowest, intersect
+from contextdb.compiled.kernels import _lowest, intersect
 
 BLOCK = 256
 _options: dict[str, Any] = {"cache": True, "nogil": True, "boundscheck": False, "error_model": "numpy"}

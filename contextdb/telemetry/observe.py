@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from contextdb.classes import TagMasks
-from contextdb.compiled import CompiledTable
-from contextdb.contexts import context_files
+from contextdb.compiled.classes import TagMasks
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
 from contextdb.covering.factors import TagFactor
 from contextdb.covering.report import Gap
 from contextdb.covering.ruled import RuledTable
 from contextdb.covering.space import Space, require_counts
 from contextdb.errors import ContextError, Fault, FileError, in_quotes, nearest, some
-from contextdb.table import Table
+from contextdb.tables.table import Table
+from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.engines import ENGINES, Engine, with_dask
 from contextdb.telemetry.gap_list import box_of
 from contextdb.telemetry.keys import estimated

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.factors import TagFactor
 from contextdb.errors import Fault, TableError
 from contextdb.telemetry.facts_read import MOST_EXAMPLES
@@ -22,7 +22,7 @@ MOST_OPEN = 1 << 13
 MOST_HASHES = 1 << 16
 MOST_MOMENTS = 1 << 62
 Keys = NDArray[np.int32]
-"""Codes of contexts as `contextdb.stack` has them, and the classes of their sets of tags: int32 [N, P]."""
+"""Codes of contexts as `contextdb.compiled.stack` has them, and the classes of their sets of tags: int32 [N, P]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
-from contextdb.classes import TagMasks, ValueMasks
-from contextdb.compiled import CompiledTable
+from contextdb.compiled.classes import TagMasks, ValueMasks
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.factors import Factor, NumberFactor, ValueFactor
 from contextdb.covering.gaps import gap_id, nearest_row, widened
 from contextdb.covering.space import Box, Space

@@ -11,10 +11,10 @@ from functools import cached_property
 
 import oracles
 
-from contextdb.conditions import Condition
-from contextdb.domains import Domain
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.table import Table
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.table import Table
 
 DOMAINS = {
     "flag": Domain("bool"),

@@ -6,8 +6,8 @@ import pytest
 
 import contextdb as cdb
 from contextdb.covering import pairs
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 
 SPEEDS = {name: {"type": "number", "min": 0, "max": 10} for name in ("speed", "target_speed")}
 

@@ -10,8 +10,8 @@ from contextdb.covering import coverage
 from contextdb.covering.assumed import opened
 from contextdb.covering.baseline import Change, compared, read_baseline
 from contextdb.errors import ContextError
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 
 SCHEMA = {"speed": {"type": "number", "min": 0, "max": 10}, "gait": {"type": "enum", "values": ["Walk", "Run"]}}
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.check import identical_rows
+from contextdb.checks.rows import check_rows
+from contextdb.checks.run import identical_rows
 from contextdb.commands.check_command import check_path
 from contextdb.covering import coverage
-from contextdb.covering.check_rows import check_rows
-from contextdb.schema import TableSettings
+from contextdb.schema.settings import TableSettings
 
 TOML = """
 [conditions.speed]
@@ -94,7 +94,7 @@ def test_a_check_finds_of_small_tables_what_coverage_finds(seed):
 
 
 def test_of_a_rule_that_many_rows_break_the_first_are_named_and_how_many_more(monkeypatch):
-    monkeypatch.setattr("contextdb.check.MOST_ROWS", 3)
+    monkeypatch.setattr("contextdb.checks.run.MOST_ROWS", 3)
     columns = {"Asset": [f"a{i}" for i in range(9)], "speed": ["Any", *(f"{i}..{i + 3}" for i in range(8))]}
     speed = {"speed": {"type": "number", "min": 0.0, "max": 20.0}}
     table = cdb.Table.from_columns(columns, speed, TableSettings("table", policy="first"))

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.cells import parse_cell
-from contextdb.check import identical_rows
+from contextdb.cells.grammar import parse_cell
+from contextdb.checks.run import identical_rows
 from contextdb.covering import coverage
 from contextdb.covering.space import Space
-from contextdb.variety import NEEDLESS
+from contextdb.tables.variety import NEEDLESS
 
 SEEDS = st.integers(0, 2**32)
 

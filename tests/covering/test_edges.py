@@ -12,7 +12,7 @@ import pytest
 import contextdb as cdb
 from contextdb.covering import coverage, format_percent
 from contextdb.covering.shares import told_apart, wilson
-from contextdb.schema import TableSettings
+from contextdb.schema.settings import TableSettings
 
 SPEED = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}
 

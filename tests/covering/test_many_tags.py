@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from strategies import TAGS, examples
 
 import contextdb as cdb
-from contextdb.cells import TagSet, covered_by, covers
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import TagSet, covered_by, covers
+from contextdb.checks.rows import check_rows
 from contextdb.covering import coverage
-from contextdb.covering.check_rows import check_rows
 from contextdb.covering.count import Bounds, uncovered_share
 from contextdb.covering.factors import TagFactor, tag_factors
 from contextdb.covering.space import Space
 from contextdb.covering.witness import BoxSet, Steps
-from contextdb.domains import Domain
 
 tag_sets = st.builds(
     TagSet, st.frozensets(st.sampled_from(TAGS), max_size=3), st.frozensets(st.sampled_from(TAGS), max_size=3), st.booleans()

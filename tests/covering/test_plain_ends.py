@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.cells import NumberSet, parse_cell
+from contextdb.cells.grammar import NumberSet, parse_cell
+from contextdb.cells.intervals import above, below, complement
+from contextdb.cells.plain_ends import cuts_of, plain
+from contextdb.checks.effects import effects
 from contextdb.covering import coverage
 from contextdb.covering.gaps import find_gaps
 from contextdb.covering.pairs import pairs
 from contextdb.covering.space import Space
-from contextdb.effects import effects
-from contextdb.intervals import above, below, complement
-from contextdb.plain_ends import cuts_of, plain
-from contextdb.schema import TableSettings
+from contextdb.schema.settings import TableSettings
 
 NUMBER = {"speed": {"type": "number", "min": 0.0, "max": 100.0}}
 ANGLE = {"speed": {"type": "angle"}}

@@ -13,8 +13,8 @@ from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.importing import table_of
 from contextdb.exchange.mapping import propose
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.table import Table
 
 NAMES = [name for name, one in FORMATS.items() if one.is_read]
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from strategies import tables
 
-from contextdb.cells import parse_cell
-from contextdb.domains import BOOL, NUMBER, TEXT
+from contextdb.cells.domains import BOOL, NUMBER, TEXT
+from contextdb.cells.grammar import parse_cell
 from contextdb.errors import TableError
 from contextdb.exchange.dmn_write import NAMESPACE
 from contextdb.exchange.feel import cell_of, string_of, unary_tests, value_of
@@ -19,8 +19,8 @@ from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.importing import table_of
 from contextdb.exchange.mapping import propose
 from contextdb.exchange.reading import Reading
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.table import Table
 
 DISHES = """<?xml version="1.0" encoding="UTF-8"?>
 <definitions xmlns="https://www.omg.org/spec/DMN/20191111/MODEL/" id="d" name="DRD" namespace="x">

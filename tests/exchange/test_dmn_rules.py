@@ -12,8 +12,8 @@ from contextdb.exchange.formats import read
 from contextdb.exchange.importing import plan_import, table_of
 from contextdb.exchange.mapping import propose
 from contextdb.exchange.reading import Reading
-from contextdb.project import Project
-from contextdb.schema import EMPTY, TableSettings
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.project import Project
 
 KNOWN = ["speed", "limit", "top speed", "Passenger2.Miles", "name", "other name"]
 START = '<definitions xmlns="https://www.omg.org/spec/DMN/20191111/MODEL/">'

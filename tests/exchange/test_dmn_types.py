@@ -9,15 +9,15 @@ from xml.sax.saxutils import escape
 
 import pytest
 
-from contextdb.cells import parse_cell
-from contextdb.conditions import Condition
-from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain
+from contextdb.cells.grammar import parse_cell
 from contextdb.exchange.dmn_read import read_dmn
 from contextdb.exchange.feel import string_of
 from contextdb.exchange.formats import FORMATS, read, write
 from contextdb.exchange.reading import Reading
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.table import Table
 
 NAMESPACES = [
     "http://www.omg.org/spec/DMN/20151101/dmn.xsd",

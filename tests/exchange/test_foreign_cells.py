@@ -15,15 +15,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb.cell_words import truth_of
-from contextdb.cells import Cell, NumberSet, ValueSet, parse_cell
+from contextdb.cells.grammar import Cell, NumberSet, ValueSet, parse_cell
+from contextdb.cells.words import truth_of
 from contextdb.errors import CellError
 from contextdb.exchange.formats import ReadOptions, read
 from contextdb.exchange.importing import plan_import, table_of
 from contextdb.exchange.mapping import Mapped, propose
 from contextdb.exchange.reading import ERRORS, Reading
-from contextdb.project import Project
-from contextdb.schema import EMPTY, TableSettings, read_schema
+from contextdb.schema.settings import EMPTY, TableSettings, read_schema
+from contextdb.tables.project import Project
 
 NAMES = [
     "Mid Air",

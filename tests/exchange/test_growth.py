@@ -11,15 +11,15 @@ from xml.sax.saxutils import escape
 
 import pytest
 
-from contextdb.cells import parse_cell
-from contextdb.domains import Domain, Kind
+from contextdb.cells.domains import Domain, Kind
+from contextdb.cells.grammar import parse_cell
 from contextdb.errors import ContextDBError, SchemaError, TableError
 from contextdb.exchange import xlsx_scan
 from contextdb.exchange.feel import cell_of, strings_of
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.grid import MOST_LOOKED_AT, blocks_of
-from contextdb.table import Table
-from contextdb.toml_lines import read_toml
+from contextdb.schema.toml_lines import read_toml
+from contextdb.tables.table import Table
 
 SMALL, FACTOR = 4_000, 8
 MOST_GROWTH = 30

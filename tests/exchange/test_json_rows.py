@@ -9,7 +9,7 @@ import pytest
 from contextdb.errors import TableError
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.reading import Reading
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 
 def texts(reading: Reading) -> dict[str, list[str]]:

@@ -10,7 +10,7 @@ import pytest
 
 from contextdb.errors import TableError
 from contextdb.exchange.formats import FORMATS, read, write
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 LONG = "x" * 3_000_000
 CONFLICT = "<<<<<<< ours\n{ours}\n=======\n{theirs}\n>>>>>>> theirs\n"

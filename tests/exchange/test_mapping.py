@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb.cells import reads
+from contextdb.cells.grammar import reads
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError
 from contextdb.exchange import mapping
@@ -17,8 +17,8 @@ from contextdb.exchange.importing import plan_import
 from contextdb.exchange.mapping import Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.proposals import propose_type
 from contextdb.exchange.reading import Reading
-from contextdb.project import Project
-from contextdb.schema import TableSettings, conditions_from_dict, read_schema
+from contextdb.schema.settings import TableSettings, conditions_from_dict, read_schema
+from contextdb.tables.project import Project
 
 TOML = """# our game
 [conditions.speed]        # how fast

@@ -12,15 +12,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import examples, tables
 
+from contextdb.cells.domains import Domain
 from contextdb.columns import TextColumn
-from contextdb.domains import Domain
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.importing import plan_import, table_of
 from contextdb.exchange.mapping import propose
 from contextdb.exchange.xlsx_parts import NEVER
-from contextdb.schema import EMPTY, TableSettings
-from contextdb.source import read_csv
-from contextdb.table import Table, build_table
+from contextdb.files.csv_source import read_csv
+from contextdb.schema.settings import EMPTY, TableSettings
+from contextdb.tables.table import Table, build_table
 
 NAMES = ("csv", "tsv", "xlsx", "parquet", "json", "jsonl")
 TEXTS = st.one_of(

@@ -12,7 +12,7 @@ from contextdb.errors import TableError
 from contextdb.exchange.formats import ReadOptions, read
 from contextdb.exchange.mapping import propose
 from contextdb.exchange.reading import Reading
-from contextdb.schema import EMPTY, TableSettings
+from contextdb.schema.settings import EMPTY, TableSettings
 
 ROWS: list[list[Any]] = [["Asset", "speed", "pos"], ["jog", 1.5, "CB"], ["run", 2.5, "FS"]]
 ERRORS = ["#N/A", "#DIV/0!", "#REF!", "#VALUE!", "#NAME?", "#NULL!", "#NUM!"]

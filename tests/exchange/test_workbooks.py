@@ -17,9 +17,9 @@ from contextdb.errors import ContextDBError, TableError
 from contextdb.exchange import xlsx_scan
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.reading import Reading
-from contextdb.project import Project
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.project import Project
+from contextdb.tables.table import Table
 
 ROOT = Path(__file__).parent.parent.parent
 

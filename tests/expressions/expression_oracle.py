@@ -11,8 +11,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from contextdb.conditions import Condition
-from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain, wrap_angle
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain, wrap_angle
 
 GAITS = ("Walk", "Run", "Idle")
 TAGS = ("InAir", "Move.Run", "Move.Walk")

@@ -12,13 +12,13 @@ from hypothesis import given, reject
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb.cells import format_cell
-from contextdb.conditions import Condition
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import BOOL, NUMBER, Domain
+from contextdb.cells.grammar import format_cell
 from contextdb.covering.engine import coverage
-from contextdb.domains import BOOL, NUMBER, Domain
 from contextdb.expressions import Box, ExpressionError, assumptions_of, read_assumptions, read_expression
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 
 STANDING_IN = {
     "p": False,

@@ -10,8 +10,8 @@ from expression_oracle import CONDITIONS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.conditions import Condition
-from contextdb.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain
 from contextdb.errors import SchemaError
 from contextdb.expressions import Expression, ExpressionError, ExpressionFault, read_expression
 from contextdb.expressions.functions import FUNCTIONS

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 from strategies import cells, examples
 
 import contextdb as cdb
-from contextdb.compiled import CompiledTable
-from contextdb.conditions import Condition
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import BOOL
+from contextdb.compiled.table import CompiledTable
 from contextdb.covering.ruled import without_rules
-from contextdb.domains import BOOL
 from contextdb.errors import ContextError
 from contextdb.expressions import ExpressionError, read_expression
-from contextdb.schema import Schema, TableSettings
+from contextdb.schema.settings import Schema, TableSettings
 
 COLUMNS = ("a", "n", "gait", "p", "tags")
 NONE = Told("", lambda facts: True)
@@ -107,7 +107,7 @@ def test_many_contexts_have_the_answers_of_each_alone(case, moments, unknown):
         return
     for few_rows in (-1, 64):  # against whole masks, row by row
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("contextdb.when.many.MANY_ROWS", few_rows)
+            patch.setattr("contextdb.expressions.rules.many.MANY_ROWS", few_rows)
             assert [rows.tolist() for rows in compiled.query_many(columns, unknown).lists()] == expected
     many = compiled.query_many(columns, unknown)
     assert [rows.tolist() for rows in many.lists()] == expected

@@ -23,7 +23,7 @@ from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.spans import Span
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 CHANNELS = [
     {"type": "position", "bone": "LeftFoot", "weight": 0.75},

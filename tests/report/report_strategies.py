@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
+from contextdb.checks.rules import RULES
 from contextdb.findings import LEVELS, Finding
 from contextdb.report.results import CheckReport, TableSummary
-from contextdb.report.rules import RULES
 
 MARKUP = [
     *("\n", "\r\n", "\r", "\t", "\0", "\x1b[31m", "\x9b2J", "\u2028", "\u202e", "\ud800", "\udfff", "\ufffe", "\x7f"),

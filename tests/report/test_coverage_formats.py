@@ -23,8 +23,8 @@ from contextdb.report import coverage_formats
 from contextdb.report.coverage_formats import FORMATS
 from contextdb.report.coverage_results import CoverageResults, Measured, fail_under, fail_under_telemetry, max_drop, table_gone
 from contextdb.report.coverage_text import bar
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 from contextdb.telemetry.observed import FactNote, Observed, SeenGap
 
 HOSTILE = [

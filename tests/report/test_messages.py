@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from contextdb import report
+from contextdb.checks.rules import RULES, TABLE_RULES
 from contextdb.commands.check_command import check_path
 from contextdb.findings import LEVELS
-from contextdb.report.rules import RULES, TABLE_RULES
 
 ROOT = Path(__file__).parent.parent.parent
 PAGE = (ROOT / "docs" / "messages.md").read_text(encoding="utf-8")

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from report_strategies import EXAMPLE, JOG, many, reports
 
 from contextdb import report as formats
+from contextdb.checks.rules import TABLE_RULES
 from contextdb.findings import LEVELS, Level
 from contextdb.report import render_junit
 from contextdb.report.results import CheckReport, told
-from contextdb.report.rules import TABLE_RULES
 
 
 def read(report: CheckReport, failing: tuple[Level, ...] = ("error",)) -> ET.Element:

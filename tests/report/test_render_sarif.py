@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given
 from report_strategies import EXAMPLE, many, reports
 
+from contextdb.checks.rules import RULES
 from contextdb.findings import LEVELS, Finding
 from contextdb.report import render_sarif
 from contextdb.report.results import CheckReport, as_path, told
-from contextdb.report.rules import RULES
 
 SARIF_LEVELS = {"error": "error", "warning": "warning", "info": "note"}
 URI = re.compile(r"(file:///)?([\w.~/-]|%[0-9A-F]{2})*", re.ASCII)

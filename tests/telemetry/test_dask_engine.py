@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 from running import run
 
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from contextdb.telemetry import observe
 from contextdb.telemetry.engines import EngineError
 

@@ -9,15 +9,15 @@ from dataclasses import replace
 import polars as pl
 import pytest
 
-from contextdb.cells import parse_cell
+from contextdb.cells.grammar import parse_cell
 from contextdb.covering import coverage
 from contextdb.covering.assumed import opened
 from contextdb.covering.gaps import gap_id
 from contextdb.covering.report import Gap
 from contextdb.report.coverage_formats import FORMATS, render
 from contextdb.report.coverage_results import CoverageResults, Measured
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
 from contextdb.telemetry import observe
 from contextdb.telemetry.gap_list import ranked
 

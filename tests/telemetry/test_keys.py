@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from contextdb import bitmask
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from contextdb.telemetry import keys, observe, observe_file
 from contextdb.telemetry.number_classes import NumberClasses
 from contextdb.telemetry.parts import MOST_HASHES

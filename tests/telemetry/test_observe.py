@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from contextdb.errors import ContextDBError
 from contextdb.report.coverage_words import facts_sentences
-from contextdb.schema import EMPTY, conditions_from_dict
-from contextdb.table import Table
+from contextdb.schema.settings import EMPTY, conditions_from_dict
+from contextdb.tables.table import Table
 from contextdb.telemetry import observe
 from contextdb.telemetry import parts as parts_module
 

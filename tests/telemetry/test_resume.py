@@ -8,7 +8,7 @@ import sys
 import polars as pl
 import pytest
 
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from contextdb.telemetry import observe
 
 SCHEMA = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}

@@ -11,11 +11,11 @@ from textual.geometry import Region
 from textual.pilot import Pilot
 from textual.widgets import Button, Static
 
-from contextdb import edits
-from contextdb.conditions import Condition
-from contextdb.domains import ANGLE, BOOL, Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import ANGLE, BOOL, Domain
+from contextdb.cells.facts import read_fact_text
+from contextdb.edits import edits
 from contextdb.errors import ContextError, Fault
-from contextdb.facts import read_fact_text
 from tui.widgets.cell_editor import CellEditor
 from tui.widgets.editing.popup import Popup
 

@@ -20,9 +20,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from contextdb import edits
-from contextdb.edits import Edit
-from contextdb.table import Table
+from contextdb.edits import edits
+from contextdb.edits.edits import Edit
+from contextdb.tables.table import Table
 from tui.model.session import Session, bytes_for
 from tui.model.watched import digest_of
 

@@ -9,8 +9,8 @@ from terminal import drive, screen_text
 from textual.app import App
 from textual.widgets import Input, Select
 
-from contextdb.edits import NewColumn
-from contextdb.table import Table, load
+from contextdb.edits.edits import NewColumn
+from contextdb.tables.table import Table, load
 from tui.model.column_choices import Insertion, NewColumnForm, blueprint_fault, blueprints, choices, missing_conditions, places
 from tui.model.condition_form import ConditionForm
 from tui.screens.add_column import AddColumn

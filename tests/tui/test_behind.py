@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import contextdb as cdb
-from contextdb.cases import check_cases
-from contextdb.compiled import CompiledTable
-from contextdb.nesting.flat import flat_rows
-from contextdb.nesting.links import Neighbours
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.checks.cases import check_cases
+from contextdb.compiled.table import CompiledTable
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.nesting.flat import flat_rows
+from contextdb.tables.nesting.links import Neighbours
+from contextdb.tables.table import Table
 from tui.model.context_list import ContextList
 from tui.model.coverage_run import measured
 from tui.model.query_row import QueryRow

@@ -13,8 +13,8 @@ from textual.pilot import Pilot
 from textual.screen import ModalScreen
 from textual.widgets import Button
 
-from contextdb.conditions import Condition
-from contextdb.domains import Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
 from contextdb.errors import Fault
 from tui.widgets.cell_editor import CellEditor
 from tui.widgets.editing.entry import one_line

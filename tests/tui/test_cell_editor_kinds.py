@@ -10,8 +10,8 @@ from editor_desk import CHART, HIT, SIDE, SPEED, STATE, STEPS, WAY, Desk, commit
 from terminal import drive, screen_text
 from textual.pilot import Pilot
 
-from contextdb.conditions import Condition
-from contextdb.domains import Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
 from tui.widgets.editing.choice_list import ChoiceList
 
 # ---- bool

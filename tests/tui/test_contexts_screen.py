@@ -14,8 +14,8 @@ from textual.app import App
 from textual.events import Paste
 from textual.widgets import Input
 
-from contextdb.cases import read_cases
-from contextdb.table import Table, load
+from contextdb.checks.cases import read_cases
+from contextdb.tables.table import Table, load
 from tui.model.context_list import ContextList
 from tui.screens.contexts import ContextsDialog, Loaded, columns_of, shown_facts
 

@@ -152,7 +152,7 @@ def test_every_gap_of_a_table_gives_a_context_without_a_valid_row(seed):
 
 def read(facts: Mapping[str, str], of: cdb.Table) -> dict[str, object]:
     """Facts as values, those that are left out missing."""
-    from contextdb.facts import read_fact_text
+    from contextdb.cells.facts import read_fact_text
 
     return {c.condition.name: read_fact_text(facts.get(c.condition.name, ""), c.condition) for c in of.conditions}
 

@@ -24,7 +24,7 @@ from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, ReadOptions, write
 from contextdb.exchange.mapping import as_job
 from contextdb.exchange.reading import Reading
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.importing import Draft, Import, Mode
 from tui.model.sheet import Sheet
 from tui.screens.export_table import Export, ExportDialog

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import tables
 
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.find import PatternError, Search, find, next_hit, replace_all
 
 NAMES = ["Asset", "x"]

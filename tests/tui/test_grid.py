@@ -13,8 +13,8 @@ from terminal import press, said, screen_text, with_editor
 from textual.strip import Strip
 
 from contextdb.columns import TextColumn
-from contextdb.schema import Schema, TableSettings, conditions_from_dict
-from contextdb.table import Table, build_table
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.tables.table import Table, build_table
 from tui.commands import GRID
 from tui.model.layout import layout
 from tui.model.session import bytes_for

@@ -9,8 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import cells, domains
 
-from contextdb.cells import parse_cell
-from contextdb.domains import ANGLE, INT, NUMBER, Domain
+from contextdb.cells.domains import ANGLE, INT, NUMBER, Domain
+from contextdb.cells.grammar import parse_cell
 from tui.model.interval_picture import (
     DIAL_HEIGHT,
     DIAL_WIDTH,

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import contextdb as cdb
-from contextdb import edits
 from contextdb.disk import write_atomic
-from contextdb.rewrite import write_csv
-from contextdb.table import Table
+from contextdb.edits import edits
+from contextdb.files.csv_rewrite import write_csv
+from contextdb.tables.table import Table
 from tui.model.journal import Journal, base_path, journal_path, recover
 from tui.model.lock import Holder, Lock
 from tui.model.sheet import Sheet

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from contextdb.errors import ContextError
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.moment import moment_inside
 from tui.model.query_row import QueryRow
 from tui.model.wanted import Wanted

@@ -8,7 +8,7 @@ import pytest
 from terminal import drive, screen_text
 from textual.app import App
 
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.query_row import QueryRow
 from tui.screens.nearest import CellAnswer, NearestDialog
 

@@ -9,7 +9,7 @@ from terminal import drive, screen_text
 from textual.app import App, ComposeResult
 from textual.widgets import Input, Select
 
-from contextdb.table import Table, load
+from contextdb.tables.table import Table, load
 from tui.messages import Edited
 from tui.model.condition_form import ConditionForm, names_in
 from tui.model.options import columns_for, with_expression

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.table import load
+from contextdb.tables.table import load
 from tui.model.priorities import (
     EXAMPLE,
     DatabaseNow,

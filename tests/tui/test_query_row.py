@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import contexts, examples, quoted, sets, tables
 
-from contextdb import cell, edits
-from contextdb.facts import describe, read_fact
-from contextdb.table import Table
+from contextdb import cell
+from contextdb.cells.facts import describe, read_fact
+from contextdb.edits import edits
+from contextdb.tables.table import Table
 from tui.model.query_row import QueryRow
 
 KINDS = ("bool", "int", "number", "angle", "enum", "tags")

@@ -12,14 +12,14 @@ from edit_strategies import edits_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb import edits
 from contextdb.disk import staged
+from contextdb.disk.folder_lock import temporary_name
+from contextdb.edits import edits
 from contextdb.errors import ContextDBError, FileError, TableError
-from contextdb.folder_lock import temporary_name
-from contextdb.journal_lines import line_of
-from contextdb.parquet import rewritten_parquet
-from contextdb.source import read_csv
-from contextdb.table import Table, load
+from contextdb.files.csv_source import read_csv
+from contextdb.files.journal_lines import line_of
+from contextdb.files.parquet import rewritten_parquet
+from contextdb.tables.table import Table, load
 from tui.model import session as session_module
 from tui.model.journal import journal_path
 from tui.model.lock import Holder, Lock

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb.check import check
-from contextdb.edits import set_cells
+from contextdb.checks.run import check
+from contextdb.edits.edits import set_cells
 from contextdb.errors import TableError
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.find import Search
 from tui.model.selection import Block, Selection
 from tui.model.sheet import Sheet

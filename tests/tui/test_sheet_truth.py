@@ -18,8 +18,8 @@ from running import run
 from terminal import press, said, screen_text, with_editor
 
 import contextdb as cdb
-from contextdb.cases import exactly, read_expected
-from contextdb.nesting.flat import flat_rows
+from contextdb.checks.cases import exactly, read_expected
+from contextdb.tables.nesting.flat import flat_rows
 from tui.model.context_list import ContextList
 from tui.model.sheet import Sheet
 from tui.model.why import why_row

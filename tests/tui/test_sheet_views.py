@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, tables
 
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.views import Filter, Sort, View, shown_rows, sorted_rows
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import contextdb as cdb
 from contextdb.errors import FileError
-from contextdb.schema import TableSettings
+from contextdb.schema.settings import TableSettings
 from tui.model.query_row import QueryRow
 from tui.model.sheet import Sheet
 from tui.model.teams import Teams, TeamSheet, roles_of, teams_path

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, sets, tables
 
-from contextdb.schema import TableSettings
-from contextdb.table import Table, build_table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table, build_table
 from tui.model.query_row import QueryRow
 from tui.model.why import nearest_rows, why_row
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from contextdb.columns import TextColumn
-from contextdb.schema import Schema, TableSettings, conditions_from_dict
-from contextdb.table import build_table
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.tables.table import build_table
 from tui.model.sheet import Sheet
 from tui.model.views import Filter, Sort
 from tui.model.window import Window

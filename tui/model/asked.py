@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows
-from contextdb.casting import Actor, CastMatches
-from contextdb.compiled import CompiledTable
+from contextdb.cells.facts import Fact
+from contextdb.compiled.casting import Actor, CastMatches
+from contextdb.compiled.explain import Explanation
+from contextdb.compiled.matches import Matches
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError, ContextError, Fault
-from contextdb.explain import Explanation
-from contextdb.facts import Fact
-from contextdb.matches import Matches
-from contextdb.nesting.flat import FlatTable
-from contextdb.nesting.links import inner_rows
-from contextdb.table import Table
+from contextdb.tables.nesting.flat import FlatTable
+from contextdb.tables.nesting.links import inner_rows
+from contextdb.tables.table import Table
 from tui.model.behind import Inside
 
 Offered = Mapping[str, Sequence[Actor]]

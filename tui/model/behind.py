@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 from contextdb.errors import ContextDBError, Fault, plural
-from contextdb.nesting.links import inner_rows, nesting_faults
-from contextdb.table import Table
+from contextdb.tables.nesting.links import inner_rows, nesting_faults
+from contextdb.tables.table import Table
 
 
 @dataclass(frozen=True, slots=True)

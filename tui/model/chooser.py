@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from contextdb.conditions import Condition
-from contextdb.domains import NUMERIC
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
 from tui.model.completion import (
     Tick,
     Vocabulary,

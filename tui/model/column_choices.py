@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import get_args
 
-from contextdb import edits
-from contextdb.conditions import Condition
-from contextdb.edits import Edit, Job, NewColumn
+from contextdb.cells.conditions import Condition
+from contextdb.edits import edits
+from contextdb.edits.edits import Edit, Job, NewColumn
 from contextdb.errors import ContextDBError, in_quotes, plural, shown
-from contextdb.shapes import wrong_name
-from contextdb.table import Table
+from contextdb.schema.shapes import wrong_name
+from contextdb.tables.table import Table
 from tui.model.condition_form import ConditionForm, plain
 
 JOB_WORDS: dict[Job, str] = {

@@ -1,7 +1,8 @@
 """The words of a cell that names values: which one is being typed, what it may become, and which values are named.
 
 A text is taken apart into words even where the grammar refuses it, for it is looked at while it is typed; what it means is for
-`contextdb.cells` to say. A word may have a sign (tags) and stand in quotes. Before the words `not` may stand, behind them `~2.5`.
+`contextdb.cells.grammar` to say. A word may have a sign (tags) and stand in quotes. Before the words `not` may stand, behind them
+`~2.5`.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from contextdb.cell_words import quoted
-from contextdb.cells import TagSet, ValueSet, parse_cell, reads
-from contextdb.domains import Domain
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import TagSet, ValueSet, parse_cell, reads
+from contextdb.cells.words import quoted
 
 Tick = Literal["on", "off", "+", "-"]
 """What a cell says of a value: accepted or not; for tags needed, banned, or "off": not named."""

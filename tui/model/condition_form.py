@@ -7,14 +7,14 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from contextdb.cell_words import quoted
-from contextdb.cells import format_number
-from contextdb.conditions import Condition, Mirror
-from contextdb.domains import KINDS
+from contextdb.cells.conditions import Condition, Mirror
+from contextdb.cells.domains import KINDS
+from contextdb.cells.grammar import format_number
+from contextdb.cells.mirroring import SWAPPED_KINDS
+from contextdb.cells.words import quoted
 from contextdb.errors import Fault, SchemaError
-from contextdb.mirroring import SWAPPED_KINDS
-from contextdb.schema import conditions_from_dict
-from contextdb.sections import has_place
+from contextdb.schema.sections import has_place
+from contextdb.schema.settings import conditions_from_dict
 
 KIND_WORDS = {
     "bool": "True or False",

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from contextdb.diff import Merge, merge
-from contextdb.diffing.markers import versions_of
-from contextdb.diffing.reading import merged_bytes, table_of
 from contextdb.disk import read_bytes, write_atomic
+from contextdb.edits.diffing import Merge, merge
+from contextdb.edits.diffing.markers import versions_of
 from contextdb.errors import ContextDBError
-from contextdb.project import schema_for, settings_of
+from contextdb.tables.merging.reading import merged_bytes, table_of
+from contextdb.tables.project import schema_for, settings_of
 
 
 def conflicts_in(path: str | Path) -> Merge | None:

@@ -18,7 +18,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.cases import (
+from contextdb.cells.conditions import Condition
+from contextdb.checks.cases import (
     EXPECTED,
     NONE,
     NOTE,
@@ -33,12 +34,11 @@ from contextdb.cases import (
     read_expected,
     rename_case,
 )
-from contextdb.compiled import CompiledTable
-from contextdb.conditions import Condition
+from contextdb.compiled.table import CompiledTable
 from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, some
-from contextdb.recordings import Recording, fact_text, open_recording
-from contextdb.table import Table
+from contextdb.tables.table import Table
+from contextdb.telemetry.recordings import Recording, fact_text, open_recording
 from tui.model.wanted import wanted_by
 
 BLOCK = 256

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from contextdb.checks.rules import RULES
 from contextdb.covering import CoverageReport, Gap, Nearest, PairTable, Slice, format_percent
 from contextdb.covering.report import Crowd
 from contextdb.covering.shares import told_apart
 from contextdb.errors import plural
 from contextdb.findings import Finding
-from contextdb.report.rules import RULES
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.coverage_run import CoverageRun, Result
 
 MOST_ROWS_NAMED = 12

@@ -19,8 +19,8 @@ from typing import Literal
 from contextdb.covering import Cancelled, CoverageReport, PairTable, coverage, pairs
 from contextdb.covering.progress import Stops, Tell
 from contextdb.errors import ContextDBError, plural, shown
-from contextdb.nesting.flat import FlatTable
-from contextdb.table import Table
+from contextdb.tables.nesting.flat import FlatTable
+from contextdb.tables.table import Table
 
 State = Literal["none", "running", "done", "stale", "failed"]
 MOST_GAPS = 100

@@ -15,11 +15,11 @@ import numpy as np
 import polars as pl
 
 from contextdb.bitmask import Flags, Rows
-from contextdb.changes import Cells
 from contextdb.columns import TextColumn
-from contextdb.edits import Edit
+from contextdb.edits.edits import Edit
 from contextdb.errors import ContextDBError, Fault, in_quotes, plural, shown
-from contextdb.table import Table
+from contextdb.tables.changes import Cells
+from contextdb.tables.table import Table
 
 
 class PatternError(ContextDBError):

@@ -12,17 +12,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from contextdb.changes import CameFrom
+from contextdb.cells.domains import KINDS
 from contextdb.columns import TextColumn
-from contextdb.domains import KINDS
-from contextdb.edits import Edit, edit_between
+from contextdb.edits.edits import Edit, edit_between
 from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, shown
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
 from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.proposals import names_of
 from contextdb.exchange.reading import Reading, listed
-from contextdb.schema import Schema, TableSettings, conditions_from_dict
-from contextdb.table import Table, build_table
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.tables.changes import CameFrom
+from contextdb.tables.table import Table, build_table
 
 Mode = Literal["merge", "append", "replace"]
 MODES: dict[Mode, str] = {

@@ -13,9 +13,9 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from contextdb.cells import Cell, NumberSet, format_cell, format_number
-from contextdb.domains import Domain
-from contextdb.intervals import CIRCLE, EVERYTHING, Span, Spans
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import Cell, NumberSet, format_cell, format_number
+from contextdb.cells.intervals import CIRCLE, EVERYTHING, Span, Spans
 
 Run = tuple[str, bool]
 """A piece of a picture, and whether the cell holds any of the values that stand there."""

@@ -27,15 +27,15 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.edits import Edit, edit_between
+from contextdb.edits.edits import Edit, edit_between
+from contextdb.edits.history import History, Step
+from contextdb.edits.schema_file import SchemaChange
 from contextdb.errors import ContextDBError, Fault, Place, plural
-from contextdb.files import AnySource
-from contextdb.history import History, Step
-from contextdb.journal_lines import Record, line_of, n_lost, read_records
-from contextdb.parquet import read_parquet
-from contextdb.schema_file import SchemaChange
-from contextdb.source import read_csv
-from contextdb.table import Table, build_table
+from contextdb.files.csv_source import read_csv
+from contextdb.files.journal_lines import Record, line_of, n_lost, read_records
+from contextdb.files.parquet import read_parquet
+from contextdb.files.texts import AnySource
+from contextdb.tables.table import Table, build_table
 from tui.model.lock import FOLDER, own_folder
 from tui.model.watched import digest_of
 

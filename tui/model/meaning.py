@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from contextdb.cell_mends import candidates
-from contextdb.cells import Cell, TagSet, ValueSet, format_number, parse_cell, reads
-from contextdb.conditions import Condition
-from contextdb.domains import NUMERIC, Domain
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC, Domain
+from contextdb.cells.facts import describe, read_fact_text
+from contextdb.cells.grammar import Cell, TagSet, ValueSet, format_number, parse_cell, reads
+from contextdb.cells.mends import candidates
 from contextdb.errors import CellError, ContextError, Fault, Place, plural, shown
-from contextdb.facts import describe, read_fact_text
 from tui.model.interval_picture import number_words
 
 _MOST_TAGS = 4

@@ -5,12 +5,12 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Mapping
 
-from contextdb.cells import Cell, format_number, parse_cell
-from contextdb.conditions import Condition
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
+from contextdb.cells.grammar import Cell, format_number, parse_cell
 from contextdb.covering.inside import facts_inside
-from contextdb.domains import NUMERIC
 from contextdb.errors import ContextError, Fault, shown
-from contextdb.recordings import fact_text
+from contextdb.telemetry.recordings import fact_text
 from tui.model.wanted import Wanted
 
 MOST_TRIED = 4000

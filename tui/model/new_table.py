@@ -10,8 +10,8 @@ import numpy as np
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import in_quotes
-from contextdb.file_names import alike, why_unportable
-from contextdb.files import write_texts
+from contextdb.files.file_names import alike, why_unportable
+from contextdb.files.texts import write_texts
 
 ASSET = "Asset Name"
 _FORBIDDEN = set('/\\:*?"<>|')

@@ -10,9 +10,9 @@ import re
 from dataclasses import replace
 from decimal import Decimal
 
-from contextdb.cell_words import NUMBER_TEXT
-from contextdb.cells import Cell, NumberSet, format_cell, format_number, parse_cell, reads
-from contextdb.domains import Domain
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import Cell, NumberSet, format_cell, format_number, parse_cell, reads
+from contextdb.cells.words import NUMBER_TEXT
 from tui.model.interval_picture import Piece, pieces
 
 _NUMBER = re.compile(rf"(?:(?<=\+)-)?({NUMBER_TEXT})")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from contextdb.table import Table
+from contextdb.tables.table import Table
 
 POLICY_WORDS = {
     "collect": "several may be valid: that is variety",

@@ -6,7 +6,7 @@ are never valid. For each condition the mask of rows that accept its fact is kep
 column, works out one mask anew.
 
 A valid row is *undecided* where it only may be valid: its cells accept some values of a set, or its rule lacks a fact. Which of the
-valid rows is picked is for `contextdb.pick` to say.
+valid rows is picked is for `contextdb.compiled.pick` to say.
 
 Where actors are offered for a role, or rows stand for other tables, the compiled table is asked (`tui.model.asked`); where a table
 inside cannot be read, each table is asked by itself (`tui.model.behind`).
@@ -24,20 +24,20 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Flags, Rows
-from contextdb.cells import Cell
+from contextdb.cells.conditions import Condition
+from contextdb.cells.facts import Fact
+from contextdb.cells.grammar import Cell
 from contextdb.columns import TextColumn
-from contextdb.compiled import CompiledTable
-from contextdb.condition_column import ConditionColumn
-from contextdb.conditions import Condition
+from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
+from contextdb.compiled.pick import Outcome
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, some
-from contextdb.explain import Explanation, Failure, RowExplanation, describe_fact
-from contextdb.facts import Fact
-from contextdb.nesting.links import is_nested
-from contextdb.nesting.names import asset_name
-from contextdb.pick import Outcome
-from contextdb.schema import TableSettings
-from contextdb.table import Table
-from contextdb.when import WhenColumn, WhenRules
+from contextdb.expressions.rules import WhenColumn, WhenRules
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.nesting.links import is_nested
+from contextdb.tables.nesting.names import asset_name
+from contextdb.tables.table import Table
 from tui.model.asked import Asked, Offered, bits_of_rows
 from tui.model.behind import Behind, Counts, Inside
 from tui.model.wanted import Wanted, flat_of

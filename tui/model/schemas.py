@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from contextdb.changes import Sections
-from contextdb.edits import Edit
+from contextdb.edits.edits import Edit
 from contextdb.errors import SchemaError
-from contextdb.schema import Schema, TableSettings
-from contextdb.sections import EDITED_SECTIONS, settings_to_dict
-from contextdb.table import Table
+from contextdb.schema.sections import EDITED_SECTIONS, settings_to_dict
+from contextdb.schema.settings import Schema, TableSettings
+from contextdb.tables.changes import Sections
+from contextdb.tables.table import Table
 
 
 def under_schema(saved: Table, present: Table, path: Path, folder: Path, schema: Schema) -> Callable[[Table], Table]:

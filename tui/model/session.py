@@ -13,17 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.diff import Merge, diff, merge
 from contextdb.disk import Was, path_in_quotes, read_bytes, write_atomic
+from contextdb.disk.folder_lock import sweep
+from contextdb.disk.together import NewFile, write_together
+from contextdb.edits.diffing import Merge, diff, merge
+from contextdb.edits.history import History
+from contextdb.edits.schema_file import schema_change
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
-from contextdb.files import new_source
-from contextdb.folder_lock import sweep
-from contextdb.history import History
-from contextdb.project import SCHEMA_FILE, load_table, schema_for
-from contextdb.saving import require_related
-from contextdb.schema_file import schema_change
-from contextdb.table import Table
-from contextdb.together import NewFile, write_together
+from contextdb.files.texts import new_source
+from contextdb.tables.project import SCHEMA_FILE, load_table, schema_for
+from contextdb.tables.saving import require_related
+from contextdb.tables.table import Table
 from tui.model.journal import Journal, finish_save, recover, set_aside
 from tui.model.lock import Holder, Lock
 from tui.model.read_only import why_read_only

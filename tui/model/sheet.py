@@ -12,14 +12,14 @@ from typing import Protocol
 
 import numpy as np
 
-from contextdb import edits
 from contextdb.bitmask import Rows
-from contextdb.changes import Cells, Change
-from contextdb.edits import Edit, Job
+from contextdb.edits import edits
+from contextdb.edits.edits import Edit, Job
+from contextdb.edits.history import History, Step
+from contextdb.edits.renaming import uses_of
 from contextdb.errors import Fault, TableError, in_quotes, plural, shown
-from contextdb.history import History, Step
-from contextdb.renaming import uses_of
-from contextdb.table import Table
+from contextdb.tables.changes import Cells, Change
+from contextdb.tables.table import Table
 from tui.model.clipboard import format_tsv, parse_tsv, place_paste
 from tui.model.find import Search, find, next_hit, replace_all
 from tui.model.selection import Block

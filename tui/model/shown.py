@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb import edits
+from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
-from contextdb.condition_column import ConditionColumn
-from contextdb.conditions import Condition
+from contextdb.edits import edits
+from contextdb.edits.history import History, Step, where_now
 from contextdb.errors import Fault
 from contextdb.findings import Finding
-from contextdb.history import History, Step, where_now
-from contextdb.nesting.links import nesting_faults
-from contextdb.nesting.names import inner_name
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.nesting.links import nesting_faults
+from contextdb.tables.nesting.names import inner_name
+from contextdb.tables.table import Table
 from tui.model.asked import Offered
 from tui.model.fact_steps import FactSteps
 from tui.model.query_row import QueryRow

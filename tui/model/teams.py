@@ -11,13 +11,13 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from contextdb.conditions import Condition
+from contextdb.cells.conditions import Condition
+from contextdb.cells.facts import Fact, read_fact_text
 from contextdb.disk import ACTORS_SUFFIX, read_bytes, write_atomic
 from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes
-from contextdb.facts import Fact, read_fact_text
-from contextdb.recordings import fact_text
-from contextdb.schema import TableSettings
-from contextdb.table import Table
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
+from contextdb.telemetry.recordings import fact_text
 from tui.model.sheet import Done, Sheet
 from tui.model.shown import Header
 from tui.model.wanted import wanted_by

@@ -15,11 +15,11 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags, Rows
-from contextdb.cells import NumberSet, TagSet, ValueSet
-from contextdb.changes import CameFrom
+from contextdb.cells.grammar import NumberSet, TagSet, ValueSet
 from contextdb.columns import TextColumn
-from contextdb.condition_column import ConditionColumn
-from contextdb.table import Table
+from contextdb.tables.changes import CameFrom
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.table import Table
 
 _DIGITS = 20
 """Numbers inside texts are compared by value up to so many digits."""

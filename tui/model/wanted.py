@@ -10,12 +10,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from contextdb.conditions import Condition
+from contextdb.cells.conditions import Condition
+from contextdb.cells.facts import Fact, read_fact, read_fact_text
 from contextdb.errors import ContextDBError, ContextError, Fault, shown, some
 from contextdb.expressions import Derivation
-from contextdb.facts import Fact, read_fact, read_fact_text
-from contextdb.nesting.links import is_nested
-from contextdb.table import Table
+from contextdb.tables.nesting.links import is_nested
+from contextdb.tables.table import Table
 
 
 @dataclass(frozen=True)

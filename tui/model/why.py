@@ -1,8 +1,8 @@
 """Why rows are not valid in the test row's context: cell by cell, with the cell that would mend each.
 
 What is said of a row is what `contextdb query --explain` says, with two reasons more that an editor meets: cells that cannot be
-read, and rows that are disabled. Of a valid row it is said whether it is picked, in the words of `contextdb.pick`. For a role with
-actors the fact is the actor who plays it, or the one whose fact is in the way.
+read, and rows that are disabled. Of a valid row it is said whether it is picked, in the words of `contextdb.compiled.pick`. For a
+role with actors the fact is the actor who plays it, or the one whose fact is in the way.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from contextdb.condition_column import ConditionColumn
-from contextdb.edits import check_cell
+from contextdb.compiled.explain import describe_fact, mended
+from contextdb.edits.edits import check_cell
 from contextdb.errors import some
-from contextdb.explain import describe_fact, mended
-from contextdb.table import Table
-from contextdb.when import has_no_rule
+from contextdb.expressions.rules import has_no_rule
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.table import Table
 from tui.model.query_row import QueryRow
 
 NEEDED = "(needed)"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from contextdb.cells import Cell
-from contextdb.condition_column import ConditionColumn
+from contextdb.cells.grammar import Cell
+from contextdb.tables.condition_column import ConditionColumn
 from tui.model.shown import ShownTable
 
 Kind = Literal["text", "any", "failing", "fault"]

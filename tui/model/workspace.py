@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from contextdb.disk import TABLE_SUFFIXES
+from contextdb.edits.renaming import renaming
 from contextdb.errors import Fault, FileError, Place, TableError, some
-from contextdb.nesting.links import Neighbours
-from contextdb.places import table_path
-from contextdb.project import read_folder_schema, schema_for, table_files
-from contextdb.renaming import renaming
-from contextdb.table import Table
+from contextdb.tables.nesting.links import Neighbours
+from contextdb.tables.places import table_path
+from contextdb.tables.project import read_folder_schema, schema_for, table_files
+from contextdb.tables.table import Table
 from tui.model.session import Session
 
 
@@ -106,7 +106,7 @@ class Workspace:
         Raises
         ------
         TableError, SchemaError, FileError
-            A table that is to be written has unsaved edits; else as `contextdb.renaming`. Nothing has changed then.
+            A table that is to be written has unsaved edits; else as `contextdb.edits.renaming`. Nothing has changed then.
         """
         found = renaming(self.sessions[name].sheet.table, old, new, only_here)
         paths = {file.path.resolve() for file in found.files}

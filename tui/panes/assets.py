@@ -12,10 +12,10 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.geometry import Size
 
+from contextdb.cells.facts import read_fact_text
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, ContextError, Fault, TableError, plural
-from contextdb.facts import read_fact_text
-from contextdb.nesting.names import MARK
+from contextdb.tables.nesting.names import MARK
 from tui.clipboard import Clipboard
 from tui.messages import Edited, RenameWanted, Told
 from tui.model.asked import Offered

@@ -20,13 +20,13 @@ from textual.widget import Widget
 from textual.widgets import Input, Select, Static
 from textual.widgets.selection_list import Selection
 
-from contextdb import edits
-from contextdb.condition_column import ConditionColumn
-from contextdb.domains import KINDS
-from contextdb.edits import Edit
+from contextdb.cells.domains import KINDS
+from contextdb.edits import edits
+from contextdb.edits.edits import Edit
 from contextdb.errors import ContextDBError
-from contextdb.sections import has_place
-from contextdb.shapes import POLICIES
+from contextdb.schema.sections import has_place
+from contextdb.schema.shapes import POLICIES
+from contextdb.tables.condition_column import ConditionColumn
 from tui.messages import Edited
 from tui.model.condition_form import KIND_WORDS, ConditionForm, plain
 from tui.model.options import JOBS, OPTIONS, POLICY_WORDS, columns_for, with_expression

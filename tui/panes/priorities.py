@@ -15,7 +15,7 @@ from textual.widget import Widget
 from textual.widgets import Button, Input, OptionList, Select, Static
 from textual.widgets.option_list import Option
 
-from contextdb import edits
+from contextdb.edits import edits
 from contextdb.errors import ContextDBError, Fault, plural, shown
 from tui.messages import Edited, Told
 from tui.model.priorities import (

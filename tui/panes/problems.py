@@ -19,7 +19,7 @@ from textual.widgets import Static
 
 from contextdb.errors import Fault
 from contextdb.findings import LEVELS, Finding, Level
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.messages import GoToCell, Told
 from tui.model.coverage_run import is_quick
 from tui.model.problems import WORDS, Problem, Problems, cell_findings, is_checked_at_once, row_findings

@@ -13,7 +13,7 @@ from textual.message import Message
 from textual.widgets import Static
 
 from contextdb.errors import ContextDBError, plural
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.clipboard import Clipboard
 from tui.messages import Edited, Told
 from tui.model.teams import NAME, Teams, TeamSheet, teams_path

@@ -15,11 +15,11 @@ from textual.content import Content
 from textual.widgets import Button, Input, OptionList, Select, Static
 from textual.widgets.option_list import Option
 
-from contextdb.domains import KINDS
-from contextdb.edits import Job
+from contextdb.cells.domains import KINDS
+from contextdb.edits.edits import Job
 from contextdb.errors import shown
-from contextdb.sections import has_place
-from contextdb.table import Table
+from contextdb.schema.sections import has_place
+from contextdb.tables.table import Table
 from tui.model.column_choices import JOB_WORDS, Choice, Insertion, NewColumnForm, choices, places
 from tui.model.condition_form import KIND_WORDS, ConditionForm
 from tui.screens.dialog import Dialog

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from contextdb.edits import set_cells
-from contextdb.table import Table
+from contextdb.edits.edits import set_cells
+from contextdb.tables.table import Table
 from tui.messages import GoToCell, SetContext
 from tui.model.context_list import ContextList
 from tui.model.teams import Teams, roles_of

@@ -17,10 +17,10 @@ from textual.content import Content
 from textual.widgets import Button, Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from contextdb import edits
-from contextdb.edits import Edit, NewColumn
+from contextdb.edits import edits
+from contextdb.edits.edits import Edit, NewColumn
 from contextdb.errors import shown
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.column_choices import Blueprint, Insertion, blueprint_fault, blueprints, conditions_of
 from tui.screens.dialog import Dialog
 from tui.widgets.field import Field

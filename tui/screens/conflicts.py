@@ -12,7 +12,7 @@ from textual.content import Content
 from textual.message import Message
 from textual.widgets import Static
 
-from contextdb.diff import Conflict, Side
+from contextdb.edits.diffing import Conflict, Side
 from contextdb.errors import plural, shown
 from tui.screens.dialog import Dialog
 from tui.widgets.line_list import LineList, ListCell, ListColumn

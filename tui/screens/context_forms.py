@@ -13,7 +13,7 @@ from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.widgets import Input, RadioButton, RadioSet, Static
 
-from contextdb.cases import exactly
+from contextdb.checks.cases import exactly
 from contextdb.errors import ContextDBError
 from tui.model.context_list import ContextList, expectation_fault, summary
 from tui.model.paths import common_start, completions, resolved

@@ -18,9 +18,9 @@ from textual.message import Message
 from textual.widgets import Static
 from textual.worker import Worker, get_current_worker
 
-from contextdb.cases import Verdict, told
+from contextdb.checks.cases import Verdict, told
 from contextdb.errors import ContextDBError, in_quotes, plural
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.context_list import ContextList, cases_file, summary
 from tui.screens.context_forms import KeepDialog, Kept, NameDialog, OpenDialog, SureDialog
 from tui.screens.dialog import Dialog

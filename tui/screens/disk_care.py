@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 
 from textual.screen import Screen
 
-from contextdb.diff import Merge, Side, diff
+from contextdb.edits.diffing import Merge, Side, diff
 from contextdb.errors import ContextDBError, FileError
 from tui.model.session import Session
 from tui.screens.conflicts import ConflictsDialog

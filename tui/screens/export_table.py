@@ -18,7 +18,7 @@ from textual.worker import get_current_worker
 
 from contextdb.errors import ContextDBError, in_quotes
 from contextdb.exchange.formats import FORMATS, format_of, write
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.importing import suffixes_written, why_not
 from tui.model.paths import common_start, completions, resolved
 from tui.screens.context_forms import SureDialog

@@ -20,7 +20,7 @@ from textual.worker import get_current_worker
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, ReadOptions, format_of, sheet_names
-from contextdb.table import Table
+from contextdb.tables.table import Table
 from tui.model.importing import MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
 from tui.model.paths import common_start, completions, resolved
 from tui.screens.dialog import Dialog

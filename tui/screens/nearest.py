@@ -13,8 +13,8 @@ from textual.content import Content
 from textual.widgets import Static
 
 from contextdb.errors import plural
-from contextdb.nesting.names import inner_name
-from contextdb.table import Table
+from contextdb.tables.nesting.names import inner_name
+from contextdb.tables.table import Table
 from tui.model.query_row import QueryRow
 from tui.model.why import NEEDED, CellWhy, RowWhy, State, nearest_rows, why_row
 from tui.model.window import MAY_BE, PICKED, VALID

@@ -20,9 +20,9 @@ from textual.message import Message
 from textual.widget import Widget
 from textual.widgets import Input
 
-from contextdb.cells import format_cell, parse_cell, reads
-from contextdb.conditions import Condition
-from contextdb.domains import NUMERIC
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
+from contextdb.cells.grammar import format_cell, parse_cell, reads
 from contextdb.errors import Fault, plural
 from tui.model.chooser import Chooser, Offer, Row
 from tui.model.layout import cut

@@ -24,12 +24,12 @@ import numpy as np
 
 from contextdb.disk import write_atomic
 from contextdb.errors import ArtefactError, FileError
+from contextdb.files.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, to_bytes
 from contextdb.motion.clips.clip import Up
 from contextdb.motion.clips.doubts import Measures
 from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.features.schema_dict import unweighted
-from contextdb.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, to_bytes
 
 EXTRACTION = 1
 """The version of what features are made of a clip: one more whenever the same clip would give other features."""

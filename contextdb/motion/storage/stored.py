@@ -30,6 +30,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from contextdb.errors import Fault, MotionError, SchemaError, in_quotes
+from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.features.schema_dict import schema_to_dict
@@ -37,7 +38,6 @@ from contextdb.motion.markup.marks import Marks
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.search.layout import Layout
-from contextdb.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
 
 STORED = FileKind(
     "contextdb.motion",

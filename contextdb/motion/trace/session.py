@@ -29,11 +29,11 @@ from typing import TYPE_CHECKING, overload
 
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ArtefactError, Fault, MotionError, Place, in_quotes, plural
+from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.trace.filter_rows import fingerprint
 from contextdb.motion.trace.rows import FILTERS, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
-from contextdb.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
 
 if TYPE_CHECKING:
     import polars as pl

@@ -13,8 +13,8 @@ from textual.geometry import Region, Size
 from textual.message import Message
 from textual.widgets import Static
 
-from contextdb.cells import Cell, NumberSet
-from contextdb.domains import Domain
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import Cell, NumberSet
 from contextdb.errors import Fault, in_quotes
 from tui.model.interval_picture import DIAL_HEIGHT, DIAL_WIDTH, Run, dial, framed_line
 from tui.widgets.editing.choice_list import ChoiceList

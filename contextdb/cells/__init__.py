@@ -1,0 +1,1 @@
+"""What one cell accepts, and what the game says of its condition."""

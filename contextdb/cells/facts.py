@@ -1,0 +1,301 @@
+"""Facts: what the game says of a moment, read and checked against the conditions.
+
+A fact is one value of a condition's domain, or a *set* of its values, written as a cell. None and NaN are missing facts. What is
+read here is in canonical form: bool, float (whole for int, in [-180, 180) for angle), str, frozenset of tags, or a `Cell` for a
+set.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from numbers import Real
+from typing import Literal
+
+import numpy as np
+
+from contextdb.cells.arguments import require_text
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC, wrap_angle
+from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, covers, format_number, parse_cell, parse_tags
+from contextdb.cells.words import truth_of
+from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, in_quotes, nearest, plural, shown, some
+
+Unknown = Literal["error", "any", "never"]
+Fact = bool | float | str | frozenset[str] | Cell | None
+Context = Mapping[str, object]
+
+NAMES = "the names of the table's conditions"
+UNKNOWN_MODES = ("error", "any", "never")
+_EXPECTED = {
+    "bool": "True or False",
+    "int": "a whole number",
+    "number": "a number",
+    "angle": "a finite number of degrees",
+    "enum": "one of its declared values",
+    "text": "a text",
+    "tags": "a set of tags",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FactSet:
+    """A set of values for a fact, written as a cell: `cdb.cell("0 ± 90")`. Read when the condition is known."""
+
+    text: str
+
+
+def cell(text: str) -> FactSet:
+    """A fact that may be any of a set of values, written as a cell: `query({"heading": cell("0 ± 90")})`."""
+    return FactSet(require_text(text, "text"))
+
+
+def check_mode(unknown: str) -> None:
+    """Raise ContextError unless `unknown` is a treatment of missing facts."""
+    if not isinstance(unknown, str) or unknown not in UNKNOWN_MODES:
+        near = nearest(str(unknown), UNKNOWN_MODES)
+        found = f"there is no treatment {in_quotes(str(unknown))} of missing facts."
+        raise ContextError(Fault(found, some(UNKNOWN_MODES), in_quotes(near) if near else ""))
+
+
+def no_condition(name: str, known: Iterable[str]) -> NoSuchFact:
+    """The error for a fact that no condition of the table is about."""
+    near = nearest(str(name), known)
+    found = f"there is no condition {in_quotes(str(name))}."
+    return NoSuchFact(Fault(found, some(known), in_quotes(near) if near else "", rule="unknown-fact"))
+
+
+def require_context(context: object) -> None:
+    """Raise ContextError for what is no mapping."""
+    if not isinstance(context, Mapping):
+        raise ContextError(Fault(f"a context is a mapping of facts, not {type(context).__name__}.", "a dict"))
+
+
+def require_names(context: Iterable[object]) -> None:
+    """Raise ContextError for keys that are no texts."""
+    for name in context:
+        if not isinstance(name, str):
+            found = f"a context has the key {in_quotes(_text_of(name))}, of type {type(name).__name__}."
+            raise ContextError(Fault(found, "the names of facts, as texts"))
+
+
+def as_context(facts: object) -> Mapping[str, object]:
+    """Facts given as a mapping or as pairs."""
+    if not isinstance(facts, Mapping):
+        try:
+            facts = dict(facts)  # type: ignore[call-overload]
+        except (TypeError, ValueError):
+            require_context(facts)
+    return facts  # type: ignore[return-value]
+
+
+def read_fact(value: object, condition: Condition) -> Fact:
+    """Bring one given fact into canonical form.
+
+    Returns
+    -------
+    bool, float, str, frozenset of str, Cell, or None
+        None when the fact is missing (None or NaN); a Cell when it is a set of values.
+
+    Raises
+    ------
+    ContextError
+        The value is of the wrong type or outside an enum's or tag's domain; names the fact, what is accepted and the nearest value.
+    """
+    if value is None or (isinstance(value, (float, np.floating)) and math.isnan(value)):
+        return None
+    if isinstance(value, FactSet):
+        return _read_set(value.text, condition)
+    if isinstance(value, Cell):
+        return _checked_set(value, condition)
+    kind = condition.domain.kind
+    if kind in NUMERIC:
+        return _read_number(value, condition)
+    if kind == "bool":
+        return _read_bool(value, condition)
+    return _read_tags(value, condition) if kind == "tags" else _read_value(value, condition)
+
+
+def read_fact_text(text: str, condition: Condition) -> Fact:
+    """Bring a fact written as text (command line, CSV) into canonical form: a plain value, or a set written as a cell."""
+    body = text.strip()
+    kind = condition.domain.kind
+    if not body:
+        return None
+    if kind == "bool":
+        truth = truth_of(body)
+        return truth if truth is not None else _read_set(body, condition)
+    if kind in ("enum", "text"):
+        is_plain = (
+            body in condition.domain.known if kind == "enum" else " " not in body and '"' not in body and body.casefold() != "any"
+        )
+        return body if is_plain else _plain_if_single(_read_set(body, condition))
+    if kind == "tags":
+        return _read_tags(body, condition)
+    return _plain_if_single(_read_set(body, condition)) if body.casefold() != "nan" else None
+
+
+def missing_error(missing: list[str], given: Iterable[str]) -> ContextError:
+    """The error for facts that a query needs and did not get; a likely misspelling among the given ones is named."""
+    extra = list(given)
+    faults = []
+    for name in missing[:1]:
+        near = nearest(name, (n for n in extra if isinstance(n, str)))
+        rest = f" ({plural(len(missing), 'fact')} missing: {some(missing)})" if len(missing) > 1 else ""
+        found = f"the fact {in_quotes(name)} is missing{rest}."
+        hint = f"{in_quotes(name)} for {in_quotes(near)}" if near else ""
+        faults.append(Fault(found, 'a value for each condition, or unknown="any" or "never"', hint, rule="missing-fact"))
+    return ContextError(*faults)
+
+
+def misspelt(missing: list[str], extra: Iterable[str]) -> ContextError | None:
+    """An error when a given name that no condition has is very likely a missing fact misspelt."""
+    for name in (n for n in extra if isinstance(n, str)):
+        near = nearest(name, missing)
+        if near is not None and _is_slip(name, near):
+            found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is missing."
+            return ContextError(Fault(found, NAMES, in_quotes(near), rule="unknown-fact"))
+    return None
+
+
+def alike(name: str, known: Iterable[str]) -> tuple[str, ...]:
+    """The known names of which a given one is very likely a misspelling, the nearest first."""
+    found = [n for n in known if _is_slip(name, n)]
+    near = nearest(name, found)
+    return tuple(sorted(found, key=lambda n: n != near))
+
+
+def _is_slip(name: str, near: str) -> bool:
+    return difflib.SequenceMatcher(None, name.casefold(), near.casefold()).ratio() >= 0.85
+
+
+def _fault(value: object, condition: Condition, mend: str = "", accepted: str = "") -> ContextError:
+    what = f"{type(value).__name__} {in_quotes(_text_of(value))}"
+    expected = accepted or _EXPECTED[condition.domain.kind]
+    place = Place(column=condition.name)
+    return ContextError(Fault(f"{what} is not a fact of type {condition.domain.kind}.", expected, mend, place, "wrong-fact"))
+
+
+def _text_of(value: object) -> str:
+    try:
+        return str(value)
+    except ValueError:  # a whole number of very many digits
+        return "…"
+
+
+def _checked_set(found: Cell, condition: Condition) -> Cell:
+    """A set of values that was read before, if it is one of the condition's own kind."""
+    kind = condition.domain.kind
+    accepts = NumberSet if kind in NUMERIC else TagSet if kind == "tags" else ValueSet
+    if found.accepts is None or (isinstance(found.accepts, accepts) and not found.is_soft and not found.is_empty):
+        return found
+    raise _fault(found, condition, accepted=f"a set of values of type {kind}")
+
+
+def _read_set(text: str, condition: Condition) -> Cell:
+    try:
+        found = parse_cell(text, condition.domain)
+    except CellError as error:
+        raise ContextError(*(f.at(Place(column=condition.name)) for f in error.faults)) from None
+    if found.is_soft:
+        raise _fault(text, condition, accepted='a set without a penalty ("~")')
+    if found.is_empty:
+        raise _fault(text, condition, accepted="a set that holds at least one value")
+    return found
+
+
+def _plain_if_single(found: Cell) -> Fact:
+    """A set of one value as that value."""
+    accepts = found.accepts
+    if isinstance(accepts, ValueSet) and len(accepts.values) == 1 and not accepts.is_complement:
+        return next(iter(accepts.values))
+    if isinstance(accepts, NumberSet) and len(accepts.spans) == 1 and accepts.spans[0][0] == accepts.spans[0][1]:
+        return accepts.spans[0][0]
+    return found
+
+
+def _read_number(value: object, condition: Condition) -> Fact:
+    if isinstance(value, str):
+        return _plain_if_single(_read_set(value, condition)) if value.strip() else None
+    if not isinstance(value, (Real, Decimal, np.integer, np.floating, np.bool_)):
+        raise _fault(value, condition)
+    try:
+        number = float(value) + 0.0
+    except (OverflowError, ValueError):
+        raise _fault(value, condition, accepted="a number that a double can hold") from None
+    kind = condition.domain.kind
+    if math.isnan(number):
+        return None
+    if kind == "angle":
+        if math.isinf(number):
+            raise _fault(value, condition)
+        return wrap_angle(number)
+    if kind == "int" and not (number.is_integer() or math.isinf(number)):
+        raise _fault(value, condition, mend=f"{round(number)}")
+    return number
+
+
+def _read_bool(value: object, condition: Condition) -> bool:
+    if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, float, np.number)) and value in (0, 1)):
+        return bool(value)
+    truth = truth_of(value) if isinstance(value, str) else None
+    raise _fault(value, condition, mend="" if truth is None else str(truth))
+
+
+def _read_value(value: object, condition: Condition) -> Fact:
+    if isinstance(value, (set, frozenset, list, tuple)) and value:
+        values = [_read_one_value(v, condition) for v in value]
+        return Cell(ValueSet(frozenset(values)))
+    return _read_one_value(value, condition)
+
+
+def _read_one_value(value: object, condition: Condition) -> str:
+    if not isinstance(value, str):
+        raise _fault(value, condition)
+    if condition.domain.kind == "enum" and value not in condition.domain.known:
+        raise _unknown(value, condition)
+    return str(value)
+
+
+def _unknown(value: str, condition: Condition) -> ContextError:
+    known = condition.domain.values or ()
+    near = nearest(value, known)
+    place = Place(column=condition.name)
+    found = f"{in_quotes(value)} is not a declared value."
+    return ContextError(Fault(found, some(known), in_quotes(near) if near else "", place, "wrong-fact"))
+
+
+def _read_tags(value: object, condition: Condition) -> Fact:
+    if isinstance(value, str):
+        if value.strip().casefold() == "any" or value.lstrip()[:1] in ("+", "-") or value.strip().casefold().startswith("not "):
+            return _read_set(value, condition)
+        try:
+            tags = parse_tags(value)
+        except CellError as error:
+            raise ContextError(*(f.at(Place(column=condition.name)) for f in error.faults)) from None
+    elif isinstance(value, (set, frozenset, list, tuple)):
+        tags = frozenset(str(t) if isinstance(t, str) else _not_a_tag(t, condition) for t in value)
+    else:
+        raise _fault(value, condition)
+    for tag in sorted(tags):
+        if condition.domain.values is not None and not covers(tag, condition.domain.known):
+            raise _unknown(tag, condition)
+    return tags
+
+
+def _not_a_tag(value: object, condition: Condition) -> str:
+    raise _fault(value, condition, accepted="a set of texts")
+
+
+def describe(fact: Fact) -> str:
+    """A canonical fact as people write it."""
+    if fact is None:
+        return "(missing)"
+    if isinstance(fact, frozenset):
+        return " ".join(sorted(fact)) or "(no tags)"
+    if isinstance(fact, bool) or not isinstance(fact, (int, float)):
+        return shown(str(fact))
+    return format_number(fact)

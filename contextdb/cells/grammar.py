@@ -1,0 +1,464 @@
+"""The grammar of a cell: text to the set of values that a row accepts, and back.
+
+    every kind    Any  -  (empty)          every value
+                  not CELL                 what CELL does not hold, within the domain
+                  CELL ~2.5                soft: a row that does not match is not excluded, it costs 2.5 more in a search
+    bool          True  False              t f yes no 1 0 in any case
+    int, number   20, 9.99  20 ± 9.99      centre and tolerance, in double arithmetic
+                  10..30  (10..30]  10..   closed, half open, without an end
+                  5  =5  <5  <=5  >5  >=5
+                  0..5 | 10..15            union
+    angle         as number, in degrees on the circle: 170..-170 runs upwards through 180
+    enum, text    CB FS "Half Back"        one of; text is an enum without declared values
+    tags          +InAir -Stunned          has all the +, none of the -; Move covers Move.Run
+
+`tests/cells.csv` holds the same as examples. Nothing here knows a file or a table.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from contextdb.cells import intervals
+from contextdb.cells.domains import NUMERIC, TAGS, Domain, wrap_angle
+from contextdb.cells.intervals import EVERYTHING, Spans
+from contextdb.cells.mends import candidates
+from contextdb.cells.words import NUMBER_TEXT, is_name, is_reserved, quoted, truth_of
+from contextdb.errors import CellError, Fault, in_quotes, shown, some
+
+_NUMBER = re.compile(NUMBER_TEXT)
+_CENTRE = re.compile(rf"({NUMBER_TEXT})\s*(?:,|±|\+-)\s*({NUMBER_TEXT})")
+_INTERVAL = re.compile(rf"([\[(]?)\s*({NUMBER_TEXT})?\s*\.\.\s*({NUMBER_TEXT})?\s*([\])]?)")
+_COMPARE = re.compile(rf"(<=|>=|<|>|=)?\s*({NUMBER_TEXT})")
+_TOKEN = re.compile(r'([+-]?)(?:"((?:[^"]|"")*)"|([^\s"]+))(?=\s|$)\s*')
+_NOT = re.compile(r"not(?=\s|$)\s*", re.IGNORECASE)
+
+ACCEPTED = {
+    "bool": '"True", "False", "Any"',
+    "int": '"20, 9" (centre, tolerance), "10..30", "<=5", "0..5 | 10..15", "Any"',
+    "number": '"20, 9.99" (centre, tolerance), "10..30", "<=5", "0..5 | 10..15", "Any"',
+    "angle": '"20, 9.99" (centre, tolerance), "10..30", "170..-170" (through 180), "Any"',
+    "enum": 'one or more declared values with spaces between, "not CB", "Any"',
+    "text": 'one or more words with spaces between, others in double quotes, "Any"',
+    "tags": '"+InAir -Stunned" (has, has not), "Any"',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class NumberSet:
+    """Numbers, as spans; angles are wrapped before they are looked up."""
+
+    spans: Spans
+    is_circular: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Whether the number is in the set."""
+        return intervals.holds(self.spans, wrap_angle(value) if self.is_circular else value)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no number is in the set."""
+        return not self.spans
+
+
+@dataclass(frozen=True, slots=True)
+class ValueSet:
+    """Some of the values of a bool, enum or text, or (for text) all but some."""
+
+    values: frozenset[bool | str]
+    is_complement: bool = False
+
+    def holds(self, value: bool | str) -> bool:
+        """Whether the value is in the set."""
+        return (value in self.values) is not self.is_complement
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no value is in the set."""
+        return not self.values and not self.is_complement
+
+
+@dataclass(frozen=True, slots=True)
+class TagSet:
+    """The sets of tags that have all of `needs` and none of `bans`, or (complement) all other sets."""
+
+    needs: frozenset[str]
+    bans: frozenset[str] = frozenset()
+    is_complement: bool = False
+
+    def holds(self, tags: frozenset[str]) -> bool:
+        """Whether a set of tags is among them."""
+        covered = covered_by(tags)
+        return (self.needs <= covered and self.bans.isdisjoint(covered)) is not self.is_complement
+
+    @property
+    def is_contradiction(self) -> bool:
+        """Whether a needed tag stands under a banned one, so that no set of tags can have all `needs` and no `bans`."""
+        return not self.bans.isdisjoint(covered_by(self.needs))
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no set of tags is among them."""
+        return not (self.needs or self.bans) if self.is_complement else self.is_contradiction
+
+
+Accepted = NumberSet | ValueSet | TagSet
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What a row accepts for a condition: `accepts` is None for Any. `penalty` makes the cell soft."""
+
+    accepts: Accepted | None = None
+    penalty: float | None = None
+
+    @property
+    def is_any(self) -> bool:
+        """Whether the cell says Any."""
+        return self.accepts is None
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether a row that does not match is kept, at a cost."""
+        return self.penalty is not None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no value at all matches."""
+        return self.accepts is not None and self.accepts.is_empty
+
+    def holds(self, value: object) -> bool:
+        """Whether the value, of the cell's own kind, is accepted; a penalty changes nothing here."""
+        return self.accepts is None or self.accepts.holds(value)  # type: ignore[arg-type]
+
+
+ANY = Cell()
+
+
+def covers(tag: str, tags: frozenset[str]) -> bool:
+    """Whether a set of tags has `tag`, itself or through a tag under it: Move covers Move.Run."""
+    return tag in tags or any(t.startswith(tag + ".") for t in tags)
+
+
+def covered_by(tags: Iterable[str]) -> frozenset[str]:
+    """Every tag that a set of tags has: its own, and those above them."""
+    return frozenset(above for tag in tags for above in tags_above(tag))
+
+
+def tags_above(tag: str) -> Iterator[str]:
+    """A tag and those above it: Move.Run and Move."""
+    yield tag
+    at = tag.rfind(".")
+    while at > 0:
+        yield tag[:at]
+        at = tag.rfind(".", 0, at)
+
+
+def parse_cell(text: str, domain: Domain, wants_mend: bool = True) -> Cell:
+    """Read a cell. Looking for a mend costs a thousand times the reading; a caller with many faults may leave it out.
+
+    Raises
+    ------
+    CellError
+        With what was found, what is accepted for the kind and, where one is near, a text that would be read.
+    """
+    try:
+        return _read(text, domain)
+    except CellError as error:
+        if not wants_mend or error.faults[0].rule == "unreadable-penalty":
+            raise
+        raise CellError(replace(error.faults[0], mend=_mend(text, domain))) from None
+
+
+def parse_tags(text: str) -> frozenset[str]:
+    """A plain set of tags, as a fact is written: names with spaces between, odd ones in double quotes; "" is no tag at all."""
+    return frozenset(sign + name for sign, name in _tokens(text.strip(), TAGS) if name)
+
+
+def _mend(text: str, domain: Domain) -> str:
+    """The nearest text that reads, quoted for a message, or nothing."""
+    short = text[:1000].strip()
+    return next((in_quotes(c) for c in candidates(short, domain) if c and c != short and reads(c, domain)), "")
+
+
+def reads(text: str, domain: Domain) -> bool:
+    """Whether a text is in the grammar."""
+    try:
+        _read(text, domain)
+    except CellError:
+        return False
+    return True
+
+
+def _read(text: str, domain: Domain) -> Cell:
+    body, penalty = _split_penalty(text.strip(), domain)
+    return Cell(_read_set(body, domain), penalty)
+
+
+def _split_penalty(text: str, domain: Domain) -> tuple[str, float | None]:
+    body, tilde, tail = text.rpartition("~")
+    if not tilde or tail.count('"') % 2:
+        return text, None
+    number = _NUMBER.fullmatch(tail.strip())
+    penalty = float(number[0]) if number else math.nan
+    if not 0.0 <= penalty < math.inf:
+        why = f'the penalty after "~" must be a number from 0 up, not {in_quotes(tail.strip())}'
+        raise CellError(replace(_unreadable(text, domain, why).faults[0], rule="unreadable-penalty"))
+    return body.strip(), penalty
+
+
+def _read_set(text: str, domain: Domain) -> Accepted | None:
+    if not text:
+        return None
+    at, n_negations = 0, 0
+    while negation := _NOT.match(text, at):
+        at, n_negations = negation.end(), n_negations + 1
+    if n_negations and at == len(text):
+        raise _unreadable(text, domain, 'after "not" a value is missing')
+    accepts = _read_plain_set(text[at:], domain)
+    for _ in range(n_negations):
+        accepts = _negated(accepts, domain)
+    return accepts
+
+
+def _read_plain_set(text: str, domain: Domain) -> Accepted | None:
+    if text == "-" or text.casefold() == "any":
+        return None
+    if domain.kind in NUMERIC:
+        return _read_numbers(text, domain)
+    if domain.kind == "bool":
+        return _read_truth(text, domain)
+    return _read_tags(text, domain) if domain.kind == "tags" else _read_names(text, domain)
+
+
+def _negated(accepts: Accepted | None, domain: Domain) -> Accepted:
+    if domain.kind in NUMERIC:
+        spans = EVERYTHING if accepts is None else accepts.spans  # type: ignore[union-attr]
+        return NumberSet(_number_complement(spans, domain), domain.kind == "angle")
+    if domain.kind == "tags":
+        tags = accepts if isinstance(accepts, TagSet) else TagSet(frozenset())
+        return TagSet(tags.needs, tags.bans, not tags.is_complement)
+    inner = accepts if isinstance(accepts, ValueSet) else ValueSet(frozenset(), True)
+    everything = frozenset((False, True)) if domain.kind == "bool" else domain.values
+    if everything is None:
+        return ValueSet(inner.values, not inner.is_complement)
+    return ValueSet(frozenset(v for v in everything if not inner.holds(v)))
+
+
+def _number_complement(spans: Spans, domain: Domain) -> Spans:
+    if domain.kind == "angle":
+        return intervals.complement(spans, *intervals.CIRCLE)
+    rest = intervals.complement(spans, domain.minimum, domain.maximum)
+    return intervals.whole(rest) if domain.kind == "int" else rest
+
+
+def _read_truth(text: str, domain: Domain) -> ValueSet:
+    value = truth_of(text)
+    if value is None:
+        raise _unreadable(text, domain)
+    return ValueSet(frozenset((value,)))
+
+
+def _read_numbers(text: str, domain: Domain) -> NumberSet:
+    spans = [span for part in text.split("|") for span in _read_spans(part.strip(), text, domain)]
+    joined = intervals.union(spans)
+    return NumberSet(intervals.whole(joined) if domain.kind == "int" else joined, domain.kind == "angle")
+
+
+def _read_spans(part: str, text: str, domain: Domain) -> Spans:
+    if found := _CENTRE.fullmatch(part):
+        return _centred(_number(found[1], text, domain), _number(found[2], text, domain), text, domain)
+    if found := _INTERVAL.fullmatch(part):
+        left, low, high, right = found.groups()
+        if low is None and high is None:
+            raise _unreadable(text, domain, '".." needs a number before or after it')
+        if (left and left not in "[(") or (low is None and left == "[") or (high is None and right == "]"):
+            raise _unreadable(text, domain, "a bracket stands at an end that is left away")
+        return _between(_end(low, text, domain), _end(high, text, domain), left == "(", right == ")", text, domain)
+    if found := _COMPARE.fullmatch(part):
+        return _compared(found[1] or "=", _number(found[2], text, domain), text, domain)
+    raise _unreadable(text, domain)
+
+
+def _end(found: str | None, text: str, domain: Domain) -> float | None:
+    return None if found is None else _number(found, text, domain)
+
+
+def _number(found: str, text: str, domain: Domain) -> float:
+    value = float(found)
+    if math.isinf(value) and ("inf" not in found.casefold() or domain.kind == "angle"):
+        raise _unreadable(text, domain, f'"{shown(found)}" is too large for a number')
+    return value + 0.0
+
+
+def _centred(centre: float, tolerance: float, text: str, domain: Domain) -> Spans:
+    if tolerance < 0.0 or math.isinf(centre) or math.isinf(tolerance):
+        raise _unreadable(text, domain, "a centre is a finite number and a tolerance one from 0 up")
+    low, high = centre - tolerance, centre + tolerance
+    if domain.kind != "angle":
+        return ((low, high),)
+    return (intervals.CIRCLE,) if tolerance >= 180.0 else intervals.arc(low, high)
+
+
+def _between(low: float | None, high: float | None, is_low_open: bool, is_high_open: bool, text: str, domain: Domain) -> Spans:
+    if domain.kind == "angle":
+        return _angles_between(low, high, is_low_open, is_high_open, text, domain)
+    if (is_low_open and low == math.inf) or (is_high_open and high == -math.inf):
+        return ()
+    first = -math.inf if low is None else intervals.above(low) if is_low_open else low
+    last = math.inf if high is None else intervals.below(high) if is_high_open else high
+    return ((first, last),)
+
+
+def _angles_between(
+    low: float | None, high: float | None, is_low_open: bool, is_high_open: bool, text: str, domain: Domain
+) -> Spans:
+    given = high if low is None else low if high is None else None
+    if given is not None and not -180.0 <= given <= 180.0:
+        raise _unreadable(text, domain, f"an end left away stands for -180 or 180, and {given:g} lies outside; write both ends")
+    is_low_open, is_high_open = is_low_open and low is not None, is_high_open and high is not None
+    return intervals.arc(-180.0 if low is None else low, 180.0 if high is None else high, is_low_open, is_high_open)
+
+
+def _compared(sign: str, value: float, text: str, domain: Domain) -> Spans:
+    if sign == "=":
+        return intervals.arc(value, value) if domain.kind == "angle" else ((value, value),)
+    is_open = sign in ("<", ">")
+    low, high = (None, value) if sign[0] == "<" else (value, None)
+    return _between(low, high, is_open, is_open, text, domain)
+
+
+def _tokens(text: str, domain: Domain) -> Iterator[tuple[str, str]]:
+    """Each word of an enum, text or tags cell, unquoted, with the sign before it."""
+    at = 0
+    while at < len(text):
+        token = _TOKEN.match(text, at)
+        if not token:
+            raise _unreadable(text, domain, "a double quote stands alone; inside quotes it is doubled")
+        sign, in_quotes, bare = token.groups()
+        if in_quotes is not None:
+            yield sign, in_quotes.replace('""', '"')
+        elif domain.kind == "tags":
+            yield sign, _bare(bare, text, domain)
+        else:
+            yield "", _bare(sign + bare, text, domain)
+        at = token.end()
+
+
+def _bare(word: str, text: str, domain: Domain) -> str:
+    if is_name(word):
+        return word
+    why = "reads like a number or a word of the grammar" if is_reserved(word) else "has characters that need quotes"
+    raise _unreadable(text, domain, f'"{shown(word)}" {why}')
+
+
+def _read_names(text: str, domain: Domain) -> ValueSet:
+    names: list[bool | str] = []
+    plain = None if '"' in text else (("", _bare(word, text, domain)) for word in text.split())
+    for sign, name in plain or _tokens(text, domain):
+        if sign:
+            raise _unreadable(text, domain, f'"{sign}" stands before a quoted value')
+        if domain.values is not None and name not in domain.known:
+            raise _unknown_value(name, text, domain, domain.values)
+        names.append(name)
+    return ValueSet(frozenset(names))
+
+
+def _read_tags(text: str, domain: Domain) -> TagSet:
+    signed: dict[str, list[str]] = {"+": [], "-": []}
+    for sign, tag in _tokens(text, domain):
+        if not sign:
+            raise _unreadable(text, domain, f'before the tag "{shown(tag)}" a + (has) or - (has not) is missing')
+        if domain.values is not None and not covers(tag, domain.known):
+            raise _unknown_value(tag, text, domain, domain.values)
+        signed[sign].append(tag)
+    return TagSet(frozenset(signed["+"]), frozenset(signed["-"]))
+
+
+def _unknown_value(name: str, text: str, domain: Domain, known: tuple[str, ...]) -> CellError:
+    what = "tag" if domain.kind == "tags" else "value"
+    return CellError(Fault(f"{in_quotes(name)} is not a declared {what}.", some(known), rule="unknown-value"))
+
+
+def _unreadable(text: str, domain: Domain, why: str = "") -> CellError:
+    article = "an" if domain.kind in ("int", "angle", "enum") else "a"
+    kind = "tags" if domain.kind == "tags" else f"{article} {domain.kind}"
+    reason = f": {why}." if why else "."
+    return CellError(Fault(f"cannot read {in_quotes(text)} as {kind}{reason}", ACCEPTED[domain.kind], rule="unreadable-cell"))
+
+
+def format_cell(cell: Cell, domain: Domain) -> str:
+    """The shortest common way to write a cell; reading it gives an equal cell."""
+    body = "Any" if cell.accepts is None else _format_set(cell.accepts, domain)
+    return body if cell.penalty is None else f"{body} ~{format_number(cell.penalty)}"
+
+
+def format_number(value: float) -> str:
+    """A double in the fewest digits that read back as the same double."""
+    value += 0.0  # -0.0 is 0
+    short = f"{value:.15g}"
+    return short if float(short) == value and "e" not in short else repr(value).removesuffix(".0")
+
+
+def _format_set(accepts: Accepted, domain: Domain) -> str:
+    if isinstance(accepts, TagSet):
+        return _format_tags(accepts)
+    if accepts.is_empty:
+        return "not Any"
+    if isinstance(accepts, NumberSet):
+        return _format_spans(accepts.spans, domain)
+    if domain.kind == "bool":
+        return "not not Any" if len(accepts.values) == 2 else str(next(iter(accepts.values)))
+    order = domain.values if domain.values is not None else sorted(str(v) for v in accepts.values)
+    names = " ".join(quoted(v) for v in order if v in accepts.values)
+    return names if not accepts.is_complement else f"not {names}" if names else "not not Any"
+
+
+def _format_tags(tags: TagSet) -> str:
+    words = [f"+{quoted(t)}" for t in sorted(tags.needs)] + [f"-{quoted(t)}" for t in sorted(tags.bans)]
+    if not words:
+        return "not Any" if tags.is_complement else "not not Any"
+    return f"not {' '.join(words)}" if tags.is_complement else " ".join(words)
+
+
+def _format_spans(spans: Spans, domain: Domain) -> str:
+    if domain.kind != "angle":
+        return " | ".join(_format_span(low, high) for low, high in spans)
+    if spans == (intervals.CIRCLE,):
+        return "-180..180"
+    rest = intervals.complement(spans, *intervals.CIRCLE)
+    if len(spans) > 1 and len(rest) == 1 and rest[0][0] == rest[0][1]:
+        return f"not {format_number(rest[0][0])}"
+    first, last = spans[0], spans[-1]
+    if len(spans) > 1 and first[0] == -180.0 and last[1] == intervals.CIRCLE[1]:
+        spans = (*spans[1:-1], (last[0], _shown_end(first[1])))
+    return " | ".join(
+        _format_span(_shown_end(low) if low == high else low, _shown_end(high) if low == high else high) for low, high in spans
+    )
+
+
+def _shown_end(degrees: float) -> float:
+    """Half a turn is told as 180, not as the -180 that it is kept as."""
+    return 180.0 if degrees == -180.0 else degrees
+
+
+def _format_span(low: float, high: float) -> str:
+    if low == high:
+        return format_number(low)
+    opened, closed = _is_rung_after(low, intervals.below), _is_rung_after(high, intervals.above)
+    first = "" if low == -math.inf else format_number(intervals.below(low) if opened else low)
+    last = "" if high == math.inf else format_number(intervals.above(high) if closed else high)
+    if not first and not last:
+        return "-inf..inf"
+    left = "(" if opened else "[" if closed and first else ""
+    right = ")" if closed else "]" if opened and last else ""
+    return f"{left}{first}..{last}{right}"
+
+
+def _is_rung_after(value: float, step: Callable[[float], float]) -> bool:
+    """Whether a double is best told as the open end at its neighbour: 4.999999999999999 is just below 5."""
+    near = step(value)
+    return math.isfinite(value) and math.isfinite(near) and (near == 0.0 or len(repr(near)) + 4 <= len(repr(value)))

@@ -1,0 +1,1 @@
+"""What is wrong with a table or a change of it: findings, cases, effects, and their catalogue."""

@@ -1,0 +1,97 @@
+"""What a check says of tables whose assets are played mirrored too: how facts change in the mirror, where nobody declared it.
+
+inferred-mirror     angles, negated because that is what angles do in a mirror
+undeclared-mirror   a condition with names of both sides that says nothing of a mirror, so that its facts stay as they are
+uneven-mirror       a negated number whose min is not the opposite of its max; whoever plays it
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.grammar import Cell, TagSet, ValueSet, format_number
+from contextdb.cells.mirroring import SWAPPED_KINDS, sided_pairs, way_of
+from contextdb.errors import some
+from contextdb.findings import Finding
+from contextdb.schema.toml_values import as_toml
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.nesting.links import reached
+from contextdb.tables.table import Table
+
+
+def check_mirroring(table: Table) -> Iterator[Finding]:
+    """What is to be said of one table."""
+    conditions = _asked(table)
+    for condition in conditions.values():
+        if _is_uneven(condition):
+            yield Finding("uneven-mirror", "warning", _uneven(condition), table.name, _file(table), column=condition.name)
+    databases = _mirroring_databases(table)
+    if not databases:
+        return
+    by = f"the database{'s' if len(databases) > 1 else ''} {some(databases)}"
+    inferred = [c.name for c in conditions.values() if c.mirror is None and way_of(c) == "negate"]
+    if inferred:
+        told = f"{some(inferred)} {'is' if len(inferred) == 1 else 'are'} negated for mirrored clips of {by}, as angles are."
+        yield Finding("inferred-mirror", "info", told, table.name, _file(table))
+    columns = {c.condition.name: c for c in table.conditions}
+    for condition in conditions.values():
+        pairs = _sides(condition, columns.get(condition.name))
+        if condition.mirror is None and condition.expr is None and pairs:
+            told = f"no mirror is declared, so its facts stay as they are for mirrored clips of {by}."
+            told += f' Try mirror = {as_toml(pairs)}, or "none".'
+            yield Finding("undeclared-mirror", "info", told, table.name, _file(table), column=condition.name)
+
+
+def _asked(table: Table) -> dict[str, Condition]:
+    """The conditions whose facts the table is asked with: its columns, those of rules, and those that others are computed from."""
+    found = {c.condition.name: c.condition for c in table.conditions}
+    if table.when is not None:
+        found |= {name: table.known_conditions[name] for name in table.when.names if name in table.known_conditions}
+    derivation = table.schema.derivation_of(found)
+    return found | {c.name: c for c in (derivation.inputs if derivation is not None else ())}
+
+
+def _mirroring_databases(table: Table) -> list[str]:
+    """The databases that play assets of the table mirrored: its own, and those of tables that it stands in."""
+    around = table.around or {}
+    found = []
+    for name, part in table.schema.databases.items():
+        owner = part.get("table")
+        if part.get("mirror") is True and isinstance(owner, str):
+            outer = around.get(owner)
+            if owner == table.name or (outer is not None and table.name in reached(outer, around)):
+                found.append(name)
+    return found
+
+
+def _sides(condition: Condition, column: ConditionColumn | None) -> dict[str, str]:
+    """The pairs of names of a condition that differ by their side alone."""
+    if condition.domain.kind not in SWAPPED_KINDS:
+        return {}
+    if condition.domain.values is not None or column is None:
+        return sided_pairs(condition.domain.values or ())
+    return sided_pairs(sorted({name for cell in column.cells for name in _names(cell)}))
+
+
+def _names(cell: Cell) -> frozenset[str]:
+    accepts = cell.accepts
+    if isinstance(accepts, TagSet):
+        return accepts.needs | accepts.bans
+    return frozenset(map(str, accepts.values)) if isinstance(accepts, ValueSet) else frozenset()
+
+
+def _is_uneven(condition: Condition) -> bool:
+    domain = condition.domain
+    return condition.mirror == "negate" and domain.kind in ("int", "number") and domain.minimum != -domain.maximum
+
+
+def _uneven(condition: Condition) -> str:
+    bounds = {"min": condition.domain.minimum, "max": condition.domain.maximum}
+    low, high = (f"{key} {format_number(b)}" if math.isfinite(b) else f"no {key}" for key, b in bounds.items())
+    return f'mirror = "negate", with {low} and {high}: the mirrored facts lie outside.'
+
+
+def _file(table: Table) -> str | None:
+    return str(table.path) if table.path else None

@@ -1,0 +1,97 @@
+"""What a check finds wrong with rows that stand for another table, and what it tells of a flat table's rows.
+
+A finding of a table is about that table's own rows: what concerns rows of an inner table alone is told of that table, once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from contextdb.errors import ContextDBError, in_quotes, plural
+from contextdb.findings import Finding, Level
+from contextdb.tables.nesting.flat import FlatTable
+from contextdb.tables.nesting.flat_columns import FlatColumn
+from contextdb.tables.nesting.links import inner_rows, is_nested, require_sound
+from contextdb.tables.table import Table
+
+
+def check_nesting(table: Table) -> Iterator[Finding]:
+    """What is wrong with the rows of a readable table that stand for others; nothing where no others are known."""
+    if not is_nested(table) or table.around is None or table.faults:
+        return
+    unusable = list(_unusable(table))
+    yield from unusable
+    if unusable:
+        return
+    try:
+        flat = table.flat()
+    except ContextDBError as error:
+        yield from (Finding.of(fault, "error", table.name) for fault in error.faults)
+        return
+    if isinstance(flat, FlatTable):
+        yield from own_findings(flat, _shut_out(flat))
+
+
+def _unusable(table: Table) -> Iterator[Finding]:
+    """A finding for each inner table that has faults, which are told of that table."""
+    for name, rows in inner_rows(table).items():
+        try:
+            assert table.around is not None
+            require_sound(table.around[name], table.around)
+        except ContextDBError as error:
+            first = error.faults[0]
+            n_faults = plural(len(error.faults), "fault")
+            message = f"the table {in_quotes(name)} cannot stand here: it has {n_faults}, the first in {first.place}."
+            yield _at(table, rows[0], "unusable-table", "error", message)
+
+
+def _shut_out(flat: FlatTable) -> Iterator[Finding]:
+    """The rows of inner tables that no context lets through, though each cell of their way lets some."""
+    reasons: dict[int, str] = {}
+    for column in flat.conditions:
+        if not isinstance(column, FlatColumn):
+            continue
+        for code in [i for i, cell in enumerate(column.cells) if cell.is_empty and not cell.is_soft]:
+            for row in np.flatnonzero((column.texts.codes == code) & flat.enabled).tolist():
+                said = column.layers.said(row)
+                if len(said) > 1 and row not in reasons:
+                    texts = " and ".join(in_quotes(text) for _, text in said)
+                    reasons[row] = f"it can never be valid here: {column.condition.name} must be {texts}, which share nothing."
+    for row, why in sorted(reasons.items()):
+        yield Finding("shut-out-row", "info", why, flat.name, None, row, flat.assets[row])
+
+
+def own_findings(flat: FlatTable, findings: Iterable[Finding]) -> Iterator[Finding]:
+    """Findings about rows of a flat table as findings about the rows of its outer table."""
+    for finding in outer_findings(flat, findings):
+        yield finding if finding.row is None else _own(flat, finding, finding.row)
+
+
+def outer_findings(flat: FlatTable, findings: Iterable[Finding]) -> Iterator[Finding]:
+    """The findings about rows of a flat table, without those that the check of an inner table tells of."""
+    return (f for f in findings if f.row is None or not _is_of_inner(flat, (f.row, *f.by)))
+
+
+def _is_of_inner(flat: FlatTable, rows: Sequence[int]) -> bool:
+    """Whether several rows all stand in one place of one inner table, whose own check tells of them."""
+    way = flat.expansion.rows
+    return len(rows) > 1 and all(way[0, row] == way[0, rows[0]] and flat.leaves[row] != flat.assets[row] for row in rows)
+
+
+def _own(flat: FlatTable, finding: Finding, row: int) -> Finding:
+    outer = flat.expansion.rows[0]
+    own, places = int(outer[row]), flat.places(row)
+    by = tuple(dict.fromkeys(int(outer[other]) for other in finding.by if outer[other] != own))
+    where = f" The row stands in {places[-1]}." if len(places) > 1 else ""
+    place = places[0]
+    return replace(
+        finding, message=finding.message + where, row=own, by=by, file=place.file, line=place.line, column=finding.column
+    )
+
+
+def _at(table: Table, row: int, rule: str, level: Level, message: str) -> Finding:
+    place = table.place(row, table.asset_column)
+    return Finding(rule, level, message, table.name, place.file, row, table.assets[row], place.line, place.column)

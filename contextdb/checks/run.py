@@ -1,0 +1,205 @@
+"""What a table alone can show to be wrong: a table in, findings out. Each rule has a paragraph in docs/messages.md."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import cast
+
+import numpy as np
+
+from contextdb import bitmask
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import Cell, NumberSet, format_number
+from contextdb.checks.mirrored import check_mirroring
+from contextdb.checks.nested import check_nesting
+from contextdb.errors import in_quotes, nearest, row_name
+from contextdb.expressions import constant_truth
+from contextdb.expressions.rules import WhenRules
+from contextdb.files.csv_source import Source
+from contextdb.findings import Finding, Level
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.nesting.names import inner_name
+from contextdb.tables.table import Table
+from contextdb.tables.variety import gathered, lets_choose
+
+LINE_ENDS = {"\n": "LF", "\r\n": "CRLF", "\r": "CR"}
+MOST_ROWS = 1000
+"""A rule reports at most so many rows of one column, then says how many more there are."""
+
+
+def check(table: Table) -> list[Finding]:
+    """Every finding of a table, in the order of its rows, those of the whole table first."""
+    rules = (_whole_table, _unreadable, _cells, _constant_rules, _assets, _identical, check_nesting, check_mirroring)
+    found = capped(finding for rule in rules for finding in rule(table))
+    return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+
+
+def capped(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """The findings; of those of one rule in one column the first `MOST_ROWS`, and one that says how many more there are."""
+    counts: Counter[tuple[str, str | None]] = Counter()
+    first_left: dict[tuple[str, str | None], Finding] = {}
+    for finding in findings:
+        kind = (finding.rule, finding.column)
+        counts[kind] += 1
+        if counts[kind] <= MOST_ROWS:
+            yield finding
+        else:
+            first_left.setdefault(kind, finding)
+    for kind, finding in first_left.items():
+        yield replace(finding, message=f"{finding.message} ({counts[kind] - MOST_ROWS:,} rows like this one are not listed.)")
+
+
+def where(table: Table, row: int, other: int) -> str:
+    """Where a row stands, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
+    place = table.place(row)
+    if place.line is None:
+        return row_name(row)
+    is_inside = table.path is not None and {place.file, table.place(other).file} != {str(table.path)}
+    return f"line {place.line} of {place.file}" if is_inside else f"line {place.line}"
+
+
+def _whole_table(table: Table) -> Iterator[Finding]:
+    file = str(table.path) if table.path else None
+    if table.n_rows == 0:
+        yield Finding("no-rows", "warning", "the table has no rows, so no context has an asset.", table.name, file)
+    if isinstance(table.source, Source) and len(table.source.line_ends) > 1:
+        ends = ", ".join(f"{n:,} in {LINE_ENDS[end]}" for end, n in table.source.line_ends.items())
+        message = f"the lines end in different ways: {ends}; they are kept as they are."
+        yield Finding("mixed-line-ends", "info", message, table.name, file)
+    for column in table.conditions:
+        if not column.condition.is_declared:
+            yield _undeclared(table, column, file)
+
+
+def _undeclared(table: Table, column: ConditionColumn, file: str | None) -> Finding:
+    name, kind = column.condition.name, column.condition.domain.kind
+    present = {c.name for c in table.columns}
+    near = nearest(name, [c for c in table.schema.conditions if c not in present])
+    hint = f" Did you mean {in_quotes(near)}?" if near else ""
+    level: Level = "warning" if table.schema.conditions else "info"
+    message = f"the condition is not declared in contextdb.toml; its cells read as {kind}.{hint}"
+    return Finding("undeclared-condition", level, message, table.name, file, column=name)
+
+
+def _unreadable(table: Table) -> Iterator[Finding]:
+    for fault in table.faults:
+        row = fault.place.row
+        yield Finding.of(fault, "error", table.name, None if row is None else table.assets[row])
+
+
+def _cells(table: Table) -> Iterator[Finding]:
+    for column in table.conditions:
+        said: dict[int, tuple[str, Level, str]] = {}
+        for i, cell in enumerate(column.cells):
+            verdict = _verdict(cell, column.condition.domain)
+            if verdict and i not in column.faults:
+                said[i] = verdict
+        rows = np.flatnonzero(np.isin(column.texts.codes, list(said))).tolist() if said else []
+        for row in rows:
+            rule, level, why = said[int(column.texts.codes[row])]
+            yield _at(table, row, rule, level, f"{in_quotes(column.texts[row])} {why}", column.condition.name)
+
+
+def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
+    """The rule that a cell breaks, its level and why."""
+    if cell.is_empty:
+        so = "its penalty always counts" if cell.is_soft else "the row never matches"
+        return "empty-cell", "error", f"accepts no value at all, so {so}."
+    if not isinstance(cell.accepts, NumberSet) or domain.kind == "angle":
+        return None
+    low, high = domain.minimum, domain.maximum
+    spans = cell.accepts.spans
+    bounds = _declared(low, high)
+    if spans[-1][1] < low or spans[0][0] > high:
+        return "outside-domain", "warning", f"lies wholly outside {bounds}, so the row matches no expected value."
+    ends = [e for span in spans for e in span if np.isfinite(e)]
+    if ends and (min(ends) < low or max(ends) > high):
+        return "beyond-domain", "info", f"reaches beyond {bounds}."
+    return None
+
+
+def _declared(low: float, high: float) -> str:
+    if np.isinf(high):
+        return f"the declared min {format_number(low)}"
+    return (
+        f"the declared max {format_number(high)}"
+        if np.isinf(low)
+        else f"the declared {format_number(low)} to {format_number(high)}"
+    )
+
+
+def _constant_rules(table: Table) -> Iterator[Finding]:
+    """Rules that say the same of every context of the declared values and bounds."""
+    when = WhenRules.of(table.when)
+    for rule in when.rules if when is not None else ():
+        truth = constant_truth(rule.expression)
+        if truth is None:
+            continue
+        kind, level = ("always-true", "info") if truth else ("never-true", "warning")
+        so = "so it excludes nothing" if truth else "so the row never matches"
+        told = f"the rule {in_quotes(rule.expression.text)} is {truth} in every context of the declared values and bounds, {so}."
+        for row in bitmask.rows(bitmask.from_int(rule.rows, table.n_rows)).tolist():
+            yield _at(table, row, kind, cast(Level, level), told, table.settings.when)
+
+
+def _assets(table: Table) -> Iterator[Finding]:
+    rows_of: dict[str, list[int]] = defaultdict(list)
+    for row, asset in enumerate(table.assets):
+        rows_of[asset].append(row)
+    for asset, rows in rows_of.items():
+        if not asset.strip():
+            for row in rows:
+                yield _at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
+        elif len(rows) > 1 and inner_name(asset) is None:
+            for row in rows[1:]:
+                message = f"the asset {in_quotes(asset)} stands in {where(table, rows[0], row)} too."
+                yield _at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
+
+
+def _identical(table: Table) -> Iterator[Finding]:
+    found = list(identical_rows(table))
+    if lets_choose([table.settings.policy]):
+        found = gathered(found, table.assets, lambda row: _at(table, row, "variety", "info", "", None), partial(named, table))
+    yield from found
+
+
+def identical_rows(table: Table) -> Iterator[Finding]:
+    """Rows whose every condition accepts the same values, whatever way it is written. A disabled row is like no other.
+
+    Each is caused by the first such row of the same asset, or else by the first of all.
+    """
+    if table.n_rows < 2 or not (table.conditions or table.when):
+        return
+    disabled = np.where(table.enabled, -1, np.arange(table.n_rows))
+    rules = [] if table.when is None else [table.when.meanings]
+    meanings = [disabled, *rules, *(_meanings(column) for column in table.conditions)]
+    _, first, group = np.unique(np.stack(meanings, axis=1), axis=0, return_index=True, return_inverse=True)
+    origin = first[group.reshape(-1)]
+    first_of: dict[tuple[int, str], int] = {}
+    for row, start in enumerate(origin.tolist()):
+        same = first_of.setdefault((start, table.assets[row]), row)
+        other = start if same == row else same
+        if other != row:
+            message = f"every condition is the same as in {named(table, other, row)}."
+            yield _at(table, row, "identical-rows", "warning", message, None, (other,))
+
+
+def named(table: Table, other: int, row: int) -> str:
+    """A row by its place and its asset, in a sentence about another."""
+    return f"{where(table, other, row)} ({in_quotes(table.assets[other])})"
+
+
+def _meanings(column: ConditionColumn) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """For each row a number that is the same for cells that mean the same; a cell that cannot be read means itself."""
+    known: dict[object, int] = {}
+    keys = [("fault", i) if i in column.faults else (c.accepts, c.penalty) for i, c in enumerate(column.cells)]
+    numbers = np.array([known.setdefault(k, len(known)) for k in keys], np.int64)
+    return numbers[column.texts.codes]
+
+
+def _at(table: Table, row: int, rule: str, level: Level, message: str, column: str | None, by: tuple[int, ...] = ()) -> Finding:
+    place = table.place(row, column)
+    return Finding(rule, level, message, table.name, place.file, row, table.assets[row], place.line, column, by)

@@ -1,0 +1,163 @@
+"""Whether files of contextdb are as they were written, by the digests and check sums that they hold. An edge: this reads files.
+
+A file of ours that holds a digest is read whole and compared with it. A CSV table or a contextdb.toml holds none, since git guards
+it, and is only read here; so is a Parquet file that another program wrote.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from contextdb.disk import read_bytes
+from contextdb.errors import ArtefactError, ContextDBError, Fault, FileError, Place, in_quotes, plural
+
+State = Literal["whole", "no-digest", "damaged"]
+
+NO_DIGEST = "read without a fault; files of this kind hold no digest"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What is known of one file."""
+
+    file: str
+    kind: str
+    state: State
+    message: str
+
+    def to_json(self) -> dict[str, str]:
+        """As plain data."""
+        return {"file": self.file, "kind": self.kind, "state": self.state, "message": self.message}
+
+
+def verified(path: Path) -> Verdict:
+    """Read a file and compare it with the digest that it holds.
+
+    Raises
+    ------
+    FileError
+        There is no such file, the disk refuses, or the file is of no kind that contextdb writes.
+    """
+    check = CHECKS.get(path.suffix.lower())
+    if check is None:
+        accepted = f"a file that contextdb writes: {', '.join(CHECKS)}"
+        found = f"{in_quotes(path.name)} is not a file of contextdb."
+        raise FileError(Fault(found, accepted, place=Place(str(path))))
+    if not os.path.isfile(path):
+        read_bytes(path)  # raises, with the reason
+    kind = "file"
+    try:
+        for kind, message in check(path):
+            if message is not None:
+                return Verdict(str(path), kind, "no-digest", message)
+        return Verdict(str(path), kind, "whole", "as it was written")
+    except FileError:
+        raise
+    except ContextDBError as error:
+        return Verdict(str(path), kind, "damaged", " ".join(fault.message for fault in error.faults[:3]))
+
+
+def files_under(folder: Path) -> list[Path]:
+    """The files below a folder that contextdb may have written, in order; what stands in hidden folders counts too."""
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in CHECKS and path.is_file())
+
+
+# ---- kinds of files. Each check yields what it takes the file for, and at last why it holds no digest, where it holds none.
+
+Told = Iterator[tuple[str, str | None]]
+
+
+def _safetensors(path: Path) -> Told:
+    from contextdb.compiled.artefact import COMPILED, open_artefact
+    from contextdb.files.tensors import metadata_of
+    from contextdb.motion.storage.feature_cache import CLIP_FEATURES
+    from contextdb.motion.storage.stored import STORED, open_database
+
+    keys = metadata_of(path, COMPILED)
+    if STORED.key in keys:
+        yield "motion database", None
+        open_database(path, verify=True)
+    elif CLIP_FEATURES.key in keys:
+        yield "features of a clip", "kept by a build; the next build checks them and computes them again where they are altered"
+    else:
+        yield "compiled table", None
+        open_artefact(path)
+
+
+def _parquet(path: Path) -> Told:
+    from contextdb.files.parquet_frame import DamagedFrame, require_whole_file
+    from contextdb.motion.trace.session import FORMAT_KEY, Trace
+
+    yield "Parquet file", None
+    try:
+        frame = require_whole_file(path)
+    except DamagedFrame as error:
+        raise ArtefactError(Fault(f"the file is damaged: {error}.", "a Parquet file as it was written")) from None
+    if FORMAT_KEY in frame.metadata:
+        yield "recorded session", None
+        Trace.load(path)
+    elif frame.is_sealed:
+        yield "table", None
+    else:
+        yield "Parquet file", "its frame is whole; it was written without a digest, by another program or an older version"
+
+
+def _csv(path: Path) -> Told:
+    from contextdb.files.csv_source import read_csv
+
+    yield "CSV", None
+    read_csv(read_bytes(path), str(path))
+    yield "CSV", NO_DIGEST
+
+
+def _toml(path: Path) -> Told:
+    from contextdb.tables.project import read_folder_schema
+
+    yield "contextdb.toml", None
+    read_folder_schema(path.parent)
+    yield "contextdb.toml", NO_DIGEST
+
+
+def _json(path: Path) -> Told:
+    import json
+
+    from contextdb.covering.baseline import ACCEPTED, read_baseline
+
+    yield "coverage report", None
+    text = read_bytes(path).decode("utf-8-sig", "replace")
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ArtefactError(Fault(f"the file is no JSON: {error}.", ACCEPTED)) from None
+    if not isinstance(document, dict) or not {"format", "tables"} <= document.keys():
+        yield "JSON", "a document of another program, or of another command; nothing to compare"
+        return
+    read_baseline(text, str(path))
+    if "digest" not in document:
+        yield "coverage report", "it reads as a baseline; it was written without a digest, by an older version"
+
+
+def _journal(path: Path) -> Told:
+    from contextdb.files.journal_lines import n_lost, read_records
+
+    yield "journal", None
+    raw = read_bytes(path)
+    records, n_bytes = read_records(raw)
+    if n_bytes < len(raw):
+        n_lines = n_lost(raw, n_bytes)
+        what = f"altered, and {plural(n_lines, 'line')} cannot be used" if n_lines else "cut off"
+        raise ArtefactError(Fault(f"line {len(records) + 1} is {what}.", "lines with their check sums"))
+
+
+CHECKS: Mapping[str, Callable[[Path], Told]] = {
+    ".safetensors": _safetensors,
+    ".parquet": _parquet,
+    ".csv": _csv,
+    ".toml": _toml,
+    ".json": _json,
+    ".journal": _journal,
+}

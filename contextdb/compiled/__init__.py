@@ -1,0 +1,1 @@
+"""A table as masks, and each way to ask it."""

@@ -1,0 +1,281 @@
+"""The compiled file for the game: .safetensors, opened by memory map, never pickle.
+
+Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double little-endian, every mask as in `contextdb.bitmask`:
+
+    enabled                uint64 [W]            rows that may match
+    priorities             int64 [R]
+    row_weights            float64 [R]
+    assets                 uint8                 JSON list of R texts
+    CCC.FIELD              as in contextdb.compiled.classes, for condition number CCC: `masks` (and `bounds`), or `low`, `high`,
+    `any_mask` CCC.codes              int32 [R]             which of the distinct texts each row holds
+    CCC.texts              uint8                 JSON list of the distinct texts
+    slots.CCC.codes        as CCC.codes and CCC.texts, for the columns of slots, named in `about`
+    slots.CCC.texts
+    when.codes             as CCC.codes and CCC.texts, for the column of rules, named in `about`
+    when.texts
+    CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
+
+and for a table with tables inside, D the depth, T the number of tables (`contextdb.compiled.ways`; soft cells then have D R rows):
+
+    ways.numbers           int32 [D, R]
+    ways.rows              int32 [D, R]
+    ways.leaves            uint8                 JSON list of R texts
+    ways.TTT.FIELD         priorities, row_weights and lines of table number TTT
+    CCC.layers             int32 [D, R]          which text each depth says
+    CCC.said               uint8                 JSON list of those texts
+    when.layers, when.said                       the same for the rows' own rules
+
+The metadata hold `contextdb` (the version of this layout), `about` (JSON: name, policy, fallback, conditions and the kind of each
+column; where facts are derived also the conditions that they are computed from; where rows have rules also their column and the
+conditions that they name and that are no columns) and `digest`, BLAKE2b-128 of `about` and of all
+tensors in the order of their names. Opening checks all of it. A table with rules has layout 2, so that what knows only masks does
+not answer without them, and so has one with tables inside and soft cells; any other has layout 1.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import TagSet
+from contextdb.cells.nesting_cells import TagMeet
+from contextdb.columns import TextColumn
+from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
+from contextdb.compiled.table import CompiledTable, SoftMasks
+from contextdb.compiled.ways_stored import ways_from, ways_to_json, ways_to_tensors
+from contextdb.expressions.rules import WhenColumn, WhenRules
+from contextdb.files.tensors import (
+    SUFFIX,
+    FileKind,
+    Tensors,
+    digest_of,
+    read_tensors,
+    texts_from_array,
+    texts_to_array,
+    write_tensors,
+)
+from contextdb.schema.settings import Schema
+
+if TYPE_CHECKING:
+    from contextdb.expressions import Derivation
+
+__all__ = ["SUFFIX", "open_artefact", "save"]
+
+COMPILED = FileKind(
+    "contextdb", 1, "one that contextdb compiled", "a file that this version of contextdb compiled", "to compile the table again"
+)
+WITH_RULES = replace(COMPILED, layout=2, also=(COMPILED.layout,))
+
+
+def save(compiled: CompiledTable, path: Path) -> None:
+    """Write a compiled table; the old file is whole until the new one is."""
+    tensors: Tensors = {
+        "enabled": compiled.enabled,
+        "priorities": compiled.priorities,
+        "row_weights": compiled.row_weights,
+        "assets": texts_to_array(list(compiled.assets)),
+        "declared": texts_to_array(sorted(compiled.declared)),
+    }
+    kinds = []
+    for at, (masks, soft, texts) in enumerate(zip(compiled.masks, compiled.soft, compiled.texts, strict=True)):
+        kinds.append(
+            {"masks": _add(tensors, f"{at:03d}", masks), "soft": None if soft is None else _add(tensors, f"{at:03d}.soft", soft[0])}
+        )
+        tensors[f"{at:03d}.codes"] = texts.codes
+        tensors[f"{at:03d}.texts"] = texts_to_array(list(texts.texts))
+        if soft is not None:
+            tensors[f"{at:03d}.soft.penalties"] = soft[1]
+    for at, column in enumerate(compiled.slots or ()):
+        tensors[f"slots.{at:03d}.codes"] = column.codes
+        tensors[f"slots.{at:03d}.texts"] = texts_to_array(list(column.texts))
+    if compiled.when is not None:
+        tensors["when.codes"] = compiled.when.texts.codes
+        tensors["when.texts"] = texts_to_array(list(compiled.when.texts.texts))
+    if compiled.ways is not None:
+        tensors |= ways_to_tensors(compiled.ways)
+    about = json.dumps(
+        {
+            "name": compiled.name,
+            "rows": compiled.n_rows,
+            "policy": compiled.policy,
+            "fallback": compiled.fallback,
+            "conditions": [_condition_to_json(c) for c in compiled.conditions],
+            "columns": kinds,
+        }
+        | ({"slots": [c.name for c in compiled.slots]} if compiled.slots is not None else {})
+        | ({"computed_from": [_condition_to_json(c) for c in _computed_from(compiled)]} if compiled.derivation else {})
+        | ({"when": _when_to_json(compiled)} if compiled.when else {})
+        | ({"ways": ways_to_json(compiled.ways)} if compiled.ways else {})
+    )
+    is_more = compiled.when is not None or (compiled.ways is not None and any(compiled.soft))
+    write_tensors(path, WITH_RULES if is_more else COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about)})
+
+
+def open_artefact(path: Path) -> CompiledTable:
+    """Open a compiled table by memory map, checked.
+
+    Raises
+    ------
+    ArtefactError
+        The file is truncated, altered, of another layout, or no artefact at all; with the reason and the mend.
+    FileError
+        The file cannot be read.
+    """
+    tensors, metadata = read_tensors(path, WITH_RULES)
+    with COMPILED.reading(path):
+        about = metadata["about"]
+        if digest_of(tensors, about) != metadata.get("digest"):
+            raise COMPILED.refused(path, "the file was altered: its contents do not give its digest.")
+        return _table(json.loads(about), tensors)
+
+
+def _table(about: dict[str, Any], tensors: Tensors) -> CompiledTable:
+    conditions = tuple(_condition_from_json(c) for c in about["conditions"])
+    n_rows = about["rows"]
+    numbered = [(f"{at:03d}", kinds) for at, kinds in enumerate(about["columns"])]
+    return CompiledTable(
+        name=about["name"],
+        assets=texts_from_array(tensors["assets"]),
+        conditions=conditions,
+        masks=tuple(_column(tensors, prefix, kinds["masks"], n_rows) for prefix, kinds in numbered),
+        enabled=tensors["enabled"],
+        soft=tuple(_soft(tensors, f"{prefix}.soft", kinds["soft"], n_rows) for prefix, kinds in numbered),
+        priorities=tensors["priorities"],
+        row_weights=tensors["row_weights"],
+        texts=tuple(
+            TextColumn(c.name, tuple(texts_from_array(tensors[f"{prefix}.texts"])), tensors[f"{prefix}.codes"])
+            for c, (prefix, _) in zip(conditions, numbered, strict=True)
+        ),
+        policy=about["policy"],
+        fallback=about["fallback"],
+        derivation=_derivation(about, conditions),
+        slots=_slots(about, tensors),
+        when=_when(about, conditions, tensors),
+        ways=ways_from(about["ways"], tensors, len(conditions)) if "ways" in about else None,
+        declared=frozenset(texts_from_array(tensors["declared"]) if "declared" in tensors else ()),
+    )
+
+
+def _when_to_json(compiled: CompiledTable) -> dict[str, object]:
+    assert compiled.when is not None
+    return {"name": compiled.when.name, "conditions": [_condition_to_json(c) for c in compiled.ruled]}
+
+
+def _when(about: dict[str, Any], conditions: tuple[Condition, ...], tensors: Tensors) -> WhenRules | None:
+    if "when" not in about:
+        return None
+    known = {c.name: c for c in (*conditions, *map(_condition_from_json, about["when"]["conditions"]))}
+    texts = TextColumn(about["when"]["name"], tuple(texts_from_array(tensors["when.texts"])), tensors["when.codes"])
+    column = WhenColumn.read(texts, known)
+    if column.faults:
+        raise ValueError(column.faults)
+    return WhenRules.of(column)
+
+
+def _slots(about: dict[str, Any], tensors: Tensors) -> tuple[TextColumn, ...] | None:
+    if "slots" not in about:
+        return None
+    return tuple(
+        TextColumn(name, tuple(texts_from_array(tensors[f"slots.{at:03d}.texts"])), tensors[f"slots.{at:03d}.codes"])
+        for at, name in enumerate(about["slots"])
+    )
+
+
+def _derivation(about: dict[str, Any], conditions: tuple[Condition, ...]) -> Derivation | None:
+    if "computed_from" not in about:
+        return None
+    others = [_condition_from_json(c) for c in (*about["computed_from"], *about.get("when", {"conditions": ()})["conditions"])]
+    known = Schema(conditions={c.name: c for c in (*conditions, *others)})
+    return known.derivation_of(known.conditions)
+
+
+def _computed_from(compiled: CompiledTable) -> list[Condition]:
+    """The conditions that derived facts are computed from and that are no columns of the table."""
+    computed = compiled.derivation.conditions if compiled.derivation else ()
+    return [condition for condition in computed if condition.name not in compiled.places]
+
+
+def _add(tensors: Tensors, prefix: str, masks: ColumnMasks) -> dict[str, object]:
+    """Put a column's arrays among the tensors; gives what else it needs."""
+    if isinstance(masks, WideMasks):
+        tensors |= {
+            f"{prefix}.bounds": masks.bounds,
+            f"{prefix}.low": masks.low,
+            f"{prefix}.high": masks.high,
+            f"{prefix}.any_mask": masks.any_mask,
+        }
+        return {"kind": "wide", "shift": masks.shift}
+    tensors[f"{prefix}.masks"] = masks.masks
+    if isinstance(masks, NumberMasks):
+        tensors[f"{prefix}.bounds"] = masks.bounds
+        return {"kind": "number"}
+    if isinstance(masks, ValueMasks):
+        return {"kind": "value", "values": list(masks.values), "has_others": masks.has_others}
+    negated = [[_tags_to_json(p) for p in t.parts] if isinstance(t, TagMeet) else _tags_to_json(t)[:2] for t in masks.negated]
+    return {"kind": "tags", "tags": list(masks.tags), "negated": negated}
+
+
+def _column(tensors: Tensors, prefix: str, about: dict[str, Any], n_rows: int) -> ColumnMasks:
+    kind = about["kind"]
+    if kind == "wide":
+        parts = (tensors[f"{prefix}.{part}"] for part in ("low", "high", "any_mask"))
+        return WideMasks(n_rows, tensors[f"{prefix}.bounds"], about["shift"], *parts)
+    masks = tensors[f"{prefix}.masks"]
+    if kind == "number":
+        return NumberMasks(n_rows, tensors[f"{prefix}.bounds"], masks)
+    if kind == "value":
+        return ValueMasks(n_rows, tuple(about["values"]), about["has_others"], masks)
+    negated = tuple(_negated(parts) for parts in about["negated"])
+    return TagMasks(n_rows, tuple(about["tags"]), negated, masks)
+
+
+def _soft(tensors: Tensors, prefix: str, about: dict[str, Any] | None, n_rows: int) -> SoftMasks | None:
+    if about is None:
+        return None
+    penalties = tensors[f"{prefix}.penalties"]
+    return _column(tensors, prefix, about, len(penalties)), penalties
+
+
+def _tags_to_json(tags: TagSet) -> list[object]:
+    return [sorted(tags.needs), sorted(tags.bans), tags.is_complement]
+
+
+def _negated(parts: list[Any]) -> TagSet:
+    """A set of tags with a "not": what it needs and bans; or the parts of a meet, each with whether it is a complement."""
+    if len(parts) == 2 and all(isinstance(name, str) for names in parts for name in names):
+        return TagSet(frozenset(parts[0]), frozenset(parts[1]), True)
+    return TagMeet.of([TagSet(frozenset(needs), frozenset(bans), is_complement) for needs, bans, is_complement in parts])
+
+
+def _condition_to_json(condition: Condition) -> dict[str, object]:
+    domain = condition.domain
+    bounds = [b if math.isfinite(b) else None for b in (domain.minimum, domain.maximum)]
+    return {
+        "name": condition.name,
+        "type": domain.kind,
+        "values": domain.values,
+        "bounds": bounds,
+        "unit": condition.unit,
+        "description": condition.description,
+        "expr": condition.expr,
+        "is_declared": condition.is_declared,
+    } | ({} if condition.mirror is None else {"mirror": condition.mirror})
+
+
+def _condition_from_json(about: dict[str, Any]) -> Condition:
+    low, high = about["bounds"]
+    values = None if about["values"] is None else tuple(about["values"])
+    domain = Domain(about["type"], values, -math.inf if low is None else low, math.inf if high is None else high)
+    return Condition(
+        about["name"], domain, about["unit"], about["description"], about["expr"], about["is_declared"], _mirror(about)
+    )
+
+
+def _mirror(about: dict[str, Any]) -> Any:
+    mirror = about.get("mirror")
+    return tuple((left, right) for left, right in mirror) if isinstance(mirror, list) else mirror

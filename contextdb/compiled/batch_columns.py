@@ -1,0 +1,141 @@
+"""Columns of facts as they are given: by name, equally long, and as arrays where they are plainly typed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
+from contextdb.cells.facts import read_fact
+from contextdb.cells.mirroring import kept_fact, mirrored_fact
+from contextdb.compiled.classes import ValueMasks
+from contextdb.errors import ContextError, Fault, Place
+
+Contexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
+Codes = NDArray[np.int32]
+
+
+def facts_of(contexts: object) -> dict[str, Any]:
+    """The columns of some contexts by name."""
+    if isinstance(contexts, pl.DataFrame):
+        return {name: contexts[name] for name in contexts.columns}
+    if not isinstance(contexts, Mapping):
+        accepted = "a polars DataFrame, or a mapping of names to equally long columns"
+        raise ContextError(Fault(f"{type(contexts).__name__} is no columns of facts.", accepted))
+    for name, column in contexts.items():
+        is_flat = column.ndim == 1 if isinstance(column, np.ndarray) else isinstance(column, (list, tuple, range, pl.Series))
+        if not is_flat:
+            place = Place(column=str(name))
+            raise ContextError(
+                Fault(f"{type(column).__name__} is no column of facts.", "a list, a flat array or a series", place=place)
+            )
+    return dict(contexts)
+
+
+def common_length(columns: Mapping[str, Any]) -> int:
+    """How many contexts equally long columns hold; 0 without a column."""
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise ContextError(Fault(f"the columns are not equally long: {lengths}.", "one fact for each context in every column"))
+    return next(iter(lengths.values()), 0)
+
+
+def plain_numbers(given: Any, kind: str) -> NDArray[np.float64] | None:
+    """A column of plain numbers as doubles, NaN where missing; None when it must be read fact by fact."""
+    series = _as_series(given, pl.Float64)
+    if series is None or not (series.dtype.is_numeric() and not series.dtype.is_decimal()):
+        return None
+    facts = series.cast(pl.Float64).to_numpy(writable=False)
+    if series.null_count():
+        facts = series.cast(pl.Float64).fill_null(np.nan).to_numpy()
+    if kind == "int" and not series.dtype.is_integer() and not (np.isnan(facts) | (facts == np.trunc(facts))).all():
+        return None
+    return None if kind == "angle" and np.isinf(facts).any() else facts
+
+
+def wrapped(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles in [-180, 180), exactly, as `domains.wrap_angle` does one."""
+    if not ((degrees < -180.0) | (degrees >= 180.0)).any():
+        return degrees
+    rest = np.fmod(degrees, 360.0)
+    return np.where(rest >= 180.0, rest - 360.0, np.where(rest < -180.0, rest + 360.0, rest))
+
+
+def listed(given: Any) -> list[Any]:
+    """A column as a list of Python's own values."""
+    return given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
+
+
+def kept_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condition]) -> dict[str, Any]:
+    """The columns of some conditions as they are now, whatever the caller writes into them later."""
+    return {name: _kept(given, conditions[name].domain.kind) for name, given in columns.items() if name in conditions}
+
+
+def _kept(given: Any, kind: str) -> Any:
+    if isinstance(given, np.ndarray):
+        return given.copy()
+    if isinstance(given, (list, tuple)) and kind == "tags":  # of which each fact is a set
+        return [kept_fact(fact) for fact in given]
+    return list(given) if isinstance(given, list) else given
+
+
+def mirrored_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condition]) -> dict[str, Any]:
+    """Columns of facts that can be read, those of `conditions` as a mirror shows them."""
+    return {name: mirrored_column(given, conditions[name]) if name in conditions else given for name, given in columns.items()}
+
+
+def mirrored_column(given: Any, condition: Condition) -> Any:
+    """One column of facts as a mirror shows them."""
+    kind = condition.domain.kind
+    numbers = plain_numbers(given, kind) if kind in NUMERIC else None
+    if numbers is not None:
+        return 0.0 - numbers
+    return [mirrored_fact(read_fact(value, condition), condition) for value in listed(given)]
+
+
+def plain_values(given: Any, masks: ValueMasks) -> Codes | None:
+    """Class numbers int32 [1, N] of a column of plain values, -1 where missing; None when it must be read fact by fact."""
+    is_truth = masks.values == (False, True)
+    series = _as_series(given, pl.Boolean if is_truth else pl.String)
+    if series is None:
+        return None
+    if is_truth:
+        if series.dtype != pl.Boolean:
+            return None
+        return _codes_of(series.cast(pl.Int32))
+    if isinstance(series.dtype, (pl.Categorical, pl.Enum)):
+        series = series.cast(pl.String)
+    if series.dtype != pl.String:
+        return None
+    found = series.cast(pl.Enum([str(v) for v in masks.values]), strict=False)
+    if masks.has_others:
+        codes = found.to_physical().cast(pl.Int32).fill_null(len(masks.values))
+        return pl.select(pl.when(series.is_null()).then(-1).otherwise(codes).cast(pl.Int32)).to_series().to_numpy()[None]
+    if found.null_count() > series.null_count():
+        return None
+    return _codes_of(found.to_physical().cast(pl.Int32))
+
+
+def _codes_of(classes: pl.Series) -> Codes:
+    return (classes.fill_null(-1) if classes.null_count() else classes).to_numpy()[None]
+
+
+def _as_series(given: Any, listed: type[pl.DataType]) -> pl.Series | None:
+    """A column as a polars series, or None when it has no single plain type.
+
+    What is listed must be of the type `listed`: left to itself polars takes a list after its first items for float32 or for truth.
+    """
+    if isinstance(given, pl.Series):
+        return given
+    is_typed = isinstance(given, np.ndarray) and given.dtype.kind in "biuf"
+    try:
+        if is_typed:
+            return pl.Series(given, nan_to_null=False)
+        return pl.Series(list(given), dtype=listed, strict=True, nan_to_null=False) if len(given) else None
+    except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
+        return None

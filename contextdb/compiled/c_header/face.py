@@ -1,0 +1,336 @@
+"""The part of the header that is about single tables: for each a struct of facts, and functions that open and ask it.
+
+A condition that several tables share has one enum. Derived facts are fields like any others: an expression is not worked out in C,
+so the game gives its value, and the artefact is refused when its expression is no longer the one that the header shows.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.grammar import format_number
+from contextdb.compiled.c_header.spelling import Names, comment, literal
+from contextdb.compiled.table import CompiledTable
+
+READER = 1
+"""Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
+
+PARTS = ("types.h", "json.h", "opening.h", "columns.h", "arrays.h", "open.h", "query.h", "files.h")
+_HEAD = """/* Written by `contextdb compile --c-header`: do not edit. */
+
+#ifdef CDB_READER
+#if CDB_READER != {version}
+#error "two headers of different versions of contextdb in one file: compile the older one again"
+#endif
+#else
+#define CDB_READER {version}
+
+{reader}
+#endif /* CDB_READER */
+
+#ifndef {guard}
+#define {guard}
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+"""
+_FOOT = """
+#ifdef __cplusplus
+}}
+#endif
+
+#endif /* {guard} */
+"""
+_ENDINGS = ("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_open", "_close", "_query")
+_TYPES = {"bool": "int", "int": "int64_t", "number": "double", "angle": "double", "text": "const char *"}
+_MISSING = {"bool": "CDB_MISSING", "int": "CDB_MISSING_INT", "number": "cdb_missing_number()", "angle": "cdb_missing_number()"}
+_MEMBERS = {"number": "number", "angle": "number", "text": "text"}
+
+
+@dataclass(frozen=True)
+class HeldBack:
+    """A table that no C program can ask, and why."""
+
+    table: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Choices:
+    """A condition's declared values in C: the type, the array of their names, and an enumerator for each."""
+
+    type: str
+    values: tuple[str, ...]
+    enumerators: tuple[str, ...]
+    missing: str
+
+    @property
+    def n_words(self) -> int:
+        """Words of a set of tags; bit 0 says that the set is known."""
+        return (len(self.values) + 1 + 63) // 64
+
+
+@dataclass(frozen=True)
+class TableFace:
+    """A table in C: what its names begin with, and the field of each condition."""
+
+    table: str
+    base: str
+    fields: tuple[str, ...]
+    enumerators: tuple[str, ...]
+
+
+def c_header_of(tables: Mapping[str, CompiledTable], guard: str = "CDB_TABLES_H") -> tuple[str, list[HeldBack]]:
+    """The text of the header, ASCII with line feeds, and the tables that it leaves out; the same tables give the same text.
+
+    Raises
+    ------
+    ContextDBError
+        A name cannot be a text of C.
+    """
+    names = names_left()
+    choices: dict[Condition, Choices] = {}
+    held_back, parts = [], []
+    for name, table in tables.items():
+        if why := _why_not(table):
+            held_back.append(HeldBack(name, why))
+            parts.append(f"\n{comment(f'table {name} is left out: {why}')}\n")
+            continue
+        for condition in table.conditions:
+            if condition.domain.values and condition not in choices:
+                choices[condition] = choices_of(condition, names)
+                parts.append("\n" + "".join(f"{line}\n" for line in _choices(condition, choices[condition])))
+        parts.append("\n" + "".join(f"{line}\n" for line in _table(table, face_of(name, table, names), choices)))
+    guard = names.of(guard, is_upper=True)
+    head = _HEAD.format(version=READER, reader=_reader(), guard=guard)
+    return "".join([head, *parts, _FOOT.format(guard=guard)]), held_back
+
+
+def names_left() -> Names:
+    """Names for a project: those that the reader has are taken."""
+    return Names(set(re.findall(r"\b(?:cdb|CDB)\w*", _reader())))
+
+
+@cache
+def _reader() -> str:
+    folder = files("contextdb.compiled.c_header").joinpath("reader")
+    return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in PARTS)
+
+
+def _why_not(table: CompiledTable) -> str:
+    """Why a table cannot be answered for in C; "" where it can."""
+    return "its rows have rules of their own (when)" if table.when is not None else ""
+
+
+def choices_of(condition: Condition, names: Names) -> Choices:
+    """Names for the declared values of a condition; of tags also those above them, which a fact may hold too."""
+    values = condition.domain.values or ()
+    is_tags = condition.domain.kind == "tags"
+    if is_tags:
+        values = tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
+    endings = ("", "_set", "_values", "_none", "_add") if is_tags else ("", "_values")
+    base = names.of(condition.name, "cdb_", endings)
+    head = f"CDB_{base.removeprefix('cdb_')}_".upper()
+    missing = "" if is_tags else names.of("missing", head, is_upper=True)
+    return Choices(base, values, tuple(names.of(value, head, is_upper=True) for value in values), missing)
+
+
+def _with_those_above(tag: str) -> Iterator[str]:
+    parts = tag.split(".")
+    return (".".join(parts[: n + 1]) for n in range(len(parts)))
+
+
+def face_of(name: str, table: CompiledTable, names: Names) -> TableFace:
+    """Names for a table and its conditions."""
+    base = names.of(name, "cdb_", _ENDINGS)
+    head = f"CDB_{base.removeprefix('cdb_')}_".upper()
+    fields = Names()
+    return TableFace(
+        name,
+        base,
+        tuple(fields.of(c.name) for c in table.conditions),
+        tuple(names.of(c.name, head, is_upper=True) for c in table.conditions),
+    )
+
+
+# ---- what is written
+
+
+def _choices(condition: Condition, choices: Choices) -> Iterator[str]:
+    is_tags = condition.domain.kind == "tags"
+    first = 1 if is_tags else 0
+    yield comment(f"---- {condition.domain.kind} {condition.name}")
+    yield f"typedef enum {choices.type} {{"
+    lines = [] if is_tags else [f"    {choices.missing} = CDB_MISSING"]
+    lines += [f"    {name} = {number}" for number, name in enumerate(choices.enumerators, first)]
+    told = ([] if is_tags else ["not known"]) + list(choices.values)
+    width = max(map(len, lines)) + 2
+    for number, (line, value) in enumerate(zip(lines, told, strict=True), 1):
+        yield f"{line + (',' if number < len(lines) else ''):<{width}}{comment(value)}"
+    yield f"}} {choices.type};"
+    yield ""
+    yield f"static const char *const {choices.type}_values[] = {{"
+    listed = ([""] if is_tags else []) + list(choices.values)
+    yield ",\n".join(f"    {literal(value)}" for value in listed)
+    yield "};"
+    if is_tags:
+        yield from _tag_set(choices)
+
+
+def _tag_set(choices: Choices) -> Iterator[str]:
+    name = choices.type
+    yield ""
+    yield f"typedef struct {name}_set {{ uint64_t words[{choices.n_words}]; }} {name}_set; /* all 0: not known */"
+    yield ""
+    yield "/* The set without tags, to put some into. */"
+    yield f"static inline {name}_set {name}_none(void)"
+    yield "{"
+    yield f"    {name}_set tags;"
+    yield "    memset(&tags, 0, sizeof tags);"
+    yield "    tags.words[0] = 1;"
+    yield "    return tags;"
+    yield "}"
+    yield ""
+    yield f"static inline void {name}_add({name}_set *tags, {name} tag)"
+    yield "{"
+    yield "    cdb_add_tag(tags->words, (size_t)tag);"
+    yield "}"
+
+
+def _table(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+    yield comment(f"---- table {face.table}")
+    yield ""
+    yield from _facts_struct(table, face, choices)
+    yield from _conditions_enum(table, face)
+    yield from _schema(table, face, choices)
+    yield from _missing_facts(table, face, choices)
+    yield from _functions(table, face, choices)
+
+
+def _facts_struct(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+    yield f"typedef struct {face.base}_facts {{"
+    lines = []
+    for condition, name in zip(table.conditions, face.fields, strict=True):
+        kind = _type(condition, choices.get(condition))
+        lines.append((f"    {kind}{'' if kind.endswith('*') else ' '}{name};", condition))
+    width = max((len(line) for line, _ in lines), default=0) + 2
+    yield from (f"{line:<{min(width, 60)}}{_told(condition)}" for line, condition in lines)
+    if not lines:
+        yield "    char nothing; /* the table has no conditions */"
+    yield f"}} {face.base}_facts;"
+    yield ""
+
+
+def _type(condition: Condition, choices: Choices | None) -> str:
+    if condition.domain.kind == "tags":
+        return f"{choices.type}_set" if choices else "cdb_texts"
+    return choices.type if choices else _TYPES[condition.domain.kind]
+
+
+def _told(condition: Condition) -> str:
+    """Type, name, bounds, unit, expression and description of a condition."""
+    domain = condition.domain
+    low, high = domain.minimum, domain.maximum
+    bounds = f"{_end(low)}..{_end(high)}" if math.isfinite(low) or math.isfinite(high) else ""
+    unit = condition.unit or ("degrees" if domain.kind == "angle" else "")
+    head = " ".join(part for part in (domain.kind, condition.name, bounds, unit) if part)
+    derived = f"the game computes it: {condition.expr}" if condition.expr else ""
+    return comment("; ".join(part for part in (head, derived, condition.description) if part))
+
+
+def _end(bound: float) -> str:
+    return format_number(bound) if math.isfinite(bound) else ""
+
+
+def _conditions_enum(table: CompiledTable, face: TableFace) -> Iterator[str]:
+    """The conditions by number, as a fault names them."""
+    yield f"typedef enum {face.base}_condition {{"
+    yield from (f"    {name} = {number}," for number, name in enumerate(face.enumerators))
+    yield f"    {face.base}_conditions = {len(face.enumerators)}"
+    yield f"}} {face.base}_condition;"
+    yield ""
+
+
+def _schema(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+    yield f"static inline const cdb_schema *{face.base}_schema(void)"
+    yield "{"
+    if table.conditions:
+        yield "    static const cdb_condition conditions[] = {"
+        for number, condition in enumerate(table.conditions, 1):
+            values = choices.get(condition)
+            n_values = 0 if values is None else len(values.values) + (condition.domain.kind == "tags")
+            expr = literal(condition.expr) if condition.expr else "NULL"
+            listed = f"{values.type}_values" if values else "NULL"
+            ending = "," if number < len(table.conditions) else ""
+            kind = f"CDB_{condition.domain.kind.upper()}"
+            yield f"        {{{literal(condition.name)}, {kind}, {expr}, {listed}, {n_values}}}{ending}"
+        yield "    };"
+    yield f"    static const cdb_schema schema = {{{'conditions' if table.conditions else 'NULL'}, {len(table.conditions)}}};"
+    yield "    return &schema;"
+    yield "}"
+    yield ""
+
+
+def _missing_facts(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+    yield "/* Facts of which none is known yet. */"
+    yield f"static inline {face.base}_facts {face.base}_missing(void)"
+    yield "{"
+    yield f"    {face.base}_facts facts;"
+    yield "    memset(&facts, 0, sizeof facts);"
+    for condition, name in zip(table.conditions, face.fields, strict=True):
+        kind, declared = condition.domain.kind, choices.get(condition)
+        if kind in _MISSING:
+            yield f"    facts.{name} = {_MISSING[kind]};"
+        elif kind == "enum" and declared:
+            yield f"    facts.{name} = {declared.missing};"
+        elif kind == "tags" and not declared:
+            yield f"    facts.{name}.count = CDB_MISSING;"
+        elif kind == "text":
+            yield f"    facts.{name} = NULL;"
+    yield "    return facts;"
+    yield "}"
+    yield ""
+
+
+def _functions(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+    base, n = face.base, max(len(table.conditions), 1)
+    yield f"typedef struct {base} {{"
+    yield "    cdb_table table;"
+    yield f"    cdb_column columns[{n}];"
+    yield f"}} {base};"
+    yield ""
+    yield "/* Open an artefact from memory that stays where it is until it is closed: see cdb_open. */"
+    yield f"static inline cdb_status {base}_open({base} *opened, const void *bytes, size_t size, cdb_fault *fault)"
+    yield "{"
+    yield f"    return cdb_open(&opened->table, opened->columns, {base}_schema(), bytes, size, fault);"
+    yield "}"
+    yield ""
+    yield f"static inline void {base}_close({base} *opened)"
+    yield "{"
+    yield "    cdb_close(&opened->table);"
+    yield "}"
+    yield ""
+    yield "/* The valid rows, one bit a row, in `rows` of `room` words: see cdb_query. */"
+    yield f"static inline cdb_status {base}_query(const {base} *opened, const {base}_facts *facts, cdb_unknown unknown,"
+    yield "    uint64_t *rows, size_t room, cdb_fault *fault)"
+    yield "{"
+    yield f"    cdb_fact given[{n}];"
+    for number, (condition, name) in enumerate(zip(table.conditions, face.fields, strict=True)):
+        yield f"    {_given(number, name, condition, choices.get(condition))}"
+    yield from () if table.conditions else ("    (void)facts;", "    memset(given, 0, sizeof given);")
+    yield f"    return cdb_query(&opened->table, opened->columns, {base}_schema(), given, unknown, rows, room, fault);"
+    yield "}"
+
+
+def _given(number: int, name: str, condition: Condition, declared: Choices | None) -> str:
+    if condition.domain.kind == "tags":
+        member, of = ("tags", f"{name}.words") if declared else ("texts", name)
+        return f"given[{number}].{member} = facts->{of};"
+    return f"given[{number}].{_MEMBERS.get(condition.domain.kind, 'whole')} = facts->{name};"

@@ -1,0 +1,101 @@
+"""Which actor plays which role: assignments of distinct actors, and the best of them.
+
+Pure combinatorics over offers; which rows take whom, and which rules must hold, is told from outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import combinations
+
+from contextdb.compiled.casting.facts import Offer
+
+Part = tuple[str, list[Offer]]
+"""A role, and the actors who fit it."""
+Chosen = list[tuple[str, Offer]]
+Holds = Callable[[Mapping[str, Offer]], bool]
+"""Whether a casting may be, when each of its actors fits."""
+Key = tuple[int, float, tuple[int, ...]]
+EMPTY = 1 << 30
+"""The place of nobody: after everybody."""
+
+
+def best(needed: list[Part], wanted: list[Part], holds: Holds | None = None) -> Chosen:
+    """The best assignment that fills the needed roles and as many others as can be."""
+    order = [name for name, _ in needed + wanted]
+    for most in range(len(wanted), -1, -1):
+        parts = [needed + chosen for chosen in _subsets(wanted, most)]
+        found = [c for p in parts if (c := _best_of(p) if holds is None else _best_that_holds(p, order, holds)) is not None]
+        if found:
+            return min(found, key=lambda c: _key(c, order))
+    return []
+
+
+def every(needed: list[Part], wanted: list[Part], holds: Holds | None = None) -> list[Chosen]:
+    """Every assignment of the needed roles with the most others, best first."""
+    most = len(best(needed, wanted, holds)) - len(needed)
+    found = [c for chosen in _subsets(wanted, most) for c in assignments(needed + chosen)]
+    order = [name for name, _ in needed + wanted]
+    return sorted((c for c in found if holds is None or holds(dict(c))), key=lambda c: _key(c, order))
+
+
+def assignments(parts: Sequence[Part], taken: frozenset[object] = frozenset()) -> Iterator[Chosen]:
+    """Every way to give each role one of its actors, none of them two."""
+    if not parts:
+        yield []
+        return
+    (name, fitting), rest = parts[0], parts[1:]
+    for offer in fitting:
+        if offer.key not in taken:
+            for others in assignments(rest, taken | {offer.key}):
+                yield [(name, offer), *others]
+
+
+def _best_of(parts: list[Part]) -> Chosen | None:
+    """The best assignment of all roles. Of each role only as many actors as there are roles can matter: one of its best is free."""
+    few = [(name, fitting[: len(parts)]) for name, fitting in parts]
+    order = [name for name, _ in parts]
+    return min(assignments(few), key=lambda c: _key(c, order), default=None)
+
+
+def _best_that_holds(parts: list[Part], order: Sequence[str], holds: Holds) -> Chosen | None:
+    """The same of those that hold: branch and bound, the bound being that roles still open go to their cheapest actors."""
+    least = {name: (min(o.cost[0] for o in f), min(o.cost[1] for o in f)) for name, f in parts if f}
+    found: Chosen | None = None
+    limit: Key | None = None
+
+    def extend(chosen: Chosen) -> None:
+        nonlocal found, limit
+        key = _key(chosen, order, least)
+        if limit is not None and key >= limit:
+            return
+        if len(chosen) == len(parts):
+            if holds(dict(chosen)):
+                found, limit = chosen, key
+            return
+        name, fitting = parts[len(chosen)]
+        taken = {offer.key for _, offer in chosen}
+        for offer in fitting:
+            if offer.key not in taken:
+                extend([*chosen, (name, offer)])
+
+    if len(least) == len(parts):
+        extend([])
+    return found
+
+
+def _subsets(parts: Sequence[Part], size: int) -> Iterator[list[Part]]:
+    return (list(c) for c in combinations(parts, size))
+
+
+def _key(chosen: Chosen, order: Sequence[str], least: Mapping[str, tuple[int, float]] | None = None) -> Key:
+    """What castings are compared by: actors without a preference, the sum of costs, and the places at which they are offered.
+
+    With `least`, the lowest that it can become when roles of `least` are filled too.
+    """
+    offers = dict(chosen)
+    if least is None:
+        least = {}
+    costs = [offers[n].cost if n in offers else least[n] for n in order if n in offers or n in least]
+    places = tuple(offers[n].place if n in offers else -1 if n in least else EMPTY for n in order)
+    return sum(c[0] for c in costs), sum(c[1] for c in costs), places

@@ -1,0 +1,350 @@
+"""Who plays which part: actors cast for the roles of a table's rows.
+
+A condition named `Role.fact` belongs to the role before its first dot. Each actor offered for a role gives a mask of the rows
+whose cells on that role accept it. A row is valid when the roles that it needs can be filled by distinct actors: by Hall's theorem
+when every set of k of them is fitted by at least k actors together. That is counted for all rows at once, in bit slices; the
+casting of one row is searched for when it is asked for.
+
+An actor is one by its `"id"`, else by being one object. Nothing here reads a file or prints.
+
+Source: Hall, "On representatives of subsets", J. London Math. Soc. 10, 1935.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from operator import or_
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.arguments import require_whole
+from contextdb.cells.facts import Context, Fact, Unknown, check_mode, require_context
+from contextdb.cells.mirroring import in_mirror, kept_facts, mirrored_facts
+from contextdb.compiled.casting.assigning import Chosen, Holds, Part, best, every
+from contextdb.compiled.casting.facts import Actor, Actors, Offer, Prefer, mirrored_offers, read_offers
+from contextdb.compiled.casting.rules import CastRules
+from contextdb.compiled.matches import SetMatches
+from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
+
+if TYPE_CHECKING:
+    from contextdb.compiled.table import CompiledTable
+
+Casting = dict[str, Actor]
+
+
+@dataclass(frozen=True, eq=False)
+class Roles:
+    """What a table says of its roles. Masks are Python integers, row r as bit r."""
+
+    names: tuple[str, ...]
+    """The roles that conditions belong to, in the order of columns, then other words of the slots that actors are offered for."""
+    conditions: Mapping[str, tuple[int, ...]]
+    """The numbers of the conditions of each role."""
+    required: Mapping[str, int]
+    """The rows that cannot do without the role."""
+    optional: Mapping[str, int]
+    """The rows in which the role is cast when somebody fits."""
+
+
+class CastMatches(SetMatches):
+    """The valid rows for a context and actors. `casting(row)` says who plays what."""
+
+    __slots__ = ("_stage",)
+
+    def __init__(self, bits: int, always: int, stage: Stage) -> None:
+        super().__init__(bits, stage.compiled.answering, always)
+        self._stage = stage
+
+    def casting(self, row: int) -> Casting:
+        """The best casting of a valid row, as {role: actor}: most optional roles filled, then by preference, then as offered."""
+        self._require_valid(row)
+        return self._stage.best(row)
+
+    def cast(self, row: int) -> dict[str, Offer]:
+        """The same as `casting`, each actor with where it was offered."""
+        self._require_valid(row)
+        return dict(self._stage.cast(row))
+
+    def castings(self, row: int) -> list[Casting]:
+        """All castings of a valid row that fill as many optional roles as can be, best first."""
+        self._require_valid(row)
+        return self._stage.all(row)
+
+    def _require_valid(self, row: int) -> None:
+        if require_whole(row, "row") not in self:
+            raise ContextError(Fault(f"row {row} is not valid, so nobody is cast for it.", "one of the valid rows, m.indices"))
+
+
+@dataclass(frozen=True, eq=False)
+class Offered:
+    """Who is offered for the roles of a table, and the rows whose needed roles they can fill."""
+
+    roles: Roles
+    offers: Mapping[str, tuple[Offer, ...]]
+    """Who is offered for each role, without repeats."""
+    n_rows: int
+
+    @cached_property
+    def bits(self) -> int:
+        """The rows whose needed roles can be filled, going by what the cells accept of each actor."""
+        return self._castable([{o.key: o.some for o in self.offers[n]} for n in self.roles.names])
+
+    @cached_property
+    def always(self) -> int:
+        """The same where an actor must fit with every value of its set-valued facts: rows that certainly match."""
+        return self._castable([{o.key: o.every for o in self.offers[n]} for n in self.roles.names])
+
+    def _castable(self, fits: Sequence[Mapping[object, int]]) -> int:
+        """The rows in which every set of k needed roles is fitted by at least k actors together."""
+        all_rows = (1 << self.n_rows) - 1
+        required = [self.roles.required[n] for n in self.roles.names]
+        return all_rows & ~_lacking(fits, required, 0, {}, all_rows, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The actors of one moment against the roles of a table."""
+
+    compiled: CompiledTable
+    offered: Offered
+    plain_facts: Mapping[int, Fact]
+    """The facts of the conditions that are no role's, by their number."""
+    unknown: Unknown
+    rule_facts: Mapping[str, Fact]
+    """The facts of plain rules."""
+    context: Context
+    """The facts as they were given, kept where the table asks in a mirror."""
+    rules: CastRules | None = None
+    """The rules that are decided for each casting; None where there are none."""
+
+    @property
+    def roles(self) -> Roles:
+        """What the table says of its roles."""
+        return self.offered.roles
+
+    @property
+    def offers(self) -> Mapping[str, tuple[Offer, ...]]:
+        """Who is offered for each role, without repeats."""
+        return self.offered.offers
+
+    def matches(self, plain: Mapping[int, tuple[int, int]]) -> CastMatches:
+        """The valid rows, from those that may and those that always accept each plain fact, or whose rule does."""
+        some_bits, all_bits = (self.compiled.enabled_bits & rows for rows in (self.offered.bits, self.offered.always))
+        for some_rows, all_rows in plain.values():
+            some_bits &= some_rows
+            all_bits &= all_rows
+        found = CastMatches(*self.left_by_rules(some_bits, all_bits), self)
+        if self.compiled.mirroring:
+            found.with_mirrored(self.mirrored)
+        if self.compiled.is_soft:
+            found.with_penalties(lambda: self.penalties(found))
+        return found
+
+    def mirrored(self) -> CastMatches:
+        """The answer with the facts of the context and of the actors as a mirror shows them. The actors stay who they are, and as
+        much preferred."""
+        compiled, unknown = self.compiled, self.unknown
+        try:
+            context = mirrored_facts(self.context, compiled.mirroring)
+            offers = mirrored_offers(compiled, self.roles.conditions, context, self.offers, unknown)
+            offered = Offered(self.roles, offers, compiled.n_rows)
+            stage, plain = set_stage(compiled, context, {}, None, unknown, offered)
+            return stage.matches(plain)
+        except ContextError as error:
+            raise in_mirror(error) from None
+
+    def left_by_rules(self, some_rows: int, all_rows: int) -> tuple[int, int]:
+        """Of rows that may and that always match by their cells, those whose rule holds: with plain facts, or for some casting."""
+        when = self.compiled.when
+        if when is None:
+            return some_rows, all_rows
+        cast = self.rules.rows if self.rules is not None else 0
+        plain, plain_always = when.left_with_care(some_rows & ~cast, all_rows & ~cast, self.rule_facts, self.unknown)
+        if self.rules is None:
+            return plain, plain_always
+        given = self.offers, self.roles.required
+        some_cast = self.rules.left(some_rows & cast, *given, lambda offer: offer.some, 0)
+        return plain | some_cast, plain_always | self.rules.left(all_rows & some_cast, *given, lambda offer: offer.every, 1)
+
+    def penalties(self, matches: CastMatches) -> NDArray[np.float64]:
+        """What the soft cells of valid rows cost with the best casting of each: float64 [n_rows]. A role that is not cast costs
+        nothing."""
+        compiled = self.compiled
+        costs = np.zeros(compiled.n_rows)
+        for at, fact in self.plain_facts.items():
+            costs += compiled.column_penalties(at, fact, self.unknown)
+        for row in matches:
+            for _, offer in self.cast(row):
+                costs[row] += sum(compiled.column_penalties(at, f, self.unknown)[row] for at, f in offer.facts.items())
+        return costs
+
+    def best(self, row: int) -> Casting:
+        """The best casting of a row that can be cast."""
+        return _as_casting(self.cast(row))
+
+    def cast(self, row: int) -> Chosen:
+        """The same, as offers."""
+        return best(*self.parts(row), self._holds(row))
+
+    def all(self, row: int) -> list[Casting]:
+        """Every casting of a row with the most optional roles, best first."""
+        return [_as_casting(c) for c in every(*self.parts(row), self._holds(row))]
+
+    def _holds(self, row: int) -> Holds | None:
+        rules = self.rules
+        return None if rules is None or not rules.rows >> row & 1 else lambda cast: rules.holds(row, cast)
+
+    def parts(self, row: int) -> tuple[list[Part], list[Part]]:
+        """The roles that a row needs and those that it may fill, each with the actors who fit, best first."""
+        needed, wanted = [], []
+        for name in self.roles.names:
+            fitting = sorted((o for o in self.offers[name] if o.some >> row & 1), key=lambda o: (o.cost, o.place))
+            if self.roles.required[name] >> row & 1:
+                needed.append((name, fitting))
+            elif self.roles.optional[name] >> row & 1:
+                wanted.append((name, fitting))
+        return needed, wanted
+
+
+def _lacking(
+    fits: Sequence[Mapping[object, int]], required: Sequence[int], at: int, joint: dict[object, int], rows: int, k: int
+) -> int:
+    """The rows of `rows` in which some set of needed roles, `joint` and more from number `at` on, has too few actors."""
+    lacking = 0
+    for i in range(at, len(fits)):
+        left = rows & required[i] & ~lacking
+        if left:
+            union = dict(joint)
+            for key, bits in fits[i].items():
+                union[key] = union.get(key, 0) | bits
+            lacking |= left & ~_at_least(k + 1, union)
+            lacking |= _lacking(fits, required, i + 1, union, left & ~lacking, k + 1)
+    return lacking
+
+
+def _at_least(k: int, masks: Mapping[object, int]) -> int:
+    """The rows that at least k of the masks hold."""
+    if k == 1:
+        return reduce(or_, masks.values(), 0)
+    counts = [0] * k
+    """Entry i: the rows that more than i of the masks so far hold."""
+    for mask in masks.values():
+        for i in range(k - 1, 0, -1):
+            counts[i] |= counts[i - 1] & mask
+        counts[0] |= mask
+    return counts[-1]
+
+
+def _as_casting(chosen: Chosen) -> Casting:
+    return {name: offer.actor for name, offer in chosen}
+
+
+def query_with_actors(
+    compiled: CompiledTable, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
+) -> CastMatches:
+    """The rows valid for a context and actors; see `CompiledTable.query`.
+
+    Raises
+    ------
+    ContextError
+        As `query`, and for actors that cannot be read, with the role and the actor.
+    """
+    stage, plain = set_stage(compiled, context, actors, prefer, unknown)
+    return stage.matches(plain)
+
+
+def set_stage(
+    compiled: CompiledTable,
+    context: Context,
+    actors: Actors,
+    prefer: Prefer = None,
+    unknown: Unknown = "error",
+    offered: Offered | None = None,
+) -> tuple[Stage, dict[int, tuple[int, int]]]:
+    """The actors of a moment against the roles, and for each condition that is no role's the rows that may and always accept.
+
+    With `offered` the actors are those, and not read.
+    """
+    check_mode(unknown)
+    roles = offered.roles if offered is not None else roles_of(compiled, context, actors)
+    cast = {at for places in roles.conditions.values() for at in places}
+    names = {at: c.name for at, c in enumerate(compiled.conditions) if at not in cast}
+    rules = CastRules.of(compiled, context, roles.names, unknown)
+    read = compiled.read_context(context, unknown, list(dict.fromkeys([*names.values(), *_ruled_names(compiled, roles)])))
+    facts = {at: read[name] for at, name in names.items()}
+    plain = {at: compiled.condition_bits(at, fact, unknown) for at, fact in facts.items()}
+    if offered is None:
+        offers = read_offers(compiled, roles.conditions, context, actors, prefer, unknown)
+        offered = Offered(roles, offers, compiled.n_rows)
+    return Stage(compiled, offered, facts, unknown, read, kept_facts(context) if compiled.mirroring else context, rules), plain
+
+
+def _ruled_names(compiled: CompiledTable, roles: Roles) -> list[str]:
+    """The facts that rules need and that no actor tells; of one derived from what actors tell, those that it is computed from."""
+    steps = compiled.derivation.steps if compiled.derivation is not None else ()
+    inputs = {step.condition.name: step.expression.names for step in steps}
+    waiting = [*compiled.when.names] if compiled.when is not None else []
+    found: dict[str, None] = {}
+    for name in waiting:
+        if compiled.roles.needed_by_rules[name].isdisjoint(roles.names):
+            found[name] = None
+        else:
+            waiting += [n for n in inputs.get(name, ()) if n not in waiting]
+    return list(found)
+
+
+def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles:
+    """The roles that are cast: all but those whose facts stand in the context, as plain facts.
+
+    Raises
+    ------
+    ContextError
+        Actors for a role that the table does not have, or for one whose facts the context gives.
+    """
+    if not isinstance(actors, Mapping):
+        raise ContextError(Fault(f"actors are a mapping of roles, not {type(actors).__name__}.", '{"Defender": [{...}, {...}]}'))
+    if compiled.slots is None:
+        found = "this compiled file does not say which slots are mandatory."
+        raise ContextError(Fault(found, "the table itself, compiled by Table.compile()"))
+    require_context(context)
+    members, slots = compiled.roles.conditions, compiled.roles.slot_rows
+    _require_roles(actors, list(dict.fromkeys([*members, *(w for words in slots.values() for w in words)])))
+    plain = {n for n in members if n not in actors and _given(compiled, n, context)}
+    _refuse_both(compiled, actors, context)
+    names = tuple(n for n in (*members, *(a for a in actors if a not in members)) if n not in plain)
+    mandatory, maybe = (slots.get(c, {}) for c in ("Mandatory_Slots", "Optional_Slots"))
+    conditions = {n: members.get(n, ()) for n in names}
+    optional = {n: maybe.get(n, 0) & ~mandatory.get(n, 0) for n in names}
+    constrained = {n: compiled.roles.constrained(conditions[n]) | compiled.roles.ruled.get(n, 0) for n in names}
+    required = {n: (mandatory.get(n, 0) | constrained[n]) & ~optional[n] for n in names}
+    return Roles(names, conditions, required, optional)
+
+
+def _given(compiled: CompiledTable, role: str, context: Context) -> list[str]:
+    """The facts of a role that stand in the context itself."""
+    known = (n for n in (*compiled.asked, *compiled.places) if n.startswith(f"{role}."))
+    return [n for n in known if context.get(n) is not None]
+
+
+def _refuse_both(compiled: CompiledTable, actors: Actors, context: Context) -> None:
+    for role in actors:
+        for name in _given(compiled, role, context):
+            found = f"{in_quotes(name)} is given as a fact, and actors are offered for {in_quotes(role)}."
+            raise ContextError(Fault(found, "the facts of a role from its actors, or without actors for it", rule="wrong-fact"))
+
+
+def _require_roles(actors: Actors, known: Sequence[str]) -> None:
+    faults = []
+    for role in actors:
+        if role not in known:
+            near = nearest(str(role), known)
+            accepted = some(known) if known else "no actors: the table has no roles"
+            faults.append(
+                Fault(f"there is no role {in_quotes(str(role))}.", accepted, in_quotes(near) if near else "", rule="unknown-fact")
+            )
+    if faults:
+        raise ContextError(*faults)

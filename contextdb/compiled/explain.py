@@ -1,0 +1,408 @@
+"""Why a row is valid for a context, or is not: which of its cells fail, with which fact, and what to change.
+
+Winner first: valid rows stand before all others, then the rows nearest to valid, with the fewest failing cells. The details of a
+row are worked out when they are asked for.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.bitmask import Rows
+from contextdb.cells import intervals
+from contextdb.cells.arguments import require_place, require_row, require_text, require_whole
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
+from contextdb.cells.facts import Context, Fact, Unknown, describe
+from contextdb.cells.grammar import (
+    Accepted,
+    Cell,
+    NumberSet,
+    TagSet,
+    ValueSet,
+    covers,
+    format_cell,
+    format_number,
+    parse_cell,
+    reads,
+)
+from contextdb.cells.words import NUMBER_TEXT
+from contextdb.columns import TextColumn
+from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
+from contextdb.compiled.mask_bits import bits_of
+from contextdb.compiled.matches import Matches
+from contextdb.errors import ContextError, Fault, in_quotes, nearest, plural, some
+from contextdb.expressions.rules import WhenColumn, has_no_rule, told_facts
+from contextdb.expressions.rules.rules import Rule, values_of
+
+if TYPE_CHECKING:
+    from contextdb.compiled.table import CompiledTable
+    from contextdb.compiled.ways import Step
+    from contextdb.expressions import Expression
+    from contextdb.expressions.rules import WhenRules
+
+FEW_DIGITS = 12
+"""A number of more characters than this is the work of rounding, not of a person: 29.990000000000002."""
+
+ONE_BOUND = 1e-12
+"""Bounds that are closer than this share of their size are those of one number: it and the double after it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """One cell that does not accept its fact, or a rule that does not hold.
+
+    Of a rule `condition` is the column of rules, `fact` tells the facts that it names, and the mend is to have none.
+    """
+
+    condition: str
+    cell: str
+    """The cell as the table writes it."""
+    fact: str
+    mend: str
+    """The cell with which the row would match, as near to the present one as can be."""
+    step: Step | None = None
+    """Where tables stand in tables: the row of the table whose cell it is."""
+
+    def __str__(self) -> str:
+        where = "" if self.step is None else f" ({self.step})"
+        return f"{self.condition} is {self.fact}, the cell says {self.cell}{where}"
+
+
+@dataclass(frozen=True, slots=True)
+class RowExplanation:
+    """One row for a context."""
+
+    row: int
+    asset: str
+    is_enabled: bool
+    failures: tuple[Failure, ...]
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the row is valid."""
+        return self.is_enabled and not self.failures
+
+    def __str__(self) -> str:
+        if self.is_valid:
+            return f"{self.asset}: valid"
+        reasons = [str(f) for f in self.failures] + ([] if self.is_enabled else ["the row is disabled"])
+        return f"{self.asset}: " + "; ".join(reasons)
+
+
+class Explanation:
+    """All rows for one context, in order: valid ones, then the nearest. Iterate, index, or ask for one row or asset."""
+
+    def __init__(self, compiled: CompiledTable, facts: dict[str, Fact], unknown: Unknown, matches: Matches) -> None:
+        self.compiled = compiled
+        self.facts = facts
+        """The facts in canonical form."""
+        self.matches = matches
+        """The answer explained."""
+        self._unknown = unknown
+
+    def __len__(self) -> int:
+        return self.compiled.n_rows
+
+    def __iter__(self) -> Iterator[RowExplanation]:
+        return (self.row(r) for r in self.order.tolist())
+
+    def __getitem__(self, place: int) -> RowExplanation:
+        return self.row(int(self.order[require_place(place, len(self), "place")]))
+
+    def row(self, row: int) -> RowExplanation:
+        """Why this row is valid or not; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        row = require_row(row, len(self))
+        at = np.flatnonzero(self._fails[:, row]).tolist()
+        failures = [failure for i in at for failure in self._failures(i, row)]
+        if self.breaks_rule[row]:
+            failures += self._rule_failures(row)
+        return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
+
+    def asset(self, asset: str) -> list[RowExplanation]:
+        """Why the rows of this asset, told with its path or without, are valid or not; ContextError names the nearest asset when no
+        row has it."""
+        require_text(asset, "asset")
+        names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
+        found = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
+        if not found:
+            known = dict.fromkeys((*self.compiled.assets, *self.compiled.leaves))
+            near = nearest(asset, known)
+            told = f"the table {in_quotes(self.compiled.name)} has no asset {in_quotes(asset)}."
+            raise ContextError(Fault(told, some(known) or "none: the table has no rows", in_quotes(near) if near else ""))
+        return found
+
+    def nearest(self, most: int = 5) -> list[RowExplanation]:
+        """The rows that are not valid but nearest to it: fewest failing cells, then least far off."""
+        most = require_whole(most, "most")
+        rows = np.flatnonzero(self.n_failures)
+        if most <= 0:
+            return []
+        if most < len(rows):  # how far off a row is need be known only of those that may be among the nearest
+            limit = np.partition(self.n_failures[rows], most - 1)[most - 1]
+            rows = rows[self.n_failures[rows] <= limit]
+        return [self.row(r) for r in self._sorted(rows)[:most].tolist()]
+
+    def always_rows(self) -> list[int]:
+        """The rows that match for every value of set-valued facts."""
+        return [int(r) for r in bitmask.rows(self.matches.always)]
+
+    @cached_property
+    def undecided(self) -> int:
+        """The valid rows that only may be so, as bits: they match for some values of set-valued facts only, or their rule is open
+        for want of a fact."""
+        always = bitmask.to_int(self.matches.always)
+        return self.matches.bits & ~self._decided(always)
+
+    def _decided(self, always: int) -> int:
+        """Of rows whose cells match for every value those whose rule does too, and is not open."""
+        when = self.compiled.when
+        return always if when is None else when.left_with_care(always, always, self.facts, "never")[1]
+
+    @cached_property
+    def n_failures(self) -> NDArray[np.int64]:
+        """How many cells of each row fail: int64 [n_rows]; a rule counts as one, cells of one condition in tables inside each other
+        count as one, and a disabled row one more."""
+        return bitmask.read_only(np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled)
+
+    @cached_property
+    def order(self) -> Rows:
+        """Row numbers, valid ones first, then by failing cells, how far the facts are off, and place in the file: int64
+        [n_rows]."""
+        return bitmask.read_only(self._sorted(np.arange(self.compiled.n_rows)))
+
+    def __str__(self) -> str:
+        lines = [f"{len(self.matches)} of {plural(self.compiled.n_rows, 'row')} valid"]
+        return "\n".join(lines + [str(r) for r, _ in zip(self, range(10), strict=False)])
+
+    @cached_property
+    def _enabled(self) -> NDArray[np.bool_]:
+        return bitmask.unpack(self.compiled.enabled, self.compiled.n_rows)
+
+    @cached_property
+    def _fails(self) -> NDArray[np.bool_]:
+        """Whether the cell of a condition fails: bool [conditions, n_rows]."""
+        compiled = self.compiled
+        fails = np.empty((len(compiled.conditions), compiled.n_rows), np.bool_)
+        for at, condition in enumerate(compiled.conditions):
+            bits, _ = compiled.condition_bits(at, self.facts[condition.name], self._unknown)
+            fails[at] = ~bitmask.unpack(bitmask.from_int(bits, compiled.n_rows), compiled.n_rows)
+        return fails
+
+    @cached_property
+    def breaks_rule(self) -> NDArray[np.bool_]:
+        """Whether each row has a rule that does not hold: bool [n_rows]; an open one only where it is not ignored."""
+        when = self.compiled.when
+        return self._flags(0 if when is None else self._broken_rules(when))
+
+    def _broken_rules(self, when: WhenRules) -> int:
+        left, _ = when.left_with_care(when.rows, when.rows, self.facts, "any" if self._unknown == "any" else "never")
+        return when.rows & ~left
+
+    def _flags(self, bits: int) -> NDArray[np.bool_]:
+        return bitmask.read_only(bitmask.unpack(bitmask.from_int(bits, self.compiled.n_rows), self.compiled.n_rows))
+
+    @property
+    def _lenient(self) -> Unknown:
+        return "any" if self._unknown == "any" else "never"
+
+    def _rule_failures(self, row: int) -> Iterator[Failure]:
+        for is_open, part in rules_that_fail(self.compiled, row, self.facts, self._lenient):
+            yield part.failure(f"{'open' if is_open else 'false'} with {told_facts(part.rule, self.facts)}")
+
+    def _sorted(self, rows: Rows) -> Rows:
+        return rows[np.lexsort((self._distances(rows), self.n_failures[rows]))]
+
+    def _distances(self, rows: Rows) -> NDArray[np.float64]:
+        """How far the failing facts are off, summed: float64 [len(rows)]; a number by its share of the domain, at most 1; others
+        1."""
+        far = np.zeros(len(rows))
+        for at, condition in enumerate(self.compiled.conditions):
+            fails, fact = self._fails[at, rows], self.facts[condition.name]
+            if fails.any():
+                far[fails] += self._column_distances(at, fact, rows[fails]) if isinstance(fact, float) else 1.0
+        return far + self.breaks_rule[rows]
+
+    def _column_distances(self, at: int, fact: float, rows: Rows) -> NDArray[np.float64]:
+        column, condition = self.compiled.texts[at], self.compiled.conditions[at]
+        width = _width(condition, self.compiled.masks[at])
+        codes, which = np.unique(column.codes[rows], return_inverse=True)
+        is_single = self.compiled.ways is None  # of tables in tables no text need be one cell; all are read together
+        cells = [parse_cell(column.texts[c], condition.domain) if is_single else self.compiled.cells(at)[c] for c in codes.tolist()]
+        return np.array([_distance(c.accepts, fact, width) for c in cells], np.float64)[which]
+
+    def _failures(self, at: int, row: int) -> Iterator[Failure]:
+        condition = self.compiled.conditions[at]
+        fact = self.facts[condition.name]
+        yield from cell_failures(self.compiled, at, row, fact, _with_unit(describe_fact(fact, condition), condition))
+
+
+def explain(compiled: CompiledTable, context: Context, unknown: Unknown = "error") -> Explanation:
+    """Explain every row of a table for one context; raises ContextError as `query` does."""
+    return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown))
+
+
+@dataclass(frozen=True, slots=True)
+class RulePart:
+    """A row's own rule; where tables stand in tables, that of one row of the way."""
+
+    column: str
+    text: str
+    rule: Expression
+    step: Step | None = None
+
+    def failure(self, fact: str) -> Failure:
+        """That it does not hold, with what is told of its facts."""
+        return Failure(self.column, self.text, fact, "Any", self.step)
+
+
+def rules_that_fail(
+    compiled: CompiledTable, row: int, facts: Mapping[str, Fact], unknown: Unknown
+) -> Iterator[tuple[bool, RulePart]]:
+    """The rules of a row that do not hold with some facts, and whether each is open; all of them where only together they do
+    not."""
+    parts = _rule_parts(compiled, row)
+    truths = [Rule(p.rule, 0).truths(values_of(facts, p.rule.conditions), facts)[0] for p in parts]
+    failing = [truth is False or (truth is None and unknown == "never") for truth in truths]
+    for truth, part, fails in zip(truths, parts, failing, strict=True):
+        if fails or not any(failing):
+            yield truth is None, part
+
+
+def _rule_parts(compiled: CompiledTable, row: int) -> list[RulePart]:
+    when, ways = compiled.when, compiled.ways
+    assert when is not None
+    whole = when.rules[int(when.of_row[row])].expression
+    if ways is None or ways.rules is None:
+        return [RulePart(when.name, when.texts[row], whole)]
+    steps = ways.steps(row)
+    said = [(steps[depth], text) for depth, text in ways.rules.said(row) if not has_no_rule(text)]
+    read = WhenColumn.read(TextColumn.of("", [text for _, text in said]), {c.name: c for c in whole.conditions})
+    rules = (read.rule(at) for at in range(len(said)))
+    return [RulePart(s.when or when.name, t, rule, s) for (s, t), rule in zip(said, rules, strict=True) if rule is not None]
+
+
+def cell_failures(compiled: CompiledTable, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
+    """The cell of a row that does not accept a fact; where tables stand in tables, each cell that does not."""
+    condition = compiled.conditions[at]
+    layers = None if compiled.ways is None else compiled.ways.layers[at]
+    if compiled.ways is None or layers is None:
+        text = compiled.texts[at][row]
+        yield Failure(condition.name, text, told, mended(text, fact, condition.domain))
+        return
+    steps = compiled.ways.steps(row)
+    said = [(steps[depth], text) for depth, text in layers.said(row)]
+    failing = [(step, text) for step, text in said if not _lets_pass(text, fact, condition.domain)]
+    for step, text in failing or said[1:]:  # where each holds some value of a set-valued fact, all but one must hold the set
+        yield Failure(condition.name, text, told, mended(text, fact, condition.domain), step)
+
+
+def _lets_pass(text: str, fact: Fact, domain: Domain) -> bool:
+    """Whether a cell alone lets its row be valid."""
+    return bool(bits_of(column_masks([parse_cell(text, domain)], np.zeros(1, np.int32), domain), fact)[0])
+
+
+def describe_fact(fact: Fact, condition: Condition) -> str:
+    """A fact in canonical form as people write it; a set as a cell."""
+    if isinstance(fact, Cell):
+        return format_cell(fact, condition.domain)
+    return describe(180.0 if fact == -180.0 and condition.domain.kind == "angle" else fact)
+
+
+def mended(text: str, fact: Fact, domain: Domain) -> str:
+    """The cell that holds what `text` says and the fact, or all values of a set-valued one; in few digits where that can be."""
+    accepts = parse_cell(text, domain).accepts
+    wider = widened(accepts, fact)
+    mend = format_cell(Cell(wider), domain)
+    if not (isinstance(accepts, NumberSet) and isinstance(fact, float)) or _most_digits(mend) <= FEW_DIGITS:
+        return mend
+    low, high = (end if end == fact else _shortened(end, accepts) for end in _stretch(accepts, fact))
+    in_old_words = f"{text} | {format_number(low)}..{format_number(high)}"
+    is_same = reads(in_old_words, domain) and parse_cell(in_old_words, domain).accepts == wider
+    return min((mend, in_old_words), key=_most_digits) if is_same else mend
+
+
+def widened(accepts: Accepted | None, fact: Fact) -> Accepted | None:
+    """The smallest change of a cell's set so that it holds the fact; None (Any) where there is no small one."""
+    if isinstance(fact, Cell):
+        return _joined(accepts, fact.accepts)
+    if isinstance(accepts, NumberSet) and isinstance(fact, float):
+        stretch = _stretch(accepts, fact)
+        added = intervals.arc(*stretch) if accepts.is_circular else (stretch,)
+        return _joined(accepts, NumberSet(added, accepts.is_circular))
+    if isinstance(accepts, ValueSet) and isinstance(fact, (bool, str)):
+        return _joined(accepts, ValueSet(frozenset((fact,))))
+    if isinstance(accepts, TagSet) and isinstance(fact, frozenset) and not accepts.is_complement:
+        needs = frozenset(t for t in accepts.needs if covers(t, fact))
+        bans = frozenset(t for t in accepts.bans if not covers(t, fact))
+        return TagSet(needs, bans) if needs or bans else None
+    return None
+
+
+def _joined(one: Accepted | None, other: Accepted | None) -> Accepted | None:
+    """The values of both sets; None (Any) where they are all values, or no set that a cell can say."""
+    if isinstance(one, NumberSet) and isinstance(other, NumberSet):
+        return NumberSet(intervals.union([*one.spans, *other.spans]), one.is_circular)
+    if not (isinstance(one, ValueSet) and isinstance(other, ValueSet)):
+        return None
+    named = one.values | other.values
+    if not (one.is_complement or other.is_complement):
+        return None if named == {False, True} else ValueSet(named)
+    left_out = frozenset(v for v in named if not (one.holds(v) or other.holds(v)))
+    return ValueSet(left_out, True) if left_out else None
+
+
+def _stretch(accepts: NumberSet, fact: float) -> intervals.Span:
+    """From the nearest end of the set to the fact, or back where that is upwards; the fact alone where the set is empty."""
+    ends = [end for span in accepts.spans for end in span] or [fact]
+    near = min(ends, key=lambda end: (_gap(end, fact, accepts.is_circular), end if fact < 0.0 else -end))
+    low, high = min(near, fact), max(near, fact)
+    return (high, low) if accepts.is_circular and high - low > 180.0 else (low, high)
+
+
+def _most_digits(text: str) -> int:
+    """How long the longest number in a cell is."""
+    return max(map(len, re.findall(NUMBER_TEXT, text)), default=0)
+
+
+def _shortened(end: float, accepts: NumberSet) -> float:
+    """A number of few digits that the set holds, next to its end; the end itself where there is none."""
+    short = round(end, FEW_DIGITS - 4)
+    return short if accepts.holds(short) else end
+
+
+def _gap(end: float, fact: float, is_circular: bool) -> float:
+    gap = abs(end - fact)
+    return min(gap, 360.0 - gap) if is_circular else gap
+
+
+def _width(condition: Condition, masks: ColumnMasks) -> float:
+    """What a number's distance is measured by: its domain, else the spread of the column's bounds."""
+    domain = condition.domain
+    if domain.kind == "angle":
+        return 180.0
+    if np.isfinite(domain.maximum - domain.minimum):
+        return domain.maximum - domain.minimum or 1.0
+    bounds = masks.bound_list if isinstance(masks, (NumberMasks, WideMasks)) else []
+    spread = min(bounds[-1] - bounds[0], sys.float_info.max) if bounds else 0.0
+    return spread if bounds and spread > abs(bounds[0]) * ONE_BOUND else 1.0
+
+
+def _distance(accepts: Accepted | None, fact: float, width: float) -> float:
+    if not isinstance(accepts, NumberSet) or not accepts.spans:
+        return 1.0
+    gaps = [_gap(end, fact, accepts.is_circular) for span in accepts.spans for end in span]
+    return min(min(gaps) / width, 1.0) if not np.isinf(fact) else 1.0
+
+
+def _with_unit(text: str, condition: Condition) -> str:
+    return f"{text} {condition.unit}" if condition.unit and text != "(missing)" else text

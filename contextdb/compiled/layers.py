@@ -1,0 +1,65 @@
+"""What the tables of a way say in one column, brought together.
+
+D = depth, n = flat rows. Only combinations of texts that come up are brought together, each once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import Cell, parse_cell
+from contextdb.cells.nesting_cells import meet
+from contextdb.columns import TextColumn
+from contextdb.tables.nesting.expansion import Expansion
+
+Numbers = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """What each depth of the ways says in one column. `codes` is int32 [D, n]; `texts[0]` is "", for nothing said."""
+
+    texts: tuple[str, ...]
+    codes: Numbers
+
+    @classmethod
+    def of(cls, expansion: Expansion, columns: Sequence[tuple[int, TextColumn]]) -> Layers:
+        """The texts of some tables' columns, given with the numbers of the tables."""
+        texts, codes = [""], np.zeros(expansion.rows.shape, np.int32)
+        for number, column in columns:
+            here = expansion.numbers == number
+            codes[here] = column.codes[expansion.rows[here]] + len(texts)
+            texts += column.texts
+        return cls(tuple(texts), codes)
+
+    @cached_property
+    def combined(self) -> tuple[Numbers, Numbers]:
+        """The combinations of texts that come up, int32 [D, combinations], and which of them each row has, int32 [n]."""
+        which = np.zeros(self.codes.shape[1], np.int64)
+        first = np.zeros(0, np.int64)
+        for codes in self.codes:
+            _, first, which = np.unique(which * len(self.texts) + codes, return_index=True, return_inverse=True)
+        return self.codes[:, first], which.astype(np.int32)
+
+    def said(self, row: int) -> list[tuple[int, str]]:
+        """What a row's way says: the depth and the text."""
+        return [(depth, self.texts[code]) for depth, code in enumerate(self.codes[:, row].tolist()) if code]
+
+    def cells(self, domain: Domain) -> tuple[Cell, ...]:
+        """What each combination accepts, in the order of `combined`."""
+        read: dict[int, Cell] = {c: parse_cell(self.texts[c], domain) for c in np.unique(self.codes).tolist() if c}
+        return tuple(meet([read[c] for c in codes if c]) for codes in self.combined[0].T.tolist())
+
+    def joined(self, name: str, join: Callable[[list[str]], str]) -> TextColumn:
+        """One text for each row out of those that its way says, outermost first; texts of blanks alone are not said."""
+        found, which = self.combined
+        told = [join([t for c in codes if (t := self.texts[c]).strip()]) for codes in found.T.tolist()]
+        known: dict[str, int] = {}
+        places = np.array([known.setdefault(text, len(known)) for text in told], np.int32)
+        return TextColumn(name, tuple(known), places[which])

@@ -1,0 +1,486 @@
+"""A context that the game keeps: set what changed, then ask. The cheap way to query every frame.
+
+Most facts stay as they are from one frame to the next. The masks of those are intersected once, and a question costs one `&` for
+each fact that has been moving; a fact that starts to move joins those, and the rest is intersected anew.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from copy import copy, deepcopy
+from functools import reduce
+from math import ldexp
+from operator import and_
+from typing import TYPE_CHECKING, Any, Self
+
+from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
+from contextdb.cells.mirroring import kept_facts
+from contextdb.compiled.lookup import SingleLookup
+from contextdb.compiled.matches import Matches
+from contextdb.errors import Fault, NoSuchFact, in_quotes, some
+from contextdb.expressions.rules.rules import Unusual
+
+if TYPE_CHECKING:
+    from contextdb.compiled.casting.facts import Actors, Prefer
+    from contextdb.compiled.casting.live import LiveActors
+    from contextdb.compiled.table import CompiledTable
+    from contextdb.expressions.rules import WhenRules
+    from contextdb.expressions.scalar import Value
+
+MOST_MOVING = 8
+
+_SHARED = frozenset(("_lookups", "_others"))
+"""What a context never changes, and shares with its copies."""
+
+CAST = ""
+"""What stands among the unusual facts while actors are offered, so that a question without actors has nothing to check."""
+
+
+class LiveContext(MutableMapping[str, object]):
+    """Facts kept between questions. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` asks.
+
+    A mapping of the facts that are set; a name that is not among them raises NoSuchFact, which is a KeyError too. `copy()` gives a
+    context that goes its own way. Two are equal when they are one.
+    """
+
+    __slots__ = (
+        "_alike",
+        "_answer",
+        "_answering",
+        "_cast",
+        "_compiled",
+        "_facts",
+        "_keep",
+        "_known",
+        "_lookups",
+        "_masks",
+        "_moving",
+        "_n_moving",
+        "_odd",
+        "_passed",
+        "_still",
+        "_unknown",
+    )
+
+    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+        self._compiled = compiled
+        self._answering = compiled.answering
+        self._unknown = unknown
+        self._lookups: dict[str, SingleLookup] = compiled.single_lookups
+        self._facts: dict[str, object] = {}
+        self._masks: dict[str, Any] = {}
+        """The mask of every fact when `_still` was intersected."""
+        self._moving: dict[str, Any] = {}
+        """The masks of the facts that have been moving; None where the value must be read with care."""
+        self._n_moving = -1
+        """How many facts moved when `_still` was intersected."""
+        self._still = 0
+        self._odd: dict[str, tuple[int, bool]] = {}
+        """Facts that are missing or sets: the rows that accept all of it, and whether it is missing."""
+        self._cast: LiveActors | None = None
+        self._known = frozenset(compiled.asked)
+        """The names of the facts that can be set."""
+        self._passed: set[str] = set()
+        """Other names that `update` was given and that are like none of these."""
+        self._alike: dict[str, tuple[str, ...]] = {}
+        """For each other name the facts that it is like."""
+        self._keep = compiled.keeping(unknown) if compiled.mirroring and not compiled.is_soft else None
+        """What keeps the facts of an answer, where it must know them for a mirror; a soft table's answers know them anyway."""
+        self._answer = Matches(0, self._answering)
+        """The last answer: while the rows stay the same, so does the object."""
+        for condition in compiled.conditions:
+            self._set_carefully(condition.name, None)
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        """Set one fact. A wrong value raises ContextError, here or when next asked, and names the fact."""
+        try:
+            bounds, masks = self._lookups[name]
+            self._moving[name] = masks[value] if bounds is None else masks[bisect_right(bounds, ldexp(value, 0))]
+        except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
+            self._set_carefully(name, value)
+        else:
+            self._facts[name] = value
+            if self._odd:
+                self._odd.pop(name, None)
+
+    def __getitem__(self, name: str) -> object:
+        value = self._value(name)
+        if value is None:
+            raise NoSuchFact(Fault(f"the fact {in_quotes(name)} is not set.", some(self) or "none: no fact is set"))
+        return value
+
+    def __delitem__(self, name: str) -> None:
+        self[name] = None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._known and self._value(name) is not None
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, value in self.facts.items() if value is not None)
+
+    def __len__(self) -> int:
+        return sum(value is not None for value in self.facts.values())
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    def _value(self, name: str) -> object:
+        """One fact, None where it is missing."""
+        if name not in self._facts:
+            raise no_condition(name, self._lookups)
+        return self._facts[name]
+
+    def update(self, facts: Mapping[str, object] | Iterable[tuple[str, object]]) -> None:  # type: ignore[override]
+        """Set several facts; those that no condition of the table asks for are passed over, as in `query`.
+
+        Raises
+        ------
+        ContextError
+            A name is very likely that of a condition misspelt, whose fact is not given beside it: then none is set. Names that the
+            project declares are of other tables, and no slips. Or a value is wrong, which names the fact.
+        """
+        if type(facts) is not dict:
+            facts = as_context(facts)
+        if not self._known.issuperset(facts):
+            facts = self._own(facts)
+        for name, value in facts.items():
+            self[name] = value
+
+    def _own(self, facts: Mapping[str, object]) -> dict[str, object]:
+        """Of some facts those that the table asks for; raises ContextError where another is very likely one of them, misspelt."""
+        require_names(facts)
+        for name in facts:
+            if name not in self._known and name not in self._passed:
+                self._look_at(name, facts)
+        return {name: value for name, value in facts.items() if name in self._known}
+
+    def _look_at(self, name: str, facts: Mapping[str, object]) -> None:
+        """Raise ContextError where a name that the table does not ask for is very likely one that it does, misspelt."""
+        if name not in self._alike:
+            self._alike[name] = () if name in self._compiled.declared else alike(name, self._known)
+        if not self._alike[name]:
+            self._passed.add(name)
+        for near in self._alike[name]:
+            if near not in facts:
+                found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is not given beside it."
+                raise NoSuchFact(Fault(found, NAMES, in_quotes(near), rule="unknown-fact"))
+
+    def copy(self) -> Self:
+        """A context of its own with the same facts and actors, which shares the compiled table. The actors' mappings are shared."""
+        new: Self = object.__new__(type(self))
+        for name, value in self._state().items():
+            setattr(new, name, copy(value) if type(value) in (dict, set) and name not in _SHARED else value)
+        new._cast = copy(self._cast)
+        return new
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """The same, with facts and actors that are copies too."""
+        new = self.copy()
+        memo[id(self)] = new
+        new._facts = deepcopy(self._facts, memo)
+        if new._cast is not None:
+            new.actors(deepcopy(new._cast.actors, memo), deepcopy(new._cast.prefer, memo))
+        return new
+
+    def _state(self) -> dict[str, Any]:
+        state: dict[str, Any] = object.__getstate__(self)[1]  # type: ignore[index]
+        return state
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """What is pickled: the table, the facts and the actors. Masks are found again."""
+        cast = None if self._cast is None else (self._cast.actors, self._cast.prefer)
+        return _live_again, (self._compiled, self._unknown, self.facts, cast)
+
+    def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
+        """Offer actors for roles from now on, as `query` takes them; None takes them back. They are read when next asked.
+
+        The mappings are kept, not copied: what the game changes in them counts in the next question. While they say the same, they
+        are not read again.
+        """
+        self._cast = None
+        self._odd.pop(CAST, None)
+        if actors is not None:
+            from contextdb.compiled.casting.live import LiveActors
+
+            self._cast = LiveActors(self._compiled, actors, prefer, self._unknown)
+            self._odd[CAST] = (0, False)
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """The facts as they were set, without derived ones; None where one is missing."""
+        return dict(self._told)
+
+    @property
+    def _told(self) -> dict[str, object]:
+        """The facts as the caller gave them; not a copy."""
+        return self._facts
+
+    def matches(self) -> Matches:
+        """The valid rows now; the same object as before while they stay the same, in a table without soft cells and without
+        conditions whose facts change in a mirror.
+
+        Raises
+        ------
+        ContextError
+            Facts are missing and the context was made with unknown="error".
+        """
+        if self._odd:
+            if self._cast is not None:
+                return self._cast.query(self.facts)
+            self._read_unusual()
+            self._refuse_missing()
+        moving = self._moving
+        if len(moving) != self._n_moving:
+            self._settle()
+        bits = self._still
+        try:
+            for mask in moving.values():
+                bits &= mask
+        except TypeError:
+            self._read_unusual()
+            return self.matches()
+        if self._odd:
+            return self._set_matches(bits)
+        if self._keep is not None:
+            answer = Matches(bits, self._answering)
+            answer._mirrored = self._keep(self._told)
+            return answer
+        if bits != self._answer.bits:
+            self._answer = Matches(bits, self._answering)
+        return self._answer
+
+    def _settle(self) -> None:
+        """Intersect what stands still; when too many facts have moved, let all of them stand still again."""
+        moving, masks = self._moving, self._masks
+        masks.update(moving)
+        if len(moving) > MOST_MOVING and None not in moving.values():
+            moving.clear()
+        self._n_moving = len(moving)
+        still = {**masks, **dict.fromkeys(moving, -1)}
+        self._still = reduce(and_, still.values(), self._compiled.enabled_bits)
+
+    def _set_carefully(self, name: str, value: object) -> None:
+        if name not in self._lookups:
+            raise no_condition(name, self._lookups)
+        some, every, is_missing = self._compiled.fact_bits(name, value, self._unknown)
+        self._moving[name] = some
+        self._facts[name] = value
+        self._odd.pop(name, None)
+        if is_missing or every != some:
+            self._odd[name] = (every, is_missing)
+
+    def _read_unusual(self) -> None:
+        """Read with care the values whose masks were not found in the usual way: NaN, numbers far out."""
+        for name in [n for n, mask in self._moving.items() if mask is None]:
+            self._set_carefully(name, self._facts[name])
+
+    def _refuse_missing(self) -> None:
+        missing = [c.name for c in self._compiled.conditions if self._odd.get(c.name, (0, False))[1]]
+        if missing and self._unknown == "error":
+            self._compiled.refuse_missing(missing, self.facts, self._unknown)
+
+    def _set_matches(self, bits: int) -> Matches:
+        masks = {**self._masks, **self._moving}
+        every = (self._odd[n][0] if n in self._odd else m for n, m in masks.items())
+        found = self._compiled.matches(bits, reduce(and_, every, self._compiled.enabled_bits))
+        return found if self._keep is None else found.with_mirrored(self._keep(kept_facts(self._told)))
+
+
+class SoftLiveContext(LiveContext):
+    """The same for a table with soft cells: every answer knows what they cost in the context of its moment."""
+
+    __slots__ = ()
+
+    def matches(self) -> Matches:
+        """The valid rows for the facts as they are now."""
+        answer = super().matches()
+        if self._cast is not None:
+            return answer
+        return self._compiled.bound(answer.again(), kept_facts(self._told) if self._odd else self._told, self._unknown)
+
+
+class AskingLiveContext(LiveContext):
+    """The same for a table with derived facts or rules, which asks for facts that are no columns.
+
+    Derived facts are computed anew when one that they need was set since the last question.
+    """
+
+    __slots__ = ("_computed", "_given", "_is_stale", "_others")
+
+    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+        super().__init__(compiled, unknown)
+        self._others = {c.name: c for c in (*(compiled.derivation.inputs if compiled.derivation else ()), *compiled.ruled)}
+        """The conditions that derived facts are computed from, and those that only rules name."""
+        self._computed: dict[str, object] = dict.fromkeys(compiled.derivation.names if compiled.derivation else ())
+        """The derived facts, when they were last computed."""
+        self._given: dict[str, object] = dict.fromkeys(compiled.asked)
+        self._is_stale = True
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        """Set one fact; a derived one is refused."""
+        condition = self._others.get(name)
+        if condition is not None:
+            if name not in self._lookups:
+                read_fact(value, condition)
+            self._is_stale = True
+        elif name not in self._given:
+            self._refuse(name)
+        if name in self._lookups:
+            super().__setitem__(name, value)
+        self._given[name] = value
+
+    def _value(self, name: str) -> object:
+        """One fact, None where it is missing; a derived one is computed."""
+        if name in self._given:
+            return self._given[name]
+        if name not in self._computed:
+            self._refuse(name)
+        self._compute()
+        return self._computed[name]
+
+    def __contains__(self, name: object) -> bool:
+        return (name in self._given or name in self._computed) and self._value(name) is not None
+
+    def _look_at(self, name: str, facts: Mapping[str, object]) -> None:
+        if name not in self._computed:
+            super()._look_at(name, facts)
+        elif facts[name] is not None:
+            self._refuse(name)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        new = super().__deepcopy__(memo)
+        new._given = deepcopy(self._given, memo)
+        return new
+
+    @property
+    def _told(self) -> dict[str, object]:
+        return self._given
+
+    def matches(self) -> Matches:
+        """The valid rows for the facts as they are now."""
+        self._compute()
+        return super().matches()
+
+    def _compute(self) -> None:
+        if self._is_stale and self._compiled.derivation is not None:
+            self._computed.update(self._compiled.derivation.compute(self._given))
+            for name, value in self._computed.items():
+                if name in self._lookups and value != self._facts[name]:
+                    super().__setitem__(name, value)
+        self._is_stale = False
+
+    def _refuse(self, name: str) -> None:
+        derivation = self._compiled.derivation
+        if derivation is not None:
+            derivation.refuse([name])
+        raise no_condition(name, self._given)
+
+
+class RuledLiveContext(AskingLiveContext):
+    """The same for a table with rules: one is asked anew when a fact that it names has changed."""
+
+    __slots__ = ("_is_set", "_left", "_named", "_truths", "_values", "_when")
+
+    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+        assert compiled.when is not None
+        self._is_set = True
+        """Whether a fact that rules need was set since they were asked."""
+        super().__init__(compiled, unknown)
+        self._when: WhenRules = compiled.when
+        inputs = compiled.derivation.inputs if compiled.derivation is not None else ()
+        self._named = compiled.when.names.union(c.name for c in inputs)
+        self._values: dict[str, Value] = {}
+        """The facts that rules name, when rules were last asked."""
+        self._truths: dict[int, Value] = {}
+        """Of the rules that were asked with these facts, by their number, whether they hold."""
+        self._left = Matches(0, self._answering)
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        """Set one fact; a derived one is refused."""
+        super().__setitem__(name, value)
+        if name in self._named:
+            self._is_set = True
+
+    def matches(self) -> Matches:
+        """The valid rows for the facts as they are now."""
+        if self._odd:
+            return self._carefully()
+        answer = super().matches()
+        try:
+            return self._carefully() if self._odd else self._with_rules(answer)
+        except Unusual:
+            return self._carefully()
+
+    def _carefully(self) -> Matches:
+        """The answer where facts are missing or sets, or actors are offered."""
+        return self._compiled.query(self.facts, self._unknown) if self._cast is None else self._cast.query(self.facts)
+
+    def _with_rules(self, answer: Matches) -> Matches:
+        """Of the rows that the cells leave, those whose rule holds."""
+        if self._is_set:
+            self._read_facts()
+        left = answer.bits
+        for number in self._when.numbers(left):
+            if number not in self._truths:
+                self._truths[number] = self._when.rules[number].run(self._values)
+            if not self._truths[number]:
+                if self._truths[number] is None:
+                    raise Unusual
+                left &= ~self._when.rules[number].rows
+        if left == answer.bits:
+            return answer
+        if self._keep is not None:
+            return Matches(left, self._answering).with_mirrored(self._keep(self._told))
+        if left != self._left.bits:
+            self._left = Matches(left, self._answering)
+        return self._left
+
+    def _read_facts(self) -> None:
+        values = self._when.usual_values({**self._given, **self._computed} if self._computed else self._given)
+        for name, value in values.items():
+            if self._values.get(name) != value:
+                for number in self._when.naming[name]:
+                    self._truths.pop(number, None)
+        self._values, self._is_set = values, False
+
+
+class SoftAskingLiveContext(SoftLiveContext, AskingLiveContext):
+    """For a table with both."""
+
+    __slots__ = ()
+
+
+class SoftRuledLiveContext(SoftLiveContext, RuledLiveContext):
+    """For a table with soft cells and rules."""
+
+    __slots__ = ()
+
+
+def _live_again(
+    compiled: CompiledTable, unknown: Unknown, facts: Mapping[str, object], cast: tuple[Actors, Prefer] | None
+) -> LiveContext:
+    """A live context out of a pickle."""
+    live = live_context(compiled, unknown)
+    live.update(facts)
+    if cast is not None:
+        live.actors(*cast)
+    return live
+
+
+def live_context(compiled: CompiledTable, unknown: Unknown = "error") -> LiveContext:
+    """A context of the kind that a table needs."""
+    is_soft = compiled.is_soft
+    if compiled.when is not None:
+        return SoftRuledLiveContext(compiled, unknown) if is_soft else RuledLiveContext(compiled, unknown)
+    if compiled.derivation is not None:
+        return SoftAskingLiveContext(compiled, unknown) if is_soft else AskingLiveContext(compiled, unknown)
+    return SoftLiveContext(compiled, unknown) if is_soft else LiveContext(compiled, unknown)

@@ -1,0 +1,377 @@
+"""Pick one asset out of the valid ones, by the table's policy.
+
+    first               the first valid row of the file
+    unique              the only valid row; two at once break the table's promise and raise PolicyError
+    collect, priority   of the rows with the highest priority one at random, by row weight, and not the asset picked last
+
+Rows of weight 0 are never picked at random, and hold no others back. When no row is left, the table's fallback is the answer.
+
+A row that stands for a table is one candidate, with its own priority and weight, as long as that table has a row to give; which of
+its rows is played is then picked by that table's own policy, priorities and weights. Its fallback is not asked for.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+import threading
+import weakref
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.bitmask import Rows
+from contextdb.compiled.matches import Matches
+from contextdb.errors import ContextError, Fault, PolicyError, in_quotes, some
+
+if TYPE_CHECKING:
+    from contextdb.compiled.table import CompiledTable
+    from contextdb.compiled.ways import Ways, WayTable
+    from contextdb.schema.shapes import Policy
+
+FEW = 1024
+"""Up to so many generators that cannot say when they are gone are kept without a look at who is still there."""
+
+
+class Rng(Protocol):
+    """What the pick needs of a random generator: `random.Random` and `numpy.random.Generator` both have it."""
+
+    def random(self) -> float:
+        """A number in [0, 1)."""
+        ...
+
+
+class Memory:
+    """Which asset each random generator picked last, so that no character repeats itself.
+
+    A generator is known by its identity as long as anybody else holds it: however many there are, none of them is forgotten. One
+    that cannot be referred to weakly (numpy's) is held here; when their number has doubled, those that nobody else holds are let
+    go.
+    `lock` is held from the look at what was last until the new pick is remembered, for threads that share a generator.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self._own = random.Random()
+        self._last: dict[int, tuple[Callable[[], Rng | None], str]] = {}
+        """By the id of a generator: what gives it, or None once it is gone, and the asset."""
+        self._held: dict[int, Rng] = {}
+        """Those that cannot be referred to weakly."""
+        self._most = FEW
+        """So many are held before it is looked which of them are gone."""
+
+    def __len__(self) -> int:
+        return len(self._last)
+
+    def rng(self, given: Rng | int | None) -> Rng:
+        """The generator to use: the given one, one seeded with the given number, or the table's own."""
+        if given is None:
+            return self._own
+        if isinstance(given, random.Random):
+            return given
+        if isinstance(given, (int, np.integer)):
+            return random.Random(int(given))
+        if not callable(getattr(given, "random", None)):
+            found = f"rng is of type {type(given).__name__}."
+            raise ContextError(Fault(found, "a random.Random, a numpy.random.Generator, or a number to seed one with"))
+        return given
+
+    def last(self, rng: Rng) -> str | None:
+        """The asset that this generator picked last."""
+        known = self._last.get(id(rng))
+        return known[1] if known is not None and known[0]() is rng else None
+
+    def remember(self, rng: Rng, asset: str) -> None:
+        """Keep what this generator picked."""
+        key = id(rng)
+        known = self._last.get(key)
+        if known is not None and known[0]() is rng:
+            self._last[key] = known[0], asset
+            return
+        try:
+            self._last[key] = weakref.ref(rng, lambda gone: self._forget(key, gone)), asset
+        except TypeError:
+            if len(self._held) >= self._most:
+                self._let_go()
+            self._held[key] = rng
+            self._last[key] = lambda: self._held.get(key), asset
+
+    def _forget(self, key: int, gone: object) -> None:
+        known = self._last.get(key)
+        if known is not None and known[0] is gone:
+            del self._last[key]
+
+    def _let_go(self) -> None:
+        """Forget the generators that are held here alone."""
+        probe = {0: object()}
+        alone = sys.getrefcount(probe[0])
+        for key in list(self._held):
+            if sys.getrefcount(self._held[key]) <= alone:
+                del self._held[key], self._last[key]
+        self._most = max(FEW, 2 * len(self._held))
+
+
+def pick(compiled: CompiledTable, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> str | None:
+    """One asset of the valid rows.
+
+    Parameters
+    ----------
+    matches : Matches
+        An answer of this table in this version.
+    rng : random.Random, numpy.random.Generator or int, optional
+        Where chance comes from; one generator a character, so that each has its own memory. A number seeds a new one, which
+        remembers nothing: the same number, the same pick. Default: the table's own. All who give none are one character to it: two
+        that ask in turn where two assets are valid get one each, again and again.
+    last : str, optional
+        The asset not to repeat, with its path where it has one; "" for none. Default: what this generator picked last in this
+        table.
+
+    Returns
+    -------
+    str or None
+        The asset; the table's fallback when no row is valid, None when it has none.
+
+    Raises
+    ------
+    ContextError
+        The answer is of another table, or of another version of it, which is named; `rng` or `last` is none.
+    PolicyError
+        The policy is "unique" and several rows are valid.
+
+    Notes
+    -----
+    What a generator picked last is remembered beside this table, by the identity of the generator, and goes over to the next
+    version of a watched table. It is neither in the generator's state nor in a pickle: a generator that was copied or came out of a
+    pickle has picked nothing yet, and one that was set back (`setstate`) still knows its later pick. Where a replay or a rollback
+    must pick the same again, keep the asset beside the state of the generator and give it as `last`: the pick then depends on the
+    answer, that state and `last` alone.
+    """
+    row = pick_row(compiled, matches, rng, last)
+    return compiled.fallback if row is None else compiled.assets[row]
+
+
+def pick_row(compiled: CompiledTable, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> int | None:
+    """The row that `pick` picks, or None."""
+    matches.require_own(compiled.answering)
+    source = compiled.memory.rng(rng)
+    if last is not None and not isinstance(last, str):
+        raise ContextError(Fault(f"last is of type {type(last).__name__}.", "the name of an asset, or None"))
+    rows = matches.indices
+    if not len(rows):
+        return None
+    if compiled.ways is not None:
+        return _through_tables(compiled, compiled.ways, rows, source, last)
+    if compiled.policy == "unique" and len(rows) > 1:
+        raise _not_unique(compiled.name, matches.assets)
+    if compiled.policy in ("first", "unique"):
+        return int(rows[0])
+    return _weighted(compiled, rows, source, last)
+
+
+def _through_tables(compiled: CompiledTable, ways: Ways, rows: Rows, source: Rng, last: str | None) -> int | None:
+    """The row that is picked where tables stand in tables."""
+    possible = _possible(ways, rows[ways.pickable[rows]], 0)
+    if not len(possible):
+        return None
+    if not any(table.is_weighted for table in ways.tables):
+        return _drawn(ways, possible, 0, source)
+    memory = compiled.memory
+    with memory.lock:
+        last = memory.last(source) if last is None else last
+        fresh = possible[[compiled.assets[r] != last for r in possible.tolist()]]
+        row = _drawn(ways, fresh if len(fresh) else possible, 0, source)
+        memory.remember(source, compiled.assets[row])
+    return row
+
+
+def _possible(ways: Ways, rows: Rows, depth: int) -> Rows:
+    """Of rows whose ways are the same above a depth, those that the policies may pick."""
+    table = ways.table_at(int(rows[0]), depth) if len(rows) else None
+    if table is None:
+        return rows
+    parts = ways.parts(rows, depth)
+    parts = _best_parts(ways, table, parts, depth)
+    return np.concatenate([_possible(ways, part, depth + 1) for part in parts])
+
+
+def _best_parts(ways: Ways, table: WayTable, parts: list[Rows], depth: int) -> list[Rows]:
+    """Of the rows of one table, each with the ways that go on from it, those that its policy may pick."""
+    if table.policy == "unique" and len(parts) > 1:
+        raise _not_unique(table.name, [ways.steps(int(part[0]))[depth].asset for part in parts])
+    if not table.is_weighted:
+        return parts[:1]
+    priorities = [int(table.priorities[ways.rows[depth, part[0]]]) for part in parts]
+    return [part for part, priority in zip(parts, priorities, strict=True) if priority == max(priorities)]
+
+
+def _drawn(ways: Ways, rows: Rows, depth: int, source: Rng) -> int:
+    """One of the rows that may be picked: at each depth by the weights of that table's rows."""
+    table = ways.table_at(int(rows[0]), depth)
+    if table is None:
+        return int(rows[0])
+    parts = ways.parts(rows, depth)
+    if len(parts) == 1 and not table.is_weighted:
+        return _drawn(ways, parts[0], depth + 1, source)
+    weights = table.row_weights[[ways.rows[depth, part[0]] for part in parts]]
+    return _drawn(ways, parts[_by_weight(weights, source)], depth + 1, source)
+
+
+def _by_weight(weights: NDArray[np.float64], source: Rng) -> int:
+    """Which of some weights chance hits."""
+    sums = np.cumsum(weights / weights.max())
+    return min(int(np.searchsorted(sums, source.random() * sums[-1], "right")), len(weights) - 1)
+
+
+def _not_unique(name: str, assets: list[str]) -> PolicyError:
+    found = f"{len(assets)} rows of {in_quotes(name)} are valid at once: {some(assets)}."
+    return PolicyError(Fault(found, 'one: the table\'s policy is "unique"', rule="not-unique"))
+
+
+def _ranked(compiled: CompiledTable, rows: Rows) -> Rows:
+    """Of some rows those between which chance decides: of the highest priority among those that have a weight."""
+    rows = rows[compiled.row_weights[rows] > 0.0]
+    priorities = compiled.priorities[rows]
+    return rows[priorities == priorities.max()] if len(rows) else rows
+
+
+def _weighted(compiled: CompiledTable, rows: Rows, source: Rng, last: str | None) -> int | None:
+    top = _ranked(compiled, rows).tolist()
+    if not top:
+        return None
+    memory = compiled.memory
+    with memory.lock:
+        last = memory.last(source) if last is None else last
+        candidates = [r for r in top if compiled.assets[r] != last] or top
+        row: int = candidates[_by_weight(compiled.row_weights[candidates], source)]
+        memory.remember(source, compiled.assets[row])
+    return row
+
+
+# ---- what a pick may give, and why not the others
+
+
+class Outcome:
+    """What the policy makes of some valid rows: which of them `pick` may give, how often, and why it passes over the others.
+
+    A chance is that of a character that has picked nothing yet; what it picked last is left out of its next pick.
+    """
+
+    def __init__(self, compiled: CompiledTable, matches: Matches) -> None:
+        """Raises ContextError where the answer is of another table, or of another version of it."""
+        matches.require_own(compiled.answering)
+        self.compiled = compiled
+        self.rows = matches.indices
+        """The valid rows."""
+        self.refusal: PolicyError | None = None
+        """Why `pick` refuses: the policy is "unique", here or in a table inside, and several rows are valid."""
+        self.candidates: Rows = self.rows[:0]
+        """The rows that may be picked, ascending: int64 [count]."""
+        try:
+            self.candidates = _candidates(compiled, self.rows)
+        except PolicyError as error:
+            self.refusal = error
+
+    @cached_property
+    def chances(self) -> dict[int, float]:
+        """The chance of each of `candidates`, 0...1."""
+        if self.compiled.ways is not None:
+            found: dict[int, float] = {}
+            if len(self.candidates):
+                _share_out(self.compiled.ways, self.candidates, 0, 1.0, found)
+            return found
+        if len(self.candidates) == 1:
+            return {int(self.candidates[0]): 1.0}
+        shares = _shares(self.compiled.row_weights[self.candidates])
+        return dict(zip(self.candidates.tolist(), shares.tolist(), strict=True))
+
+    @property
+    def prefers_some(self) -> bool:
+        """Whether the valid rows are not all picked alike."""
+        return len(self.candidates) < len(self.rows) or len(set(self.chances.values())) > 1
+
+    def chance(self, rows: Iterable[int]) -> float:
+        """The chance that one of some rows is picked, 0...1; 0 for rows that are not valid."""
+        return min(sum(self.chances.get(row, 0.0) for row in rows), 1.0)
+
+    def said_of(self, rows: Sequence[int]) -> str:
+        """How valid rows that are one row of a table, one or those behind it, stand: "picked", "picked, chance 40 %",
+        "outranked by B (priority 5)"."""
+        if any(row in self.chances for row in rows):
+            chance = self.chance(rows)
+            return "picked" if chance >= 1.0 else f"picked, chance {_percent(chance)}"
+        return self.why_not(rows[0])
+
+    def why_not(self, row: int) -> str:
+        """Why a valid row is not picked."""
+        if self.refusal is not None:
+            return f"none is picked: {self.refusal.faults[0].found.rstrip('.')}"
+        if self.compiled.ways is not None:
+            return _why_not_through(self.compiled.ways, self.rows, row)
+        compiled = self.compiled
+        if compiled.policy not in ("first", "unique") and not compiled.row_weights[row] > 0.0:
+            return "weight 0: never picked"
+        winners = [compiled.assets[r] for r in self.candidates[:1].tolist()]
+        return _outranked(compiled.policy, winners[0], len(self.candidates), int(compiled.priorities[self.candidates[0]]))
+
+
+def _candidates(compiled: CompiledTable, rows: Rows) -> Rows:
+    """Of the valid rows those that may be picked; raises PolicyError as `pick` does."""
+    if compiled.ways is not None:
+        return np.sort(_possible(compiled.ways, rows[compiled.ways.pickable[rows]], 0))
+    if compiled.policy == "unique" and len(rows) > 1:
+        raise _not_unique(compiled.name, [compiled.assets[r] for r in rows.tolist()])
+    return rows[:1] if compiled.policy in ("first", "unique") else _ranked(compiled, rows)
+
+
+def _share_out(ways: Ways, rows: Rows, depth: int, share: float, found: dict[int, float]) -> None:
+    """The chances of rows that may be picked, as `_drawn` draws them."""
+    table = ways.table_at(int(rows[0]), depth)
+    if table is None:
+        found[int(rows[0])] = share
+        return
+    parts = ways.parts(rows, depth)
+    shares = _shares(table.row_weights[[ways.rows[depth, part[0]] for part in parts]]) if len(parts) > 1 else np.ones(1)
+    for part, own in zip(parts, shares.tolist(), strict=True):
+        _share_out(ways, part, depth + 1, share * own, found)
+
+
+def _shares(weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    shares = weights / weights.max() if len(weights) else weights
+    return np.asarray(shares / shares.sum())
+
+
+def _why_not_through(ways: Ways, valid: Rows, row: int) -> str:
+    """Why a valid row is not picked where tables stand in tables: who outranks it where the ways part."""
+    steps = ways.steps(row)
+    if not ways.pickable[row]:
+        tables = [ways.table_at(row, depth) for depth in range(len(steps))]
+        lost = next(d for d, t in enumerate(tables) if t and t.is_weighted and not t.row_weights[ways.rows[d, row]] > 0.0)
+        where = f" of {steps[lost].asset}" if len(steps) > 1 else ""
+        return f"weight 0{where}: never picked"
+    group = valid[ways.pickable[valid]]
+    for depth in range(len(steps)):
+        table = ways.table_at(row, depth)
+        assert table is not None
+        parts = ways.parts(group, depth)
+        best = _best_parts(ways, table, parts, depth)
+        group = next(part for part in parts if row in part)
+        if not any(part[0] == group[0] for part in best):
+            first = int(best[0][0])
+            return _outranked(
+                table.policy, ways.steps(first)[depth].asset, len(best), int(table.priorities[ways.rows[depth, first]])
+            )
+    raise AssertionError("the row can be picked")
+
+
+def _percent(share: float) -> str:
+    """A share as a whole percentage; one that is neither 0 nor 1 never rounds to them."""
+    return "<1 %" if share < 0.01 else ">99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
+
+
+def _outranked(policy: Policy, winner: str, n_winners: int, priority: int) -> str:
+    more = f" and {n_winners - 1:,} more" if n_winners > 1 else ""
+    why = "an earlier row" if policy == "first" else f"priority {priority}"
+    return f"outranked by {winner}{more} ({why})"

@@ -1,0 +1,101 @@
+"""The facts of compiled tables as Python types, so that an editor completes names and values and a type checker knows them.
+
+For each table a TypedDict of the facts that it asks for; for each condition with declared values a Literal of them. The text is a
+module that imports typing alone. Nothing here touches the disk.
+"""
+
+from __future__ import annotations
+
+import keyword
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from unicodedata import normalize
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.grammar import format_number
+from contextdb.compiled.table import CompiledTable
+from contextdb.errors import shown
+
+_HEAD = '''"""The facts that each table asks for, as types. Written by `contextdb compile --stubs`: do not edit."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias, TypedDict
+'''
+_PLAIN = {"bool": "bool", "int": "int", "number": "float", "angle": "float"}
+_UNITS = {"angle": "degrees"}
+
+
+def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
+    """The text of a Python module with the types of all tables; the same tables give the same text."""
+    names = _Names()
+    literals: dict[Condition, str] = {}
+    parts = []
+    for table in tables.values():
+        for condition in table.asked.values():
+            if condition.domain.values and condition not in literals:
+                literals[condition] = names.of(condition.name)
+                parts.append(_literal(literals[condition], condition))
+        parts.append(_facts(names.of(f"{table.name} facts"), table, literals))
+    return _HEAD + "".join(f"\n{part}" for part in parts)
+
+
+@dataclass
+class _Names:
+    """Names of types: each is given once."""
+
+    taken: set[str] = field(default_factory=lambda: {"Literal", "TypeAlias", "TypedDict", "annotations"})
+
+    def of(self, text: str) -> str:
+        """A name of Python like the text: "Defender.DepthChart" gives DefenderDepthChart."""
+        name = "".join(word[:1].upper() + word[1:] for word in re.split(r"[\W_]+", normalize("NFKC", text)))
+        if not name.isidentifier() or keyword.iskeyword(name):
+            name = f"T{name}" if f"T{name}".isidentifier() else "T"
+        number, unique = 2, name
+        while unique in self.taken:
+            number, unique = number + 1, f"{name}_{number}"
+        self.taken.add(unique)
+        return unique
+
+
+def _literal(name: str, condition: Condition) -> str:
+    values = condition.domain.values or ()
+    if condition.domain.kind == "tags":
+        values = tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
+    listed = "".join(f"    {value!r},\n" for value in values)
+    return f"# {shown(condition.name, 200)}\n{name}: TypeAlias = Literal[\n{listed}]\n"
+
+
+def _with_those_above(tag: str) -> Iterator[str]:
+    parts = tag.split(".")
+    return (".".join(parts[: n + 1]) for n in range(len(parts)))
+
+
+def _facts(name: str, table: CompiledTable, literals: Mapping[Condition, str]) -> str:
+    lines = [f"        {c.name!r}: {_type(c, literals.get(c))},{_comment(c)}\n" for c in table.asked.values()]
+    fields = "{\n" + "".join(lines) + "    }" if lines else "{}"
+    return f"# table {shown(table.name, 200)}\n{name} = TypedDict(\n    {name!r},\n    {fields},\n)\n"
+
+
+def _type(condition: Condition, literal: str | None) -> str:
+    kind = condition.domain.kind
+    if kind == "tags":
+        tag = literal or "str"
+        return f"set[{tag}] | frozenset[{tag}] | list[{tag}] | tuple[{tag}, ...]"
+    return _PLAIN.get(kind) or literal or "str"
+
+
+def _comment(condition: Condition) -> str:
+    """Bounds, unit and description, as far as they are declared, on one line."""
+    low, high = condition.domain.minimum, condition.domain.maximum
+    bounds = f"{_end(low)}..{_end(high)}" if math.isfinite(low) or math.isfinite(high) else ""
+    unit = condition.unit or _UNITS.get(condition.domain.kind, "")
+    parts = [" ".join(part for part in (bounds, unit) if part), condition.description]
+    said = shown(": ".join(part for part in parts if part), 200)
+    return f"  # {said}" if said else ""
+
+
+def _end(bound: float) -> str:
+    return format_number(bound) if math.isfinite(bound) else ""

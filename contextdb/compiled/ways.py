@@ -1,0 +1,157 @@
+"""The way of each row of a flat table through the tables that stand in each other, as a compiled table keeps it.
+
+D = depth, n = flat rows. A way tells the path of a row's name, where its rows stand in their files, and which of two rows a
+policy prefers: that of the table where their ways part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.compiled.layers import Layers
+from contextdb.errors import Place
+from contextdb.schema.shapes import Policy
+from contextdb.tables.nesting.expansion import Expansion
+from contextdb.tables.nesting.names import MARK
+
+if TYPE_CHECKING:
+    from contextdb.tables.table import Table
+
+Numbers = NDArray[np.int32]
+Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One row of a way: a row of a table, what its asset cell says, and where it stands."""
+
+    table: str
+    row: int
+    asset: str
+    place: Place
+    when: str | None = None
+    """The table's column of rules."""
+
+    def __str__(self) -> str:
+        return str(self.place) if self.place.file else f'{self.place} of the table "{self.table}"'
+
+
+@dataclass(frozen=True, eq=False)
+class WayTable:
+    """What is kept of one table: R its rows."""
+
+    name: str
+    file: str | None
+    policy: Policy
+    priorities: NDArray[np.int64]
+    """Higher first: [R]."""
+    row_weights: NDArray[np.float64]
+    lines: NDArray[np.int64] | None = None
+    """The line of each row in its file, from 1, -1 where it has none: [R]. None where `table` tells it."""
+    table: Table | None = None
+    when: str | None = None
+    """Its column of rules."""
+
+    @classmethod
+    def of(cls, name: str, table: Table) -> WayTable:
+        """What is kept of a table."""
+        file = str(table.path) if table.path else None
+        return cls(name, file, table.settings.policy, table.priorities, table.row_weights, None, table, table.settings.when)
+
+    def place(self, row: int) -> Place:
+        """Where a row stands."""
+        if self.table is not None:
+            return self.table.place(row)
+        line = -1 if self.lines is None else int(self.lines[row])
+        return Place(self.file, None if line < 0 else line, None, row)
+
+    @property
+    def is_weighted(self) -> bool:
+        """Whether chance decides between its rows, so that one of weight 0 is never picked."""
+        return self.policy in ("collect", "priority")
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """The ways of all rows."""
+
+    tables: tuple[WayTable, ...]
+    """Every table once, the outer one first."""
+    numbers: Numbers
+    """Which of `tables` a way passes at each depth: int32 [D, n]; -1 below its end."""
+    rows: Numbers
+    """The row that it takes there: int32 [D, n]; -1 below its end."""
+    leaves: Sequence[str]
+    """The asset of each row without its path."""
+    layers: tuple[Layers | None, ...]
+    """For each condition what the tables of the ways say; None for one that none of them has, but a rule."""
+    rules: Layers | None = None
+    """The same for the rows' own rules."""
+
+    @classmethod
+    def of(cls, expansion: Expansion, leaves: Sequence[str], layers: Sequence[Layers | None]) -> Ways:
+        """The ways of a flat table."""
+        tables = tuple(map(WayTable.of, expansion.names, expansion.tables))
+        whens = [(n, t.when.texts) for n, t in enumerate(expansion.tables) if t.when is not None and any(t.when.rules)]
+        rules = Layers.of(expansion, whens) if whens else None
+        return cls(tables, expansion.numbers, expansion.rows, leaves, tuple(layers), rules)
+
+    def steps(self, row: int) -> tuple[Step, ...]:
+        """The rows of a way, outermost first."""
+        pairs = [(n, r) for n, r in zip(self.numbers[:, row].tolist(), self.rows[:, row].tolist(), strict=True) if n >= 0]
+        assets = [*(MARK + self.tables[n].name for n, _ in pairs[1:]), self.leaves[row]]
+        return tuple(self._step(n, r, asset) for (n, r), asset in zip(pairs, assets, strict=True))
+
+    def parts(self, rows: Rows, depth: int) -> list[Rows]:
+        """Rows whose ways are the same above a depth, grouped by the row that they take there, in the order of the file."""
+        taken = self.rows[depth, rows]
+        return np.split(rows, np.flatnonzero(np.diff(taken)) + 1) if len(rows) else []
+
+    def table_at(self, row: int, depth: int) -> WayTable | None:
+        """The table that a way passes at a depth; None below its end."""
+        number = int(self.numbers[depth, row]) if depth < len(self.numbers) else -1
+        return self.tables[number] if number >= 0 else None
+
+    @cached_property
+    def pickable(self) -> NDArray[np.bool_]:
+        """Whether each row may be picked at all: no weight of its way is 0 where chance decides: bool [n]."""
+        able = np.ones(self.rows.shape[1], np.bool_)
+        for number, table in enumerate(self.tables):
+            if table.is_weighted:
+                for numbers, rows in zip(self.numbers, self.rows, strict=True):
+                    here = np.flatnonzero(numbers == number)
+                    able[here] &= table.row_weights[rows[here]] > 0.0
+        return able
+
+    def preferred_to(self, row: int) -> NDArray[np.bool_]:
+        """The rows that may be picked before a row, by the policy of the table where their ways part: bool [n]."""
+        found = np.zeros(self.rows.shape[1], np.bool_)
+        alike = np.ones(len(found), np.bool_)
+        for depth, own in enumerate(self.rows[:, row].tolist()):
+            table = self.table_at(row, depth)
+            if table is None:
+                break
+            others = self.rows[depth]
+            if table.policy == "first":
+                found |= alike & (others < own) & self.pickable
+            elif table.policy == "priority":
+                rows = np.flatnonzero(alike)
+                found[rows] |= (table.priorities[others[rows]] > table.priorities[own]) & self.pickable[rows]
+            alike = alike & (others == own)
+        return found
+
+    def forbids_both(self, one: int, other: int) -> bool:
+        """Whether the table where two ways part allows one valid row only."""
+        parting = int(np.flatnonzero(self.rows[:, one] != self.rows[:, other])[0])
+        table = self.table_at(one, parting)
+        return table is not None and table.policy == "unique"
+
+    def _step(self, number: int, row: int, asset: str) -> Step:
+        table = self.tables[number]
+        return Step(table.name, row, asset, table.place(row), table.when)

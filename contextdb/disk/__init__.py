@@ -1,0 +1,308 @@
+"""Bytes of files: read whole, written atomically. An edge: this touches the disk.
+
+A save writes a temporary file beside the old one, has the system put it on the disk, and renames it. So at any moment, killed or
+out of power, the file is wholly the old one or wholly the new one. What the system refuses is a `FileError` that says what to do.
+
+Saves into one folder take turns for the moment in which they look at the old file and replace it (`contextdb.disk.folder_lock`), so
+that no save writes over another one that it has not seen. Whoever has the turn deletes what killed saves left there.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from contextdb.disk.folder_lock import claim, folder_turn, sweep_in_turn, temporary_name
+from contextdb.errors import Fault, FileError, Place, in_quotes, nearest
+
+TABLE_SUFFIXES = (".csv", ".parquet")
+CASES_SUFFIX = ".cases.csv"
+"""What the file of a table's saved contexts ends in: no table itself."""
+ACTORS_SUFFIX = ".actors.json"
+"""What the file of the actors for a table's roles ends in."""
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_BINARY = getattr(os, "O_BINARY", 0)
+
+Data = bytes | Iterable[bytes]
+
+Was = bytes | Literal["any"] | None
+"""What a file must still hold when it is replaced; None: it must not be there."""
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """The bytes of a file.
+
+    Raises
+    ------
+    FileError
+        It is missing (with the nearest name there is), a folder, no plain file, or may not be read.
+    """
+    file = Path(path)
+    with _refused(file, _why_unread):
+        mode = file.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise FileError(_is_folder(file))
+        if not stat.S_ISREG(mode):  # reading a pipe could wait for ever
+            raise FileError(Fault("this is no plain file.", "a file", place=Place(str(file))))
+        return file.read_bytes()
+
+
+def names_a_table(name: str) -> bool:
+    """Whether a file of this name in a folder of tables is a table: no saved contexts, and nothing hidden, as macOS and editors put
+    beside a file."""
+    folded = name.lower()
+    return folded.endswith(TABLE_SUFFIXES) and not folded.endswith(CASES_SUFFIX) and not folded.startswith(".")
+
+
+def write_atomic(path: str | Path, data: Data, was: Was = "any", syncs: bool = True) -> bool:
+    """Replace a file's bytes, given whole or in pieces, in one step, or make the file.
+
+    A link stays a link, and the file it leads to is replaced; mode and, where that is permitted, owner stay. A pipe, a terminal or
+    another device is written into.
+
+    Parameters
+    ----------
+    was : bytes or None, optional
+        Only if the file holds these bytes; None: only if it is not there. Default: whatever is there.
+    syncs : bool
+        False does not wait until the bytes are on the disk: for what can be computed again.
+
+    Returns
+    -------
+    bool
+        Whether the file was written: False where it is not as `was` says.
+
+    Raises
+    ------
+    FileError
+        The file is read-only, the folder missing or not permitted, the disk full. The old file is then whole, and no temporary file
+        stays.
+    """
+    file = Path(path)
+    if is_stream(file):
+        _write_into(file, data)
+        return True
+    with refused_writing(file, data), staged(file, data, syncs) as new, folder_turn(new.target.parent) as folder:
+        if not is_still(new.target, was):
+            return False
+        new.replace()
+        sync_folder(folder)
+        return True
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a path is that of a pipe, a terminal or another device that takes bytes one after another."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISCHR(mode) or stat.S_ISFIFO(mode)
+
+
+def is_still(file: Path, was: Was) -> bool:
+    """Whether a file holds what it is said to hold. Whoever asks has the turn of its folder."""
+    if was == "any":
+        return True
+    try:
+        return file.read_bytes() == was
+    except FileNotFoundError:
+        return was is None
+
+
+@dataclass
+class Staged:
+    """New bytes of a file, in a temporary file beside it that this process holds."""
+
+    target: Path
+    temporary: Path
+    handle: int
+
+    def close(self) -> None:
+        """Let go of the temporary file, before it takes its name: for whoever has the turn of the folder."""
+        if self.handle >= 0:
+            handle, self.handle = self.handle, -1
+            os.close(handle)
+
+    def replace(self) -> None:
+        """Take the name, for whoever has the turn of the folder."""
+        self.close()
+        os.replace(self.temporary, self.target)
+
+
+@contextmanager
+def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = None) -> Iterator[Staged]:
+    """New bytes beside a file, or in another folder, not yet under its name; gone at the end where they did not take it.
+
+    Raises
+    ------
+    OSError, FileError
+        The file may not be replaced, or the disk refuses.
+    """
+    target = Path(os.path.realpath(file))
+    old = target.stat() if target.exists() else None
+    if old is not None:
+        _require_writable(file, old)
+    place = target.parent if folder is None else folder
+    temporary = place / temporary_name()
+    with folder_turn(place):  # so that nobody sees the file before it is held
+        if syncs:  # a cache is swept by whoever prunes it: its folder may be long
+            sweep_in_turn(place)
+        new = Staged(target, temporary, os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY, 0o666))
+        claim(new.handle)
+    try:
+        _fill(new, data, old, syncs)
+        yield new
+    finally:  # also when the user interrupts
+        with suppress(OSError):
+            new.close()
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, where they are not there yet.
+
+    Raises
+    ------
+    FileError
+        It is a file, or may not be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
+        raise FileError(Fault(f"the folder cannot be made: {why}.", "a folder", place=Place(str(folder)))) from None
+
+
+def _require_writable(file: Path, old: os.stat_result) -> None:
+    """Refuse what a rename would replace all the same: a folder, a device, a file that is marked read-only."""
+    if stat.S_ISDIR(old.st_mode):
+        raise FileError(_is_folder(file))
+    if not stat.S_ISREG(old.st_mode):
+        raise FileError(Fault("this is no plain file.", "a file", place=Place(str(file))))
+    if not old.st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH):
+        mend = "to check it out of version control, or to make it writable"
+        raise FileError(Fault("the file is marked read-only.", "a file that may be written", mend, Place(str(file))))
+
+
+def _fill(new: Staged, data: Data, old: os.stat_result | None, syncs: bool) -> None:
+    """Write a temporary file and have the system put it on the disk."""
+    if old is not None:
+        with suppress(OSError, AttributeError):  # only root may give a file away; Windows has no chown
+            os.chown(new.temporary, old.st_uid, old.st_gid)
+        os.chmod(new.temporary, stat.S_IMODE(old.st_mode))
+    _write_all(new.handle, data)
+    if syncs:
+        os.fsync(new.handle)
+
+
+def _write_all(handle: int, data: Data) -> None:
+    for piece in [data] if isinstance(data, bytes) else data:
+        rest = memoryview(piece)
+        while rest:
+            rest = rest[os.write(handle, rest) :]
+
+
+def _write_into(file: Path, data: Data) -> None:
+    try:
+        handle = os.open(file, os.O_WRONLY | _BINARY)
+        try:
+            _write_all(handle, data)
+        finally:
+            os.close(handle)
+    except BrokenPipeError:  # a reader that has seen enough, as `head`
+        raise
+    except OSError as error:
+        found = f"it cannot be written into: {error.strerror}."
+        raise FileError(Fault(found, "a file, or a pipe that is read", place=Place(str(file)))) from None
+
+
+def sync_folder(folder: int | None) -> None:
+    """Have the system put a new name on the disk too, where it can; the file is whole either way."""
+    if folder is not None:
+        with suppress(OSError):
+            os.fsync(folder)
+
+
+# ---- what the system refuses
+
+
+def refused_writing(file: Path, data: Data) -> AbstractContextManager[None]:
+    """Turn what the system refuses into a `FileError` that names the file."""
+    size = len(data) if isinstance(data, bytes) else None
+    return _refused(file, lambda error, at: _why_unwritten(error, at, size))
+
+
+@contextmanager
+def _refused(file: Path, why: Callable[[OSError, Path], Fault]) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise FileError(why(error, file)) from None
+    except ValueError as error:  # a path with a NUL character
+        raise FileError(Fault(f"this is no path: {error}.", "a path", place=Place(str(file)))) from None
+
+
+def _is_folder(folder: Path) -> Fault:
+    tables = sorted(p for p in folder.iterdir() if names_a_table(p.name))
+    return Fault("this is a folder.", "one file", path_in_quotes(tables[0]) if tables else "", Place(str(folder)))
+
+
+def _why_unread(error: OSError, file: Path) -> Fault:
+    place = Place(str(file))
+    if isinstance(error, FileNotFoundError):
+        return _missing(file)
+    if isinstance(error, NotADirectoryError):
+        return Fault(f"{path_in_quotes(file.parent)} is no folder.", "a file in a folder", place=place, rule="no-such-path")
+    if isinstance(error, PermissionError):
+        return Fault("the file may not be read.", "a file that you have the permission to read", place=place)
+    return Fault(f"the file cannot be read: {error.strerror}.", place=place)
+
+
+def _missing(file: Path) -> Fault:
+    """There is no such file; the nearest name in its folder, or, if the folder is missing too, the nearest folder."""
+    place = Place(str(file))
+    if file.is_symlink():
+        return Fault(
+            f"this is a link to {path_in_quotes(os.readlink(file))}, which is not there.", place=place, rule="no-such-path"
+        )
+    part = file
+    while not part.parent.is_dir() and part.parent != part:
+        part = part.parent
+    what = "file" if part is file else f"folder {path_in_quotes(part)}"
+    with suppress(OSError):
+        near = nearest(part.name, os.listdir(part.parent))
+        mend = path_in_quotes(part.with_name(near)) if near else ""
+        return Fault(f"there is no such {what}.", mend=mend, place=place, rule="no-such-path")
+    return Fault(f"there is no such {what}.", place=place, rule="no-such-path")
+
+
+def _why_unwritten(error: OSError, file: Path, size: int | None) -> Fault:
+    place, folder = Place(str(file)), path_in_quotes(Path(os.path.realpath(file)).parent)
+    kept = " The old file is as it was." if os.path.exists(file) else ""
+    if error.errno in _FULL:
+        return Fault(
+            f"the disk is full.{kept}",
+            "more room" if size is None else f"{size:,} free bytes",
+            "to free some space and save again",
+            place,
+        )
+    if error.errno == errno.EROFS:
+        return Fault(f"the folder {folder} is on a disk that cannot be written.{kept}", mend="to save elsewhere", place=place)
+    if isinstance(error, (FileNotFoundError, NotADirectoryError)):
+        return Fault(f"there is no folder {folder}.", "a folder that is there", place=place, rule="no-such-path")
+    if isinstance(error, PermissionError):
+        busy = ", or another program has the file open" if os.name == "nt" else ""
+        return Fault(f"the folder {folder} may not be written in{busy}.{kept}", mend="to save elsewhere", place=place)
+    return Fault(f"the file cannot be written: {error.strerror or error}.{kept}", mend="to save elsewhere", place=place)
+
+
+def path_in_quotes(path: str | Path) -> str:
+    """A path in quotes, in full: half a path is no help."""
+    return in_quotes(str(path), most=4096)

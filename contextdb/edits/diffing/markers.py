@@ -1,0 +1,156 @@
+"""Conflicts of a merge in a CSV, between the marks that git uses, and the three versions that such a file holds.
+
+Only rows that the sides disagree about stand between marks, each with what it was, so that a person and the editor can decide:
+
+    <<<<<<< ours
+    run,1..2,True
+    ||||||| base
+    run,0..5,True
+    =======
+    run,3..4,True
+    >>>>>>> theirs
+
+Where a column itself is in question the whole file stands between them. Nothing here touches the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from contextdb.files.csv_rewrite import rewritten
+from contextdb.files.csv_source import Source
+from contextdb.tables.merging.conflicts import Conflict
+from contextdb.tables.merging.merging import Merge
+from contextdb.tables.table import Table
+
+OURS, BASE, MIDDLE, THEIRS = b"<<<<<<<", b"|||||||", b"=======", b">>>>>>>"
+
+Known = tuple[int, int, int]
+"""A row by its places in base, ours and theirs."""
+Versions = tuple[bytes, bytes, bytes]
+"""Base, ours, theirs."""
+
+
+def with_markers(merge: Merge) -> bytes:
+    """The merged CSV, with what is not decided between marks."""
+    source = merge.ours.source
+    end = source.line_end.encode() if isinstance(source, Source) else b"\n"
+    if any(one.kind in ("column", "name") for one in merge.conflicts):
+        versions = (table.source for table in (merge.ours, merge.base, merge.theirs))
+        return block([_ended(one.raw, end) if one is not None else b"" for one in versions], end)
+    theirs = merge.resolved(dict.fromkeys(range(len(merge.conflicts)), "theirs"))
+    mine, yours = _Lines(merge), _Lines(theirs)
+    was = _base_lines(merge, mine, yours)
+    head = mine.source.raw[: mine.source.starts[1]]
+    return b"".join([_ended(head, end), *_woven(mine, yours, was, end)])
+
+
+def versions_of(raw: bytes) -> Versions | None:
+    """The versions that a file with git's marks holds; None where there are no marks, or they do not go together.
+
+    Where git wrote no version of before, base has nothing in its place.
+    """
+    kept: list[list[bytes]] = [[], [], []]
+    sides: tuple[int, ...] = (0, 1, 2)
+    n_blocks = 0
+    steps = {OURS: (sides, (1,)), BASE: ((1,), (0,)), MIDDLE: ((0,), (2,)), THEIRS: ((2,), sides)}
+    for line in raw.splitlines(keepends=True):
+        mark = line[:7] if line[:7] in steps and line[7:8] in (b"", b" ", b"\r", b"\n") else b""
+        if mark == MIDDLE and sides == (1,):
+            sides = (2,)
+        elif mark and sides == steps[mark][0]:
+            sides = steps[mark][1]
+            n_blocks += mark == OURS
+        elif mark and mark != MIDDLE:
+            return None
+        else:
+            for side in sides:
+                kept[side].append(line)
+    if not n_blocks or len(sides) != 3:
+        return None
+    base, ours, theirs = (b"".join(lines) for lines in kept)
+    return (base or ours.splitlines(keepends=True)[0] if ours else base), ours, theirs
+
+
+# ---- parts
+
+
+class _Lines:
+    """The lines of a merge, by row."""
+
+    def __init__(self, merge: Merge, table: Table | None = None) -> None:
+        table = table or merge.table
+        source = merge.ours.source if isinstance(merge.ours.source, Source) else None
+        origin = table.origin if source is not None else np.full(table.n_rows, -1)
+        fields = merge.fields.ours.tolist() if source is not None else [-1] * len(table.columns)
+        self.source = rewritten(table.columns, source, origin, fields)
+        self.table = table
+        self.rows: list[Known] = list(
+            zip(*(side.tolist() for side in (merge.rows.base, merge.rows.ours, merge.rows.theirs)), strict=True)
+        )
+
+    def line(self, row: int) -> bytes:
+        """One row, without its line end."""
+        return self.source.raw[self.source.starts[row + 1] : self.source.stops[row + 1]]
+
+    def with_end(self, row: int) -> bytes:
+        """One row, with its line end and blank lines after it."""
+        return self.source.raw[self.source.starts[row + 1] : self.source.starts[row + 2]]
+
+
+def _woven(mine: _Lines, yours: _Lines, was: dict[Known, bytes], end: bytes) -> Iterator[bytes]:
+    """Go through both sides' rows, which are the same but for those in question."""
+    known = set(mine.rows), set(yours.rows)
+    at, other = 0, 0
+    while at < len(mine.rows) or other < len(yours.rows):
+        row = mine.rows[at] if at < len(mine.rows) else None
+        if row is None or (other < len(yours.rows) and yours.rows[other] not in known[0]):
+            key = yours.rows[other]
+            yield block([b"", was.get(key, b""), yours.line(other) + end], end)
+            other += 1
+        elif row not in known[1]:
+            yield block([mine.line(at) + end, was.get(row, b""), b""], end)
+            at += 1
+        else:
+            lines = mine.line(at), yours.line(other)
+            is_same = lines[0] == lines[1]
+            yield _ended(mine.with_end(at), end) if is_same else block([lines[0] + end, was.get(row, b""), lines[1] + end], end)
+            at, other = at + 1, other + 1
+
+
+def _base_lines(merge: Merge, mine: _Lines, yours: _Lines) -> dict[Known, bytes]:
+    """What stood in base of each row in question, in the merged columns."""
+    asked: dict[int, list[Conflict]] = {}
+    for one in merge.conflicts:
+        base = one.key[1]
+        if isinstance(base, int) and base >= 0:
+            asked.setdefault(base, []).append(one)
+    found: dict[Known, bytes] = {}
+    for lines in (yours, mine):
+        rows = {row[0]: at for at, row in enumerate(lines.rows) if row[0] in asked}
+        cells = [cell for base, at in rows.items() for cell in _base_cells(merge, base, at, asked[base])]
+        again = _Lines(merge, lines.table.with_cells(cells)) if cells else lines
+        end = again.source.line_end.encode()
+        found |= {lines.rows[at]: again.line(at) + end for at in rows.values()}
+    return found
+
+
+def _base_cells(merge: Merge, base: int, row: int, asked: Sequence[Conflict]) -> Iterator[tuple[int, str, str]]:
+    """The cells of base that a row in question had: all where the row itself is, else those in question."""
+    is_whole = any(one.kind == "row" for one in asked)
+    wanted = {one.column for one in asked}
+    for column, field in zip(merge.columns, merge.fields.base.tolist(), strict=True):
+        if is_whole or column.name in wanted:
+            yield row, column.name, merge.base.columns[field][base] if field >= 0 else ""
+
+
+def block(versions: Sequence[bytes], end: bytes) -> bytes:
+    """Ours, base and theirs, each whole lines, between marks."""
+    ours, base, theirs = versions
+    return b"".join([OURS, b" ours", end, ours, BASE, b" base", end, base, MIDDLE, end, theirs, THEIRS, b" theirs", end])
+
+
+def _ended(text: bytes, end: bytes) -> bytes:
+    return text if not text or text.endswith((b"\n", b"\r")) else text + end

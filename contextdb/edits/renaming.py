@@ -1,0 +1,330 @@
+"""Give a condition another name in a whole project, or in one table of it, so that what speaks of it still does.
+
+    everywhere        the headers of all tables, rules of rows, saved contexts and actors, and in contextdb.toml the declaration,
+                      derived facts, assumptions and blueprints
+    in one table      its header, its rules, its saved contexts and actors, its assumptions; the new name is declared as the old
+                      one is, which stays for all others
+
+An edge: it reads the files of a folder, and writes them. All are worked out and read again before the first is written; when the
+disk refuses one, those that were written are put back.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contextdb.checks.cases import WORDS, cases_path
+from contextdb.columns import TextColumn
+from contextdb.disk import ACTORS_SUFFIX, read_bytes, write_atomic
+from contextdb.edits.schema_file import schema_path
+from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
+from contextdb.expressions.names import names_in, with_names
+from contextdb.expressions.rules import has_no_rule
+from contextdb.files.csv_rewrite import rewritten
+from contextdb.files.parquet import ParquetSource, rewritten_parquet
+from contextdb.files.texts import AnySource, read_texts
+from contextdb.schema import toml_edit
+from contextdb.schema.settings import TableSettings, read_schema
+from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
+from contextdb.tables.table import Table
+
+_BOM = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True)
+class Uses:
+    """What else speaks of a condition than the column of one table."""
+
+    tables: tuple[str, ...] = ()
+    """Other tables that have it as a column, or that cannot be read."""
+    derived: tuple[str, ...] = ()
+    """Derived facts that are computed from it."""
+    n_assumptions: int = 0
+    blueprints: tuple[str, ...] = ()
+    n_rules: int = 0
+    """Rows, of any table, whose own rule names it."""
+    n_cases: int = 0
+    """Saved contexts, of any table, that give its fact."""
+    is_elsewhere: bool = False
+    """Some of them are not of the table itself, and keep the old name when only the table takes another one."""
+
+    @property
+    def text(self) -> str:
+        """How many there are of each: "1 table, 2 rules, 1 saved context"; nothing for none."""
+        counts = (
+            (len(self.tables), "table"),
+            (len(self.derived), "derived fact"),
+            (self.n_assumptions, "assumption"),
+            (len(self.blueprints), "blueprint"),
+            (self.n_rules, "rule"),
+            (self.n_cases, "saved context"),
+        )
+        return ", ".join(plural(n, noun) for n, noun in counts if n)
+
+
+@dataclass(frozen=True)
+class Rewrite:
+    """A file as it is to be written."""
+
+    path: Path
+    before: bytes
+    after: bytes
+
+
+@dataclass(frozen=True)
+class Renaming:
+    """The files of a project under another name of a condition."""
+
+    old: str
+    new: str
+    files: tuple[Rewrite, ...]
+
+    def write(self) -> None:
+        """Replace the files.
+
+        Raises
+        ------
+        FileError
+            A file was changed since it was read, or the disk refuses: then all are as they were.
+        """
+        for file in self.files:
+            if read_bytes(file.path) != file.before:
+                fault = Fault("the file was changed while the condition was renamed.", "a file at rest", "to do it again")
+                raise FileError(fault.at(Place(str(file.path))))
+        for at, file in enumerate(self.files):
+            try:
+                write_atomic(file.path, file.after)
+            except FileError:
+                for written in self.files[:at]:
+                    write_atomic(written.path, written.before)
+                raise
+
+
+@dataclass(frozen=True)
+class _File:
+    """A table's file and what stands in it."""
+
+    name: str
+    path: Path
+    settings: TableSettings
+    source: AnySource
+    columns: tuple[TextColumn, ...]
+
+    @classmethod
+    def read(cls, name: str, path: Path, settings: TableSettings) -> _File:
+        source, columns = read_texts(path)
+        return cls(name, path, settings, source, tuple(columns))
+
+    def has_condition(self, condition: str) -> bool:
+        """Whether the table has a column that is this condition."""
+        settings = self.settings
+        jobs = (settings.asset or self.columns[0].name, settings.enabled, settings.priority, settings.weight, settings.when)
+        return condition not in (*jobs, *settings.outputs) and any(c.name == condition for c in self.columns)
+
+    @property
+    def rules(self) -> TextColumn | None:
+        """The column of rules."""
+        return next((c for c in self.columns if c.name == self.settings.when), None)
+
+
+def uses_of(table: Table, condition: str) -> Uses:
+    """What else speaks of a condition than the column of a table. Of the table its unsaved edits count, of others the files."""
+    schema, own = table.schema, table.settings
+    others: list[str] = []
+    n_rules = n_own_rules = 0
+    if table.when is not None:
+        n_own_rules = _n_rules(table.text_column(table.when.name), condition)
+    n_cases = n_own_cases = _n_cases(table.path, condition) if table.path is not None else 0
+    for name, path in table_files(_folder(table), schema) if table.path is not None else ():
+        if table.path is not None and path.resolve() == table.path.resolve():
+            continue
+        try:
+            file = _File.read(name, path, schema.tables.get(name, TableSettings(name)))
+        except ContextDBError:  # what it holds is not known
+            others.append(name)
+            continue
+        others += [name] if file.has_condition(condition) else []
+        n_rules += _n_rules(file.rules, condition) if file.rules is not None else 0
+        n_cases += _n_cases(path, condition)
+    derived = tuple(c.name for c in schema.conditions.values() if c.expr is not None and condition in names_in(c.expr))
+    blueprints = tuple(name for name, names in schema.blueprints.items() if condition in names)
+    n_own_assumed = _n_naming(own.assume, condition)
+    assumed = n_own_assumed + sum(_n_naming(s.assume, condition) for s in schema.tables.values() if s.name != own.name)
+    is_elsewhere = bool(others or derived or blueprints or n_rules or n_cases > n_own_cases or assumed > n_own_assumed)
+    return Uses(tuple(others), derived, assumed, blueprints, n_rules + n_own_rules, n_cases, is_elsewhere)
+
+
+def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renaming:
+    """What is to be written so that a condition of a table has another name, in all the project or in this table only.
+
+    Raises
+    ------
+    TableError, SchemaError, FileError
+        The new name is taken or no name; a file cannot be read, or could not say what it should.
+    """
+    folder, schema = _folder(table), table.schema
+    assert table.path is not None
+    raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
+    on_disk = read_folder_schema(folder) if raw else schema
+    if not only_here and new in on_disk.conditions:
+        raise SchemaError(Fault(f"the condition {in_quotes(new)} is declared already.", "a name that nothing has yet"))
+    files: list[Rewrite] = []
+    for name, path in table_files(folder, on_disk):
+        is_own = path.resolve() == table.path.resolve()
+        if is_own or not only_here:
+            files += _rewritten_table(_File.read(name, path, on_disk.tables.get(name, TableSettings(name))), old, new)
+    own = next((n for n, p in table_files(folder, on_disk) if p.resolve() == table.path.resolve()), table.name)
+    if raw:
+        change = (lambda said: _only_here(said, old, new, own)) if only_here else (lambda said: _everywhere(said, old, new))
+        files += _rewritten_toml(folder / SCHEMA_FILE, raw, change, (old, new) if not only_here else None)
+    return Renaming(old, new, tuple(files))
+
+
+def _folder(table: Table) -> Path:
+    return schema_path(table).parent
+
+
+# ---- what speaks of a condition
+
+
+def _n_naming(texts: Sequence[str], condition: str) -> int:
+    return sum(condition in names_in(text) for text in texts)
+
+
+def _n_rules(column: TextColumn, condition: str) -> int:
+    naming = [code for code, text in enumerate(column.texts) if not has_no_rule(text) and condition in names_in(text)]
+    return int(np.isin(column.codes, naming).sum())
+
+
+def _n_cases(table: Path, condition: str) -> int:
+    path = cases_path(table)
+    try:
+        columns = read_texts(path)[1] if path.is_file() and condition not in WORDS else []
+    except ContextDBError:
+        return 1
+    return sum(bool(text.strip()) for column in columns if column.name == condition for text in column.to_list())
+
+
+# ---- files under the new name
+
+
+def _rewritten_table(file: _File, old: str, new: str) -> Iterator[Rewrite]:
+    """The table and its saved contexts, where they speak of the condition."""
+    columns = [c.renamed(new) if c.name == old and file.has_condition(old) else c for c in file.columns]
+    _require_free(file.path, columns)
+    columns = [_with_rules(c, old, new) if file.rules is not None and c.name == file.rules.name else c for c in columns]
+    yield from _rewritten(file.path, file.source, file.columns, columns)
+    cases = cases_path(file.path)
+    if cases.is_file() and old not in WORDS:
+        source, found = read_texts(cases)
+        renamed = [c.renamed(new) if c.name == old else c for c in found]
+        _require_free(cases, renamed)
+        yield from _rewritten(cases, source, found, renamed)
+    yield from _rewritten_actors(file.path.with_name(file.path.stem + ACTORS_SUFFIX), old, new)
+
+
+def _rewritten_actors(path: Path, old: str, new: str) -> Iterator[Rewrite]:
+    """The actors that are kept beside a table, where they have a fact of the role under its old name."""
+    (role, _, was), (new_role, _, now) = old.partition("."), new.partition(".")
+    if not (was and now and role == new_role and path.is_file()):
+        return
+    raw = read_bytes(path)
+    try:
+        teams = json.loads(raw)
+        names = {was: now, old: new}
+        renamed = [{names.get(fact, fact): value for fact, value in actor.items()} for actor in teams.get(role, [])]
+    except (ValueError, AttributeError, TypeError):  # no file of actors: said where it is read
+        return
+    if renamed != teams.get(role, []):
+        yield Rewrite(path, raw, (json.dumps({**teams, role: renamed}, ensure_ascii=False, indent=2) + "\n").encode())
+
+
+def _with_rules(column: TextColumn, old: str, new: str) -> TextColumn:
+    texts = [text if has_no_rule(text) else with_names(text, {old: new}) for text in column.texts]
+    return column if texts == list(column.texts) else TextColumn.of(column.name, [texts[code] for code in column.codes.tolist()])
+
+
+def _require_free(path: Path, columns: Sequence[TextColumn]) -> None:
+    names = [c.name for c in columns]
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        found = f"the file would have two columns {in_quotes(twice[0])}."
+        raise TableError(Fault(found, "a name that no column has yet", place=Place(str(path))))
+
+
+def _rewritten(path: Path, source: AnySource, before: Sequence[TextColumn], after: Sequence[TextColumn]) -> Iterator[Rewrite]:
+    if all(one is other for one, other in zip(before, after, strict=True)):
+        return
+    write: Callable[..., Any] = rewritten_parquet if isinstance(source, ParquetSource) else rewritten
+    yield Rewrite(path, source.raw, write(list(after), source, np.arange(after[0].n_rows)).raw)
+
+
+# ---- contextdb.toml
+
+
+def _everywhere(said: dict[str, Any], old: str, new: str) -> None:
+    """Change what the file says, as plain data."""
+    conditions = said.get("conditions", {})
+    if old in conditions:
+        said["conditions"] = {new if name == old else name: part for name, part in conditions.items()}
+    for part in said.get("conditions", {}).values():
+        if isinstance(part.get("expr"), str):
+            part["expr"] = with_names(part["expr"], {old: new})
+    for part in said.get("tables", {}).values():
+        _assume(part, old, new)
+    for part in said.get("blueprints", {}).values():
+        part["conditions"] = [new if name == old else name for name in part.get("conditions", [])]
+
+
+def _only_here(said: dict[str, Any], old: str, new: str, table: str) -> None:
+    conditions = said.get("conditions", {})
+    if old in conditions and new not in conditions:
+        conditions[new] = deepcopy(conditions[old])
+    _assume(said.get("tables", {}).get(table, {}), old, new)
+
+
+def _assume(part: dict[str, Any], old: str, new: str) -> None:
+    if "assume" in part:
+        part["assume"] = [with_names(text, {old: new}) for text in part["assume"]]
+
+
+def _rewritten_toml(
+    path: Path, raw: bytes, change: Callable[[dict[str, Any]], None], moved: tuple[str, str] | None
+) -> Iterator[Rewrite]:
+    """contextdb.toml with a change; only the keys that say something else are written, and a section that moves keeps its lines."""
+    bom = _BOM if raw.startswith(_BOM) else b""
+    text = raw.removeprefix(_BOM).decode()
+    before, wanted = tomllib.loads(text), tomllib.loads(text)
+    change(wanted)
+    if wanted == before:
+        return
+    if moved is not None:
+        paths = (("conditions", moved[0]), ("conditions", moved[1]))
+        text = toml_edit.rename_section(text, *paths) or text
+    for section in ("conditions", "tables", "blueprints"):
+        text = _with_section(text, section, tomllib.loads(text).get(section, {}), wanted.get(section, {}))
+    if tomllib.loads(text) != wanted:
+        found = "the condition cannot be renamed without changing more of the file."
+        mend = "to rename it in a text editor"
+        raise SchemaError(Fault(found, "sections such as [conditions.NAME]", mend, Place(str(path))))
+    read_schema(text, str(path))  # refuses what no project can be
+    yield Rewrite(path, raw, bom + text.encode())
+
+
+def _with_section(text: str, section: str, now: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+    for name, part in wanted.items():
+        for key, value in part.items():
+            if now.get(name, {}).get(key) != value:
+                behind = [(section, one) for one in now]
+                text = toml_edit.set_key(text, (section, name, key), value, behind)
+    for name in now:
+        if name not in wanted:
+            text = toml_edit.drop_key(text, (section, name))
+    return text

@@ -1,0 +1,236 @@
+"""The rules of a compiled table, asked with the facts of one context.
+
+Masks are Python integers, row r as bit r. Each distinct rule stands once, with the rows that have it, and is computed at most once
+for a question: when the cells leave one of its rows. A rule's truth is True, False, or open (None) where facts that it needs are
+missing, or where it has no finite value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from operator import or_
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
+from contextdb.cells.facts import Fact, Unknown, describe, read_fact
+from contextdb.cells.grammar import Cell, format_cell
+from contextdb.columns import TextColumn
+from contextdb.errors import ContextError, Fault, Place, in_quotes
+from contextdb.expressions import Expression
+from contextdb.expressions.boxes import Box, meets
+from contextdb.expressions.expression import NAN
+from contextdb.expressions.rules.column import WhenColumn
+from contextdb.expressions.scalar import Run, Value
+
+FEW = 4
+"""With so many times more rules than rows left, the rules are found by the rows."""
+MOST_TOLD = 6
+"""So many facts of a rule are told in a message."""
+
+_USUAL: Mapping[str, type] = {"number": float, "bool": bool, "text": str}
+"""The types of which every value but NaN is in canonical form already."""
+
+
+class Unusual(Exception):
+    """A fact is missing or a set, or a rule is open: to be answered with care."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """One distinct rule and the rows that have it."""
+
+    expression: Expression
+    rows: int
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """What is worked out from the two is worked out anew in another process."""
+        return Rule, (self.expression, self.rows)
+
+    @cached_property
+    def run(self) -> Run:
+        """Computes the truth from facts in canonical form, a missing number as NaN, another as None."""
+        return self.expression.run
+
+    @cached_property
+    def true_boxes(self) -> list[Box] | None:
+        """Where the rule is True, for facts that are known; None where boxes cannot tell."""
+        return self.expression.as_boxes(True)
+
+    @cached_property
+    def false_boxes(self) -> list[Box] | None:
+        """The same for False."""
+        return self.expression.as_boxes(False)
+
+    def truths(self, values: Mapping[str, Value], facts: Mapping[str, Fact]) -> tuple[bool | None, bool | None]:
+        """Whether the rule is True for some value of set-valued facts, and for every one. Where that is not known the first is
+        True and the second False; both are None where the rule is open without them.
+
+        `values` are the facts as plans take them, sets as missing; `facts` in canonical form.
+        """
+        truth = self.run(values)
+        if truth is not None:
+            return bool(truth), bool(truth)
+        own = {name: facts[name] for name in self.expression.names}
+        if not any(isinstance(fact, Cell) for fact in own.values()):
+            return None, None
+        if self.true_boxes is None or self.false_boxes is None or None in own.values():
+            return True, False
+        is_anything = any(isinstance(fact, Cell) and fact.accepts is None for fact in own.values())
+        return meets(self.true_boxes, own), not (is_anything or meets(self.false_boxes, own))
+
+
+@dataclass(frozen=True, eq=False)
+class WhenRules:
+    """The distinct rules of a table's rows. Made by `WhenRules.of`."""
+
+    texts: TextColumn
+    """The column as it is written."""
+    rules: tuple[Rule, ...]
+    of_row: NDArray[np.int32]
+    """The number of each row's rule; -1 for a row without one. int32 [n_rows]."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """What computes the rules is functions, made anew in another process."""
+        return WhenRules, (self.texts, self.rules, self.of_row)
+
+    @classmethod
+    def of(cls, column: WhenColumn | None) -> WhenRules | None:
+        """The rules of a column that can be read; None where no row has one, so that such a table pays nothing."""
+        if column is None:
+            return None
+        held = set(np.unique(column.texts.codes).tolist())
+        numbers: dict[str, int] = {}
+        number_of = np.full(len(column.rules) + 1, -1, np.int32)
+        for code, rule in enumerate(column.rules):
+            if rule is not None and code in held:
+                number_of[code] = numbers.setdefault(rule.text, len(numbers))
+        if not numbers:
+            return None
+        of_row = number_of[column.texts.codes]
+        read = {rule.text: rule for rule in column.rules if rule is not None}
+        rows = [bitmask.to_int(bitmask.pack(of_row == number)) for number in numbers.values()]
+        return cls(column.texts, tuple(Rule(read[t], r) for t, r in zip(numbers, rows, strict=True)), of_row)
+
+    @property
+    def name(self) -> str:
+        """The name of the column."""
+        return self.texts.name
+
+    @cached_property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The conditions that rules name, in the order of their first mention."""
+        return tuple({c.name: c for rule in self.rules for c in rule.expression.conditions}.values())
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Their names."""
+        return frozenset(c.name for c in self.conditions)
+
+    @cached_property
+    def naming(self) -> Mapping[str, tuple[int, ...]]:
+        """For each of these conditions the numbers of the rules that name it."""
+        return {n: tuple(i for i, rule in enumerate(self.rules) if n in rule.expression.names) for n in sorted(self.names)}
+
+    @cached_property
+    def rows(self) -> int:
+        """The rows that have a rule."""
+        return reduce(or_, (rule.rows for rule in self.rules))
+
+    def numbers(self, left: int) -> Iterator[int]:
+        """The numbers of the rules of some rows, each once."""
+        left &= self.rows
+        if FEW * left.bit_count() >= len(self.rules):
+            return (n for n, rule in enumerate(self.rules) if rule.rows & left)
+        return iter(dict.fromkeys(self._numbers_by_row(left)))
+
+    def _numbers_by_row(self, left: int) -> Iterator[int]:
+        while left:
+            row = left.bit_length() - 1
+            left ^= 1 << row
+            yield int(self.of_row[row])
+
+    def usual_values(self, facts: Mapping[str, object]) -> dict[str, Value]:
+        """The facts as plans take them; raises Unusual where one is missing or a set, and ContextError where one is wrong."""
+        values: dict[str, Value] = {}
+        for name, condition, usual in self._reading:
+            given = facts.get(name)
+            if type(given) is not usual:
+                given = read_fact(given, condition)
+                if given is None or isinstance(given, Cell):
+                    raise Unusual
+            if given != given:
+                raise Unusual
+            values[name] = given + 0.0 if type(given) is float else given  # type: ignore[assignment]
+        return values
+
+    def left(self, bits: int, values: Mapping[str, Value]) -> int:
+        """Of some rows those that have no rule, or one that is True; raises Unusual where a rule is open."""
+        for number in self.numbers(bits):
+            rule = self.rules[number]
+            truth = rule.run(values)
+            if truth is None:
+                raise Unusual
+            if not truth:
+                bits &= ~rule.rows
+        return bits
+
+    def left_with_care(self, some: int, every: int, facts: Mapping[str, Fact], unknown: Unknown) -> tuple[int, int]:
+        """The same with facts in canonical form, None where missing, for rows that may and that always match by their cells.
+
+        Raises
+        ------
+        ContextError
+            A rule of one of the rows is open, and `unknown` is "error".
+        """
+        values = values_of(facts, self.conditions)
+        for number in self.numbers(some):
+            rule = self.rules[number]
+            may, always = rule.truths(values, facts)
+            if may is None and unknown == "error":
+                raise no_value(rule.expression, values, self.name)
+            if not (unknown == "any" if may is None else may):
+                some &= ~rule.rows
+            if not (unknown == "any" if always is None else always):
+                every &= ~rule.rows
+        return some, every & some
+
+    @cached_property
+    def _reading(self) -> tuple[tuple[str, Condition, type | None], ...]:
+        return tuple((c.name, c, _USUAL.get(c.domain.kind)) for c in self.conditions)
+
+
+def values_of(facts: Mapping[str, Fact], conditions: tuple[Condition, ...]) -> dict[str, Value]:
+    """Facts in canonical form as plans take them: a missing number as NaN, another missing fact or a set as None."""
+    return {c.name: _value(facts.get(c.name), c) for c in conditions}
+
+
+def _value(fact: Fact, condition: Condition) -> Value:
+    if fact is None or isinstance(fact, Cell):
+        return NAN if condition.domain.kind in NUMERIC else None
+    return fact + 0.0 if type(fact) is float else fact
+
+
+def no_value(rule: Expression, values: Mapping[str, Value], column: str) -> ContextError:
+    """The error for a rule that is open though its facts are known: a division by 0, an overflow."""
+    found = f"the rule {in_quotes(rule.text)} has no finite value with {told_facts(rule, values)}."
+    accepted = 'facts that it can be computed with, or unknown="any" or "never"'
+    return ContextError(Fault(found, accepted, place=Place(column=column), rule="missing-fact"))
+
+
+def told_facts(rule: Expression, facts: Mapping[str, Fact | Value]) -> str:
+    """The facts of a rule in words: speed = 3, gait = Walk."""
+    told = [f"{c.name} = {_told(facts.get(c.name), c)}" for c in rule.conditions]
+    more = [f"{len(told) - MOST_TOLD} more"] if len(told) > MOST_TOLD else []
+    return ", ".join([*told[:MOST_TOLD], *more]) or "no facts"
+
+
+def _told(fact: Fact | Value, condition: Condition) -> str:
+    if isinstance(fact, Cell):
+        return format_cell(fact, condition.domain)
+    return describe(None if fact != fact else 180.0 if fact == -180.0 and condition.domain.kind == "angle" else fact)

@@ -1,0 +1,1 @@
+"""A table's file as texts and back, byte for byte."""

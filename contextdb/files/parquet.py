@@ -1,0 +1,265 @@
+"""A Parquet file as texts, and a Parquet file again.
+
+Strings stay as they are; numbers become the shortest text that reads back as the same number, bools True and False, a list of
+strings an enum set (`CB FS "Half Back"`), and null is empty: Any. Without an edit the same bytes are written. After one, a column
+keeps its type where every text still fits it, and becomes strings where one does not. What is written is sealed: its metadata hold
+the digest of its bytes. Nothing here touches the disk.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from contextdb.bitmask import Flags
+from contextdb.cells.words import NUMBER_TEXT, quoted, truth_of
+from contextdb.columns import TextColumn
+from contextdb.errors import Fault, Place, TableError, row_name, shown
+from contextdb.files.csv_faults import MOST_CHARACTERS
+from contextdb.files.csv_rewrite import Origin, changed_rows, source_fields
+from contextdb.files.csv_source import name_faults, text_columns
+from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, require_whole, sealed
+from contextdb.files.strangers import seems_to_be
+
+_ACCEPTED = "strings, categories, bools, numbers, and lists of strings"
+_WHOLE = re.compile(r"[+-]?\d{1,40}")
+_NUMBER = re.compile(NUMBER_TEXT)
+_NAME = re.compile(r'(?:"((?:[^"]|"")*)"|([^\s"]+))(?:\s+|\Z)')
+_ANY = ("any", "-", "")
+_UNFIT = object()
+"""What stands for a text that has no value in a type."""
+_STRINGS = (pl.String, pl.Categorical, pl.Enum)
+
+
+@dataclass(frozen=True, eq=False)
+class ParquetSource:
+    """The bytes of a Parquet file and the texts that they mean; record r is row r of the file."""
+
+    raw: bytes
+    columns: tuple[TextColumn, ...]
+
+    @property
+    def n_records(self) -> int:
+        """How many rows the file has."""
+        return self.columns[0].n_rows
+
+    def line(self, record: int) -> int | None:
+        """None: a Parquet file has no lines."""
+        return None
+
+
+def read_parquet(raw: bytes, file: str) -> tuple[ParquetSource, list[TextColumn]]:
+    """Read the texts of a Parquet file.
+
+    Parameters
+    ----------
+    raw : bytes
+        The file.
+    file : str
+        Its name, for messages.
+
+    Returns
+    -------
+    ParquetSource
+        What is needed to write the same bytes again.
+    list of TextColumn
+        The columns in the order of the file.
+
+    Raises
+    ------
+    TableError
+        The file is no Parquet, cut off or damaged; or columns of a type that no cell has, each with what it is.
+    """
+    frame = _frame(raw, file)
+    faults = [fault.at(Place(file)) for fault in name_faults(frame.columns)]
+    faults += [fault.at(Place(file, column=s.name)) for s in frame for fault in _type_faults(s)]
+    if not frame.width:
+        faults = [Fault("the file has no columns.", "at least one column, the assets", place=Place(file))]
+    columns = [] if faults else _texts(frame)
+    faults += [fault.at(Place(file, column=c.name)) for c in columns for fault in _long_faults(c)]
+    if faults:
+        raise TableError(*faults)
+    return ParquetSource(raw, tuple(columns)), columns
+
+
+def rewritten_parquet(
+    columns: Sequence[TextColumn], source: ParquetSource | None, origin: Origin, field_of: Sequence[int] | None = None
+) -> ParquetSource:
+    """Write texts over the Parquet file they came from; parameters as in `contextdb.files.csv_rewrite.rewritten`.
+
+    Raises
+    ------
+    TableError
+        A text or a name that no Parquet file can hold.
+    """
+    before = source.columns if source else ()
+    fields = source_fields(columns, before, field_of)
+    changed = changed_rows(columns, before, fields, origin)
+    is_same = [c.name for c in columns] == [c.name for c in before] and fields == list(range(len(before)))
+    if source and is_same and np.array_equal(origin, np.arange(source.n_records)) and not any(flags.any() for flags in changed):
+        return source
+    faults = [*name_faults([c.name for c in columns]), *_surrogates(columns)]
+    if faults or not columns:
+        raise TableError(*faults or [Fault("the table has no columns.", "at least one column, the assets")])
+    old = _frame(source.raw, "").get_columns() if source else []
+    series = [_series(c, old[f] if f >= 0 else None, origin, rows) for c, f, rows in zip(columns, fields, changed, strict=True)]
+    out = io.BytesIO()
+    pl.DataFrame(series).write_parquet(out, metadata=dict(UNSEALED))
+    return read_parquet(sealed(out.getvalue()), "")[0]
+
+
+# ---- the file
+
+
+def _frame(raw: bytes, file: str) -> pl.DataFrame:
+    fault = _no_parquet(raw)
+    if fault:
+        raise TableError(fault.at(Place(file)))
+    try:
+        require_whole(raw)
+        return pl.read_parquet(io.BytesIO(raw))
+    except DamagedFrame as error:
+        reason = str(error)
+    except pl.exceptions.PolarsError as error:
+        reason = shown(str(error).split("\n")[0], 200)
+    except (Exception, pl.exceptions.PanicException):  # some damage makes polars stumble instead of complain
+        reason = "its parts contradict each other"
+    raise TableError(Fault(f"the file is damaged: {reason}.", "a Parquet file as it was written", place=Place(file)))
+
+
+def _no_parquet(raw: bytes) -> Fault | None:
+    """What is wrong with the file's first and last bytes, if anything."""
+    if not raw:
+        return Fault("the file is empty.", "a Parquet file")
+    if not raw.startswith(MAGIC):
+        kind = seems_to_be(raw) or ("binary data" if b"\0" in raw[:1000] else "text")
+        mend = "the suffix .csv" if kind == "text" else ""
+        return Fault(f"this is no Parquet file: it seems to be {kind}.", "a Parquet file", mend)
+    size = int.from_bytes(raw[-8:-4], "little")
+    if len(raw) < 12 or not raw.endswith(MAGIC) or size > len(raw) - 12:
+        return Fault(
+            "the file is cut off: its end, where Parquet lists its columns, is missing.", "a Parquet file as it was written"
+        )
+    return None
+
+
+def _type_faults(series: pl.Series) -> Iterator[Fault]:
+    dtype = series.dtype
+    if isinstance(dtype, pl.List) and isinstance(dtype.inner, _STRINGS):
+        if series.list.len().eq(0).any():
+            yield Fault("a list without names in it, which would match nothing.", "null for Any, or at least one name")
+        if series.list.eval(pl.element().is_null()).list.any().any():
+            yield Fault("a list with a null in it.", "names only")
+    elif not (isinstance(dtype, (*_STRINGS, pl.Boolean, pl.Null)) or dtype.is_integer() or dtype.is_float()):
+        yield Fault(f"the column is of type {dtype}.", _ACCEPTED, "to write it as strings")
+
+
+def _long_faults(column: TextColumn) -> Iterator[Fault]:
+    for code, text in enumerate(column.texts):
+        if len(text) > MOST_CHARACTERS:
+            row = int((column.codes == code).argmax())
+            yield Fault(
+                f"the cell in {row_name(row)} has {len(text):,} characters.", f"at most {MOST_CHARACTERS:,} characters in a cell"
+            )
+
+
+def _surrogates(columns: Sequence[TextColumn]) -> Iterator[Fault]:
+    for column in columns:
+        for text in (column.name, *column.texts):
+            try:
+                text.encode()
+            except UnicodeEncodeError:
+                yield Fault("a text has half a surrogate pair.", "text in UTF-8", place=Place(column=ascii(column.name)[1:-1]))
+                break
+
+
+# ---- values to texts
+
+
+def _texts(frame: pl.DataFrame) -> list[TextColumn]:
+    strings = pl.DataFrame([_as_strings(series).alias(str(i)) for i, series in enumerate(frame)])
+    return text_columns(strings, frame.columns)
+
+
+def _as_strings(series: pl.Series) -> pl.Series:
+    if isinstance(series.dtype, pl.List):
+        return pl.Series([None if names is None else " ".join(map(quoted, names)) for names in series.to_list()], dtype=pl.String)
+    strings = series.cast(pl.String)
+    return strings.str.to_titlecase() if series.dtype == pl.Boolean else strings
+
+
+# ---- texts to values
+
+
+def _series(column: TextColumn, old: pl.Series | None, origin: Origin, is_changed: Flags) -> pl.Series:
+    """A column's values: of the old type where the changed texts fit it, else strings."""
+    new = None if old is None else _fitting(column, old, is_changed)
+    if old is None or new is None:
+        is_nullable = old is not None and old.null_count() > 0
+        texts = [None if is_nullable and not text else text for text in column.texts]
+        return _taken(column.name, pl.Series(texts, dtype=pl.String), column.codes)
+    values = _taken(column.name, new, column.codes)
+    if is_changed.all():
+        return values
+    return _taken(column.name, old, np.maximum(origin, 0)).zip_with(pl.Series(~is_changed), values)
+
+
+def _taken(name: str, values: pl.Series, at: NDArray[np.integer]) -> pl.Series:
+    return (values.gather(at) if len(at) else values.clear()).alias(name)
+
+
+def _fitting(column: TextColumn, old: pl.Series, is_changed: Flags) -> pl.Series | None:
+    """One value for each distinct text, null for those that no changed row has; None where one does not fit the type."""
+    values: list[object] = [None] * len(column.texts)
+    for code in np.unique(column.codes[is_changed]).tolist():
+        value = _value(column.texts[code], old)
+        if value is _UNFIT:
+            return None
+        values[code] = value
+    try:
+        return pl.Series(values, dtype=old.dtype, strict=True)
+    except (pl.exceptions.PolarsError, TypeError, OverflowError):
+        return None
+
+
+def _value(text: str, old: pl.Series) -> object:
+    """The value of a text in the type of a column, or _UNFIT."""
+    dtype = old.dtype
+    if isinstance(dtype, (pl.String, pl.Categorical)):
+        return None if not text and old.null_count() else text
+    if isinstance(dtype, pl.Enum):
+        return text if text in dtype.categories else _UNFIT if text else None
+    if text.strip().casefold() in _ANY:
+        return None
+    if isinstance(dtype, pl.List):
+        return _names(text)
+    if isinstance(dtype, pl.Boolean):
+        truth = truth_of(text)
+        return _UNFIT if truth is None else truth
+    if dtype.is_integer():
+        return int(text) if _WHOLE.fullmatch(text) else _UNFIT
+    return _float(text, dtype) if dtype.is_float() else _UNFIT
+
+
+def _float(text: str, dtype: pl.DataType) -> object:
+    """The number that a text means, if the type holds it without rounding what was written."""
+    if not _NUMBER.fullmatch(text):
+        return _UNFIT
+    value = pl.Series([float(text)], dtype=pl.Float64).cast(dtype)
+    return value[0] if Decimal(value.cast(pl.String)[0]) == Decimal(text) else _UNFIT
+
+
+def _names(text: str) -> object:
+    """The names of a plain enum set."""
+    names, at = [], 0
+    while found := _NAME.match(text, at):
+        names.append(found[2] if found[1] is None else found[1].replace('""', '"'))
+        at = found.end()
+    return names if at == len(text) and " ".join(map(quoted, names)) == text else _UNFIT

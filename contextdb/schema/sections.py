@@ -1,0 +1,164 @@
+"""The sections of contextdb.toml as plain data, from what they mean: the way back from `contextdb.schema.settings`.
+
+A key that says what holds without it is left out, so that two settings are equal when their data are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+from contextdb.cells.conditions import Condition
+from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
+from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.schema.shapes import NAMES, SECTIONS, as_toml, wrong_name
+
+Part = dict[str, object]
+"""The keys of one named section, such as `[conditions.speed]`, and their values as TOML has them."""
+
+EDITED_SECTIONS = ("conditions", "blueprints", "selectors")
+"""The sections that edits may change, beside the settings of a table."""
+
+
+def condition_to_dict(condition: Condition) -> Part:
+    """What `[conditions.NAME]` says of a condition."""
+    domain = condition.domain
+    as_said = int if domain.kind == "int" else float
+    bounds = {"min": domain.minimum, "max": domain.maximum}
+    said: Part = {"type": domain.kind}
+    said |= {key: as_said(bound) for key, bound in bounds.items() if math.isfinite(bound)}
+    if domain.values is not None:
+        said["values"] = list(domain.values)
+    texts = {"unit": condition.unit, "description": condition.description, "expr": condition.expr}
+    said |= {key: text for key, text in texts.items() if text}
+    if condition.mirror is not None:
+        said["mirror"] = dict(condition.mirror) if isinstance(condition.mirror, tuple) else condition.mirror
+    return said
+
+
+def has_place(key: str, kind: object) -> bool:
+    """Whether a key of a condition has a place under a type."""
+    return kind in {"min": ("int", "number"), "max": ("int", "number"), "values": ("enum", "tags")}.get(key, (kind,))
+
+
+def settings_to_dict(settings: TableSettings) -> Part:
+    """What `[tables.NAME]` says of a table."""
+    plain = TableSettings(settings.name)
+    said = {field.name: getattr(settings, field.name) for field in fields(settings) if field.name != "name"}
+    said = {key: value for key, value in said.items() if value != getattr(plain, key)}
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in said.items()}
+
+
+def schema_to_dict(schema: Schema) -> dict[str, dict[str, Part]]:
+    """The sections that edits may change: section to name to keys."""
+    return {
+        "conditions": {name: condition_to_dict(condition) for name, condition in schema.conditions.items()},
+        "blueprints": {name: {"conditions": list(names)} for name, names in schema.blueprints.items()},
+        "selectors": {name: dict(part) for name, part in schema.selectors.items()},
+    }
+
+
+def differences(before: Mapping[str, object], after: Mapping[str, object]) -> dict[str, object]:
+    """What each key says anew; None where it says nothing any more."""
+    changed = {key: value for key, value in after.items() if key not in before or before[key] != value}
+    return changed | {key: None for key in before if key not in after}
+
+
+# ---- what is said anew
+
+
+def schema_with(schema: Schema, parts: Mapping[str, Mapping[str, Mapping[str, object] | None]]) -> Schema:
+    """The schema with some parts said anew, None taking one away.
+
+    Raises
+    ------
+    SchemaError
+        A part that contextdb.toml could not hold, with what is accepted.
+    """
+    said: dict[str, Any] = {
+        section: _with(getattr(schema, section), parts[section]) for section in EDITED_SECTIONS if section in parts
+    }
+    if "conditions" in parts:
+        new = conditions_from_dict({name: part for name, part in parts["conditions"].items() if part is not None})
+        said["conditions"] = {name: new.get(name, kept) for name, kept in said["conditions"].items()}
+    if "blueprints" in parts:
+        said["blueprints"] = {name: _names(name, part) for name, part in said["blueprints"].items()}
+    now = replace(schema, **said)
+    if "selectors" in parts:
+        from contextdb.motion.storage.config import MotionConfig
+
+        MotionConfig.from_dict(now.motion, file=schema.file)
+    return now
+
+
+def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSettings:
+    """The settings with some keys said anew, None taking one away.
+
+    Raises
+    ------
+    SchemaError
+        A key or a value that `[tables.NAME]` could not hold, with what is accepted.
+    """
+    shapes, plain = SECTIONS["tables"] or {}, TableSettings(settings.name)
+    faults = []
+    for key, value in said.items():
+        if key not in shapes:
+            near = nearest(key, shapes)
+            faults.append(
+                Fault(f"a table has no setting {in_quotes(key)}.", some(shapes, len(shapes)), in_quotes(near) if near else "")
+            )
+        elif value is not None and (wrong := shapes[key].wrong(value)):
+            meant = shapes[key].mend(value)
+            mend = "" if meant is None else f"{key} = {as_toml(meant)}"
+            faults.append(Fault(f"{shown(f'{key} = {as_toml(value)}')}: {wrong}.", shapes[key].accepted, mend))
+    if faults:
+        raise SchemaError(*faults)
+    now: dict[str, Any] = {key: getattr(plain, key) if value is None else value for key, value in said.items()}
+    now |= {key: tuple(value) for key, value in now.items() if isinstance(value, list)}
+    return replace(settings, **now)
+
+
+def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) -> Iterator[Fault]:
+    """Why a table of these columns cannot have these settings: a column that is not there, has two jobs, or is a condition."""
+    jobs: dict[str, str] = {}
+    known = frozenset(columns)
+    named = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
+    for key, column in [*named, *(("outputs", name) for name in settings.outputs)]:
+        if column is None:
+            continue
+        if column not in known:
+            near = nearest(column, columns)
+            yield Fault(f"there is no column {in_quotes(column)} for {key}.", some(columns), in_quotes(near) if near else "")
+        elif column in jobs:
+            yield Fault(f"{key} and {jobs[column]} both name the column {in_quotes(column)}.", "one job for a column")
+        elif column in schema.conditions:
+            found = f"{key} names {in_quotes(column)}, which contextdb.toml declares as a condition."
+            yield Fault(found, "a column that is no condition")
+        jobs.setdefault(column, key)
+
+
+def blueprint_faults(schema: Schema) -> Iterator[Fault]:
+    """Conditions that a blueprint names and nobody declares."""
+    for name, conditions in schema.blueprints.items():
+        for condition in conditions:
+            if condition not in schema.conditions:
+                near = nearest(condition, schema.conditions)
+                found = f"the blueprint {in_quotes(name)} names the condition {in_quotes(condition)}, which is not declared."
+                yield Fault(found, some(schema.conditions), in_quotes(near) if near else "")
+
+
+def _with(parts: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+    now = {**parts, **said}
+    return {name: part for name, part in now.items() if part is not None}
+
+
+def _names(blueprint: str, part: Any) -> tuple[str, ...]:
+    """The conditions of a blueprint: as they were, or checked where they are said anew."""
+    if isinstance(part, tuple):
+        return part
+    wrong = wrong_name(blueprint) or NAMES.wrong(part.get("conditions"))
+    if wrong:
+        raise SchemaError(Fault(f"the blueprint {in_quotes(str(blueprint))}: {wrong}.", NAMES.accepted))
+    return tuple(part["conditions"])

@@ -1,0 +1,458 @@
+"""What contextdb.toml says, as frozen data.
+
+`contextdb.schema.shapes` describes what each key accepts; here stands how keys and sections go together. All is checked before
+anything is used, so that every fault of the file is reported at once. `features`, `databases`, `selectors` and `controllers` are
+kept as plain data, for `contextdb.motion` to read. Nothing here reads a file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any, cast
+
+from contextdb.cells.conditions import Condition, Mirror
+from contextdb.cells.domains import KINDS, Domain
+from contextdb.cells.grammar import covers
+from contextdb.cells.mirroring import NEGATED_KINDS, SWAPPED_KINDS, sided_pairs, swap_faults, swapped_tag
+from contextdb.disk import TABLE_SUFFIXES
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
+from contextdb.files.file_names import alike, composed
+from contextdb.schema import toml_values
+from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
+from contextdb.schema.toml_lines import Path, key_lines, line_of, read_toml
+
+if TYPE_CHECKING:
+    from contextdb.expressions import Derivation
+
+Found = tuple[Path, Fault]
+Section = Mapping[str, Any]
+
+_HEADERS = {name: "[project]" if name == "project" else f"[{name}.NAME]" for name in SECTIONS}
+_BOUNDED = ("int", "number")
+_EACH_ONCE = 'each name in one pair, such as { Left = "Right" }'
+_KINDS_WITH = {"min": _BOUNDED, "max": _BOUNDED, "values": ("enum", "tags")}
+_HAS_NO_PLACE = {
+    "angle": "an angle goes round, so it has no ends and no list",
+    "bool": "a bool is True or False",
+    "enum": "names have no order",
+    "tags": "tags have no order",
+    "int": "a number is declared by min and max",
+    "number": "a number is declared by min and max",
+    "text": "a text can be anything",
+}
+
+
+@dataclass(frozen=True)
+class TableSettings:
+    """What `[tables.NAME]` says: the table's file, and which of its columns are no conditions."""
+
+    name: str
+    file: str | None = None
+    """Below the folder of contextdb.toml; None: NAME.csv or NAME.parquet."""
+    asset: str | None = None
+    """The column that names the asset; None: the first one."""
+    outputs: tuple[str, ...] = ()
+    enabled: str | None = None
+    priority: str | None = None
+    weight: str | None = None
+    fallback: str | None = None
+    policy: Policy = "collect"
+    assume: tuple[str, ...] = ()
+    when: str | None = None
+    """The column of each row's own rule."""
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files that may hold the table, the most wanted first."""
+        names = [self.name + suffix for suffix in TABLE_SUFFIXES] if self.file is None else [self.file]
+        return tuple(str(PurePosixPath(name)) for name in names)
+
+
+@dataclass(frozen=True)
+class Schema:
+    """All that a contextdb.toml says."""
+
+    name: str = ""
+    conditions: Mapping[str, Condition] = field(default_factory=dict)
+    tables: Mapping[str, TableSettings] = field(default_factory=dict)
+    blueprints: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    features: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    databases: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    selectors: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    controllers: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    file: str | None = None
+
+    def __getstate__(self) -> dict[str, object]:
+        """What is pickled: not `derivation`, which is functions."""
+        return {key: value for key, value in self.__dict__.items() if key != "derivation"}
+
+    @cached_property
+    def derivation(self) -> Derivation | None:
+        """How the conditions with an `expr` are computed from the others; None where there are none.
+
+        Raises
+        ------
+        SchemaError
+            An expression cannot be used. `read_schema` has checked that already; a schema made in Python has not.
+        """
+        if not any(condition.expr for condition in self.conditions.values()):
+            return None
+        from contextdb.expressions import derive
+
+        return derive(self.conditions)
+
+    def derivation_of(self, names: Iterable[str]) -> Derivation | None:
+        """What is needed to compute those of some conditions that are derived; None where none is."""
+        derived = self.derivation.only(names) if self.derivation else None
+        return derived if derived and derived.steps else None
+
+    @property
+    def motion(self) -> dict[str, Mapping[str, object]]:
+        """The sections that `MotionConfig.from_dict` reads."""
+        return {
+            "features": self.features,
+            "databases": self.databases,
+            "selectors": self.selectors,
+            "controllers": self.controllers,
+        }
+
+    def settings_for(self, file: str) -> TableSettings:
+        """The settings of the table in `file`, a path below the folder; one that is not declared has the file's stem as name."""
+        path = PurePosixPath(composed(file))
+        declared = (settings for settings in self.tables.values() if str(path) in map(composed, settings.files))
+        return next(declared, TableSettings(path.stem))
+
+
+EMPTY = Schema()
+"""A schema that declares nothing."""
+
+
+def read_schema(text: str, file: str) -> Schema:
+    """What the text of a contextdb.toml says; `file` is its name in messages.
+
+    Raises
+    ------
+    SchemaError
+        With every fault: its line, what was found, what is accepted and the nearest mend.
+    """
+    text = text.removeprefix("\ufeff")
+    document = read_toml(text, file)
+    found = list(_document_faults(document))
+    if not any(path[0] == "conditions" for path, _ in found):
+        found += _expressions_of(document)
+    if found:
+        lines = key_lines(text)
+        placed = (fault.at(Place(file, line_of(path, lines))) for path, fault in found)
+        raise SchemaError(*sorted(placed, key=lambda fault: fault.place.line or 0))
+    return _schema(document, file)
+
+
+def conditions_from_dict(mapping: Mapping[str, Mapping[str, object]]) -> dict[str, Condition]:
+    """Conditions from what `[conditions.NAME]` of contextdb.toml would hold: `{"speed": {"type": "number"}}`.
+
+    What an `expr` says is not looked at: it may name conditions that stand elsewhere.
+
+    Raises
+    ------
+    SchemaError
+        With every fault, as from a file but without a line.
+    """
+    if found := list(_section_faults("conditions", mapping)):
+        raise SchemaError(*(fault for _, fault in found))
+    return {name: _condition(name, section) for name, section in mapping.items()}
+
+
+def expression_faults(schema: Schema) -> Iterator[Fault]:
+    """What is wrong with the derived facts and assumptions of a schema, as `read_schema` tells it, without lines."""
+    assumed = {name: settings.assume for name, settings in schema.tables.items()}
+    yield from (fault for _, fault in _expression_faults(schema.conditions, assumed))
+
+
+# ---- faults, each with the path of the key it is about
+
+
+def _document_faults(document: Section) -> Iterator[Found]:
+    for name, section in document.items():
+        if name in SECTIONS:
+            yield from _section_faults(name, section)
+        else:
+            yield (name,), _no_section(name, section)
+    conditions = _parts(document, "conditions").keys()
+    for name, part in _parts(document, "tables").items():
+        yield from _column_faults(("tables", name), _fitting("tables", part), conditions)
+    yield from _file_faults(_parts(document, "tables"))
+    for name, part in _parts(document, "blueprints").items():
+        yield from _blueprint_faults(("blueprints", name), _fitting("blueprints", part), conditions)
+
+
+def _expressions_of(document: Section) -> Iterator[Found]:
+    """What is wrong with derived facts and assumptions, for a document whose conditions are sound."""
+    conditions = {name: _condition(name, part) for name, part in _parts(document, "conditions").items()}
+    assumed = {name: _fitting("tables", part).get("assume", ()) for name, part in _parts(document, "tables").items()}
+    yield from _expression_faults(conditions, assumed)
+
+
+def _expression_faults(conditions: Mapping[str, Condition], assumed: Mapping[str, Sequence[str]]) -> Iterator[Found]:
+    """An assumption may name a column that no condition declares; whether the table has it shows when the table is read."""
+    yield from _derivation_faults(conditions)
+    for name, assume in assumed.items():
+        if assume:
+            from contextdb.expressions import assumption_faults
+
+            path = ("tables", name)
+            for fault in assumption_faults(assume, conditions):
+                if fault.rule != "unknown-fact":
+                    yield (*path, "assume"), replace(fault, found=f"{_header(path)} assume {fault.found}")
+
+
+def _derivation_faults(conditions: Mapping[str, Condition]) -> Iterator[Found]:
+    if any(condition.expr for condition in conditions.values()):
+        from contextdb.expressions import derivation_faults
+
+        for name, fault in derivation_faults(conditions):
+            path = ("conditions", name)
+            mend = fault.mend or ("to declare it, in a section [conditions.NAME]" if fault.rule == "unknown-fact" else "")
+            yield (*path, "expr"), replace(fault, found=f"{_header(path)} expr {fault.found}", mend=mend, rule="unreadable")
+
+
+def _no_section(name: str, section: object) -> Fault:
+    near = nearest(name, SECTIONS)
+    inner = next(iter(section), None) if isinstance(section, dict) and near != "project" else None
+    mend = _header((near, inner) if inner else (near,)) if near else ""
+    return Fault(f"{in_quotes(name)} is no section.", ", ".join(_HEADERS.values()), mend)
+
+
+def _section_faults(name: str, section: object) -> Iterator[Found]:
+    if not isinstance(section, Mapping):
+        yield (name,), Fault(f"{shown(f'{name} = {as_toml(section)}')}: this is {what(section)}, not a section.", _HEADERS[name])
+    elif name == "project":
+        yield from _key_faults((name,), section)
+    else:
+        for key, part in section.items():
+            yield from _part_faults((name, key), part)
+
+
+def _part_faults(path: Path, part: object) -> Iterator[Found]:
+    name, key = path
+    if wrong := wrong_name(key):
+        mend = _header((name, key.strip())) if isinstance(key, str) and key.strip() else ""
+        yield path, Fault(f"{_header(path)}: the name cannot be used: {wrong}.", "a name without spaces around it", mend)
+    if not isinstance(part, Mapping):
+        is_kind = name == "conditions" and isinstance(part, str)
+        mend = f"{key} = {{ type = {as_toml(part)} }}" if is_kind else ""
+        yield path, Fault(f"[{name}] {_said(key, part)}: this is {what(part)}, not a table.", _HEADERS[name], mend)
+    elif SECTIONS[name] is not None:
+        yield from _key_faults(path, part)
+        if name == "conditions":
+            yield from _condition_faults(path, part)
+
+
+def _key_faults(path: Path, part: Section) -> Iterator[Found]:
+    shapes = _shapes(path[0])
+    for key, value in part.items():
+        if key not in shapes:
+            yield (*path, key), _no_key(path, key, value)
+        elif wrong := shapes[key].wrong(value):
+            meant = shapes[key].mend(value)
+            mend = "" if meant is None else _said(key, meant)
+            yield (*path, key), Fault(f"{_header(path)} {_said(key, value)}: {wrong}.", shapes[key].accepted, mend)
+
+
+def _no_key(path: Path, key: str, value: object) -> Fault:
+    shapes = _shapes(path[0])
+    near = _near_key(key, shapes)
+    if isinstance(value, Mapping) and len(path) == 2:
+        mend = _header((path[0], f"{path[1]}.{key}"))
+        return Fault(f"{_header(path)} {_said(key, value)}: this is a table, not a key.", "a name with a dot in quotes", mend)
+    return Fault(f"{_header(path)} has no key {in_quotes(str(key))}.", some(shapes, len(shapes)), in_quotes(near) if near else "")
+
+
+def _condition_faults(path: Path, part: Section) -> Iterator[Found]:
+    fitting = _fitting("conditions", part)
+    kind = fitting.get("type")
+    meant = {_near_key(key, _shapes("conditions")) for key in part}
+    if "type" not in meant and not any(isinstance(v, Mapping) for k, v in part.items() if k != "mirror"):
+        guess = 'type = "enum"' if "values" in part else 'type = "number"' if {"min", "max"} & part.keys() else ""
+        yield path, Fault(f"{_header(path)} has no type.", _shapes("conditions")["type"].accepted, guess)
+    if kind == "enum" and "values" not in meant:
+        mend = 'type = "text", whose values are not declared'
+        yield path, Fault(f"{_header(path)} is an enum without values.", 'values = ["A", "B"]', mend)
+    for key, kinds in _KINDS_WITH.items():
+        if key in fitting and kind and kind not in kinds:
+            yield (*path, key), _no_place(path, key, fitting)
+    if kind in _BOUNDED:
+        yield from _bound_faults(path, fitting)
+    if kind in KINDS and "mirror" in fitting:
+        yield from _mirror_faults(path, fitting)
+
+
+def _no_place(path: Path, key: str, fitting: Section) -> Fault:
+    found = f"{_header(path)} {_said(key, fitting[key])} has no place here: {_HAS_NO_PLACE[fitting['type']]}."
+    accepted = f"{key} in a condition of type {' or '.join(_KINDS_WITH[key])}"
+    return Fault(found, accepted, 'type = "enum"' if key == "values" else "to leave it out")
+
+
+def _bound_faults(path: Path, fitting: Section) -> Iterator[Found]:
+    low, high = fitting.get("min", -math.inf), fitting.get("max", math.inf)
+    if low > high:
+        found = f"{_header(path)} {_said('min', low)} is above {_said('max', high)}."
+        mend = f"{_said('min', high)} and {_said('max', low)}"
+        yield (*path, "min"), Fault(found, "a min that is not above max", mend)
+    for key, bound, is_no_end, nearer in (("min", low, low == math.inf, math.ceil), ("max", high, high == -math.inf, math.floor)):
+        said = f"{_header(path)} {_said(key, bound)}"
+        if is_no_end:
+            yield (*path, key), Fault(f"{said} leaves no number.", "a finite number", "to leave it out")
+        elif fitting["type"] == "int" and math.isfinite(bound) and bound != math.floor(bound):
+            yield (*path, key), Fault(f"{said}: an int has whole bounds.", "a whole number", _said(key, nearer(bound)))
+
+
+def _mirror_faults(path: Path, fitting: Section) -> Iterator[Found]:
+    """Why the facts of a condition cannot change in a mirror as it says."""
+    kind, mirror, values = fitting["type"], fitting["mirror"], fitting.get("values")
+    said, key = f"{_header(path)} {_said('mirror', mirror)}", (*path, "mirror")
+    if mirror == "none":
+        return
+    if "expr" in fitting:
+        found = f"{said} has no place here: a derived fact is computed from mirrored facts."
+        yield key, Fault(found, "mirror in the conditions that it is computed from", "to leave it out")
+    elif mirror == "negate" and kind not in NEGATED_KINDS:
+        mend = _said("mirror", sided_pairs(values or ()) or {"Left": "Right"})
+        yield key, Fault(f"{said}: a condition of type {kind} has no sign.", 'names that change places, or "none"', mend)
+    elif mirror != "negate" and kind not in SWAPPED_KINDS:
+        yield key, Fault(f"{said}: a condition of type {kind} has no names.", '"negate" or "none"', _said("mirror", "negate"))
+    elif mirror != "negate":
+        yield from ((key, Fault(f"{said}: {in_quotes(name)}: {why}.", _EACH_ONCE)) for name, why in swap_faults(mirror, kind))
+        yield from ((key, replace(fault, found=f"{said}: {fault.found}")) for fault in _unknown_partners(mirror, kind, values))
+
+
+def _unknown_partners(mirror: Mapping[str, str], kind: str, values: Sequence[str] | None) -> Iterator[Fault]:
+    """Faults of names of pairs that are no declared values, and of tags that would change places with one that is none."""
+    if values is None:
+        return
+    known = frozenset(values)
+    names = dict.fromkeys(name for pair in mirror.items() for name in pair)
+    unknown = [name for name in names if not (covers(name, known) if kind == "tags" else name in known)]
+    for name in unknown:
+        near = nearest(name, values)
+        yield Fault(f"there is no value {in_quotes(name)}.", some(values), in_quotes(near) if near else "")
+    for value in values if kind == "tags" and not unknown else ():
+        image = swapped_tag(value, tuple(mirror.items()))
+        if not covers(image, known):
+            found = f"{in_quotes(value)} changes places with {in_quotes(image)}, which is no declared value."
+            yield Fault(found, "values that hold both", f"to add {in_quotes(image)} to the values")
+
+
+def _column_faults(path: Path, table: Section, conditions: Set[str]) -> Iterator[Found]:
+    jobs: dict[str, str] = {}
+    columns = [(key, table[key]) for key in ("asset", "enabled", "priority", "weight", "when") if key in table]
+    for key, column in [*columns, *(("outputs", name) for name in table.get("outputs", ()))]:
+        if column in jobs:
+            found = f"{_header(path)} {key} and {jobs[column]} both name the column {in_quotes(column)}."
+            yield (*path, key), Fault(found, "one job for a column")
+        jobs.setdefault(column, key)
+        if column in conditions:
+            found = f"{_header(path)} {key} names {in_quotes(column)}, which is declared as a condition."
+            mend = f"to leave out {_header(('conditions', column))}"
+            yield (*path, key), Fault(found, "a column that is no condition", mend)
+
+
+def _file_faults(tables: Mapping[str, Section]) -> Iterator[Found]:
+    wrong_file = _shapes("tables")["file"].wrong
+    owners: dict[str, str] = {}
+    for name, part in tables.items():
+        path, file = ("tables", name), part.get("file")
+        wrong = wrong_name(name) or wrong_file(name + TABLE_SUFFIXES[0] if file is None else file)
+        if wrong and file is None:
+            yield path, Fault(f"{_header(path)} has no file, and its name cannot be that of one: {wrong}.", 'file = "NAME.csv"')
+        if wrong:
+            continue
+        standing = {alike(one) for one in TableSettings(name, file).files}
+        if shared := next((one for one in sorted(standing) if one in owners), None):
+            found = f"{_header(path)} stands in {in_quotes(shared)}, as {_header(('tables', owners[shared]))} does."
+            yield (*path, "file"), Fault(found, "one file for each table")
+        owners |= dict.fromkeys(standing - owners.keys(), name)
+
+
+def _blueprint_faults(path: Path, blueprint: Section, conditions: Set[str]) -> Iterator[Found]:
+    for name in blueprint.get("conditions", ()):
+        if name not in conditions:
+            near = nearest(name, conditions)
+            found = f"{_header(path)} names the condition {in_quotes(name)}, which is not declared."
+            yield (*path, "conditions"), Fault(found, some(conditions), in_quotes(near) if near else "")
+
+
+# ---- words and parts
+
+
+def _header(path: Path) -> str:
+    """A section as the file writes it: [conditions.speed], [conditions."Defender.Tags"]."""
+    *outer, name = map(str, path)
+    is_bare = name and all(c.isascii() and (c.isalnum() or c in "_-") for c in name)
+    return shown(f"[{'.'.join((*outer, name if is_bare else as_toml(name)))}]")
+
+
+def _said(key: str, value: object) -> str:
+    """A key with its value, that of a mirror with the names in it."""
+    is_pairs = key == "mirror" and isinstance(value, Mapping)
+    return shown(f"{key} = {toml_values.as_toml(value) if is_pairs else as_toml(value)}")
+
+
+def _shapes(section: str) -> Mapping[str, Shape]:
+    return SECTIONS[section] or {}
+
+
+def _near_key(key: str, shapes: Mapping[str, Shape]) -> str | None:
+    if key in shapes:
+        return key
+    synonym = KEY_SYNONYMS.get(str(key).casefold())
+    return synonym if synonym in shapes else nearest(str(key), shapes)
+
+
+def _parts(document: Section, section: str) -> dict[str, Section]:
+    """The named tables of a section, as far as they are tables."""
+    parts = document.get(section)
+    return {name: part for name, part in parts.items() if isinstance(part, Mapping)} if isinstance(parts, Mapping) else {}
+
+
+def _fitting(section: str, part: Section) -> dict[str, Any]:
+    """What of a section can be used."""
+    shapes = _shapes(section)
+    return {key: value for key, value in part.items() if key in shapes and shapes[key].wrong(value) is None}
+
+
+# ---- from checked data
+
+
+def _schema(document: Section, file: str) -> Schema:
+    return Schema(
+        document.get("project", {}).get("name", ""),
+        {name: _condition(name, part) for name, part in _parts(document, "conditions").items()},
+        {name: _settings(name, part) for name, part in _parts(document, "tables").items()},
+        {name: tuple(part.get("conditions", ())) for name, part in _parts(document, "blueprints").items()},
+        _parts(document, "features"),
+        _parts(document, "databases"),
+        _parts(document, "selectors"),
+        _parts(document, "controllers"),
+        file,
+    )
+
+
+def _condition(name: str, part: Section) -> Condition:
+    values = tuple(part["values"]) if "values" in part else None
+    domain = Domain(part["type"], values, float(part.get("min", -math.inf)) + 0.0, float(part.get("max", math.inf)) + 0.0)
+    return Condition(
+        name, domain, part.get("unit", ""), part.get("description", ""), part.get("expr"), mirror=_mirror(part.get("mirror"))
+    )
+
+
+def _mirror(said: str | Mapping[str, str] | None) -> Mirror | None:
+    return tuple(said.items()) if isinstance(said, Mapping) else cast("Mirror | None", said)
+
+
+def _settings(name: str, part: Section) -> TableSettings:
+    keys: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in part.items()}
+    return TableSettings(name, **keys)

@@ -1,0 +1,248 @@
+"""What the keys of contextdb.toml accept: in words, as a check, and what a wrong value was likely meant to be.
+
+`SECTIONS` describes the file. How the keys of a section go together is for `contextdb.schema.settings` to check.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import numbers
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePosixPath, PureWindowsPath
+from typing import Literal, get_args
+
+from contextdb.cells.domains import KINDS
+from contextdb.disk import TABLE_SUFFIXES
+from contextdb.errors import in_quotes, nearest, some
+
+Policy = Literal["collect", "first", "unique", "priority"]
+POLICIES: tuple[Policy, ...] = get_args(Policy)
+
+KIND_SYNONYMS = {
+    **dict.fromkeys(("boolean", "flag", "logical", "truth"), "bool"),
+    **dict.fromkeys(("integer", "long", "int32", "int64", "whole", "count"), "int"),
+    **dict.fromkeys(("float", "double", "real", "decimal", "numeric", "float32", "float64", "range"), "number"),
+    **dict.fromkeys(("degrees", "degree", "deg", "direction", "heading", "rotation", "yaw"), "angle"),
+    **dict.fromkeys(("choice", "option", "category", "categorical", "enumeration", "list"), "enum"),
+    **dict.fromkeys(("string", "str", "name"), "text"),
+    **dict.fromkeys(("tag", "set", "labels", "gameplaytags", "tagset"), "tags"),
+}
+POLICY_SYNONYMS = {"all": "collect", "any": "collect", "single": "unique", "highest": "priority"}
+MIRRORS = ("negate", "none")
+MIRROR_SYNONYMS = {
+    **dict.fromkeys(("negative", "sign", "flip", "invert", "minus", "true"), "negate"),
+    **dict.fromkeys(("no", "off", "keep", "same", "false", "any", "-", ""), "none"),
+}
+KEY_SYNONYMS = {
+    **{"kind": "type", "minimum": "min", "lower": "min", "maximum": "max", "upper": "max", "formula": "expr", "expression": "expr"},
+    **dict.fromkeys(("options", "choices", "enum", "tags", "set"), "values"),
+    **{"desc": "description", "help": "description", "comment": "description", "path": "file", "columns": "conditions"},
+    **dict.fromkeys(("mirrored", "swap", "mirroring"), "mirror"),
+    **{"default": "fallback", "assumptions": "assume", "hit_policy": "policy"},
+}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a key accepts. `wrong` says what is wrong with a value, or None; `meant` is the value that was likely meant, or None."""
+
+    accepted: str
+    wrong: Callable[[object], str | None]
+    meant: Callable[[object], object]
+
+    def mend(self, value: object) -> object:
+        """What was likely meant, if that is accepted."""
+        meant = self.meant(value)
+        return None if meant is None or self.wrong(meant) else meant
+
+
+def as_toml(value: object) -> str:
+    """A value as contextdb.toml writes it; what stands inside tables and inner lists is left out."""
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join("[…]" if isinstance(v, (list, tuple)) else as_toml(v) for v in value) + "]"
+    if isinstance(value, Mapping):
+        return "{…}" if value else "{}"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool)) else str(value)
+
+
+def what(value: object) -> str:
+    """The type of a value, in a word for a message."""
+    for types, word in ((str, "text"), (bool, "true or false"), (numbers.Real, "a number"), (Mapping, "a table")):
+        if isinstance(value, types):
+            return word
+    return "a list" if isinstance(value, (list, tuple)) else "nothing" if value is None else f"a {type(value).__name__}"
+
+
+def wrong_name(value: object) -> str | None:
+    """What is wrong with a name: of a condition, a table, a column, a value."""
+    if not isinstance(value, str) or not value.strip():
+        return _wrong_text(value) or "this is empty"
+    return None if value == value.strip() else "a space stands before or after it"
+
+
+def _wrong_text(value: object) -> str | None:
+    return None if isinstance(value, str) else f"this is {what(value)}, not text"
+
+
+def _wrong_number(value: object) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return f"this is {what(value)}, not a number"
+    try:
+        number = float(value)
+    except OverflowError:
+        return "this is too large for a number"
+    if math.isnan(number):
+        return "nothing is above or below it"
+    return None if number == value else f"no double is equal to it; the nearest is {number!r}"
+
+
+def _wrong_list(value: object) -> str | None:
+    if not isinstance(value, (list, tuple)):
+        return f"this is {what(value)}, not a list"
+    seen: set[str] = set()
+    for i, name in enumerate(value):
+        if wrong := wrong_name(name):
+            return f"entry {i + 1} cannot be used: {wrong}"
+        if name in seen:
+            return f"{in_quotes(name)} stands twice"
+        seen.add(name)
+    return None
+
+
+def _wrong_values(value: object) -> str | None:
+    return _wrong_list(value) or (None if value else "the list is empty")
+
+
+def _wrong_file(value: object) -> str | None:
+    if not isinstance(value, str) or wrong_name(value):
+        return wrong_name(value)
+    path = PureWindowsPath(value)
+    if path.drive or path.root:
+        return "it names a place on one machine"
+    if ".." in path.parts:
+        return "it leaves the folder of contextdb.toml"
+    if "\\" in value:
+        return 'folders are separated by "/" on every system'
+    return None if path.suffix.casefold() in TABLE_SUFFIXES else "its ending is that of no table file"
+
+
+def _meant_file(value: object) -> object:
+    if not isinstance(value, str):
+        return None
+    path = PureWindowsPath(value.strip())
+    if path.drive or path.root:
+        return path.name
+    inside = PurePosixPath(*(part for part in path.parts if part != ".."))
+    return str(inside) if inside.suffix else f"{inside}.csv" if inside.name else None
+
+
+def _meant_number(value: object) -> object:
+    try:
+        return json.loads(value) if isinstance(value, str) else None
+    except (ValueError, RecursionError):
+        return None
+
+
+def _meant_text(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        return None
+    return str(value).strip()
+
+
+def _meant_names(separators: str) -> Callable[[object], object]:
+    """What a list of names was meant to be; text is taken apart at `separators`, a pattern."""
+
+    def meant(value: object) -> object:
+        parts = re.split(separators, value) if isinstance(value, str) else value
+        if not isinstance(parts, (list, tuple)):
+            return None
+        names = [_meant_text(part) for part in parts]
+        return list(dict.fromkeys(name for name in names if name)) if None not in names else None
+
+    return meant
+
+
+def _wrong_mirror(value: object) -> str | None:
+    if isinstance(value, str):
+        return None if value in MIRRORS else "there is no such way to mirror"
+    if not isinstance(value, Mapping):
+        return f"this is {what(value)}, neither a word nor names that change places"
+    for left, right in value.items():
+        for name in (left, right):
+            if wrong := wrong_name(name):
+                return f"the name {as_toml(name)} cannot be used: {wrong}"
+    return None if value else "no names change places"
+
+
+def _meant_mirror(value: object) -> object:
+    """What was likely meant: pairs may have been written as a list, or as "Left = Right"."""
+    if isinstance(value, str):
+        sides = [side.strip(" \"'") for side in re.split(r"[=:,/]|<->|->", value)]
+        if len(sides) == 2 and all(sides):
+            return {sides[0]: sides[1]}
+        return MIRROR_SYNONYMS.get(value.strip().casefold()) or nearest(value, MIRRORS)
+    if isinstance(value, bool):
+        return "negate" if value else "none"
+    pairs = [value] if isinstance(value, (list, tuple)) and all(isinstance(side, str) for side in value) else value
+    if isinstance(pairs, (list, tuple)) and all(isinstance(pair, (list, tuple)) and len(pair) == 2 for pair in pairs):
+        return dict(map(tuple, pairs)) if all(isinstance(side, str) for pair in pairs for side in pair) else None
+    return None
+
+
+def _one_of(words: Sequence[str], noun: str, synonyms: Mapping[str, str]) -> Shape:
+    def wrong(value: object) -> str | None:
+        return _wrong_text(value) or (None if value in words else f"there is no such {noun}")
+
+    def meant(value: object) -> object:
+        return synonyms.get(value.strip().casefold()) or nearest(value, words) if isinstance(value, str) else None
+
+    return Shape(some(words, len(words)), wrong, meant)
+
+
+TEXT = Shape('text, such as "m/s"', _wrong_text, _meant_text)
+NAME = Shape('a name, such as "Asset Name"', wrong_name, _meant_text)
+EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wrong_name, _meant_text)
+EXPRESSIONS = Shape('a list of expressions, such as ["not (IsRunning and IsIdle)"]', _wrong_list, _meant_names(r"\A|\Z"))
+NUMBER = Shape("a number, such as -1.5", _wrong_number, _meant_number)
+NAMES = Shape('a list of different names, such as ["A", "B"]', _wrong_list, _meant_names(","))
+VALUES = Shape('a list of different names, such as ["A", "B"]', _wrong_values, _meant_names(r"[,;|\s]+"))
+FILE = Shape("a .csv or .parquet file in the folder of contextdb.toml or below it", _wrong_file, _meant_file)
+
+MIRROR = Shape(
+    '"negate" (the other sign), "none", or names that change places, such as { Left = "Right" }', _wrong_mirror, _meant_mirror
+)
+
+SECTIONS: dict[str, Mapping[str, Shape] | None] = {
+    "project": {"name": TEXT},
+    "conditions": {
+        "type": _one_of(KINDS, "type", KIND_SYNONYMS),
+        "min": NUMBER,
+        "max": NUMBER,
+        "values": VALUES,
+        "unit": TEXT,
+        "description": TEXT,
+        "expr": EXPRESSION,
+        "mirror": MIRROR,
+    },
+    "tables": {
+        "file": FILE,
+        "asset": NAME,
+        "outputs": NAMES,
+        "enabled": NAME,
+        "priority": NAME,
+        "weight": NAME,
+        "fallback": NAME,
+        "policy": _one_of(POLICIES, "policy", POLICY_SYNONYMS),
+        "assume": EXPRESSIONS,
+        "when": NAME,
+    },
+    "blueprints": {"conditions": NAMES},
+    "features": None,
+    "databases": None,
+    "selectors": None,
+    "controllers": None,
+}
+"""The sections and their keys; None: kept as they are. All but `project` hold named tables."""

@@ -1,0 +1,215 @@
+"""Change single keys of a TOML text; every other byte stays as it is: comments, order, spaces, line ends.
+
+A text that reads is cut into its statements: section headers and `key = value`. A key is found under whichever form it is written
+in: `[tables.a]` and `policy = …`, dotted (`tables.a.policy = …`), or in an inline table. Changing one replaces its value alone; a
+new one stands behind the last key of its section, a new section behind another one. `contextdb.schema.toml_values` writes the
+values. Nothing here reads a file; whether the text then says what it should is for the caller to check.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from contextdb.schema.toml_values import TOKEN, Path, as_toml, dotted, end_of_line, merged
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A section header or `key = value`: its whole path, that of the section it stands in, and where it stands in the text."""
+
+    path: Path
+    section: Path
+    start: int
+    """Where its first line starts."""
+    stop: int
+    """Where the line after its last one starts."""
+    span: tuple[int, int]
+    """Where it starts and stops without the space and the comment around it."""
+    value: tuple[int, int] | None = None
+    """Where the value starts and stops; None for a header."""
+
+
+def statements(text: str) -> list[Statement]:
+    """The statements of a text that reads, in order."""
+    return list(_statements(text))
+
+
+def set_key(text: str, path: Path, value: object, behind: Sequence[Path] = ()) -> str:
+    """The text with a key set. A section that is not there yet is put behind the last of those of `behind`, else at the end."""
+    found = statements(text)
+    for one in found:
+        if one.value and one.path == path[: len(one.path)]:
+            return _replaced(text, one.value, merged(text[slice(*one.value)], path[len(one.path) :], value))
+    part = path[:-1]
+    below = [one for one in found if one.path[: len(path)] == path]
+    if below:  # an array of tables, [[a.b]], or a table of its own, [a.b] or a.b.key = …: one value in its place
+        return set_key(_without(text, below), path, value, behind)
+    inside = [one for one in found if one.path[: len(part)] == part and len(one.section) <= len(part)]
+    if inside:
+        last = inside[-1]
+        key = path[len(last.section) :] if last.value else path[len(last.path) :]
+        return _inserted(text, last.stop, [_indent(text, last) + f"{dotted(key)} = {as_toml(value)}"])
+    at = _end_of_section(text, found, behind)
+    blank = [""] if text[:at].strip() else []
+    return _inserted(text, at, [*blank, f"[{dotted(part)}]", f"{dotted(path[-1:])} = {as_toml(value)}"])
+
+
+def add_sections(text: str, sections: Mapping[Path, Mapping[str, object]], behind: Sequence[Path] = ()) -> str:
+    """The text with sections that it does not have yet, one behind the other, where `set_key` would put the first of them."""
+    at = _end_of_section(text, statements(text), behind)
+    lines: list[str] = []
+    for part, keys in sections.items():
+        lines += [""] if lines or text[:at].strip() else []
+        lines += [f"[{dotted(part)}]", *(f"{dotted((key,))} = {as_toml(value)}" for key, value in keys.items())]
+    return _inserted(text, at, lines)
+
+
+def absent(text: str, paths: Sequence[Path]) -> list[Path]:
+    """Those of some sections of which nothing stands in the text, in whichever form."""
+    found = statements(text)
+    said = {one.path[:depth] for one in found for depth in range(1, len(one.path) + 1)}
+    whole = {one.path for one in found if one.value}
+    return [path for path in paths if path not in said and not any(path[:depth] in whole for depth in range(1, len(path)))]
+
+
+def drop_key(text: str, path: Path) -> str:
+    """The text without a key, or without a whole section."""
+    found = statements(text)
+    for one in found:
+        if one.value and len(one.path) < len(path) and one.path == path[: len(one.path)]:
+            return _replaced(text, one.value, merged(text[slice(*one.value)], path[len(one.path) :], None))
+    return _without(text, [one for one in found if one.path[: len(path)] == path])
+
+
+def drop_empty_section(text: str, path: Path) -> str:
+    """The text without a section in which nothing stands any more."""
+    for one in statements(text):
+        if one.value and one.path == path[: len(one.path)]:
+            inner: Any = {one.path[-1]: tomllib.loads(f"x = {text[slice(*one.value)]}")["x"]}
+            for key in path[len(one.path) - 1 :]:
+                inner = inner.get(key, ...)
+            return drop_key(text, path) if inner == {} else text
+    inside = [one for one in statements(text) if one.path[: len(path)] == path]
+    return _without(text, inside) if len(inside) == 1 and inside[0].value is None else text
+
+
+def has_comment(text: str, path: Path) -> bool:
+    """Whether a comment stands behind a key, on its line."""
+    return any(one.path == path and text[one.span[1] : one.stop].strip() for one in statements(text))
+
+
+def rename_section(text: str, path: Path, new: Path) -> str | None:
+    """The text with another path in the header of a section; None where the section is not written with one header."""
+    inside = [one for one in statements(text) if one.path[: len(path)] == path]
+    if not inside or inside[0].value is not None or any(one.section != path for one in inside):
+        return None
+    return _replaced(text, inside[0].span, f"[{dotted(new)}]")
+
+
+# ---- statements
+
+
+def _statements(text: str) -> Iterator[Statement]:
+    depth, line, first = 0, 0, 0
+    section: Path = ()
+    tokens: list[tuple[str, int]] = []
+    for match in TOKEN.finditer(text if text.endswith("\n") else text + "\n"):
+        token = match[0]
+        depth += (token in ("[", "{")) - (token in ("]", "}"))
+        if token == "\n" and depth == 0:
+            if tokens:
+                one = _statement(tokens, section, first, min(match.end(), len(text)))
+                section = one.section if one.value else one.path
+                yield one
+            tokens = []
+        elif not token.isspace() and token[0] != "#":
+            first = first if tokens else line
+            tokens.append((token, match.start()))
+        if token == "\n":
+            line = match.end()
+
+
+def _statement(tokens: Sequence[tuple[str, int]], section: Path, start: int, stop: int) -> Statement:
+    words = [token for token, _ in tokens]
+    end = tokens[-1][1] + len(words[-1])
+    span = (tokens[0][1], end)
+    if words[0] == "[":
+        path = _keys("".join(words).strip("[]"))
+        return Statement(path, path, start, stop, span)
+    equals = words.index("=")
+    return Statement(section + _keys("".join(words[:equals])), section, start, stop, span, (tokens[equals + 1][1], end))
+
+
+@lru_cache(4096)
+def _keys(dotted: str) -> Path:
+    value: object = tomllib.loads(f"{dotted} = 0")
+    path: list[str] = []
+    while isinstance(value, dict):
+        key, value = next(iter(value.items()))
+        path.append(key)
+    return tuple(path)
+
+
+def _end_of_section(text: str, found: Sequence[Statement], paths: Sequence[Path]) -> int:
+    """Where the last of some sections ends: before the next header, or with the last statement. Without one of them, at the end."""
+    wanted, depths = set(paths), {len(path) for path in paths}
+    anchors = [i for i, one in enumerate(found) if any(one.path[:depth] in wanted for depth in depths)]
+    last = anchors[-1] if anchors else len(found) - 1
+    while last + 1 < len(found) and found[last + 1].value is not None:
+        last += 1
+    return found[last].stop if found else len(text)
+
+
+# ---- lines
+
+
+def _indent(text: str, one: Statement) -> str:
+    line = text[one.start : one.stop]
+    return line[: len(line) - len(line.lstrip(" \t"))]
+
+
+def _inserted(text: str, at: int, lines: Sequence[str]) -> str:
+    """The text with new lines; a text whose last line has no end keeps to that."""
+    end = end_of_line(text)
+    before, after = text[:at], text[at:]
+    if before and not before.endswith("\n"):
+        return before + "".join(end + line for line in lines) + after
+    return before + "".join(line + end for line in lines) + after
+
+
+def _without(text: str, gone: Sequence[Statement]) -> str:
+    """The text without some statements; with a section goes what stands between its lines, and one blank line before it."""
+    for start, stop in reversed(list(_spans(text, gone))):
+        before, after = text[:start], text[stop:]
+        if not after and not text.endswith("\n"):
+            before = before.removesuffix("\n").removesuffix("\r")
+        text = before + after
+    return text
+
+
+def _spans(text: str, gone: Sequence[Statement]) -> Iterator[tuple[int, int]]:
+    is_gone = {one.start for one in gone}
+    runs: list[list[Statement]] = []
+    for one in statements(text):
+        if one.start not in is_gone:
+            runs.append([])
+        elif not runs or one.value is None:
+            runs.append([one])
+        else:
+            runs[-1].append(one)
+    for run in (run for run in runs if run):
+        if run[0].value is not None:
+            yield from ((one.start, one.stop) for one in run)
+            continue
+        start = run[0].start
+        blank = re.search(r"(?:\A|(?<=\n))[ \t]*\r?\n\Z", text[:start])
+        yield (blank.start() if blank else start), run[-1].stop
+
+
+def _replaced(text: str, span: tuple[int, int], new: str) -> str:
+    return text[: span[0]] + new + text[span[1] :]

@@ -1,0 +1,122 @@
+"""TOML with the lines kept: which line a key stands on, and which line cannot be read.
+
+`tomllib` gives the values of a document but not where they stand. So a document that reads is walked once more, statement by
+statement (`contextdb.schema.toml_edit`), when a fault in it has to be placed. Keys of inline tables are not followed: they stand on
+the line of their statement.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, shown
+from contextdb.schema.toml_edit import statements
+from contextdb.schema.toml_values import Path as Path
+
+MOST_PARTS = 256
+"""A key of more parts, a.b.c, is refused: reading it would cost the square of them."""
+MOST_KEYS = 8
+"""Deeper keys are placed on the line of their first ones; no section of ours goes as deep."""
+
+_STRING_OR_COMMENT = re.compile(
+    r'"""(?:\\.|[^\\])*?(?:"""+|\Z)|\'\'\'.*?(?:\'\'\'+|\Z)|"(?:\\.|[^"\\\n])*"?|\'[^\'\n]*\'?|#[^\n]*', re.DOTALL
+)
+"""Strings that are not closed count as strings up to where they could end, so that no character is looked at twice."""
+_PLACE = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
+
+_ACCEPTED = '[section.name], key = "text", key = 1.5, key = ["A", "B"]'
+_TWICE = re.compile(r"Cannot (overwrite a value|declare .* twice|mutate immutable .*)", re.DOTALL)
+
+# What people write, and what they mean. Tried in turn; the first that reads is offered.
+_LINE_MENDS: tuple[tuple[str, str], ...] = (
+    (r"^(\s*[\w.-]+\s*=\s*)True\b", r"\1true"),
+    (r"^(\s*[\w.-]+\s*=\s*)False\b", r"\1false"),
+    (r"^\s*([\w.-]+)\s*:=?\s*", r"\1 = "),
+    (r"$", "]"),
+    (r"^", "["),
+    (r"$", '"'),
+    (r"^\s*\[\s*([\w-]+)\.([^\"'\[\]]*[^\"'\[\]\s])\s*(?:\]\s*)?$", r'[\1."\2"]'),
+    (r"^(\s*[\w.-]+\s*=\s*)([^\s\"'\[{][^\"'#]*?)\s*(#.*)?$", r'\1"\2"'),
+    (r"([\[,]\s*)([^\s\"'\[\],][^\"'\[\],]*?)(?=\s*[,\]])", r'\1"\2"'),
+)
+
+
+def read_toml(text: str, file: str) -> dict[str, object]:
+    """The values of a TOML document.
+
+    Raises
+    ------
+    SchemaError
+        With the line that cannot be read, the character in it and what would be read in its place.
+    """
+    _require_short_keys(text, file)
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise SchemaError(Fault("lists stand in lists too deep to be read.", "lists of names", place=Place(file))) from None
+    except ValueError as error:  # TOMLDecodeError, and a whole number of too many digits
+        raise SchemaError(_syntax_fault(str(error), text, file)) from None
+
+
+def _require_short_keys(text: str, file: str) -> None:
+    """Refuse a key of very many parts; what stands in strings and comments does not count."""
+    if text.count(".") <= MOST_PARTS:
+        return
+    line = 1
+    for chunk in re.split(r"([=,\[\]{}\n])", _STRING_OR_COMMENT.sub(_bare, text)):
+        if chunk.count(".") >= MOST_PARTS:
+            found = f"a key has {chunk.count('.') + 1:,} parts."
+            raise SchemaError(Fault(found, f"at most {MOST_PARTS}, as in [section.name]", place=Place(file, line)))
+        line += chunk == "\n"
+
+
+def _bare(found: re.Match[str]) -> str:
+    """What stands for a string or a comment where only its lines count."""
+    return "\n" * found[0].count("\n") or "q"
+
+
+def key_lines(text: str) -> dict[Path, int]:
+    """The line (from 1) on which each key, and each section, of a document that reads first stands."""
+    lines: dict[Path, int] = {}
+    line, at = 1, 0
+    for one in statements(text):
+        line += text.count("\n", at, one.span[0])
+        at = one.span[0]
+        for depth in range(1, len(one.path[:MOST_KEYS]) + 1):
+            lines.setdefault(one.path[:depth], line)
+    return lines
+
+
+def line_of(path: Path, lines: Mapping[Path, int]) -> int | None:
+    """The line of a key, else of the nearest section that holds it."""
+    return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), None)
+
+
+def _syntax_fault(error: str, text: str, file: str) -> Fault:
+    found = _PLACE.fullmatch(error)
+    if not found:
+        return Fault("a whole number has too many digits to be read.", "a number, such as -1.5", place=Place(file))
+    number = int(found[2]) if found[2] else text.rstrip().count("\n") + 1
+    line, place = text.split("\n")[number - 1].strip(), Place(file, number)
+    if _TWICE.fullmatch(found[1]):
+        return Fault(f"{in_quotes(line)} stands twice.", "each section once, and each key once in it", place=place)
+    character = f"at character {found[3]}" if found[2] else "the file ends here"
+    why = f"{found[1][:1].lower()}{found[1][1:]}, {character}"
+    return Fault(f"cannot read {in_quotes(line)} as TOML: {why}.", _ACCEPTED, _line_mend(line[:1000]), place)
+
+
+def _line_mend(line: str) -> str:
+    if _reads(line):
+        return ""
+    mended = (re.sub(pattern, replacement, line) for pattern, replacement in _LINE_MENDS)
+    return next((shown(m) for m in mended if m != line and _reads(m)), "")
+
+
+def _reads(line: str) -> bool:
+    try:
+        tomllib.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return True

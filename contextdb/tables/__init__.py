@@ -1,0 +1,1 @@
+"""A table, tables in tables, a folder of them, merged and watched."""

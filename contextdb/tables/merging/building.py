@@ -1,0 +1,79 @@
+"""The edit that makes one table another: its rows, its columns, what is said of them, and the texts that then still differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from contextdb.columns import TextColumn
+from contextdb.edits.edits import Edit
+from contextdb.errors import SchemaError
+from contextdb.schema.sections import condition_to_dict, differences, settings_to_dict
+from contextdb.schema.settings import Schema, TableSettings
+from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Rows, Sections
+from contextdb.tables.merging.shared import Shared
+from contextdb.tables.table import Table
+
+JOBS = ("asset", "outputs", "enabled", "priority", "weight", "when")
+"""What settings say of columns."""
+
+_EMPTY = TextColumn("", ("",), np.zeros(1, np.int32))
+
+
+def edit_to(
+    before: Table,
+    columns: Sequence[TextColumn],
+    rows: CameFrom,
+    fields: CameFrom,
+    settings: TableSettings,
+    schema: Schema,
+    name: str,
+) -> Edit:
+    """An edit that gives `before` these columns.
+
+    `rows` and `fields` are, for each row and column, the one it was before or -1; of `settings` the jobs of columns are taken, and
+    of `schema` what it declares of these columns, unless the two cannot be said together: then `before` keeps what it says.
+    """
+    changes: list[Change] = []
+    if not np.array_equal(rows, np.arange(before.n_rows)):
+        changes.append(Rows(rows))
+    layout = tuple((c.name, before.columns[f].name if f >= 0 else None) for c, f in zip(columns, fields.tolist(), strict=True))
+    if layout != tuple((c.name, c.name) for c in before.columns):
+        changes.append(Columns(layout))
+    middle = Edit(name, tuple(c for c in changes if isinstance(c, Columns))).apply(before)
+    said = _said_of(middle, columns, settings, schema)
+    changes += [said] if not said.is_empty and _fits(middle, said) else []
+    texts = {c.name: _differences(before, c, rows, f) for c, f in zip(columns, fields.tolist(), strict=True)}
+    texts = {column: cells for column, cells in texts.items() if cells}
+    return Edit(name, (*changes, Cells(texts)) if texts else tuple(changes))
+
+
+def _said_of(table: Table, columns: Sequence[TextColumn], settings: TableSettings, schema: Schema) -> Sections:
+    old, new = settings_to_dict(table.settings), settings_to_dict(settings)
+    jobs = differences({k: v for k, v in old.items() if k in JOBS}, {k: v for k, v in new.items() if k in JOBS})
+    known = table.schema.conditions
+    wanted = (schema.conditions.get(c.name) for c in columns)
+    declared = {c.name: condition_to_dict(c) for c in wanted if c is not None and known.get(c.name) != c}
+    return Sections(jobs, {"conditions": declared} if declared else {})
+
+
+def _fits(table: Table, said: Sections) -> bool:
+    try:
+        said.apply(table.with_rows_taken([]))
+    except SchemaError:
+        return False
+    return True
+
+
+def _differences(before: Table, column: TextColumn, rows: CameFrom, field: int) -> dict[int, str]:
+    """The rows whose text is not what the column has after its rows and columns were put in place; new cells are empty then."""
+    old = before.columns[field] if field >= 0 else None
+    is_shared = old is not None and old.codes is column.codes and old.texts is column.texts
+    if is_shared and np.array_equal(rows, np.arange(before.n_rows)):
+        return {}
+    shared = Shared.of((old, column, _EMPTY))
+    was = shared.at(0, rows)
+    was[was < 0] = int(shared.codes[2][0])
+    differs = np.flatnonzero(shared.codes[1] != was).tolist()
+    return {row: column[row] for row in differs}

@@ -1,0 +1,153 @@
+"""A three-way merge of tables: what two sides made of one base, cell by cell.
+
+A cell that one side changed is as that side has it; what both changed alike is no conflict, nor is a change that only writes the
+same otherwise. Rows and columns that come, go and move on either side do so in the merge (`contextdb.tables.merging.order`). What
+the sides disagree about stands in `conflicts`, and until somebody decides it ours holds. The result keeps the source of ours, so
+that saving it changes only lines that theirs changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from contextdb.cells.conditions import Condition
+from contextdb.columns import TextColumn
+from contextdb.edits.edits import Edit
+from contextdb.schema.sections import job_faults
+from contextdb.schema.settings import Schema, TableSettings
+from contextdb.tables.changes import CameFrom
+from contextdb.tables.merging.alignment import align
+from contextdb.tables.merging.building import JOBS, edit_to
+from contextdb.tables.merging.cells import merge_column
+from contextdb.tables.merging.conflicts import Conflict, Decided, Side
+from contextdb.tables.merging.order import Origins
+from contextdb.tables.merging.structure import merge_columns, merge_rows
+from contextdb.tables.table import Table
+
+
+@dataclass(frozen=True, eq=False)
+class Merge:
+    """The merge of `ours` and `theirs`, which were both made of `base`."""
+
+    base: Table
+    ours: Table
+    theirs: Table
+    rows: Origins
+    fields: Origins
+    """The same for columns."""
+    columns: tuple[TextColumn, ...]
+    """The merged texts."""
+    settings: TableSettings
+    schema: Schema
+    conflicts: tuple[Conflict, ...]
+    """What is not decided yet, by row; until then `columns` has it as ours."""
+    decided: Decided
+
+    @cached_property
+    def table(self) -> Table:
+        """The merged table, with the source of ours: saving it changes only lines that theirs changed."""
+        return self.edit_of_ours().apply(self.ours)
+
+    def edit_of_ours(self, name: str = "Merge") -> Edit:
+        """The edit that makes ours the merge."""
+        return self._edit(self.ours, self.rows.ours, self.fields.ours, name)
+
+    def edit_of_theirs(self, name: str = "Merge") -> Edit:
+        """The edit that makes theirs the merge."""
+        return self._edit(self.theirs, self.rows.theirs, self.fields.theirs, name)
+
+    def resolved(self, sides: Mapping[int, Side]) -> Merge:
+        """The merge with some of its conflicts decided, each by its place in `conflicts`."""
+        decided = {**self.decided, **{self.conflicts[at].key: side for at, side in sides.items()}}
+        return merge(self.base, self.ours, self.theirs, decided)
+
+    def _edit(self, side: Table, rows: CameFrom, fields: CameFrom, name: str) -> Edit:
+        return edit_to(side, self.columns, rows, fields, self.settings, self.schema, name)
+
+
+def merge(base: Table, ours: Table, theirs: Table, decided: Decided | None = None) -> Merge:
+    """Join what two sides made of a table.
+
+    Parameters
+    ----------
+    base, ours, theirs : Table
+        Cells may be unreadable; such a text means itself.
+    decided : mapping, optional
+        Conflicts that are decided already, by their `key`; use `Merge.resolved`.
+
+    Returns
+    -------
+    Merge
+        Merging a table with itself gives it byte for byte.
+    """
+    decided = decided or {}
+    of_ours, of_theirs = align(base, ours), align(base, theirs)
+    fields, names, about_columns = merge_columns(base, ours, theirs, of_ours, of_theirs, decided)
+    rows, about_rows = merge_rows(base, ours, theirs, of_ours, of_theirs, decided)
+    merged = [
+        merge_column((base, ours, theirs), rows, (int(b), int(o), int(t)), name, decided)
+        for b, o, t, name in zip(fields.base, fields.ours, fields.theirs, names, strict=True)
+    ]
+    columns = tuple(column for column, _ in merged)
+    schema = _schema(base.schema, ours.schema, theirs.schema)
+    settings = _settings(base, ours, theirs, fields, names, schema)
+    asset = _asset_texts(columns, settings)
+    cells = sorted((one for _, found in merged for one in found), key=lambda one: one.row or 0)
+    named = tuple(replace(one, asset=asset[one.row] if one.row is not None else "") for one in cells)
+    return Merge(base, ours, theirs, rows, fields, columns, settings, schema, (*about_columns, *about_rows, *named), decided)
+
+
+def _asset_texts(columns: Sequence[TextColumn], settings: TableSettings) -> TextColumn:
+    return next((c for c in columns if c.name == settings.asset), columns[0])
+
+
+# ---- what is said of the columns
+
+
+def _settings(base: Table, ours: Table, theirs: Table, fields: Origins, names: Sequence[str], schema: Schema) -> TableSettings:
+    """The settings of ours, with what only theirs said anew where that goes together, under the names of the merge."""
+    was, mine, yours = (
+        _jobs(table, dict(zip(places.tolist(), names, strict=True)))
+        for table, places in ((base, fields.base), (ours, fields.ours), (theirs, fields.theirs))
+    )
+    said = mine
+    for key in (key for key in JOBS if yours[key] != was[key]):
+        if key == "outputs":
+            tried = said | {key: _merged_names(was[key], mine[key], yours[key])}
+        else:
+            tried = said | {key: yours[key] if mine[key] == was[key] else mine[key]}
+        if not any(job_faults(replace(ours.settings, **tried), names, schema)):
+            said = tried
+    return replace(ours.settings, **said)
+
+
+def _jobs(table: Table, name_of: Mapping[int, str]) -> dict[str, Any]:
+    """What the settings say, under the names that columns have in the merge; of a column that is not there nothing."""
+    places = {c.name: at for at, c in enumerate(table.columns)}
+
+    def named(column: str | None) -> str | None:
+        return name_of.get(places[column]) if column in places else None
+
+    said: dict[str, Any] = {key: named(getattr(table.settings, key)) for key in JOBS if key != "outputs"}
+    said["outputs"] = tuple(name for name in map(named, table.settings.outputs) if name is not None)
+    return said
+
+
+def _merged_names(was: tuple[str, ...], ours: tuple[str, ...], theirs: tuple[str, ...]) -> tuple[str, ...]:
+    kept = [name for name in ours if name in theirs or name not in was]
+    return (*kept, *(name for name in theirs if name not in kept and name not in was))
+
+
+def _schema(base: Schema, ours: Schema, theirs: Schema) -> Schema:
+    return ours if theirs is ours else replace(ours, conditions=merged_conditions(base, ours, theirs))
+
+
+def merged_conditions(base: Schema, ours: Schema, theirs: Schema) -> dict[str, Condition]:
+    """What is declared of conditions: as ours has it where ours changed it, else as theirs."""
+    was, mine, yours = base.conditions, ours.conditions, theirs.conditions
+    names = [*yours, *(name for name in mine if name not in yours)]
+    found = {name: yours.get(name) if mine.get(name) == was.get(name) else mine.get(name) for name in names}
+    return {name: condition for name, condition in found.items() if condition is not None}

@@ -1,0 +1,245 @@
+"""A table with the rows of its inner tables in place of those that stand for them: the table that is compiled and measured.
+
+Cells of one condition in the tables of a way must all hold; a row is enabled when every row of its way is. Columns of slots and
+rules add up, of other outputs the innermost text counts. Nothing here touches the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contextdb import bitmask
+from contextdb.cells.conditions import Condition
+from contextdb.columns import TextColumn
+from contextdb.compiled.ways import Ways
+from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.schema.settings import Schema, TableSettings
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.nesting.expansion import NO_ROWS, Expansion, expand
+from contextdb.tables.nesting.flat_columns import FlatColumn
+from contextdb.tables.nesting.flat_texts import free_name, outputs_of, paths_and_leaves, rules_of
+from contextdb.tables.nesting.links import Neighbours, require_sound
+from contextdb.tables.plain_columns import PlainColumns
+from contextdb.tables.table import Table
+
+if TYPE_CHECKING:
+    Sources = Mapping[str, list[tuple[int, ConditionColumn]]]
+
+
+@dataclass(frozen=True, eq=False)
+class FlatTable(Table):
+    """A table with its inner tables' rows; get one from `Table.flat()`. Its assets are paths, its row numbers those of matches."""
+
+    expansion: Expansion = NO_ROWS
+    leaves: tuple[str, ...] = ()
+    """The asset of each row without its path."""
+    switched_off: int = 0
+    """Rows that are not enabled whatever their tables say, as bits."""
+
+    @cached_property
+    def ways(self) -> Ways:
+        """The way of each row, as a compiled table keeps it."""
+        layers = [column.layers if isinstance(column, FlatColumn) else None for column in self.conditions]
+        return Ways.of(self.expansion, self.leaves, layers)
+
+    @cached_property
+    def faults(self) -> list[Fault]:
+        """Nothing: what cannot be read is told of the tables it is made of."""
+        return []
+
+    @cached_property
+    def _plain(self) -> PlainColumns:
+        plain = _plain(self.expansion)
+        off = bitmask.unpack(bitmask.from_int(self.switched_off, self.n_rows), self.n_rows)
+        return replace(plain, enabled=plain.enabled & ~off)
+
+    def place(self, row: int, column: str | None = None) -> Place:
+        """Where the innermost row of a way stands; with a column, the innermost that has it."""
+        steps = self._steps(row)
+        having = [(t, r) for t, r in steps if column is None or any(c.name == column for c in t.columns)]
+        table, inner = (having or steps)[-1]
+        return table.place(inner, column)
+
+    def places(self, row: int) -> list[Place]:
+        """Where the rows of a way stand, outermost first."""
+        return [table.place(inner) for table, inner in self._steps(row)]
+
+    def _steps(self, row: int) -> list[tuple[Table, int]]:
+        numbers, rows = (of[:, row].tolist() for of in (self.expansion.numbers, self.expansion.rows))
+        return [(self.expansion.tables[n], r) for n, r in zip(numbers, rows, strict=True) if n >= 0]
+
+    def flat(self, tables: Mapping[str, Table] | None = None) -> Table:
+        """The table itself."""
+        return self
+
+    def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
+        """Refuse: a flat table is worked out from others."""
+        raise TableError(Fault("a table with its inner tables' rows is no file.", "the tables that it is made of"))
+
+
+def flatten(table: Table, tables: Mapping[str, Table]) -> FlatTable:
+    """The flat table of a table whose inner tables are among some others.
+
+    Raises
+    ------
+    TableError
+        Inner tables that are not there or cannot be read, cycles, conditions of unlike types, or too many rows; with every fault.
+    """
+    last = tables.last if isinstance(tables, Neighbours) and isinstance(tables.last, FlatTable) else None
+    expansion = _expansion(require_sound(table, tables), last)
+    sources = _sources(expansion)
+    conditions = _conditions(expansion, sources)
+    columns = tuple(_column(expansion, conditions[name], found, last) for name, found in sources.items())
+    taken = set(sources)
+    asset, leaves = _assets(expansion, free_name(table.asset_column, taken), last)
+    outputs = outputs_of(expansion, taken)
+    rules = rules_of(expansion, taken)
+    settings = replace(
+        TableSettings(table.settings.name, table.settings.file),
+        asset=asset.name,
+        outputs=tuple(c.name for c in outputs),
+        fallback=table.settings.fallback,
+        policy=table.settings.policy,
+        assume=table.settings.assume,
+        **({"when": rules.name} if rules else {}),
+    )
+    texts = (asset, *outputs, *([rules] if rules else []), *(c.texts for c in columns))
+    flat = FlatTable(
+        name=table.name,
+        settings=settings,
+        columns=texts,
+        conditions=columns,
+        schema=_schema(expansion),
+        path=table.path,
+        origin=np.arange(expansion.n_rows),
+        expansion=expansion,
+        leaves=leaves,
+    )
+    if flat.when is not None and (unread := [_together(f).at(flat.place(row)) for row, f in flat.when.faulty_rows()]):
+        raise TableError(*unread)
+    if isinstance(tables, Neighbours):
+        tables.last = flat
+    return flat
+
+
+def _together(fault: Fault) -> Fault:
+    """A fault of the rules of a way, each of which can be read alone."""
+    return replace(fault, found=f"the rules of this row and of those that stand for its table, taken together: {fault.found}")
+
+
+def _expansion(tables: Mapping[str, Table], last: FlatTable | None) -> Expansion:
+    """The flat rows; those of the last time where no asset cell has changed since."""
+    was = last.expansion if last is not None else None
+    if was is None or was.names != tuple(tables):
+        return expand(tables)
+    pairs = zip(was.tables, tables.values(), strict=True)
+    is_same = all(old.text_column(old.asset_column) is new.text_column(new.asset_column) for old, new in pairs)
+    return replace(was, tables=tuple(tables.values())) if is_same else expand(tables)
+
+
+def _sources(expansion: Expansion) -> Sources:
+    """For each condition of any of the tables its columns, with the numbers of the tables."""
+    found: dict[str, list[tuple[int, ConditionColumn]]] = {}
+    for number, table in enumerate(expansion.tables):
+        for column in table.conditions:
+            found.setdefault(column.condition.name, []).append((number, column))
+    return found
+
+
+def _conditions(expansion: Expansion, sources: Sources) -> dict[str, Condition]:
+    """The condition of each name; a column of Any alone, whose type is a guess, is of any type."""
+    chosen: dict[str, Condition] = {}
+    faults: list[Fault] = []
+    for name, columns in sources.items():
+        saying = [(n, c) for n, c in columns if c.condition.is_declared or not all(cell.is_any for cell in c.cells)]
+        first, column = (saying or columns)[0]
+        chosen[name] = column.condition
+        faults += [
+            _unlike(expansion, first, number, name, column.condition, other.condition)
+            for number, other in saying
+            if other.condition.domain != column.condition.domain
+        ]
+    if faults:
+        raise TableError(*faults)
+    return chosen
+
+
+def _unlike(expansion: Expansion, first: int, number: int, name: str, one: Condition, other: Condition) -> Fault:
+    here, there = (
+        str(t.path) if t.path else f"the table {in_quotes(expansion.names[n])}" for n, t in _two(expansion, number, first)
+    )
+    is_kind = one.domain.kind != other.domain.kind
+    found = (
+        f"is of type {other.domain.kind} here and of type {one.domain.kind}" if is_kind else "has other values or bounds here than"
+    )
+    place = Place(here, None, name)
+    mend = "" if one.is_declared and other.is_declared else f"to declare it in contextdb.toml: [conditions.{name}]"
+    accepted = "one type in all tables that stand in each other"
+    return Fault(f"the condition {found} in {there}.", accepted, mend, place, "unlike-conditions")
+
+
+def _two(expansion: Expansion, *numbers: int) -> list[tuple[int, Table]]:
+    return [(n, expansion.tables[n]) for n in numbers]
+
+
+def _column(
+    expansion: Expansion, condition: Condition, sources: list[tuple[int, ConditionColumn]], last: FlatTable | None
+) -> FlatColumn:
+    """A condition's column; that of the last time where nothing in it has changed."""
+    is_same_rows = last is not None and last.expansion.rows is expansion.rows
+    for known in last.conditions if last is not None and is_same_rows else ():
+        if isinstance(known, FlatColumn) and known.condition == condition and _are_same(known.sources, sources):
+            return known
+    return FlatColumn.made(expansion, condition, sources)
+
+
+def _are_same(some: Sequence[tuple[int, ConditionColumn]], others: Sequence[tuple[int, ConditionColumn]]) -> bool:
+    return len(some) == len(others) and all(n == m and a is b for (n, a), (m, b) in zip(some, others, strict=True))
+
+
+def _assets(expansion: Expansion, name: str, last: FlatTable | None) -> tuple[TextColumn, tuple[str, ...]]:
+    """The assets of all rows; those of the last time where no row has changed since."""
+    if last is not None and last.expansion.rows is expansion.rows:
+        return last.text_column(last.asset_column).renamed(name), last.leaves
+    return paths_and_leaves(expansion, name)
+
+
+def _schema(expansion: Expansion) -> Schema:
+    """What is declared for the tables: by the outer one's project, and for those of other projects by theirs."""
+    outer = expansion.tables[0].schema
+    more = [t.schema.conditions for t in expansion.tables[1:] if t.schema is not outer]
+    if not more:
+        return outer
+    return replace(outer, conditions={**{n: c for known in reversed(more) for n, c in known.items()}, **outer.conditions})
+
+
+def _plain(expansion: Expansion) -> PlainColumns:
+    """Enabled where all of a way are; the outer row's priority; the product of the weights."""
+    n_rows = expansion.n_rows
+    enabled, weights = np.ones(n_rows, np.bool_), np.ones(n_rows)
+    for number, table in enumerate(expansion.tables):
+        for numbers, rows in zip(expansion.numbers, expansion.rows, strict=True):
+            here = numbers == number
+            enabled[here] &= table.enabled[rows[here]]
+            weights[here] *= table.row_weights[rows[here]]
+    return PlainColumns(enabled, expansion.tables[0].priorities[expansion.rows[0]], weights, ())
+
+
+def leaf_assets(table: Table) -> list[str]:
+    """The assets that the rows of a table and those inside it name, without paths."""
+    flat = table.flat()
+    return list(flat.leaves) if isinstance(flat, FlatTable) else flat.assets
+
+
+def flat_rows(table: Table, flat: Table) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
+    """For each row of a table its rows in the flat table."""
+    if not isinstance(flat, FlatTable):
+        return list(np.arange(table.n_rows).reshape(-1, 1))
+    own = flat.expansion.rows[0]
+    return np.split(np.arange(len(own)), np.searchsorted(own, np.arange(1, table.n_rows))) if table.n_rows else []

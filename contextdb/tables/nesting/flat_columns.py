@@ -1,0 +1,82 @@
+"""The conditions of a flat table: each row accepts what all cells of its way accept. D = depth, n = flat rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.grammar import ANY, Cell, format_cell
+from contextdb.cells.nesting_cells import TagMeet, meet
+from contextdb.columns import TextColumn
+from contextdb.compiled.classes import ColumnMasks, column_masks
+from contextdb.compiled.layers import Layers
+from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.nesting.expansion import Expansion
+
+BOTH = " & "
+"""Between the cells of two tables where no single cell says the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlatColumn(ConditionColumn):
+    """A condition of a flat table: each row accepts what all cells of its way accept."""
+
+    sources: tuple[tuple[int, ConditionColumn], ...]
+    """The columns that it was made of, with the numbers of their tables."""
+    layers: Layers
+
+    @classmethod
+    def made(cls, expansion: Expansion, condition: Condition, sources: Sequence[tuple[int, ConditionColumn]]) -> FlatColumn:
+        """Bring the columns of some tables together."""
+        layers = Layers.of(expansion, [(number, column.texts) for number, column in sources])
+        found, which = layers.combined
+        cells = _Cells(sources)
+        met = [_met([layers.texts[c] for c in codes if c], [cells[c] for c in codes if c], condition) for codes in found.T.tolist()]
+        texts = TextColumn(condition.name, tuple(text for text, _ in met), which)
+        return cls(condition, texts, tuple(cell for _, cell in met), {}, tuple(sources), layers)
+
+    @cached_property
+    def soft(self) -> tuple[ColumnMasks, NDArray[np.float64]] | None:
+        """Of soft cells, one row for each row of each depth: masks of those that match, and the penalties float64 [D n]."""
+        cells, used = _Cells(self.sources), np.unique(self.layers.codes)
+        soft = [cells[c] if cells[c].is_soft else ANY for c in used.tolist()]
+        if all(cell.is_any for cell in soft):
+            return None
+        codes = np.searchsorted(used, self.layers.codes).astype(np.int32).reshape(-1)
+        penalties = np.array([cell.penalty or 0.0 for cell in soft])
+        return column_masks([Cell(cell.accepts) for cell in soft], codes, self.condition.domain), penalties[codes]
+
+
+class _Cells:
+    """The cells of some columns under the codes of `Layers`."""
+
+    def __init__(self, sources: Sequence[tuple[int, ConditionColumn]]) -> None:
+        self._columns = [column for _, column in sources]
+        self._starts = np.cumsum([1, *(len(column.texts.texts) for column in self._columns)])
+
+    def __getitem__(self, code: int) -> Cell:
+        if code == 0:
+            return ANY
+        at = int(np.searchsorted(self._starts, code, "right")) - 1
+        return self._columns[at].cells[code - int(self._starts[at])]
+
+
+def _met(texts: list[str], cells: list[Cell], condition: Condition) -> tuple[str, Cell]:
+    """A cell and its text: the text of one table where that says it all."""
+    found = meet(cells)
+    said = [(text, cell) for text, cell in zip(texts, cells, strict=True) if not cell.is_any]
+    if not said:
+        return (texts[-1] if texts else ""), found
+    n_soft = sum(cell.is_soft for _, cell in said)
+    if not n_soft or len(said) == 1:
+        same = next((text for text, cell in said if cell == found), None)
+        if same is not None:
+            return same, found
+    if n_soft or isinstance(found.accepts, TagMeet):
+        return BOTH.join(text.strip() for text, _ in said), found
+    return format_cell(found, condition.domain), found

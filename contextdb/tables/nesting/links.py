@@ -1,0 +1,149 @@
+"""Which tables the rows of a table stand for, and what is wrong with that: a table that is not there, tables that come back to
+themselves. Tables are given as a mapping by name, whose reading may fail; nothing here touches the disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, nearest, some
+from contextdb.tables.nesting.names import MARK, inner_name, says_nesting
+
+if TYPE_CHECKING:
+    from contextdb.tables.table import Table
+
+    Tables = Mapping[str, Table]
+
+
+class Neighbours(Mapping[str, "Table"]):
+    """The tables that the rows of one table may stand for, by name, and what was worked out with them last.
+
+    The versions of a table that come of edits share it, so that flattening anew costs what changed.
+    """
+
+    def __init__(self, tables: Tables, last: object = None) -> None:
+        self.tables = tables
+        self.last = last
+        """The flat table that was made last."""
+
+    def __getstate__(self) -> dict[str, object]:
+        """What is pickled: not what can be worked out again."""
+        return {"tables": self.tables, "last": None}
+
+    def __getitem__(self, name: str) -> Table:
+        return self.tables[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.tables
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def __len__(self) -> int:
+        return len(self.tables)
+
+
+def is_nested(table: Table) -> bool:
+    """Whether an asset cell of the table says more than the name of an asset."""
+    return bool(table.columns) and says_nesting(table.text_column(table.asset_column).texts)
+
+
+def inner_rows(table: Table) -> dict[str, list[int]]:
+    """The tables that rows stand for, by name, with those rows."""
+    if not table.columns:
+        return {}
+    column = table.text_column(table.asset_column)
+    names = {code: name for code, text in enumerate(column.texts) if MARK in text and (name := inner_name(text)) is not None}
+    found: dict[str, list[int]] = {}
+    for row in np.flatnonzero(np.isin(column.codes, list(names))).tolist() if names else ():
+        found.setdefault(names[int(column.codes[row])], []).append(row)
+    return found
+
+
+def inner_tables(tables: Iterable[Table]) -> set[str]:
+    """The names of the tables that rows of some tables stand for."""
+    return {name for table in tables for name in inner_rows(table)}
+
+
+def reached(table: Table, tables: Tables) -> dict[str, Table]:
+    """The table and all that stand in it, by name, each once; the table itself first. Those that cannot be read are left out."""
+    found = {table.name: table}
+    waiting = [table]
+    while waiting:
+        for name in inner_rows(waiting.pop()):
+            if name not in found and (inner := _read(name, tables)) is not None:
+                found[name] = inner
+                waiting.append(inner)
+    return found
+
+
+def nesting_faults(table: Table, tables: Tables, name: str | None = None) -> list[Fault]:
+    """What is wrong with the rows of one table, known as `name`, that stand for others, in the order of its rows."""
+    found: list[tuple[int, Fault]] = []
+    for inner, rows in inner_rows(table).items():
+        if fault := _missing(name or table.name, inner, tables) or _cycle(name or table.name, inner, tables):
+            found += [(row, fault.at(table.place(row, table.asset_column))) for row in rows]
+    return [fault for _, fault in sorted(found, key=lambda item: item[0])]
+
+
+def require_sound(table: Table, tables: Tables) -> dict[str, Table]:
+    """The tables that stand in a table, as `reached`.
+
+    Raises
+    ------
+    TableError
+        With what is wrong in any of them: files and cells that cannot be read, tables that are not there, cycles.
+    """
+    found = reached(table, tables)
+    faults = dict.fromkeys(_unread(found.values(), tables))
+    for name, inner in found.items():
+        faults |= dict.fromkeys((*inner.faults, *nesting_faults(inner, tables, name)))
+    if faults:
+        raise TableError(*faults)
+    return found
+
+
+def _unread(found: Iterable[Table], tables: Tables) -> Iterator[Fault]:
+    for name in dict.fromkeys(name for table in found for name in inner_rows(table)):
+        if name in tables:
+            try:
+                tables[name]
+            except ContextDBError as error:
+                yield from error.faults
+
+
+def _read(name: str, tables: Tables) -> Table | None:
+    try:
+        return tables.get(name)
+    except ContextDBError:  # told by `require_sound`, and in the file itself
+        return None
+
+
+def _missing(outer: str, name: str, tables: Tables) -> Fault | None:
+    if name in tables or name == outer:
+        return None
+    others = [other for other in tables if other != outer]
+    near = nearest(name, others)
+    known = some(f"{MARK}{other}" for other in others) or "an asset, as there is no other table"
+    mend = in_quotes(MARK + near) if near else f'to put an asset of this name in quotes: "{MARK}{name}"' if name else ""
+    found = f"there is no table {in_quotes(name)} to stand here." if name else f'after "{MARK}" the name of a table is missing.'
+    return Fault(found, known, mend, rule="no-such-table")
+
+
+def _cycle(outer: str, name: str, tables: Tables) -> Fault | None:
+    """A fault when the table `outer` stands in itself by way of the table `name`; the shortest way is told."""
+    ways: dict[str, tuple[str, ...]] = {name: (outer, name)}
+    waiting = [name]
+    while waiting:
+        at = waiting.pop(0)
+        if at == outer:
+            way = " > ".join(ways[at])
+            return Fault(f"the table stands in itself: {way}.", "tables that do not come back to themselves", rule="cyclic-tables")
+        inner = _read(at, tables)
+        for following in inner_rows(inner) if inner is not None else ():
+            if following not in ways:
+                ways[following] = (*ways[at], following)
+                waiting.append(following)
+    return None

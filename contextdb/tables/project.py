@@ -1,0 +1,321 @@
+"""A folder of tables: contextdb.toml and one file a table, read from the disk."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from contextdb.cells.arguments import require_kind, require_path
+from contextdb.compiled.unchanging import Unchanging
+from contextdb.disk import names_a_table, path_in_quotes, read_bytes
+from contextdb.disk.together import finish
+from contextdb.errors import ContextDBError, Fault, FileError, NoSuchTable, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.files import texts as files
+from contextdb.files.file_names import alike, composed, spelled
+from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
+from contextdb.tables.nesting.links import Neighbours, inner_tables, is_nested, require_sound
+from contextdb.tables.other_files import other_form, stray_sentence
+from contextdb.tables.table import Table, build_table
+
+if TYPE_CHECKING:
+    from contextdb.compiled.table import CompiledTable
+
+SCHEMA_FILE = "contextdb.toml"
+T = TypeVar("T")
+
+
+class ByName(Mapping[str, T]):
+    """A mapping by names that is equal to itself alone, and true though it may be empty."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    def __bool__(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True, eq=False)
+class Project(Unchanging, ByName[Table]):
+    """All tables of a folder, under one contextdb.toml: a mapping of tables by name."""
+
+    folder: Path
+    schema: Schema
+    tables: Mapping[str, Table]
+
+    @classmethod
+    def load(cls, path: str | Path, strict: bool = True) -> Project:
+        """Read a folder of tables (or its contextdb.toml).
+
+        Parameters
+        ----------
+        strict : bool
+            False keeps cells that cannot be read, in each table's `faults`.
+
+        Raises
+        ------
+        ContextDBError
+            With every fault of every file.
+        """
+        folder = folder_of(require_path(path))
+        schema = read_folder_schema(folder)
+        tables: dict[str, Table] = {}
+        faults: list[Fault] = []
+        found = list(table_files(folder, schema))
+        for name, file in found:
+            try:
+                tables[name] = _read_table(file, schema, folder, strict)
+            except ContextDBError as error:
+                faults += error.faults
+        faults += twice_named(found)
+        if faults:
+            raise TableError(*faults)
+        project = cls(folder, schema, around_each_other(tables))
+        if strict:
+            project.require_sound()
+        return project
+
+    def __getitem__(self, name: str) -> Table:
+        """One table by its name; a name that is not there raises NoSuchTable, which is a KeyError too, and names the nearest."""
+        if name not in self.tables:
+            near = nearest(str(name), self.tables)
+            found = f"there is no table {in_quotes(str(name))}."
+            raise NoSuchTable(Fault(found, some(self.tables) or "none: the folder has no table", in_quotes(near) if near else ""))
+        return self.tables[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def __len__(self) -> int:
+        return len(self.tables)
+
+    def with_table(self, table: Table) -> Project:
+        """The project with one table in another version, for those too whose rows stand for it."""
+        require_kind(table, Table, "table", "a Table")
+        return replace(self, tables=around_each_other({**self.tables, table.name: table}))
+
+    @property
+    def inner(self) -> set[str]:
+        """The names of the tables that rows of other tables stand for."""
+        return inner_tables(self.tables.values()) & set(self.tables)
+
+    def require_sound(self) -> None:
+        """Raise TableError with what is wrong with rows that stand for tables."""
+        faults: dict[Fault, None] = {}
+        for table in self.tables.values():
+            if is_nested(table):
+                try:
+                    require_sound(table, self.tables)
+                except ContextDBError as error:
+                    faults |= dict.fromkeys(error.faults)
+        if faults:
+            raise TableError(*faults)
+
+    def compile(self) -> dict[str, CompiledTable]:
+        """Every table compiled, by name."""
+        return {name: table.compile() for name, table in self.tables.items()}
+
+
+def load_table(path: Path, strict: bool = True) -> Table:
+    """Read one table under the contextdb.toml beside it, or above it where that one declares the file."""
+    folder, schema = schema_for(path)
+    around = Neighbours(_Folder(folder, schema))
+    table = _read_table(path, schema, folder, strict, around)
+    if strict and is_nested(table):
+        require_sound(table, around)
+    return table
+
+
+def neighbours(path: Path) -> Neighbours:
+    """The tables that the rows of a table file may stand for: those of its folder, each read when it is first asked for."""
+    return Neighbours(_Folder(*schema_for(path)))
+
+
+def around_each_other(tables: Mapping[str, Table], before: Mapping[str, Table] | None = None) -> dict[str, Table]:
+    """Tables that know of each other; what was worked out for them, or for their versions before, is kept."""
+    alone = {name: table if table.around is None else replace(table, around=None) for name, table in tables.items()}
+    was = {name: (before or {}).get(name, table).around for name, table in tables.items()}
+    lasts = {name: around.last if isinstance(around, Neighbours) else None for name, around in was.items()}
+    return {name: replace(table, around=Neighbours(alone, lasts[name])) for name, table in tables.items()}
+
+
+class _Folder(Mapping[str, Table]):
+    """The tables of a folder, each read when it is first asked for."""
+
+    def __init__(self, folder: Path, schema: Schema) -> None:
+        self._folder, self._schema = folder, schema
+        self._read: dict[str, Table] = {}
+        self._paths: dict[str, Path] | None = None
+
+    @property
+    def _files(self) -> dict[str, Path]:
+        if self._paths is None:
+            self._paths = {}
+            with suppress(OSError):  # a folder that cannot be listed has no other tables
+                self._paths |= table_files(self._folder, self._schema)
+        return self._paths
+
+    def __getitem__(self, name: str) -> Table:
+        if name not in self._read:
+            self._read[name] = _read_table(self._files[name], self._schema, self._folder, strict=False)
+        return self._read[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._files
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._files)
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+
+def schema_for(path: Path) -> tuple[Path, Schema]:
+    """The folder and the schema that a table file belongs to."""
+    finish(path.parent)
+    beside = path.parent / SCHEMA_FILE
+    if beside.is_file():
+        return path.parent, read_folder_schema(path.parent)
+    for folder in path.resolve().parent.parents:
+        if (folder / SCHEMA_FILE).is_file():
+            schema = read_folder_schema(folder)
+            if settings_of(path, folder, schema) in schema.tables.values():
+                return folder, schema
+            break
+    return path.parent, EMPTY
+
+
+def read_folder_schema(folder: Path) -> Schema:
+    """What the folder's contextdb.toml says; nothing where there is none."""
+    finish(folder)
+    path = folder / SCHEMA_FILE
+    if not path.is_file():
+        return EMPTY
+    raw = read_bytes(path)
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(str(path), line))) from None
+    return read_schema(text, str(path))
+
+
+def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
+    """Name and file of every table: those that contextdb.toml declares, then others that lie in the folder and may be tables."""
+    declared = list(_declared_files(folder, schema))
+    yield from declared
+    for path in _undeclared_files(folder, declared):
+        if other_form(path, schema.conditions) is None:
+            yield composed(path.stem), path
+
+
+def stray_files(folder: Path, schema: Schema) -> Iterator[tuple[Path, str]]:
+    """The files that lie beside the tables and look like something else, each with a sentence that says so."""
+    for path in _undeclared_files(folder, list(_declared_files(folder, schema))):
+        form = other_form(path, schema.conditions)
+        if form is not None:
+            yield path, stray_sentence(path, form)
+
+
+def _declared_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
+    names: dict[Path, list[str]] = {}
+    for settings in schema.tables.values():
+        candidates = [folder / f for f in settings.files]
+        yield settings.name, next((found for p in candidates if (found := _on_disk(p, names)) is not None), candidates[0])
+
+
+def _undeclared_files(folder: Path, declared: Iterable[tuple[str, Path]]) -> Iterator[Path]:
+    taken = {path for _, path in declared}
+    return (path for path in sorted(folder.iterdir()) if path not in taken and _is_table(path))
+
+
+def _on_disk(path: Path, names: dict[Path, list[str]]) -> Path | None:
+    """A file as its folder spells it: in another Unicode form perhaps, on some disks in other capitals; None where it is not there.
+    `names` are those of folders that were listed already."""
+    if path.parent not in names:
+        names[path.parent] = _names_in(path.parent)
+    present = names[path.parent]
+    found = spelled(path.name, present)
+    if found is None and path.is_file():  # a disk that does not tell capitals, or a folder that cannot be listed
+        found = next((name for name in present if alike(name) == alike(path.name)), path.name)
+    return path.with_name(found) if found is not None and path.with_name(found).is_file() else None
+
+
+def _names_in(folder: Path) -> list[str]:
+    try:
+        return sorted(os.listdir(folder))
+    except (OSError, ValueError):
+        return []
+
+
+def settings_of(path: Path, folder: Path, schema: Schema) -> TableSettings:
+    """What contextdb.toml says of a table file: what it declares for this file, whatever the disk makes of its name."""
+    below = _below(path, folder)
+    settings = schema.settings_for(below)
+    if settings.name in schema.tables:
+        return settings
+    for declared in schema.tables.values():
+        for file in declared.files:
+            if alike(file) == alike(below) and _is_same_file(folder / file, path):
+                return declared
+    return settings
+
+
+def _is_same_file(one: Path, other: Path) -> bool:
+    with suppress(OSError, ValueError):
+        return os.path.samefile(one, other)
+    return False
+
+
+def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
+    """A fault for every file whose table has the name of one before it: nobody could say which of the two is meant."""
+    first: dict[str, Path] = {}
+    faults = []
+    for name, path in found:
+        if first.setdefault(name, path) != path:
+            stands = f"the table {in_quotes(name)} stands in {path_in_quotes(first[name])} too."
+            faults.append(Fault(stands, "one file for each table", place=Place(str(path))))
+    return faults
+
+
+def _is_table(path: Path) -> bool:
+    return names_a_table(path.name) and path.is_file()
+
+
+def folder_of(path: Path) -> Path:
+    """The folder that a path to a folder, or to a contextdb.toml, means."""
+    if os.path.isdir(path):  # os.path says no, where Path raises, to a name that no file can have
+        return path
+    if path.name == SCHEMA_FILE and os.path.isfile(path):
+        return path.parent
+    noun = "file" if path.name == SCHEMA_FILE else "folder"
+    found = "it is no folder." if os.path.exists(path) else f"there is no such {noun}."
+    siblings = [p.name for p in path.parent.iterdir() if p.is_dir()] if os.path.isdir(path.parent) else []
+    near = nearest(path.name, siblings)
+    mend = path_in_quotes(path.parent / near) if near else ""
+    raise FileError(Fault(found, f"a folder of tables, or its {SCHEMA_FILE}", mend, Place(str(path)), "no-such-path"))
+
+
+def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: Mapping[str, Table] | None = None) -> Table:
+    settings = settings_of(path, folder, schema)
+    source, columns = files.read_texts(path)
+    table = replace(build_table(settings.name, columns, schema, settings, path, source), around=around)
+    if strict:
+        table.require_readable()
+    return table
+
+
+def _below(path: Path, folder: Path) -> str:
+    """The path of a file below a folder, as contextdb.toml has it; links on the way to the file stay what they are named."""
+    if path.is_relative_to(folder):
+        return path.relative_to(folder).as_posix()
+    whole, root = path.parent.resolve() / path.name, folder.resolve()
+    return whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path.name

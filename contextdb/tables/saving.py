@@ -1,0 +1,88 @@
+"""Save a table into the file that it was read from, though others may have written it since. An edge: this touches the disk.
+
+What others wrote is merged cell by cell, as the editor does it; where both changed a cell otherwise, nothing is written.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from contextdb.disk import Was, read_bytes, write_atomic
+from contextdb.edits.diffing import Conflict, merge
+from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, plural, shown
+from contextdb.files.texts import new_source
+from contextdb.tables.merging.alignment import align
+from contextdb.tables.merging.reading import table_of
+from contextdb.tables.table import Table
+
+MOST_NAMED = 3
+
+
+def save_table(table: Table, target: Path, overwrite: bool) -> Table:
+    """Write a table; see `Table.save`."""
+    is_own = not overwrite and table.path is not None and table.source is not None and _is_same(table.path, target)
+    while True:
+        there = _bytes_of(target) if is_own else None
+        now = table if there is None else _joined(table, target, there)
+        source = new_source(target, now.columns, now.source, now.origin)
+        was: Was = there if is_own else "any"
+        if write_atomic(target, source.raw, was):
+            return replace(now, path=target, source=source, origin=np.arange(now.n_rows))
+
+
+def require_related(base: Table, on_disk: Table, mend: str) -> None:
+    """Raise TableError when what stands in a file has no row in common with the table that was read from it."""
+    if base.n_rows and not (align(base, on_disk).rows >= 0).any():
+        said = "what stands in the file now has no row in common with the table that was read from it."
+        accepted = "the table as it was, with changes"
+        raise TableError(Fault(said, accepted, mend, Place(str(on_disk.path)), "merge-conflict"))
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _bytes_of(file: Path) -> bytes | None:
+    return read_bytes(file) if os.path.exists(file) else None
+
+
+def _joined(table: Table, file: Path, there: bytes) -> Table:
+    """The table with what others wrote into its file since it was read.
+
+    Raises
+    ------
+    FileError
+        Both changed a cell otherwise, or the file is no table any more.
+    """
+    assert table.source is not None
+    if there == table.source.raw:
+        return table
+    place = Place(str(file))
+    mend = "to load it again and repeat the edits, or save(overwrite=True)"
+    try:
+        base, theirs = (table_of(raw, str(file), table.schema, table.settings) for raw in (table.source.raw, there))
+        require_related(base, theirs, mend)
+    except ContextDBError as error:
+        said = f"the file has been changed since it was read, and cannot be merged: {error.faults[0].found}"
+        raise FileError(Fault(said, "the table as it was, with changes", mend, place, "merge-conflict")) from None
+    found = merge(base, table, theirs)
+    if found.conflicts:
+        n = len(found.conflicts)
+        named = "; ".join(map(_told, found.conflicts[:MOST_NAMED])) + (f"; and {n - MOST_NAMED:,} more" if n > MOST_NAMED else "")
+        said = f"the file has been changed since it was read, in {plural(n, 'place')} otherwise than here: {named}."
+        raise FileError(Fault(said, mend=mend, place=place, rule="merge-conflict"))
+    now = found.edit_of_theirs().apply(theirs)
+    return replace(now, name=table.name, schema=table.schema, around=table.around)
+
+
+def _told(one: Conflict) -> str:
+    here, there = (_said(text) for text in (one.ours, one.theirs))
+    return f"{shown(one.place)} is {here} here and {there} in the file"
+
+
+def _said(text: str | None) -> str:
+    return "gone" if text is None else f'"{shown(text)}"'

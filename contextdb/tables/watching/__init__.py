@@ -1,0 +1,9 @@
+"""Hot reload: `contextdb.watch(folder)`. The package is not called `watch`, which is the function's name."""
+
+from __future__ import annotations
+
+from contextdb.tables.watching.sharing import table_like
+from contextdb.tables.watching.snapshot import Snapshot
+from contextdb.tables.watching.watcher import Watch, watch
+
+__all__ = ["Snapshot", "Watch", "table_like", "watch"]

@@ -1,0 +1,141 @@
+"""One version of a project: read from bytes that were all on the disk at one time, compiled, and never changed.
+
+`next_snapshot` makes a version from the one before: files whose bytes are the same are not read again, and of the others only the
+columns that changed are compiled. The disk is touched only to say why a file that is missing could not be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.unchanging import Unchanging
+from contextdb.disk import read_bytes
+from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError
+from contextdb.files.csv_source import read_csv
+from contextdb.files.parquet import read_parquet
+from contextdb.schema.settings import EMPTY, Schema, read_schema
+from contextdb.tables.nesting.links import reached
+from contextdb.tables.project import SCHEMA_FILE, ByName, Project, around_each_other, settings_of, twice_named
+from contextdb.tables.table import Table
+from contextdb.tables.watching.sharing import table_like
+from contextdb.tables.watching.stamps import Digests, digests_of
+
+Contents = Mapping[Path, bytes]
+Found = Sequence[tuple[str, Path]]
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot(Unchanging, ByName[CompiledTable]):
+    """One version of a project, compiled: a mapping of compiled tables by name. It never changes, so that a game can ask several
+    tables of one and the same version."""
+
+    number: int
+    """1 for the version that the watch began with, one more for each that came after it."""
+    project: Project = field(repr=False)
+    tables: Mapping[str, CompiledTable] = field(repr=False)
+    """Every table compiled, by name."""
+    changed: tuple[str, ...]
+    """The tables that are new or differ from the version before, in a table inside them too."""
+    digests: Digests = field(repr=False)
+    """Of each file, as it was read."""
+    alone: Mapping[str, Table] = field(repr=False)
+    """The tables as their files have them, knowing nothing of each other."""
+
+    def __getitem__(self, name: str) -> CompiledTable:
+        """One compiled table; a name that is not there raises NoSuchTable, which is a KeyError too, and names the nearest."""
+        return self.tables[self.project[name].name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def __len__(self) -> int:
+        return len(self.tables)
+
+
+def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Schema:
+    """What the folder's contextdb.toml says; the same object as before when its bytes are the same.
+
+    Raises
+    ------
+    FileError
+        It was there and is not, or may not be read.
+    SchemaError
+        It says something that cannot be meant.
+    """
+    path = folder / SCHEMA_FILE
+    raw = contents.get(path)
+    if raw is None:
+        if last is not None and path in last.digests:
+            gone = "the file is gone; the tables stay as they were."
+            raise FileError(Fault(gone, mend="to put it back", place=Place(str(path)), rule="no-such-path"))
+        if path.exists():
+            read_bytes(path)
+        return EMPTY
+    if last is not None and digests_of({path: raw})[path] == last.digests.get(path):
+        return last.project.schema
+    return read_schema(_decoded(raw, path), str(path))
+
+
+def next_snapshot(folder: Path, schema: Schema, found: Found, contents: Contents, last: Snapshot | None = None) -> Snapshot:
+    """The version that the files now are; `found` are the names and files of the tables.
+
+    Raises
+    ------
+    ContextDBError
+        With every fault of every table.
+    """
+    digests = digests_of(contents)
+    tables: dict[str, Table] = {}
+    faults: list[Fault] = []
+    for name, path in found:
+        try:
+            tables[name] = _table(path, folder, schema, contents, digests, last)
+        except ContextDBError as error:
+            faults += error.faults
+    faults += twice_named(found)
+    if faults:
+        raise TableError(*faults)
+    project = Project(folder, schema, around_each_other(tables, last.project.tables if last else {}))
+    project.require_sound()
+    before = last.alone if last else {}
+    changed = tuple(n for n, t in tables.items() if any(before.get(m) is not inner for m, inner in reached(t, tables).items()))
+    older = last.tables if last else {}
+    compiled = {n: older[n] if last and n not in changed else _compiled(t, older.get(n)) for n, t in project.tables.items()}
+    return Snapshot(last.number + 1 if last else 1, project, compiled, changed, digests, tables)
+
+
+def _table(path: Path, folder: Path, schema: Schema, contents: Contents, digests: Digests, last: Snapshot | None) -> Table:
+    settings = settings_of(path, folder, schema)
+    old = last.alone.get(settings.name) if last else None
+    if path not in contents:
+        read_bytes(path)  # raises FileError, which says why it cannot be read
+        raise FileError(Fault("the file came while the folder was read.", mend="to save it again", place=Place(str(path))))
+    is_same = old is not None and old.path == path and last is not None and digests[path] == last.digests.get(path)
+    if is_same and old is not None and old.schema is schema:
+        return old
+    read = read_parquet if path.suffix.lower() == ".parquet" else read_csv
+    source, columns = (old.source, old.columns) if is_same and old and old.source else read(contents[path], str(path))
+    table = table_like(old, columns, schema, settings, path, source)
+    table.require_readable()
+    return table
+
+
+def _compiled(table: Table, older: CompiledTable | None) -> CompiledTable:
+    """The table compiled, and made ready for the first query, which else would wait for it; it remembers what was picked of the
+    older version."""
+    compiled = table.compile()
+    if older is not None:
+        compiled.remember_as(older)
+    compiled.query({}, unknown="any")
+    return compiled
+
+
+def _decoded(raw: bytes, path: Path) -> str:
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise SchemaError(Fault("the file is not UTF-8.", "TOML is UTF-8", "to save it as UTF-8", Place(str(path), line))) from None

@@ -1,0 +1,143 @@
+"""Contexts from files: one row a moment, one column a fact. CSV texts are read as on the command line; Parquet keeps its types."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import polars as pl
+from polars.selectors import by_name
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import NUMERIC
+from contextdb.cells.facts import Unknown, read_fact_text
+from contextdb.cells.grammar import Cell
+from contextdb.compiled.batch import ManyMatches
+from contextdb.compiled.table import CompiledTable
+from contextdb.disk import path_in_quotes
+from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes, nearest
+from contextdb.files.texts import AnySource, read_texts, scanned_parquet
+
+ONE = "one value of its type in each context"
+
+
+@dataclass(frozen=True)
+class Contexts:
+    """The contexts of one file, one row each."""
+
+    path: Path
+    facts: pl.DataFrame
+    """The facts that the table asks for, typed as `query_many` takes them, null where one is missing. Other columns are all null:
+    their names may tell of a misspelling, and a row that says nothing to the table is a context too."""
+    source: AnySource | None = None
+
+    def ask(self, compiled: CompiledTable, unknown: Unknown) -> ManyMatches:
+        """The valid rows in every context; a ContextError names file, line and fact."""
+        try:
+            return compiled.query_many(self.facts, unknown)
+        except ContextError as error:
+            raise ContextError(*(fault.at(self._place(fault.place)) for fault in error.faults)) from None
+
+    def _place(self, place: Place) -> Place:
+        line = self.source.line(place.row) if self.source is not None and place.row is not None else None
+        return Place(str(self.path), line, place.column, place.row)
+
+
+def context_files(pattern: str) -> list[Path]:
+    """The files that a path or a glob means, in the order of their names.
+
+    Raises
+    ------
+    FileError
+        There is none.
+    """
+    if os.path.isfile(pattern):
+        return [Path(pattern)]
+    found = sorted(Path(p) for p in glob.glob(pattern, recursive=True) if os.path.isfile(p))
+    if not found:
+        accepted = "a .csv or .parquet file, or a glob"
+        raise FileError(Fault("no file of contexts is there.", accepted, _near(Path(pattern)), Place(pattern), "no-such-path"))
+    return found
+
+
+def _near(path: Path) -> str:
+    """What may have been meant by a name that is no file's: the files of a folder, or a file of nearly that name."""
+    if os.path.isdir(path):
+        suffixes = {file.suffix for file in path.iterdir()}
+        return next((path_in_quotes(path / f"*{suffix}") for suffix in (".parquet", ".csv") if suffix in suffixes), "")
+    near = nearest(path.name, sorted(os.listdir(path.parent))) if os.path.isdir(path.parent) else None
+    return path_in_quotes(path.parent / near) if near else ""
+
+
+def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
+    """Read the contexts of a file for a table.
+
+    Raises
+    ------
+    TableError, ContextError, FileError
+        The file cannot be read, or holds facts that the table cannot be asked with; file, line and fact are named.
+    """
+    if path.suffix.lower() == ".parquet":
+        return Contexts(path, _read_parquet(path, compiled))
+    source, columns = read_texts(path)
+    known = known_conditions(compiled)
+    series, faults = [], []
+    for column in columns:
+        condition = known.get(column.name)
+        if condition is None:
+            series.append(without_facts(column.name, column.n_rows))
+            continue
+        values, wrong = read_texts_as(column.texts, condition)
+        faults += [f.at(Place(str(path), source.line(int((column.codes == i).argmax())), column.name)) for i, f in wrong]
+        distinct = pl.Series(column.name, values, dtype=fact_type(condition), strict=False)
+        series.append(distinct.gather(column.codes) if len(distinct) else distinct)
+    if faults:
+        raise ContextError(*sorted(faults, key=lambda fault: fault.place.line or 0))
+    return Contexts(path, pl.DataFrame(series), source)
+
+
+def known_conditions(compiled: CompiledTable) -> dict[str, Condition]:
+    """The conditions that columns may be about; derived ones too, which the table then refuses."""
+    return compiled.asked | {c.name: c for c in compiled.conditions}
+
+
+def read_texts_as(texts: Sequence[str], condition: Condition) -> tuple[list[object], list[tuple[int, Fault]]]:
+    """Texts as facts, and what is wrong with which of them."""
+    values: list[object] = []
+    faults: list[tuple[int, Fault]] = []
+    for i, text in enumerate(texts):
+        try:
+            fact = read_fact_text(text, condition)
+            if isinstance(fact, Cell):
+                raise ContextError(Fault(f"{in_quotes(text)} is a set of values.", ONE, rule="wrong-fact"))
+            values.append(sorted(fact) if isinstance(fact, frozenset) else fact)
+        except ContextError as error:
+            values.append(None)
+            faults += [(i, replace(f, accepted=ONE) if f.rule == "unreadable-cell" else f) for f in error.faults]
+    return values, faults
+
+
+def fact_type(condition: Condition) -> pl.DataType:
+    """The type of a column of facts."""
+    kind = condition.domain.kind
+    if kind in NUMERIC:
+        return pl.Float64()
+    return pl.Boolean() if kind == "bool" else pl.List(pl.String) if kind == "tags" else pl.String()
+
+
+def _read_parquet(path: Path, compiled: CompiledTable) -> pl.DataFrame:
+    with scanned_parquet(path) as scan:
+        names = scan.collect_schema().names()
+        n_rows = scan.select(pl.len()).collect().item()
+        known = known_conditions(compiled)
+        asked = [n for n in names if n in known]
+        facts = scan.select(by_name(asked)).collect().get_columns() if asked else []
+    return pl.DataFrame([*facts, *(without_facts(n, n_rows) for n in names if n not in known)])
+
+
+def without_facts(name: str, n_rows: int) -> pl.Series:
+    """A column without a fact."""
+    return pl.repeat(None, n_rows, dtype=pl.Null, eager=True).alias(name)

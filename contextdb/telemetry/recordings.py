@@ -1,0 +1,141 @@
+"""Recorded contexts, looked at a few rows at a time: telemetry of the game, however long, in CSV or Parquet.
+
+One row is a moment, one column a fact. The rows stay in their file (Parquet) or its bytes (CSV) until they are asked for. Texts of
+a CSV are facts as on the command line; values of a Parquet file become such texts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+from polars.selectors import by_name
+
+from contextdb.cells.conditions import Condition
+from contextdb.cells.grammar import format_number
+from contextdb.cells.words import quoted
+from contextdb.disk import read_bytes
+from contextdb.files.csv_faults import record_faults
+from contextdb.files.csv_records import fields_of, find_records, text_of
+from contextdb.files.csv_source import name_faults, read_csv
+from contextdb.files.strangers import UTF8_BOM, require_text
+from contextdb.files.texts import scanned_parquet
+
+SEARCHED_AT_ONCE = 1 << 17
+"""Rows that are searched in one go."""
+
+Read = Callable[[int, int], pl.DataFrame]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Recorded contexts that stay where they are until they are looked at."""
+
+    path: Path
+    n_rows: int
+    facts: tuple[str, ...]
+    """The columns that are facts, in the order of the file."""
+    read: Read
+    """The facts of the rows from the first up to the second number, as the file has them. A TableError where the file has been
+    changed so that it cannot be read any more."""
+
+    def search(self, text: str) -> Iterator[NDArray[np.int64]]:
+        """The rows in which every word of a text stands, as in "gait=walk 3.5", capital letters or not.
+
+        A part of the rows at a time, in order; there may be none in it.
+        """
+        words = text.casefold().split()
+        for start in range(0, self.n_rows, SEARCHED_AT_ONCE):
+            frame = self.read(start, min(start + SEARCHED_AT_ONCE, self.n_rows))
+            yield _rows_with(frame, words) + start
+
+
+def open_recording(path: Path, conditions: Collection[str]) -> Recording:
+    """Open recorded contexts; the columns of these conditions are facts, others are left out.
+
+    Raises
+    ------
+    TableError, FileError
+        The file cannot be read; with every fault of it.
+    """
+    return _open_parquet(path, conditions) if path.suffix.lower() == ".parquet" else _open_csv(path, conditions)
+
+
+def fact_text(value: object, condition: Condition) -> str:
+    """A recorded value as the text of a fact; empty where the fact is missing."""
+    if value is None or value != value:  # NaN
+        return ""
+    if isinstance(value, float):
+        return format_number(value)
+    if isinstance(value, list):
+        return " ".join(_name(str(v)) for v in value) or '""'
+    is_name = isinstance(value, str) and condition.domain.kind in ("enum", "text")
+    return _name(str(value)) if is_name and value not in condition.domain.known else str(value)
+
+
+def _name(text: str) -> str:
+    """A name that is read as that name, even first in a fact."""
+    return '"' + text.replace('"', '""') + '"' if text.startswith("-") else quoted(text)
+
+
+def _rows_with(frame: pl.DataFrame, words: list[str]) -> NDArray[np.int64]:
+    if not words:
+        return np.arange(len(frame), dtype=np.int64)
+    numbered = frame.rename({name: str(at) for at, name in enumerate(frame.columns)})  # polars reads some names as patterns
+    said = [_said(name, numbered[str(at)]) for at, name in enumerate(frame.columns)]
+    line = pl.concat_str(said or [pl.lit("")]).str.to_lowercase()
+    holds = pl.all_horizontal([line.str.contains(word, literal=True) for word in words])
+    return numbered.select(holds.arg_true()).to_series().to_numpy().astype(np.int64)
+
+
+def _said(name: str, column: pl.Series) -> pl.Expr:
+    """What a search finds of a fact: "gait=Walk "; nothing where the fact is missing."""
+    value = pl.col(column.name)
+    text = (
+        value.cast(pl.List(pl.String)).list.join(" ") if isinstance(column.dtype, pl.List) else value.cast(pl.String, strict=False)
+    )
+    return pl.when(value.is_not_null()).then(pl.concat_str(pl.lit(f"{name}="), text, pl.lit(" "))).otherwise(pl.lit(""))
+
+
+def _open_parquet(path: Path, conditions: Collection[str]) -> Recording:
+    with scanned_parquet(path) as scan:
+        facts = tuple(name for name in scan.collect_schema().names() if name in conditions)
+        n_rows = scan.select(pl.len()).collect().item()
+
+    def read(start: int, stop: int) -> pl.DataFrame:
+        if not facts:
+            return pl.DataFrame()
+        with scanned_parquet(path) as scan:
+            return scan.select(by_name(facts)).slice(start, stop - start).collect()
+
+    return Recording(path, n_rows, facts, read)
+
+
+def _open_csv(path: Path, conditions: Collection[str]) -> Recording:
+    raw = read_bytes(path)
+    require_text(raw, str(path))
+    records, strays = find_records(raw)
+    if strays or record_faults(raw, records, strays, str(path)):
+        read_csv(raw, str(path))  # says what is wrong with the file
+    head = raw[records.starts[0] : records.stops[0]]
+    names = [text_of(field) for field in fields_of(head, int(records.n_fields[0]))]
+    if any(name_faults(names)):
+        read_csv(raw, str(path))
+    starts, stops = records.starts[1:], records.stops[1:]
+    places = [at for at, name in enumerate(names) if name in conditions]
+    schema = dict.fromkeys(map(str, range(len(names))), pl.String)
+
+    def read(start: int, stop: int) -> pl.DataFrame:
+        if not (places and start < stop):
+            return pl.DataFrame()
+        spans = zip(starts[start:stop].tolist(), stops[start:stop].tolist(), strict=True)
+        rows = b"\n".join([raw[a:b] for a, b in spans])
+        rows = UTF8_BOM + rows if rows.startswith(UTF8_BOM) else rows  # polars takes one away: here it is text
+        frame = pl.read_csv(rows, has_header=False, schema=schema).select(map(str, places))
+        return frame.rename({str(at): names[at] for at in places})
+
+    return Recording(path, len(starts), tuple(names[at] for at in places), read)

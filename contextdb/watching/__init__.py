@@ -1,9 +1,0 @@
-"""Hot reload: `contextdb.watch(folder)`. The package is not called `watch`, which is the function's name."""
-
-from __future__ import annotations
-
-from contextdb.watching.sharing import table_like
-from contextdb.watching.snapshot import Snapshot
-from contextdb.watching.watcher import Watch, watch
-
-__all__ = ["Snapshot", "Watch", "table_like", "watch"]

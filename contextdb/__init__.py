@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from contextdb.compiled.live import LiveContext
     from contextdb.compiled.matches import Matches
     from contextdb.compiled.table import CompiledTable
+    from contextdb.console import __version__ as __version__
     from contextdb.covering import CoverageReport, Gap, coverage
     from contextdb.errors import (
         ArtefactError,
@@ -45,11 +46,10 @@ if TYPE_CHECKING:
     from contextdb.tables.table import Table, load
     from contextdb.tables.watching import watch
 
-__version__ = "0.1.0"
-
 _HOMES = {
     "compiled.batch": ("ManyMatches",),
     "compiled.table": ("CompiledTable",),
+    "console": ("__version__",),
     "covering": ("CoverageReport", "Gap", "coverage"),
     "errors": (
         "ArtefactError",

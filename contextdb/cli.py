@@ -16,10 +16,9 @@ from importlib import import_module
 from types import ModuleType
 from typing import IO, Any, NoReturn
 
-from contextdb.console import drop_output, printable
+from contextdb.console import ExitCode, drop_output, printable
 from contextdb.disk.together import UnfinishedWarning
 from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
-from contextdb.exit_codes import ExitCode
 
 COMMANDS = {
     "edit": "the terminal editor",
@@ -175,7 +174,7 @@ def _run(group: Group, given: Sequence[str]) -> int:
         print(group.overview, end="", file=sys.stdout if given else sys.stderr)
         return ExitCode.OK if given else ExitCode.BAD_USE
     if given[0] == "--version" and not group.words:
-        from contextdb import __version__
+        from contextdb.console import __version__
 
         print(f"contextdb {__version__}")
         return ExitCode.OK

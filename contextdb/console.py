@@ -1,4 +1,4 @@
-"""Text for people in a terminal: aligned columns, colour only where a terminal shows it, progress on standard error."""
+"""What commands say to people and to the shell: aligned columns, colour only where a terminal shows it, progress, exit codes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from enum import IntEnum
 from time import monotonic
 from typing import IO, TypeVar
 
@@ -16,7 +17,20 @@ Item = TypeVar("Item")
 PATIENCE_S = 0.5
 """Work that is done sooner has no progress bar."""
 
+__version__ = "0.1.0"
+
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}
+
+
+class ExitCode(IntEnum):
+    """The exit codes of every command."""
+
+    OK = 0
+    FOUND = 1
+    """No asset is valid; findings at the level that fails."""
+    BAD_USE = 2
+    """A wrong argument, no such file, a table that cannot be read."""
+    INTERRUPTED = 130
 
 
 @contextmanager

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.checks.cases import Case, cases_path, check_cases, delete_case, exactly, judge, keep_case, read_cases, rename_case
+from contextdb.checks.cases import Case, check_cases, delete_case, exactly, judge, keep_case, read_cases, rename_case
 from contextdb.errors import TableError
+from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
 
 SCHEMA = {"speed": {"type": "number"}, "hit": {"type": "bool"}}

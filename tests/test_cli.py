@@ -15,7 +15,7 @@ from running import ROOT, Result, run, run_process
 import contextdb
 from contextdb import cli
 from contextdb.commands import check_command, query_command
-from contextdb.exit_codes import ExitCode
+from contextdb.console import ExitCode
 
 ESCAPE = "\x1b"
 EXAMPLE = re.compile(r"  (?:\w+ \| |git config [\w.]+ \")?contextdb (\w+) ")

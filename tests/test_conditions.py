@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from contextdb.cells.conditions import Condition, infer_condition
+from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL, NUMBER, TEXT
 from contextdb.columns import TextColumn
 from contextdb.schema.settings import EMPTY
+from contextdb.tables.condition_column import infer_condition
 from contextdb.tables.table import build_table
 
 

@@ -14,13 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.cells import conditions
-from contextdb.cells.conditions import Condition, infer_condition
+from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, INT, NUMBER, TEXT, Domain
 from contextdb.cells.grammar import ANY, Cell, NumberSet, parse_cell, reads
 from contextdb.cells.numbers import FEW, NumberCells, are_plain, doubtful, has_soft
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import column_masks
-from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.condition_column import ConditionColumn, infer_condition
 
 PADDING = tuple(f"{i}..{i + 1}" for i in range(1000, 1001 + FEW))
 """Texts enough to be read all at once."""

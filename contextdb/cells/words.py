@@ -10,6 +10,9 @@ NUMBER_TEXT = r"[+-]?(?:inf|(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)
 ANY_WORDS = frozenset(("", "-", "any"))
 """What a cell that accepts every value says, in any case."""
 
+MARK = "@"
+"""What an asset cell begins with that stands for another table."""
+
 _NAME = re.compile(r"[\w.:/\-]+")
 _RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)
 _SLOT = re.compile(r'"((?:[^"]|"")*)"|[^\s,;|"]+')

@@ -26,16 +26,16 @@ from contextdb.cells.grammar import TagSet, ValueSet, parse_cell
 from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.compiled.table import CompiledTable
-from contextdb.disk import CASES_SUFFIX, write_atomic
+from contextdb.disk import write_atomic
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, nearest, some
 from contextdb.files.csv_rewrite import Origin
 from contextdb.files.texts import AnySource, new_source, read_texts
 from contextdb.findings import Finding
+from contextdb.tables.other_files import CASE_COLUMNS
 from contextdb.tables.table import Table
 
-NAME, EXPECTED, NOTE, NONE = "Case", "Expected", "Note", "(none)"
-WORDS = (NAME, EXPECTED, NOTE)
-"""Columns that are no facts."""
+NAME, EXPECTED, NOTE = CASE_COLUMNS
+NONE = "(none)"
 
 Columns = Sequence[TextColumn]
 
@@ -94,11 +94,6 @@ class Verdict:
 # ---- the file
 
 
-def cases_path(table: Path) -> Path:
-    """The file of the cases of a table's file."""
-    return table.with_name(table.stem + CASES_SUFFIX)
-
-
 def exactly(assets: Sequence[str]) -> str:
     """What `Expected` says for exactly these assets."""
     return " ".join(quoted(asset) for asset in dict.fromkeys(assets)) or NONE
@@ -132,7 +127,7 @@ def keep_case(path: Path, case: Case) -> None:
     TableError, FileError
         The file cannot be read or written, or a condition has a name that such a file uses itself.
     """
-    if taken := [name for name in WORDS if name in case.facts]:
+    if taken := [name for name in CASE_COLUMNS if name in case.facts]:
         found = f"a condition of the name {in_quotes(taken[0])} cannot be kept: a file of cases has such a column itself."
         raise TableError(Fault(found, "another name of the condition", place=Place(str(path))))
     empty = [TextColumn.of(NAME, ()), TextColumn.of(EXPECTED, ())]

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from contextdb.errors import ContextDBError, in_quotes, plural
-from contextdb.findings import Finding, Level
+from contextdb.findings import Finding
+from contextdb.tables.alike import finding_at
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.flat_columns import FlatColumn
 from contextdb.tables.nesting.links import inner_rows, is_nested, require_sound
@@ -45,7 +46,7 @@ def _unusable(table: Table) -> Iterator[Finding]:
             first = error.faults[0]
             n_faults = plural(len(error.faults), "fault")
             message = f"the table {in_quotes(name)} cannot stand here: it has {n_faults}, the first in {first.place}."
-            yield _at(table, rows[0], "unusable-table", "error", message)
+            yield finding_at(table, rows[0], "unusable-table", "error", message, table.asset_column)
 
 
 def _shut_out(flat: FlatTable) -> Iterator[Finding]:
@@ -90,8 +91,3 @@ def _own(flat: FlatTable, finding: Finding, row: int) -> Finding:
     return replace(
         finding, message=finding.message + where, row=own, by=by, file=place.file, line=place.line, column=finding.column
     )
-
-
-def _at(table: Table, row: int, rule: str, level: Level, message: str) -> Finding:
-    place = table.place(row, table.asset_column)
-    return Finding(rule, level, message, table.name, place.file, row, table.assets[row], place.line, place.column)

@@ -17,12 +17,12 @@ import numpy as np
 
 from contextdb.checks.nested import outer_findings, own_findings
 from contextdb.checks.run import capped
-from contextdb.covering.assumed import opened
+from contextdb.covering.assumed import assumptions_of, opened
 from contextdb.covering.engine import finding_steps
 from contextdb.covering.judge import Judge
 from contextdb.covering.progress import Progress, Tell
 from contextdb.errors import ContextDBError, plural
-from contextdb.expressions import ExpressionError, assumptions_of, names_in
+from contextdb.expressions import ExpressionError, names_in
 from contextdb.findings import Finding
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import Path

@@ -15,11 +15,12 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import Cell, NumberSet, format_number
 from contextdb.checks.mirrored import check_mirroring
 from contextdb.checks.nested import check_nesting
-from contextdb.errors import in_quotes, nearest, row_name
+from contextdb.errors import in_quotes, nearest
 from contextdb.expressions import constant_truth
 from contextdb.expressions.rules import WhenRules
 from contextdb.files.csv_source import Source
 from contextdb.findings import Finding, Level
+from contextdb.tables.alike import finding_at, identical_rows, named, where
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
@@ -50,15 +51,6 @@ def capped(findings: Iterable[Finding]) -> Iterator[Finding]:
             first_left.setdefault(kind, finding)
     for kind, finding in first_left.items():
         yield replace(finding, message=f"{finding.message} ({counts[kind] - MOST_ROWS:,} rows like this one are not listed.)")
-
-
-def where(table: Table, row: int, other: int) -> str:
-    """Where a row stands, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
-    place = table.place(row)
-    if place.line is None:
-        return row_name(row)
-    is_inside = table.path is not None and {place.file, table.place(other).file} != {str(table.path)}
-    return f"line {place.line} of {place.file}" if is_inside else f"line {place.line}"
 
 
 def _whole_table(table: Table) -> Iterator[Finding]:
@@ -100,7 +92,7 @@ def _cells(table: Table) -> Iterator[Finding]:
         rows = np.flatnonzero(np.isin(column.texts.codes, list(said))).tolist() if said else []
         for row in rows:
             rule, level, why = said[int(column.texts.codes[row])]
-            yield _at(table, row, rule, level, f"{in_quotes(column.texts[row])} {why}", column.condition.name)
+            yield finding_at(table, row, rule, level, f"{in_quotes(column.texts[row])} {why}", column.condition.name)
 
 
 def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
@@ -142,7 +134,7 @@ def _constant_rules(table: Table) -> Iterator[Finding]:
         so = "so it excludes nothing" if truth else "so the row never matches"
         told = f"the rule {in_quotes(rule.expression.text)} is {truth} in every context of the declared values and bounds, {so}."
         for row in bitmask.rows(bitmask.from_int(rule.rows, table.n_rows)).tolist():
-            yield _at(table, row, kind, cast(Level, level), told, table.settings.when)
+            yield finding_at(table, row, kind, cast(Level, level), told, table.settings.when)
 
 
 def _assets(table: Table) -> Iterator[Finding]:
@@ -152,54 +144,17 @@ def _assets(table: Table) -> Iterator[Finding]:
     for asset, rows in rows_of.items():
         if not asset.strip():
             for row in rows:
-                yield _at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
+                yield finding_at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
         elif len(rows) > 1 and inner_name(asset) is None:
             for row in rows[1:]:
                 message = f"the asset {in_quotes(asset)} stands in {where(table, rows[0], row)} too."
-                yield _at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
+                yield finding_at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
 
 
 def _identical(table: Table) -> Iterator[Finding]:
     found = list(identical_rows(table))
     if lets_choose([table.settings.policy]):
-        found = gathered(found, table.assets, lambda row: _at(table, row, "variety", "info", "", None), partial(named, table))
+        found = gathered(
+            found, table.assets, lambda row: finding_at(table, row, "variety", "info", "", None), partial(named, table)
+        )
     yield from found
-
-
-def identical_rows(table: Table) -> Iterator[Finding]:
-    """Rows whose every condition accepts the same values, whatever way it is written. A disabled row is like no other.
-
-    Each is caused by the first such row of the same asset, or else by the first of all.
-    """
-    if table.n_rows < 2 or not (table.conditions or table.when):
-        return
-    disabled = np.where(table.enabled, -1, np.arange(table.n_rows))
-    rules = [] if table.when is None else [table.when.meanings]
-    meanings = [disabled, *rules, *(_meanings(column) for column in table.conditions)]
-    _, first, group = np.unique(np.stack(meanings, axis=1), axis=0, return_index=True, return_inverse=True)
-    origin = first[group.reshape(-1)]
-    first_of: dict[tuple[int, str], int] = {}
-    for row, start in enumerate(origin.tolist()):
-        same = first_of.setdefault((start, table.assets[row]), row)
-        other = start if same == row else same
-        if other != row:
-            message = f"every condition is the same as in {named(table, other, row)}."
-            yield _at(table, row, "identical-rows", "warning", message, None, (other,))
-
-
-def named(table: Table, other: int, row: int) -> str:
-    """A row by its place and its asset, in a sentence about another."""
-    return f"{where(table, other, row)} ({in_quotes(table.assets[other])})"
-
-
-def _meanings(column: ConditionColumn) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """For each row a number that is the same for cells that mean the same; a cell that cannot be read means itself."""
-    known: dict[object, int] = {}
-    keys = [("fault", i) if i in column.faults else (c.accepts, c.penalty) for i, c in enumerate(column.cells)]
-    numbers = np.array([known.setdefault(k, len(known)) for k in keys], np.int64)
-    return numbers[column.texts.codes]
-
-
-def _at(table: Table, row: int, rule: str, level: Level, message: str, column: str | None, by: tuple[int, ...] = ()) -> Finding:
-    place = table.place(row, column)
-    return Finding(rule, level, message, table.name, place.file, row, table.assets[row], place.line, column, by)

@@ -17,19 +17,19 @@ from functools import partial
 from pathlib import Path
 
 from contextdb import report
-from contextdb.checks.cases import cases_path, check_cases, read_cases
+from contextdb.checks.cases import check_cases, read_cases
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
 from contextdb.commands.coverage_telemetry import Bar, log_of
-from contextdb.console import output, printable, progress, terminal_width, wants_colour
+from contextdb.console import ExitCode, output, printable, progress, terminal_width, wants_colour
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
-from contextdb.exit_codes import ExitCode
 from contextdb.files.file_names import alike, composed, confusable, why_unportable
 from contextdb.findings import LEVELS, Finding
 from contextdb.report.results import CheckReport, TableSummary
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import key_lines
+from contextdb.tables.other_files import cases_path
 from contextdb.tables.places import table_path
 from contextdb.tables.project import (
     SCHEMA_FILE,

@@ -20,10 +20,9 @@ from pathlib import Path, PurePath
 from contextdb.compiled.artefact import SUFFIX
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.stubs import stubs_of
-from contextdb.console import output, printable, progress
+from contextdb.console import ExitCode, output, printable, progress
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural
-from contextdb.exit_codes import ExitCode
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import Table

@@ -23,11 +23,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb.commands import coverage_telemetry
-from contextdb.console import output, printable, terminal_width, wants_colour
+from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
-from contextdb.exit_codes import ExitCode
 from contextdb.report import coverage_formats
 from contextdb.report.results import as_path
 from contextdb.tables.nesting.flat import FlatTable

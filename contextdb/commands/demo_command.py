@@ -20,11 +20,10 @@ from contextdb.cells.facts import Context
 from contextdb.commands.demo_teams import cast_lines
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import aligned, output, styled, wants_colour
+from contextdb.console import ExitCode, aligned, output, styled, wants_colour
 from contextdb.disk import make_folder, refused_writing
 from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import Fault, FileError, Place, plural
-from contextdb.exit_codes import ExitCode
 from contextdb.motion import (
     FeatureSchema,
     MotionConfig,

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 
 from contextdb.commands.diff_views import as_markdown, as_text
 from contextdb.commands.effects_views import effects_json, effects_markdown, effects_text
-from contextdb.console import output, wants_colour
+from contextdb.console import ExitCode, output, wants_colour
 from contextdb.edits.diffing import Diff, diff
 from contextdb.errors import ContextDBError, Fault
-from contextdb.exit_codes import ExitCode
 from contextdb.report.render_json import as_json
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.places import table_path

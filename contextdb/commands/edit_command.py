@@ -12,8 +12,8 @@ import argparse
 import os
 import sys
 
+from contextdb.console import ExitCode
 from contextdb.errors import ContextDBError, Fault
-from contextdb.exit_codes import ExitCode
 
 
 class TerminalError(ContextDBError):

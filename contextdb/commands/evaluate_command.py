@@ -31,11 +31,10 @@ from contextdb.cells.facts import UNKNOWN_MODES
 from contextdb.commands import missing_facts_by_option
 from contextdb.commands.coverage_telemetry import ENGINES, bar
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import aligned, output, printable, styled, wants_colour
+from contextdb.console import ExitCode, aligned, output, printable, styled, wants_colour
 from contextdb.disk import is_stream, path_in_quotes, refused_writing, write_atomic
 from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, plural
-from contextdb.exit_codes import ExitCode
 from contextdb.report.render_json import as_json
 from contextdb.tables.places import open_compiled
 from contextdb.telemetry.contexts import context_files

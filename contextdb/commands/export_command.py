@@ -15,11 +15,10 @@ import os
 import sys
 from pathlib import Path
 
-from contextdb.console import drop_output, printable
+from contextdb.console import ExitCode, drop_output, printable
 from contextdb.disk import is_stream, write_atomic
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.exchange.formats import FORMATS, format_of, write
-from contextdb.exit_codes import ExitCode
 from contextdb.tables.places import table_path
 from contextdb.tables.project import load_table
 

@@ -12,9 +12,8 @@ import argparse
 
 from contextdb.commands import git_setup
 from contextdb.commands.git_setup import Setup, setup_of
-from contextdb.console import output, printable
+from contextdb.console import ExitCode, output, printable
 from contextdb.errors import plural
-from contextdb.exit_codes import ExitCode
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,8 +8,7 @@ from __future__ import annotations
 import argparse
 
 from contextdb.commands.git_setup import LINES, add_arguments, setup_of
-from contextdb.console import aligned, output, printable
-from contextdb.exit_codes import ExitCode
+from contextdb.console import ExitCode, aligned, output, printable
 
 __all__ = ["add_arguments", "run"]
 

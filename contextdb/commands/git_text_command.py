@@ -11,10 +11,9 @@ import argparse
 import sys
 from collections.abc import Iterator
 
-from contextdb.console import output, printable
+from contextdb.console import ExitCode, output, printable
 from contextdb.disk import read_bytes
 from contextdb.errors import TableError
-from contextdb.exit_codes import ExitCode
 from contextdb.tables.merging.reading import table_of
 from contextdb.tables.table import Table
 

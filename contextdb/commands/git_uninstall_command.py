@@ -8,9 +8,8 @@ from __future__ import annotations
 import argparse
 
 from contextdb.commands.git_setup import LINES, Setup, add_arguments, setup_of
-from contextdb.console import output, printable
+from contextdb.console import ExitCode, output, printable
 from contextdb.errors import plural
-from contextdb.exit_codes import ExitCode
 
 __all__ = ["add_arguments", "run"]
 

@@ -18,14 +18,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from contextdb.cells.domains import KINDS
-from contextdb.console import aligned, output, printable
+from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural, row_name
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
 from contextdb.exchange.importing import Plan, declared_differently, plan_import, project_of
 from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
 from contextdb.exchange.reading import Reading, listed
-from contextdb.exit_codes import ExitCode
 from contextdb.files.file_names import why_unportable
 from contextdb.schema.shapes import KIND_SYNONYMS
 from contextdb.tables.project import SCHEMA_FILE, schema_for

@@ -27,14 +27,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from contextdb.console import printable
+from contextdb.console import ExitCode, printable
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.edits.diffing import Merge, Side, diff, merge
 from contextdb.edits.diffing.lines import merged_lines
 from contextdb.edits.diffing.markers import with_markers
 from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
-from contextdb.exit_codes import ExitCode
 from contextdb.files.parquet import ParquetSource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
 from contextdb.tables.merging.reading import PARQUET, merged_bytes, table_of

@@ -21,10 +21,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from contextdb.commands.motion_bar import building_bar
-from contextdb.console import aligned, output, printable
+from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
-from contextdb.exit_codes import ExitCode
 from contextdb.motion.clips.doubts import grouped
 from contextdb.motion.storage import building
 from contextdb.motion.storage.build_inputs import told_once

@@ -23,10 +23,9 @@ from pathlib import Path
 from contextdb.commands.motion_bar import building_bar
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_stage import add_view
-from contextdb.console import output, terminal_width
+from contextdb.console import ExitCode, output, terminal_width
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, MotionError, Place, QueryError, in_quotes
-from contextdb.exit_codes import ExitCode
 from contextdb.motion import MotionDatabase, open_database, open_or_build, saved_path
 from contextdb.motion.reading import as_number
 from contextdb.motion.selection.decision import Decision, Playing

@@ -23,10 +23,9 @@ import numpy as np
 from contextdb.cells.facts import UNKNOWN_MODES
 from contextdb.commands.motion_stage import Stage, reach_s
 from contextdb.commands.motion_stick import Moments, Stick, conditions_of
-from contextdb.console import output, progress
+from contextdb.console import ExitCode, output, progress
 from contextdb.disk import path_in_quotes
 from contextdb.errors import Fault, FileError, Place, in_quotes
-from contextdb.exit_codes import ExitCode
 from contextdb.motion import FeatureSchema, Trajectory, steady_path, with_path
 from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.features.extraction import Features

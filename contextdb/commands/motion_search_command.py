@@ -18,9 +18,8 @@ import numpy as np
 from contextdb.cells.facts import Fact
 from contextdb.commands.motion_stage import Stage, add_asked, add_view, context_text
 from contextdb.compiled.matches import Matches
-from contextdb.console import output, printable, terminal_width
+from contextdb.console import ExitCode, output, printable, terminal_width
 from contextdb.errors import in_quotes, plural
-from contextdb.exit_codes import ExitCode
 from contextdb.motion import Candidates, MotionDatabase
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines

@@ -12,8 +12,7 @@ import argparse
 from dataclasses import replace
 
 from contextdb.commands.motion_stage import Stage, add_asked, add_view, context_text
-from contextdb.console import output, terminal_width
-from contextdb.exit_codes import ExitCode
+from contextdb.console import ExitCode, output, terminal_width
 from contextdb.motion import LeftOut
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.decision import Decision

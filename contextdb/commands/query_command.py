@@ -22,9 +22,8 @@ from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import aligned, output, printable, styled, terminal_width, wants_colour, width_of
+from contextdb.console import ExitCode, aligned, output, printable, styled, terminal_width, wants_colour, width_of
 from contextdb.errors import ContextError, Fault, in_quotes, plural
-from contextdb.exit_codes import ExitCode
 from contextdb.report.render_json import as_json
 from contextdb.tables.places import open_compiled
 

@@ -20,9 +20,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from contextdb.checks.verify import CHECKS, Verdict, files_under, verified
-from contextdb.console import aligned, output, progress, wants_colour
+from contextdb.console import ExitCode, aligned, output, progress, wants_colour
 from contextdb.errors import Fault, FileError, Place
-from contextdb.exit_codes import ExitCode
 from contextdb.report.render_json import as_json
 
 

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cells.words import MARK
 from contextdb.compiled.layers import Layers
 from contextdb.errors import Place
 from contextdb.schema.shapes import Policy
 from contextdb.tables.nesting.expansion import Expansion
-from contextdb.tables.nesting.names import MARK
 
 if TYPE_CHECKING:
     from contextdb.tables.table import Table

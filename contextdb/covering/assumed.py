@@ -6,7 +6,7 @@ shares are estimates.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from contextdb.cells.arguments import require_kind, require_many
@@ -16,7 +16,10 @@ from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.ruled import RuledTable, without_rules
 from contextdb.covering.space import CellBox, Space, WeightsOf, used_factors
-from contextdb.expressions import Assumptions, Derivation, Expression, assumptions_of
+from contextdb.expressions import Assumptions, Derivation, Expression
+from contextdb.expressions.assume import WANTS, read_assumptions
+from contextdb.expressions.expression import read_expression
+from contextdb.expressions.faults import ExpressionError
 from contextdb.expressions.tokens import written_name
 from contextdb.tables.table import Table
 
@@ -102,3 +105,25 @@ def _drawn(table: Table, assumed: Assumptions) -> Iterator[Condition]:
         condition = column.condition
         if condition.expr and f"{written_name(condition.name)} == ({condition.expr})" not in told:
             yield condition
+
+
+def assumptions_of(table: Table) -> Assumptions:
+    """The assumptions of a table, as its settings in contextdb.toml say, and what its derived bools imply.
+
+    Raises
+    ------
+    ExpressionError
+        An assumption names what is neither a condition of the table nor declared.
+    """
+    conditions = [column.condition for column in table.conditions]
+    assumed = read_assumptions(table.settings.assume, conditions, table.schema.conditions)
+    derived = [_definition(c, table.schema.conditions) for c in conditions if c.expr and c.domain.kind == "bool"]
+    return replace(assumed, derived=tuple(e for e in derived if e is not None and e.as_boxes(False) is not None))
+
+
+def _definition(condition: Condition, declared: Mapping[str, Condition]) -> Expression | None:
+    """That a derived bool is what it is computed as; None where that is too long or too deep to be said."""
+    try:
+        return read_expression(f"{written_name(condition.name)} == ({condition.expr})", declared, WANTS)
+    except ExpressionError:
+        return None

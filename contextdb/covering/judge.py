@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.checks.run import identical_rows, named
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
@@ -32,6 +31,7 @@ from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
 from contextdb.findings import Finding, Level
+from contextdb.tables.alike import identical_rows, named
 from contextdb.tables.table import Table
 from contextdb.tables.variety import gathered, lets_choose, needless, softened
 

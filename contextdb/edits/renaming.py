@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from contextdb.checks.cases import WORDS, cases_path
 from contextdb.columns import TextColumn
 from contextdb.disk import ACTORS_SUFFIX, read_bytes, write_atomic
 from contextdb.edits.schema_file import schema_path
@@ -33,6 +32,7 @@ from contextdb.files.parquet import ParquetSource, rewritten_parquet
 from contextdb.files.texts import AnySource, read_texts
 from contextdb.schema import toml_edit
 from contextdb.schema.settings import TableSettings, read_schema
+from contextdb.tables.other_files import CASE_COLUMNS, cases_path
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema, table_files
 from contextdb.tables.table import Table
 
@@ -207,7 +207,7 @@ def _n_rules(column: TextColumn, condition: str) -> int:
 def _n_cases(table: Path, condition: str) -> int:
     path = cases_path(table)
     try:
-        columns = read_texts(path)[1] if path.is_file() and condition not in WORDS else []
+        columns = read_texts(path)[1] if path.is_file() and condition not in CASE_COLUMNS else []
     except ContextDBError:
         return 1
     return sum(bool(text.strip()) for column in columns if column.name == condition for text in column.to_list())
@@ -223,7 +223,7 @@ def _rewritten_table(file: _File, old: str, new: str) -> Iterator[Rewrite]:
     columns = [_with_rules(c, old, new) if file.rules is not None and c.name == file.rules.name else c for c in columns]
     yield from _rewritten(file.path, file.source, file.columns, columns)
     cases = cases_path(file.path)
-    if cases.is_file() and old not in WORDS:
+    if cases.is_file() and old not in CASE_COLUMNS:
         source, found = read_texts(cases)
         renamed = [c.renamed(new) if c.name == old else c for c in found]
         _require_free(cases, renamed)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contextdb.cells.conditions import READABLE_SHARE
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.grammar import Cell, TagSet, ValueSet, parse_cell, reads
 from contextdb.cells.numbers import doubtful
@@ -17,6 +16,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import CellError, in_quotes, plural
 from contextdb.exchange.reading import ERRORS, listed
 from contextdb.schema.shapes import wrong_name
+from contextdb.tables.condition_column import READABLE_SHARE
 
 MOST_ENUM_VALUES = 40
 """A column with more different names than this is a text: nobody wants to keep such a list."""

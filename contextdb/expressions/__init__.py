@@ -21,7 +21,7 @@ One context and a frame of millions give the same answers to the last bit. Text 
 most 4,000 characters and 64 levels.
 """
 
-from contextdb.expressions.assume import Assumptions, assumption_faults, assumptions_of, constant_truth, read_assumptions
+from contextdb.expressions.assume import Assumptions, assumption_faults, constant_truth, read_assumptions
 from contextdb.expressions.boxes import Box
 from contextdb.expressions.derived import Derivation, derivation_faults, derive
 from contextdb.expressions.expression import Expression, read_expression
@@ -36,7 +36,6 @@ __all__ = [
     "ExpressionError",
     "ExpressionFault",
     "assumption_faults",
-    "assumptions_of",
     "constant_truth",
     "derivation_faults",
     "derive",

@@ -7,9 +7,9 @@ with facts, or compares them with each other, can only be asked context by conte
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,8 @@ from contextdb.errors import Fault, in_quotes
 from contextdb.expressions.boxes import Box, NoBoxes, Sets, all_of
 from contextdb.expressions.expression import Expression, read_expression
 from contextdb.expressions.faults import ExpressionError
-from contextdb.expressions.tokens import written_name
 
-if TYPE_CHECKING:
-    from contextdb.tables.table import Table
-
-_WANTS = Condition("", BOOL)
+WANTS = Condition("", BOOL)
 
 
 @dataclass(frozen=True)
@@ -162,35 +158,13 @@ def read_assumptions(
     known = {**(declared or {}), **{condition.name: condition for condition in conditions}}
     if faults := list(assumption_faults(assume, known)):
         raise ExpressionError(*faults)
-    return Assumptions(tuple(read_expression(text, known, _WANTS) for text in assume), tuple(conditions))
-
-
-def assumptions_of(table: Table) -> Assumptions:
-    """The assumptions of a table, as its settings in contextdb.toml say, and what its derived bools imply.
-
-    Raises
-    ------
-    ExpressionError
-        An assumption names what is neither a condition of the table nor declared.
-    """
-    conditions = [column.condition for column in table.conditions]
-    assumed = read_assumptions(table.settings.assume, conditions, table.schema.conditions)
-    derived = [_definition(c, table.schema.conditions) for c in conditions if c.expr and c.domain.kind == "bool"]
-    return replace(assumed, derived=tuple(e for e in derived if e is not None and e.as_boxes(False) is not None))
-
-
-def _definition(condition: Condition, declared: Mapping[str, Condition]) -> Expression | None:
-    """That a derived bool is what it is computed as; None where that is too long or too deep to be said."""
-    try:
-        return read_expression(f"{written_name(condition.name)} == ({condition.expr})", declared, _WANTS)
-    except ExpressionError:
-        return None
+    return Assumptions(tuple(read_expression(text, known, WANTS) for text in assume), tuple(conditions))
 
 
 def assumption_faults(assume: Sequence[str], conditions: Mapping[str, Condition]) -> Iterator[Fault]:
     """Why assumptions cannot be read; the rule is "unknown-fact" where one names what is no condition of these."""
     for text in assume:
         try:
-            read_expression(text, conditions, _WANTS)
+            read_expression(text, conditions, WANTS)
         except ExpressionError as error:
             yield from error.faults

@@ -9,8 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from importlib.resources import files
 
-from contextdb import __version__
-from contextdb.console import printable
+from contextdb.console import __version__, printable
 from contextdb.covering import CoverageReport, format_percent
 from contextdb.report.coverage_heat import heat_map
 from contextdb.report.coverage_results import CoverageResults, Gate, Measured, gap_moments, gap_size, has_moments

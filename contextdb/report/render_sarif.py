@@ -15,9 +15,8 @@ from collections.abc import Iterator
 from pathlib import PurePath
 from urllib.parse import quote
 
-from contextdb import __version__
 from contextdb.checks.rules import RULES
-from contextdb.console import printable
+from contextdb.console import __version__, printable
 from contextdb.findings import Finding, Level
 from contextdb.report.render_json import as_json
 from contextdb.report.results import CheckReport, told, worst_first

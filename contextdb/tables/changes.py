@@ -19,7 +19,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.conditions import Condition, infer_condition
+from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, SchemaError, TableError
 from contextdb.files.csv_source import name_faults
@@ -34,7 +34,7 @@ from contextdb.schema.sections import (
     settings_with,
 )
 from contextdb.schema.settings import Schema, TableSettings, expression_faults
-from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.condition_column import ConditionColumn, infer_condition
 from contextdb.tables.table import Table
 
 CameFrom = NDArray[np.int64]

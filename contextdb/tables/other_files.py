@@ -12,12 +12,15 @@ from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import in_quotes
 
 HEAD = 65_536
 """Bytes of a file that are looked at."""
 FEW_ROWS = 20
 TIMES = ("time", "time_s", "times", "timestamp", "t", "tick", "frame")
+CASE_COLUMNS = ("Case", "Expected", "Note")
+"""The columns of saved contexts that are no facts: a name, the assets that are expected, and why in words."""
 SESSION = b"contextdb.trace"
 FOOTER_AT = 8
 
@@ -40,6 +43,11 @@ def other_form(path: Path, conditions: Collection[str]) -> str | None:
     return None
 
 
+def cases_path(table: Path) -> Path:
+    """The file of the cases of a table's file."""
+    return table.with_name(table.stem + CASES_SUFFIX)
+
+
 def stray_sentence(path: Path, form: str) -> str:
     """What to say of such a file."""
     name = path.stem
@@ -51,7 +59,7 @@ def stray_sentence(path: Path, form: str) -> str:
 def _forms(conditions: Collection[str]) -> Sequence[tuple[Callable[[Sequence[str], Rows], bool], str]]:
     return (
         (lambda names, rows: {"asset", "tag", "from", "to"} <= {name.casefold() for name in names}, "markup of clips"),
-        (lambda names, rows: {"Case", "Expected"} <= set(names), "saved contexts, whose files end in .cases.csv"),
+        (lambda names, rows: set(CASE_COLUMNS[:2]) <= set(names), "saved contexts, whose files end in .cases.csv"),
         (lambda names, rows: names[0].casefold() in TIMES and _are_numbers(rows), "recorded moments, such as a stick"),
         (lambda names, rows: len(names) > 1 and all(name in conditions for name in names), "contexts: it has no column of assets"),
     )

@@ -25,13 +25,13 @@ from contextdb.cells.arguments import (
     require_text,
     require_whole,
 )
-from contextdb.cells.conditions import Condition, infer_condition
+from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, Place, SchemaError, TableError, in_quotes, nearest, some
 from contextdb.expressions.rules import WhenColumn
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults
-from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.condition_column import ConditionColumn, infer_condition
 from contextdb.tables.plain_columns import PlainColumns
 
 if TYPE_CHECKING:

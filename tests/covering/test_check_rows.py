@@ -13,10 +13,10 @@ from strategies import examples
 
 import contextdb as cdb
 from contextdb.checks.rows import check_rows
-from contextdb.checks.run import identical_rows
 from contextdb.commands.check_command import check_path
 from contextdb.covering import coverage
 from contextdb.schema.settings import TableSettings
+from contextdb.tables.alike import identical_rows
 
 TOML = """
 [conditions.speed]

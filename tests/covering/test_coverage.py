@@ -12,9 +12,9 @@ from strategies import examples
 
 import contextdb as cdb
 from contextdb.cells.grammar import parse_cell
-from contextdb.checks.run import identical_rows
 from contextdb.covering import coverage
 from contextdb.covering.space import Space
+from contextdb.tables.alike import identical_rows
 from contextdb.tables.variety import NEEDLESS
 
 SEEDS = st.integers(0, 2**32)

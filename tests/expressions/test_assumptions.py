@@ -15,8 +15,9 @@ from strategies import examples
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL, NUMBER, Domain
 from contextdb.cells.grammar import format_cell
+from contextdb.covering.assumed import assumptions_of
 from contextdb.covering.engine import coverage
-from contextdb.expressions import Box, ExpressionError, assumptions_of, read_assumptions, read_expression
+from contextdb.expressions import Box, ExpressionError, read_assumptions, read_expression
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 

@@ -25,7 +25,6 @@ from contextdb.checks.cases import (
     NOTE,
     Case,
     Verdict,
-    cases_path,
     delete_case,
     exactly,
     judge,
@@ -37,6 +36,7 @@ from contextdb.checks.cases import (
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, some
+from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
 from contextdb.telemetry.recordings import Recording, fact_text, open_recording
 from tui.model.wanted import wanted_by

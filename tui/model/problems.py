@@ -9,12 +9,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from contextdb.checks.cases import cases_path, check_cases, read_cases
+from contextdb.checks.cases import check_cases, read_cases
 from contextdb.checks.rows import check_rows
 from contextdb.checks.rules import RULES
 from contextdb.checks.run import check
 from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.findings import LEVELS, Finding, Level
+from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
 from tui.model.coverage_lines import rows_text
 from tui.model.coverage_run import is_quick

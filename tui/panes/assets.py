@@ -13,9 +13,9 @@ from textual.binding import Binding, BindingType
 from textual.geometry import Size
 
 from contextdb.cells.facts import read_fact_text
+from contextdb.cells.words import MARK
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, ContextError, Fault, TableError, plural
-from contextdb.tables.nesting.names import MARK
 from tui.clipboard import Clipboard
 from tui.messages import Edited, RenameWanted, Told
 from tui.model.asked import Offered

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contextdb.cells.words import MARK
 from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, nearest, some
-from contextdb.tables.nesting.names import MARK, inner_name, says_nesting
+from contextdb.tables.nesting.names import inner_name, says_nesting
 
 if TYPE_CHECKING:
     from contextdb.tables.table import Table

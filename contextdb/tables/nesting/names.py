@@ -10,7 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-MARK = "@"
+from contextdb.cells.words import MARK
+
 _QUOTED = re.compile(r'"(@(?:[^"]|"")*)"')
 
 

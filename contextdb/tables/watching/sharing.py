@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.cells.conditions import Condition, infer_condition
+from contextdb.cells.conditions import Condition
 from contextdb.cells.numbers import NumberCells
 from contextdb.columns import TextColumn
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import Schema, TableSettings
-from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.condition_column import ConditionColumn, infer_condition
 from contextdb.tables.table import Table, build_table
 
 

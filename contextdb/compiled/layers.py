@@ -5,7 +5,7 @@ D = depth, n = flat rows. Only combinations of texts that come up are brought to
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +16,6 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import Cell, parse_cell
 from contextdb.cells.nesting_cells import meet
 from contextdb.columns import TextColumn
-from contextdb.tables.nesting.expansion import Expansion
 
 Numbers = NDArray[np.int32]
 
@@ -27,16 +26,6 @@ class Layers:
 
     texts: tuple[str, ...]
     codes: Numbers
-
-    @classmethod
-    def of(cls, expansion: Expansion, columns: Sequence[tuple[int, TextColumn]]) -> Layers:
-        """The texts of some tables' columns, given with the numbers of the tables."""
-        texts, codes = [""], np.zeros(expansion.rows.shape, np.int32)
-        for number, column in columns:
-            here = expansion.numbers == number
-            codes[here] = column.codes[expansion.rows[here]] + len(texts)
-            texts += column.texts
-        return cls(tuple(texts), codes)
 
     @cached_property
     def combined(self) -> tuple[Numbers, Numbers]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,6 @@ from contextdb.cells.words import MARK
 from contextdb.compiled.layers import Layers
 from contextdb.errors import Place
 from contextdb.schema.shapes import Policy
-from contextdb.tables.nesting.expansion import Expansion
-
-if TYPE_CHECKING:
-    from contextdb.tables.table import Table
 
 Numbers = NDArray[np.int32]
 Rows = NDArray[np.int64]
@@ -42,6 +38,14 @@ class Step:
         return str(self.place) if self.place.file else f'{self.place} of the table "{self.table}"'
 
 
+class Placing(Protocol):
+    """What knows where its rows stand: a table."""
+
+    def place(self, row: int, /) -> Place:
+        """The file and line of a row, where it has them."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class WayTable:
     """What is kept of one table: R its rows."""
@@ -54,15 +58,9 @@ class WayTable:
     row_weights: NDArray[np.float64]
     lines: NDArray[np.int64] | None = None
     """The line of each row in its file, from 1, -1 where it has none: [R]. None where `table` tells it."""
-    table: Table | None = None
+    table: Placing | None = None
     when: str | None = None
     """Its column of rules."""
-
-    @classmethod
-    def of(cls, name: str, table: Table) -> WayTable:
-        """What is kept of a table."""
-        file = str(table.path) if table.path else None
-        return cls(name, file, table.settings.policy, table.priorities, table.row_weights, None, table, table.settings.when)
 
     def place(self, row: int) -> Place:
         """Where a row stands."""
@@ -93,14 +91,6 @@ class Ways:
     """For each condition what the tables of the ways say; None for one that none of them has, but a rule."""
     rules: Layers | None = None
     """The same for the rows' own rules."""
-
-    @classmethod
-    def of(cls, expansion: Expansion, leaves: Sequence[str], layers: Sequence[Layers | None]) -> Ways:
-        """The ways of a flat table."""
-        tables = tuple(map(WayTable.of, expansion.names, expansion.tables))
-        whens = [(n, t.when.texts) for n, t in enumerate(expansion.tables) if t.when is not None and any(t.when.rules)]
-        rules = Layers.of(expansion, whens) if whens else None
-        return cls(tables, expansion.numbers, expansion.rows, leaves, tuple(layers), rules)
 
     def steps(self, row: int) -> tuple[Step, ...]:
         """The rows of a way, outermost first."""

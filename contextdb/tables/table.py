@@ -149,7 +149,7 @@ class Table(Unchanging):
     def faults(self) -> list[Fault]:
         """Every cell that cannot be read, in the order of rows."""
         found = [(row, at, fault) for at, column in enumerate(self.conditions) for row, fault in column.faulty_rows()]
-        found += [(row, -1, fault) for row, fault in self._plain.faults]
+        found += [(row, -1, fault.at(self.place(row, fault.place.column))) for row, fault in self._plain.faults]
         if self.when is not None:
             found += [(row, -1, fault.at(self.place(row, self.when.name))) for row, fault in self.when.faulty_rows()]
         if self.around is not None:
@@ -292,7 +292,7 @@ class Table(Unchanging):
 
     @cached_property
     def _plain(self) -> PlainColumns:
-        return PlainColumns.read(self)
+        return PlainColumns.read(self.columns, self.settings)
 
     def _no_row(self, row: int) -> Fault:
         accepted = f"rows 0 to {self.n_rows - 1}" if self.n_rows else "no row: the table is empty"

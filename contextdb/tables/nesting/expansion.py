@@ -6,13 +6,15 @@ table, a row of that one, and so on. The order is that of the files: inner rows 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.columns import TextColumn
+from contextdb.compiled.layers import Layers
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.tables.nesting.links import inner_rows
 
@@ -45,6 +47,15 @@ class Expansion:
     def depth(self) -> int:
         """How many tables the longest way passes."""
         return len(self.rows)
+
+    def layers(self, columns: Iterable[tuple[int, TextColumn]]) -> Layers:
+        """The texts of some tables' columns, given with the numbers of the tables."""
+        texts, codes = [""], np.zeros(self.rows.shape, np.int32)
+        for number, column in columns:
+            here = self.numbers == number
+            codes[here] = column.codes[self.rows[here]] + len(texts)
+            texts += column.texts
+        return Layers(tuple(texts), codes)
 
 
 NO_ROWS = Expansion((), (), np.empty((1, 0), np.int32), np.empty((1, 0), np.int32))

@@ -17,7 +17,7 @@ import numpy as np
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
-from contextdb.compiled.ways import Ways
+from contextdb.compiled.ways import Ways, WayTable
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.condition_column import ConditionColumn
@@ -45,8 +45,12 @@ class FlatTable(Table):
     @cached_property
     def ways(self) -> Ways:
         """The way of each row, as a compiled table keeps it."""
-        layers = [column.layers if isinstance(column, FlatColumn) else None for column in self.conditions]
-        return Ways.of(self.expansion, self.leaves, layers)
+        made_of = self.expansion
+        layers = tuple(column.layers if isinstance(column, FlatColumn) else None for column in self.conditions)
+        whens = [(n, t.when.texts) for n, t in enumerate(made_of.tables) if t.when is not None and any(t.when.rules)]
+        rules = made_of.layers(whens) if whens else None
+        tables = tuple(map(_way_table, made_of.names, made_of.tables))
+        return Ways(tables, made_of.numbers, made_of.rows, self.leaves, layers, rules)
 
     @cached_property
     def faults(self) -> list[Fault]:
@@ -81,6 +85,11 @@ class FlatTable(Table):
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
         """Refuse: a flat table is worked out from others."""
         raise TableError(Fault("a table with its inner tables' rows is no file.", "the tables that it is made of"))
+
+
+def _way_table(name: str, table: Table) -> WayTable:
+    file = str(table.path) if table.path else None
+    return WayTable(name, file, table.settings.policy, table.priorities, table.row_weights, None, table, table.settings.when)
 
 
 def flatten(table: Table, tables: Mapping[str, Table]) -> FlatTable:

@@ -33,7 +33,7 @@ class FlatColumn(ConditionColumn):
     @classmethod
     def made(cls, expansion: Expansion, condition: Condition, sources: Sequence[tuple[int, ConditionColumn]]) -> FlatColumn:
         """Bring the columns of some tables together."""
-        layers = Layers.of(expansion, [(number, column.texts) for number, column in sources])
+        layers = expansion.layers([(number, column.texts) for number, column in sources])
         found, which = layers.combined
         cells = _Cells(sources)
         met = [_met([layers.texts[c] for c in codes if c], [cells[c] for c in codes if c], condition) for codes in found.T.tolist()]

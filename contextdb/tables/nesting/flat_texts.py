@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextdb.columns import TextColumn
-from contextdb.compiled.layers import Layers
 from contextdb.expressions.rules import has_no_rule
 from contextdb.tables.nesting.expansion import Expansion
 from contextdb.tables.nesting.names import asset_name
@@ -31,7 +30,7 @@ def outputs_of(expansion: Expansion, taken: set[str]) -> list[TextColumn]:
     for name in (name for name in names if name not in taken):
         columns = [(n, t.text_column(name)) for n, t in enumerate(expansion.tables) if name in t.settings.outputs]
         join = all_words if name == MANDATORY else _innermost
-        found.append(optional_slots(expansion, columns) if name == OPTIONAL else Layers.of(expansion, columns).joined(name, join))
+        found.append(optional_slots(expansion, columns) if name == OPTIONAL else expansion.layers(columns).joined(name, join))
         taken.add(name)
     return found
 
@@ -45,7 +44,7 @@ def rules_of(expansion: Expansion, taken: set[str]) -> TextColumn | None:
     columns = [(n, t.text_column(t.settings.when)) for n, t in enumerate(expansion.tables) if t.settings.when is not None]
     if not columns:
         return None
-    return Layers.of(expansion, columns).joined(free_name(columns[0][1].name, taken), _all_rules)
+    return expansion.layers(columns).joined(free_name(columns[0][1].name, taken), _all_rules)
 
 
 def _all_rules(texts: list[str]) -> str:

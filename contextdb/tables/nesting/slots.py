@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from contextdb.cells.words import quoted, slot_words
 from contextdb.columns import TextColumn
-from contextdb.compiled.layers import Layers
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.expansion import Expansion
 
@@ -34,7 +33,7 @@ def all_words(texts: list[str]) -> str:
 
 def optional_slots(expansion: Expansion, columns: Sequence[tuple[int, TextColumn]]) -> TextColumn:
     """The optional slots of flat rows, without the roles that a row of the way needs and has not among its own."""
-    layers = Layers.of(expansion, columns)
+    layers = expansion.layers(columns)
     joined = layers.joined(OPTIONAL, all_words)
     roles = {role for table in expansion.tables for role in _roles(table)}
     texts: list[str] | None = None

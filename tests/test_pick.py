@@ -16,7 +16,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.compiled.pick import FEW, Memory, Outcome, Rng, pick_row
+from contextdb.compiled.memory import FEW, Memory, Rng
+from contextdb.compiled.pick import Outcome, pick_row
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError, PolicyError
 from contextdb.schema.settings import TableSettings

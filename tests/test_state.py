@@ -18,6 +18,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
 import contextdb as cdb
 from contextdb import motion
+from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.live import LiveContext
 from contextdb.compiled.table import CompiledTable
 from contextdb.schema.settings import TableSettings
@@ -347,7 +348,7 @@ def asked(compiled: CompiledTable, facts: Mapping[str, object]) -> CompiledTable
     compiled.query_many({name: [value] for name, value in facts.items()}).hits  # noqa: B018
     compiled.explain(facts).nearest()
     compiled.live(facts).matches()
-    _ = compiled.roles, compiled.version, compiled.penalties(facts)
+    _ = roles_of_table(compiled), compiled.version, compiled.penalties(facts)
     return compiled
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from contextdb.compiled.data import CompiledData
 from contextdb.disk import read_bytes
 from contextdb.errors import ArtefactError, ContextDBError, Fault, FileError, Place, in_quotes, plural
 
@@ -85,7 +86,7 @@ def _safetensors(path: Path) -> Told:
         yield "features of a clip", "kept by a build; the next build checks them and computes them again where they are altered"
     else:
         yield "compiled table", None
-        open_artefact(path)
+        open_artefact(path, CompiledData)
 
 
 def _parquet(path: Path) -> Told:

@@ -38,7 +38,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
@@ -46,8 +46,9 @@ from contextdb.cells.grammar import TagSet
 from contextdb.cells.nesting_cells import TagMeet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
-from contextdb.compiled.table import CompiledTable, SoftMasks
+from contextdb.compiled.data import CompiledData, SoftMasks
 from contextdb.compiled.ways_stored import ways_from, ways_to_json, ways_to_tensors
+from contextdb.expressions import Derivation
 from contextdb.expressions.rules import WhenColumn, WhenRules
 from contextdb.files.tensors import (
     SUFFIX,
@@ -61,10 +62,9 @@ from contextdb.files.tensors import (
 )
 from contextdb.schema.settings import Schema
 
-if TYPE_CHECKING:
-    from contextdb.expressions import Derivation
-
 __all__ = ["SUFFIX", "open_artefact", "save"]
+
+Compiled = TypeVar("Compiled", bound=CompiledData)
 
 COMPILED = FileKind(
     "contextdb", 1, "one that contextdb compiled", "a file that this version of contextdb compiled", "to compile the table again"
@@ -72,7 +72,7 @@ COMPILED = FileKind(
 WITH_RULES = replace(COMPILED, layout=2, also=(COMPILED.layout,))
 
 
-def save(compiled: CompiledTable, path: Path) -> None:
+def save(compiled: CompiledData, path: Path) -> None:
     """Write a compiled table; the old file is whole until the new one is."""
     tensors: Tensors = {
         "enabled": compiled.enabled,
@@ -116,8 +116,8 @@ def save(compiled: CompiledTable, path: Path) -> None:
     write_tensors(path, WITH_RULES if is_more else COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about)})
 
 
-def open_artefact(path: Path) -> CompiledTable:
-    """Open a compiled table by memory map, checked.
+def open_artefact(path: Path, kind: type[Compiled]) -> Compiled:
+    """Open a compiled table by memory map, checked; `kind` is the class to make of it.
 
     Raises
     ------
@@ -131,14 +131,14 @@ def open_artefact(path: Path) -> CompiledTable:
         about = metadata["about"]
         if digest_of(tensors, about) != metadata.get("digest"):
             raise COMPILED.refused(path, "the file was altered: its contents do not give its digest.")
-        return _table(json.loads(about), tensors)
+        return _table(json.loads(about), tensors, kind)
 
 
-def _table(about: dict[str, Any], tensors: Tensors) -> CompiledTable:
+def _table(about: dict[str, Any], tensors: Tensors, kind: type[Compiled]) -> Compiled:
     conditions = tuple(_condition_from_json(c) for c in about["conditions"])
     n_rows = about["rows"]
     numbered = [(f"{at:03d}", kinds) for at, kinds in enumerate(about["columns"])]
-    return CompiledTable(
+    return kind(
         name=about["name"],
         assets=texts_from_array(tensors["assets"]),
         conditions=conditions,
@@ -161,7 +161,7 @@ def _table(about: dict[str, Any], tensors: Tensors) -> CompiledTable:
     )
 
 
-def _when_to_json(compiled: CompiledTable) -> dict[str, object]:
+def _when_to_json(compiled: CompiledData) -> dict[str, object]:
     assert compiled.when is not None
     return {"name": compiled.when.name, "conditions": [_condition_to_json(c) for c in compiled.ruled]}
 
@@ -194,7 +194,7 @@ def _derivation(about: dict[str, Any], conditions: tuple[Condition, ...]) -> Der
     return known.derivation_of(known.conditions)
 
 
-def _computed_from(compiled: CompiledTable) -> list[Condition]:
+def _computed_from(compiled: CompiledData) -> list[Condition]:
     """The conditions that derived facts are computed from and that are no columns of the table."""
     computed = compiled.derivation.conditions if compiled.derivation else ()
     return [condition for condition in computed if condition.name not in compiled.places]

@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,13 +39,11 @@ from contextdb.compiled.batch_columns import (
     wrapped,
 )
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.expressions.rules import ManyRules
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
 
 Answer = TypeVar("Answer", bound=Matches)
 
@@ -131,7 +129,7 @@ class ManyMatches(Unchanging, Answers[Matches]):
     """The valid rows of many contexts: a sequence of `Matches`. What is asked for is worked out then, and kept; arrays are
     read-only."""
 
-    compiled: CompiledTable
+    compiled: CompiledData
     n_contexts: int
     values: Values
     numbers: Numbers
@@ -284,7 +282,7 @@ def load_kernels(work: int = MUCH_WORK) -> ModuleType | None:
     return kernels
 
 
-def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
+def query_codes(compiled: CompiledData, codes: Codes) -> Matches:
     """The rows for the codes of one context."""
     compiled.refuse_rules("codes do not keep the facts that they need")
     stack = compiled.stack
@@ -305,7 +303,7 @@ def query_codes(compiled: CompiledTable, codes: Codes) -> Matches:
     return compiled.matches(bitmask.to_int(mask))
 
 
-def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "error") -> ManyMatches:
+def query_many(compiled: CompiledData, contexts: Contexts, unknown: Unknown = "error") -> ManyMatches:
     """Encode the columns of many contexts; see `CompiledTable.query_many`."""
     check_mode(unknown)
     columns = given = facts_of(contexts)
@@ -326,7 +324,7 @@ def query_many(compiled: CompiledTable, contexts: Contexts, unknown: Unknown = "
 class _Encoder:
     """Turns columns of facts into classes (values) and doubles (numbers)."""
 
-    def __init__(self, compiled: CompiledTable, n_contexts: int, unknown: Unknown) -> None:
+    def __init__(self, compiled: CompiledData, n_contexts: int, unknown: Unknown) -> None:
         self.compiled, self.n_contexts, self.unknown = compiled, n_contexts, unknown
         self.classes: list[Codes] = []
         self.value_slots: list[tuple[int, int, int]] = []

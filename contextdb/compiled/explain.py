@@ -11,7 +11,6 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,17 +37,14 @@ from contextdb.cells.grammar import (
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.mask_bits import bits_of
 from contextdb.compiled.matches import Matches
+from contextdb.compiled.ways import Step
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, plural, some
-from contextdb.expressions.rules import WhenColumn, has_no_rule, told_facts
+from contextdb.expressions import Expression
+from contextdb.expressions.rules import WhenColumn, WhenRules, has_no_rule, told_facts
 from contextdb.expressions.rules.rules import Rule, values_of
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
-    from contextdb.compiled.ways import Step
-    from contextdb.expressions import Expression
-    from contextdb.expressions.rules import WhenRules
 
 FEW_DIGITS = 12
 """A number of more characters than this is the work of rounding, not of a person: 29.990000000000002."""
@@ -102,7 +98,7 @@ class RowExplanation:
 class Explanation:
     """All rows for one context, in order: valid ones, then the nearest. Iterate, index, or ask for one row or asset."""
 
-    def __init__(self, compiled: CompiledTable, facts: dict[str, Fact], unknown: Unknown, matches: Matches) -> None:
+    def __init__(self, compiled: CompiledData, facts: dict[str, Fact], unknown: Unknown, matches: Matches) -> None:
         self.compiled = compiled
         self.facts = facts
         """The facts in canonical form."""
@@ -246,7 +242,7 @@ class Explanation:
         yield from cell_failures(self.compiled, at, row, fact, _with_unit(describe_fact(fact, condition), condition))
 
 
-def explain(compiled: CompiledTable, context: Context, unknown: Unknown = "error") -> Explanation:
+def explain(compiled: CompiledData, context: Context, unknown: Unknown = "error") -> Explanation:
     """Explain every row of a table for one context; raises ContextError as `query` does."""
     return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown))
 
@@ -266,7 +262,7 @@ class RulePart:
 
 
 def rules_that_fail(
-    compiled: CompiledTable, row: int, facts: Mapping[str, Fact], unknown: Unknown
+    compiled: CompiledData, row: int, facts: Mapping[str, Fact], unknown: Unknown
 ) -> Iterator[tuple[bool, RulePart]]:
     """The rules of a row that do not hold with some facts, and whether each is open; all of them where only together they do
     not."""
@@ -278,7 +274,7 @@ def rules_that_fail(
             yield truth is None, part
 
 
-def _rule_parts(compiled: CompiledTable, row: int) -> list[RulePart]:
+def _rule_parts(compiled: CompiledData, row: int) -> list[RulePart]:
     when, ways = compiled.when, compiled.ways
     assert when is not None
     whole = when.rules[int(when.of_row[row])].expression
@@ -291,7 +287,7 @@ def _rule_parts(compiled: CompiledTable, row: int) -> list[RulePart]:
     return [RulePart(s.when or when.name, t, rule, s) for (s, t), rule in zip(said, rules, strict=True) if rule is not None]
 
 
-def cell_failures(compiled: CompiledTable, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
+def cell_failures(compiled: CompiledData, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
     """The cell of a row that does not accept a fact; where tables stand in tables, each cell that does not."""
     condition = compiled.conditions[at]
     layers = None if compiled.ways is None else compiled.ways.layers[at]

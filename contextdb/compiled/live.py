@@ -12,21 +12,19 @@ from copy import copy, deepcopy
 from functools import reduce
 from math import ldexp
 from operator import and_
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
 from contextdb.cells.mirroring import kept_facts
+from contextdb.compiled.casting.facts import Actors, Prefer
+from contextdb.compiled.casting.live import LiveActors
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.lookup import SingleLookup
 from contextdb.compiled.matches import Matches
 from contextdb.errors import Fault, NoSuchFact, in_quotes, some
+from contextdb.expressions.rules import WhenRules
 from contextdb.expressions.rules.rules import Unusual
-
-if TYPE_CHECKING:
-    from contextdb.compiled.casting.facts import Actors, Prefer
-    from contextdb.compiled.casting.live import LiveActors
-    from contextdb.compiled.table import CompiledTable
-    from contextdb.expressions.rules import WhenRules
-    from contextdb.expressions.scalar import Value
+from contextdb.expressions.scalar import Value
 
 MOST_MOVING = 8
 
@@ -63,7 +61,7 @@ class LiveContext(MutableMapping[str, object]):
         "_unknown",
     )
 
-    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+    def __init__(self, compiled: CompiledData, unknown: Unknown = "error") -> None:
         self._compiled = compiled
         self._answering = compiled.answering
         self._unknown = unknown
@@ -209,8 +207,6 @@ class LiveContext(MutableMapping[str, object]):
         self._cast = None
         self._odd.pop(CAST, None)
         if actors is not None:
-            from contextdb.compiled.casting.live import LiveActors
-
             self._cast = LiveActors(self._compiled, actors, prefer, self._unknown)
             self._odd[CAST] = (0, False)
 
@@ -316,7 +312,7 @@ class AskingLiveContext(LiveContext):
 
     __slots__ = ("_computed", "_given", "_is_stale", "_others")
 
-    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+    def __init__(self, compiled: CompiledData, unknown: Unknown = "error") -> None:
         super().__init__(compiled, unknown)
         self._others = {c.name: c for c in (*(compiled.derivation.inputs if compiled.derivation else ()), *compiled.ruled)}
         """The conditions that derived facts are computed from, and those that only rules name."""
@@ -390,7 +386,7 @@ class RuledLiveContext(AskingLiveContext):
 
     __slots__ = ("_is_set", "_left", "_named", "_truths", "_values", "_when")
 
-    def __init__(self, compiled: CompiledTable, unknown: Unknown = "error") -> None:
+    def __init__(self, compiled: CompiledData, unknown: Unknown = "error") -> None:
         assert compiled.when is not None
         self._is_set = True
         """Whether a fact that rules need was set since they were asked."""
@@ -466,7 +462,7 @@ class SoftRuledLiveContext(SoftLiveContext, RuledLiveContext):
 
 
 def _live_again(
-    compiled: CompiledTable, unknown: Unknown, facts: Mapping[str, object], cast: tuple[Actors, Prefer] | None
+    compiled: CompiledData, unknown: Unknown, facts: Mapping[str, object], cast: tuple[Actors, Prefer] | None
 ) -> LiveContext:
     """A live context out of a pickle."""
     live = live_context(compiled, unknown)
@@ -476,7 +472,7 @@ def _live_again(
     return live
 
 
-def live_context(compiled: CompiledTable, unknown: Unknown = "error") -> LiveContext:
+def live_context(compiled: CompiledData, unknown: Unknown = "error") -> LiveContext:
     """A context of the kind that a table needs."""
     is_soft = compiled.is_soft
     if compiled.when is not None:

@@ -12,109 +12,22 @@ its rows is played is then picked by that table's own policy, priorities and wei
 
 from __future__ import annotations
 
-import random
-import sys
-import threading
-import weakref
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Rows
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches
+from contextdb.compiled.memory import Rng
+from contextdb.compiled.ways import Ways, WayTable
 from contextdb.errors import ContextError, Fault, PolicyError, in_quotes, some
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
-    from contextdb.compiled.ways import Ways, WayTable
-    from contextdb.schema.shapes import Policy
-
-FEW = 1024
-"""Up to so many generators that cannot say when they are gone are kept without a look at who is still there."""
+from contextdb.schema.shapes import Policy
 
 
-class Rng(Protocol):
-    """What the pick needs of a random generator: `random.Random` and `numpy.random.Generator` both have it."""
-
-    def random(self) -> float:
-        """A number in [0, 1)."""
-        ...
-
-
-class Memory:
-    """Which asset each random generator picked last, so that no character repeats itself.
-
-    A generator is known by its identity as long as anybody else holds it: however many there are, none of them is forgotten. One
-    that cannot be referred to weakly (numpy's) is held here; when their number has doubled, those that nobody else holds are let
-    go.
-    `lock` is held from the look at what was last until the new pick is remembered, for threads that share a generator.
-    """
-
-    def __init__(self) -> None:
-        self.lock = threading.RLock()
-        self._own = random.Random()
-        self._last: dict[int, tuple[Callable[[], Rng | None], str]] = {}
-        """By the id of a generator: what gives it, or None once it is gone, and the asset."""
-        self._held: dict[int, Rng] = {}
-        """Those that cannot be referred to weakly."""
-        self._most = FEW
-        """So many are held before it is looked which of them are gone."""
-
-    def __len__(self) -> int:
-        return len(self._last)
-
-    def rng(self, given: Rng | int | None) -> Rng:
-        """The generator to use: the given one, one seeded with the given number, or the table's own."""
-        if given is None:
-            return self._own
-        if isinstance(given, random.Random):
-            return given
-        if isinstance(given, (int, np.integer)):
-            return random.Random(int(given))
-        if not callable(getattr(given, "random", None)):
-            found = f"rng is of type {type(given).__name__}."
-            raise ContextError(Fault(found, "a random.Random, a numpy.random.Generator, or a number to seed one with"))
-        return given
-
-    def last(self, rng: Rng) -> str | None:
-        """The asset that this generator picked last."""
-        known = self._last.get(id(rng))
-        return known[1] if known is not None and known[0]() is rng else None
-
-    def remember(self, rng: Rng, asset: str) -> None:
-        """Keep what this generator picked."""
-        key = id(rng)
-        known = self._last.get(key)
-        if known is not None and known[0]() is rng:
-            self._last[key] = known[0], asset
-            return
-        try:
-            self._last[key] = weakref.ref(rng, lambda gone: self._forget(key, gone)), asset
-        except TypeError:
-            if len(self._held) >= self._most:
-                self._let_go()
-            self._held[key] = rng
-            self._last[key] = lambda: self._held.get(key), asset
-
-    def _forget(self, key: int, gone: object) -> None:
-        known = self._last.get(key)
-        if known is not None and known[0] is gone:
-            del self._last[key]
-
-    def _let_go(self) -> None:
-        """Forget the generators that are held here alone."""
-        probe = {0: object()}
-        alone = sys.getrefcount(probe[0])
-        for key in list(self._held):
-            if sys.getrefcount(self._held[key]) <= alone:
-                del self._held[key], self._last[key]
-        self._most = max(FEW, 2 * len(self._held))
-
-
-def pick(compiled: CompiledTable, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> str | None:
+def pick(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> str | None:
     """One asset of the valid rows.
 
     Parameters
@@ -153,7 +66,7 @@ def pick(compiled: CompiledTable, matches: Matches, rng: Rng | int | None = None
     return compiled.fallback if row is None else compiled.assets[row]
 
 
-def pick_row(compiled: CompiledTable, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> int | None:
+def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> int | None:
     """The row that `pick` picks, or None."""
     matches.require_own(compiled.answering)
     source = compiled.memory.rng(rng)
@@ -171,7 +84,7 @@ def pick_row(compiled: CompiledTable, matches: Matches, rng: Rng | int | None = 
     return _weighted(compiled, rows, source, last)
 
 
-def _through_tables(compiled: CompiledTable, ways: Ways, rows: Rows, source: Rng, last: str | None) -> int | None:
+def _through_tables(compiled: CompiledData, ways: Ways, rows: Rows, source: Rng, last: str | None) -> int | None:
     """The row that is picked where tables stand in tables."""
     possible = _possible(ways, rows[ways.pickable[rows]], 0)
     if not len(possible):
@@ -230,14 +143,14 @@ def _not_unique(name: str, assets: list[str]) -> PolicyError:
     return PolicyError(Fault(found, 'one: the table\'s policy is "unique"', rule="not-unique"))
 
 
-def _ranked(compiled: CompiledTable, rows: Rows) -> Rows:
+def _ranked(compiled: CompiledData, rows: Rows) -> Rows:
     """Of some rows those between which chance decides: of the highest priority among those that have a weight."""
     rows = rows[compiled.row_weights[rows] > 0.0]
     priorities = compiled.priorities[rows]
     return rows[priorities == priorities.max()] if len(rows) else rows
 
 
-def _weighted(compiled: CompiledTable, rows: Rows, source: Rng, last: str | None) -> int | None:
+def _weighted(compiled: CompiledData, rows: Rows, source: Rng, last: str | None) -> int | None:
     top = _ranked(compiled, rows).tolist()
     if not top:
         return None
@@ -259,7 +172,7 @@ class Outcome:
     A chance is that of a character that has picked nothing yet; what it picked last is left out of its next pick.
     """
 
-    def __init__(self, compiled: CompiledTable, matches: Matches) -> None:
+    def __init__(self, compiled: CompiledData, matches: Matches) -> None:
         """Raises ContextError where the answer is of another table, or of another version of it."""
         matches.require_own(compiled.answering)
         self.compiled = compiled
@@ -317,7 +230,7 @@ class Outcome:
         return _outranked(compiled.policy, winners[0], len(self.candidates), int(compiled.priorities[self.candidates[0]]))
 
 
-def _candidates(compiled: CompiledTable, rows: Rows) -> Rows:
+def _candidates(compiled: CompiledData, rows: Rows) -> Rows:
     """Of the valid rows those that may be picked; raises PolicyError as `pick` does."""
     if compiled.ways is not None:
         return np.sort(_possible(compiled.ways, rows[compiled.ways.pickable[rows]], 0))

@@ -1,22 +1,21 @@
 """Do for a compiled table, while a game loads, what is otherwise done when it is first asked.
 
-Modules are loaded, look-ups are made, and kernels are compiled, or read from numba's cache, for the arrays that this table has.
+Look-ups are made, and kernels are compiled, or read from numba's cache, for the arrays that this table has.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from contextdb.compiled.batch import load_kernels, query_codes, query_many
+from contextdb.compiled.casting.roles import roles_of_table
+from contextdb.compiled.casting.stage import query_with_actors
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.live import live_context
 
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
 
-
-def prepare(compiled: CompiledTable, casting: bool = False, batches: bool = False) -> None:
+def prepare(compiled: CompiledData, casting: bool = False, batches: bool = False) -> None:
     """Make a table ready; see `CompiledTable.prepare`."""
-    import contextdb.compiled.pick  # noqa: F401
-
     compiled.query({}, unknown="any")
-    compiled.live(unknown="any").matches()
+    live_context(compiled, "any").matches()
     _ = compiled.memory
     if compiled.ways is not None:
         _ = compiled.ways.pickable
@@ -26,20 +25,15 @@ def prepare(compiled: CompiledTable, casting: bool = False, batches: bool = Fals
         _prepare_batches(compiled)
 
 
-def _prepare_casting(compiled: CompiledTable) -> None:
-    import contextdb.compiled.casting.live
-    import contextdb.compiled.casting.many  # noqa: F401
-
-    nobody: dict[str, list[dict[str, object]]] = {role: [] for role in compiled.roles.conditions}
-    compiled.query({}, "any", nobody)
+def _prepare_casting(compiled: CompiledData) -> None:
+    nobody: dict[str, list[dict[str, object]]] = {role: [] for role in roles_of_table(compiled).conditions}
+    query_with_actors(compiled, {}, nobody, None, "any")
 
 
-def _prepare_batches(compiled: CompiledTable) -> None:
-    from contextdb.compiled.batch import load_kernels
-
+def _prepare_batches(compiled: CompiledData) -> None:
     load_kernels()
     name = next(iter(compiled.asked), None)
-    many = compiled.query_many({} if name is None else {name: [None]}, "any")
+    many = query_many(compiled, {} if name is None else {name: [None]}, "any")
     _ = many.counts, many.mask
     if compiled.when is None:
-        compiled.query_codes(compiled.encode({}, "any"))
+        query_codes(compiled, compiled.encode({}, "any"))

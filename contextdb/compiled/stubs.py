@@ -15,7 +15,7 @@ from unicodedata import normalize
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import format_number
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 from contextdb.errors import shown
 
 _HEAD = '''"""The facts that each table asks for, as types. Written by `contextdb compile --stubs`: do not edit."""
@@ -28,7 +28,7 @@ _PLAIN = {"bool": "bool", "int": "int", "number": "float", "angle": "float"}
 _UNITS = {"angle": "degrees"}
 
 
-def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
+def stubs_of(tables: Mapping[str, CompiledData]) -> str:
     """The text of a Python module with the types of all tables; the same tables give the same text."""
     names = _Names()
     literals: dict[Condition, str] = {}
@@ -73,7 +73,7 @@ def _with_those_above(tag: str) -> Iterator[str]:
     return (".".join(parts[: n + 1]) for n in range(len(parts)))
 
 
-def _facts(name: str, table: CompiledTable, literals: Mapping[Condition, str]) -> str:
+def _facts(name: str, table: CompiledData, literals: Mapping[Condition, str]) -> str:
     lines = [f"        {c.name!r}: {_type(c, literals.get(c))},{_comment(c)}\n" for c in table.asked.values()]
     fields = "{\n" + "".join(lines) + "    }" if lines else "{}"
     return f"# table {shown(table.name, 200)}\n{name} = TypedDict(\n    {name!r},\n    {fields},\n)\n"

@@ -1,166 +1,43 @@
-"""Compile a table into bitmasks, and look contexts up in them.
-
-Each condition's domain is cut into the fewest classes its column tells apart; each class keeps one bit a row. A query finds the
-class of every fact and ANDs the masks, so its cost grows with conditions x rows / 64 and not with how the cells are written.
-
-W = ceil(n_rows / 64). Bit r % 64 of word r // 64 is row r; bits past the last row are 0, always. A compiled table is never
-changed and may be asked from several threads. Nothing here reads a file, prints, or looks at the clock; `save` and `open` call
-`contextdb.compiled.artefact`.
-
-Source: Lakshman and Stiliadis, "High-speed policy-based packet forwarding using efficient multi-dimensional range matching",
-SIGCOMM 1998.
-"""
+"""A compiled table with every way to ask it: one context or many, kept between frames, explained, picked from, saved."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb import bitmask
-from contextdb.bitmask import Words, read_only
-from contextdb.cells.arguments import require_path, require_row
-from contextdb.cells.conditions import Condition
-from contextdb.cells.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
-from contextdb.cells.grammar import ANY, Cell, parse_cell, reads
-from contextdb.cells.mirroring import changed_in_mirror, in_mirror, kept_facts, mirrored_facts
-from contextdb.columns import TextColumn
-from contextdb.compiled.classes import ColumnMasks
+from contextdb.cells.arguments import require_path
+from contextdb.cells.facts import Context, Unknown, check_mode
+from contextdb.compiled.artefact import open_artefact, save
+from contextdb.compiled.batch import ManyMatches, query_codes, query_many
+from contextdb.compiled.casting.explaining import explain_with_actors
+from contextdb.compiled.casting.facts import Actors, Prefer
+from contextdb.compiled.casting.many import ManyCastMatches, query_many_with_actors
+from contextdb.compiled.casting.stage import query_with_actors
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.explain import Explanation, explain
 from contextdb.compiled.live import LiveContext, live_context
-from contextdb.compiled.lookup import Ask, SingleLookup, build_ask, ruled_ask, single_lookup
-from contextdb.compiled.mask_bits import bits_of, nbytes
-from contextdb.compiled.matches import Answering, Matches, SetMatches
-from contextdb.compiled.stack import MaskStack
-from contextdb.compiled.unchanging import Unchanging
-from contextdb.compiled.versions import version_of
-from contextdb.errors import ContextError, Fault, Place, in_quotes
-from contextdb.expressions.rules import WhenRules
+from contextdb.compiled.matches import Matches
+from contextdb.compiled.memory import Rng
+from contextdb.compiled.pick import pick
+from contextdb.compiled.preparing import prepare
 
 if TYPE_CHECKING:
     import polars as pl
 
-    from contextdb.compiled.batch import ManyMatches
-    from contextdb.compiled.casting.facts import Actors, Prefer
-    from contextdb.compiled.casting.many import ManyCastMatches
-    from contextdb.compiled.casting.roles import TableRoles
-    from contextdb.compiled.explain import Explanation
-    from contextdb.compiled.pick import Memory, Rng
-    from contextdb.compiled.ways import Step, Ways
-    from contextdb.expressions import Derivation
-    from contextdb.schema.shapes import Policy
-    from contextdb.tables.table import Table
-
     ManyContexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
-
-SLOT_COLUMNS = ("Mandatory_Slots", "Optional_Slots")
-"""The outputs that say which roles a row fills."""
-
-SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
-class CompiledTable(Unchanging):
+class CompiledTable(CompiledData):
     """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`.
 
     It can be pickled at any time. What was pickled answers the same; only which assets were picked last (`pick`) is not pickled.
     """
-
-    name: str
-    assets: Sequence[str]
-    conditions: tuple[Condition, ...]
-    masks: tuple[ColumnMasks, ...]
-    """One for each condition."""
-    enabled: Words
-    """The rows that may match at all."""
-    soft: tuple[SoftMasks | None, ...]
-    """For each condition with soft cells: masks of the rows that they match, and the penalty of each row float64 [n_rows]."""
-    priorities: NDArray[np.int64]
-    row_weights: NDArray[np.float64]
-    texts: tuple[TextColumn, ...]
-    """The cells of each condition as they are written, for explanations."""
-    policy: Policy = "collect"
-    fallback: str | None = None
-    derivation: Derivation | None = None
-    """How the conditions that are derived are computed; None where none is."""
-    slots: tuple[TextColumn, ...] | None = None
-    """The outputs of `SLOT_COLUMNS` that the table has; None where that is not known."""
-    when: WhenRules | None = None
-    """The rows' own rules; None where no row has one."""
-    ways: Ways | None = None
-    """The way of each row through tables inside tables; None for a table without."""
-    declared: frozenset[str] = frozenset()
-    """Conditions that the project declares: facts of these names are of other tables, and no slips."""
-    _ask: Callable[[Context], Matches] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_ask", self._build_and_ask)  # a plain attribute: the way of every query
-        read_only(self.priorities)
-        read_only(self.row_weights)
-
-    @classmethod
-    def of(cls, table: Table) -> CompiledTable:
-        """Compile a table whose cells can all be read; columns compiled before are taken as they are."""
-        when = WhenRules.of(table.when)
-        return cls(
-            name=table.name,
-            assets=table.assets,
-            conditions=tuple(c.condition for c in table.conditions),
-            masks=tuple(c.masks for c in table.conditions),
-            enabled=bitmask.pack(table.enabled),
-            soft=tuple(c.soft for c in table.conditions),
-            priorities=table.priorities,
-            row_weights=table.row_weights,
-            texts=tuple(c.texts for c in table.conditions),
-            policy=table.settings.policy,
-            fallback=table.settings.fallback,
-            derivation=table.schema.derivation_of([*(c.condition.name for c in table.conditions), *(when.names if when else ())]),
-            slots=tuple(c for c in table.columns if c.name in SLOT_COLUMNS and c.name in table.settings.outputs),
-            when=when,
-            ways=getattr(table, "ways", None),
-            declared=frozenset(table.schema.conditions),
-        )
-
-    @property
-    def n_rows(self) -> int:
-        """How many rows the table has."""
-        return len(self.assets)
-
-    @property
-    def leaves(self) -> Sequence[str]:
-        """The asset of each row, without the path that it has in a table inside the table."""
-        return self.assets if self.ways is None else self.ways.leaves
-
-    def way(self, row: int) -> tuple[Step, ...]:
-        """The rows of tables that a row comes from, outermost first, each with its file and line; for a table without tables inside
-        one step, the row itself."""
-        row = require_row(row, self.n_rows)
-        if self.ways is not None:
-            return self.ways.steps(row)
-        from contextdb.compiled.ways import Step
-
-        return (Step(self.name, row, self.assets[row], Place(row=row)),)
-
-    @cached_property
-    def asked(self) -> dict[str, Condition]:
-        """The conditions whose facts a caller gives: those of the table and of its rules, and for derived ones those that they are
-        computed from."""
-        derived, inputs = (self.derivation.names, self.derivation.inputs) if self.derivation else ((), ())
-        return {c.name: c for c in (*self.conditions, *inputs, *self.ruled) if c.name not in derived}
-
-    @cached_property
-    def ruled(self) -> tuple[Condition, ...]:
-        """The conditions that rules name and that are no columns of the table."""
-        return tuple(c for c in self.when.conditions if c.name not in self.places) if self.when else ()
-
-    @cached_property
-    def enabled_bits(self) -> int:
-        """The rows that may match at all, as an integer."""
-        return bitmask.to_int(self.enabled)
 
     def query(self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None) -> Matches:
         """Find the rows whose every cell accepts its fact, and whose roles can be filled.
@@ -191,17 +68,13 @@ class CompiledTable(Unchanging):
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
         if actors is not None:
-            from contextdb.compiled.casting.stage import query_with_actors
-
             return query_with_actors(self, context, actors, prefer, unknown)
         if unknown != "error":
-            check_mode(unknown)
-        try:
-            found = self._ask(context)
-            return found if unknown == "error" or not self.mirroring else found.with_mirrored(self.keeping(unknown)(context))
-        except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
-            found = self.matches(*self._bits_carefully(context, unknown))
-            return self.bound(found, kept_facts(context), unknown) if self.is_bound else found
+            return super().query(context, unknown)
+        try:  # as there, without a call more: the way of every question
+            return self._ask(context)
+        except Exception:
+            return self.query_with_care(context)
 
     @overload
     def query_many(self, contexts: ManyContexts, unknown: Unknown = "error") -> ManyMatches: ...
@@ -234,11 +107,7 @@ class CompiledTable(Unchanging):
             As `query`, naming the first contexts concerned.
         """
         if actors is not None:
-            from contextdb.compiled.casting.many import query_many_with_actors
-
             return query_many_with_actors(self, contexts, actors, prefer, unknown)
-        from contextdb.compiled.batch import query_many
-
         return query_many(self, contexts, unknown)
 
     def live(self, facts: Context | None = None, unknown: Unknown = "error") -> LiveContext:
@@ -259,33 +128,11 @@ class CompiledTable(Unchanging):
             Also what the first batches do, small and large: numba is loaded, where it is installed, and the kernels are compiled or
             read from its cache, which takes about a second.
         """
-        from contextdb.compiled.preparing import prepare
-
         prepare(self, casting, batches)
-
-    def encode(self, context: Context, unknown: Unknown = "error") -> NDArray[np.int32]:
-        """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.compiled.stack`. Rules have no
-        codes."""
-        self.refuse_rules("codes do not keep the facts that its rules need")
-        facts = self.read_context(context, unknown)
-        local: list[tuple[int, ...] | None] = []
-        for name, masks in zip(facts, self.masks, strict=True):
-            fact = facts[name]
-            if isinstance(fact, Cell):
-                raise ContextError(Fault("a set of values has no single code.", "one value", place=Place(column=name)))
-            local.append(None if fact is None and unknown == "any" else masks.codes(fact))  # type: ignore[arg-type]
-        return self.stack.codes(local)
 
     def query_codes(self, codes: NDArray[np.int32]) -> Matches:
         """The rows for codes that `encode` made."""
-        from contextdb.compiled.batch import query_codes
-
         return query_codes(self, codes)
-
-    @property
-    def policies(self) -> frozenset[str]:
-        """The policies of the table and of those that stand in it."""
-        return frozenset((self.policy,) if self.ways is None else (table.policy for table in self.ways.tables))
 
     def explain(
         self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
@@ -293,274 +140,20 @@ class CompiledTable(Unchanging):
         """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
         which role cannot be filled, and whose fact is in the way."""
         if actors is not None:
-            from contextdb.compiled.casting.explaining import explain_with_actors
-
             return explain_with_actors(self, context, actors, prefer, unknown)
-        from contextdb.compiled.explain import explain
-
         return explain(self, context, unknown)
 
     def pick(
         self, context: Context | Matches, rng: Rng | int | None = None, last: str | None = None, unknown: Unknown = "error"
     ) -> str | None:
         """One asset by the table's policy: see `contextdb.compiled.pick.pick`."""
-        from contextdb.compiled.pick import pick
-
         return pick(self, context if isinstance(context, Matches) else self.query(context, unknown), rng, last)
-
-    def penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:
-        """What each row's soft cells cost in a search: float64 [n_rows], the sum of the penalties of those that do not match.
-
-        A soft cell whose fact is missing costs nothing with unknown="any", its penalty with "never". A set-valued fact costs
-        nothing where some value of the set matches.
-        """
-        costs = np.zeros(self.n_rows)
-        if any(self.soft):
-            facts = self.read_context(context, unknown)
-            for at, condition in enumerate(self.conditions):
-                if self.soft[at] is not None:
-                    costs += self.column_penalties(at, facts[condition.name], unknown)
-        return costs
-
-    def column_penalties(self, at: int, fact: Fact, unknown: Unknown) -> NDArray[np.float64]:
-        """What the soft cells of one condition cost with a fact in canonical form: float64 [n_rows]."""
-        soft = self.soft[at]
-        if soft is None or (fact is None and unknown == "any"):
-            return np.zeros(self.n_rows)
-        masks, row_penalties = soft
-        n = len(row_penalties)  # in a table with tables inside, a row for each row of each depth
-        fails = ~bitmask.unpack(bitmask.from_int(bits_of(masks, fact)[0], n), n)
-        costs = np.where(fails, row_penalties, 0.0)
-        return costs if n == self.n_rows else costs.reshape(-1, self.n_rows).sum(axis=0)
-
-    @cached_property
-    def mirroring(self) -> dict[str, Condition]:
-        """The conditions of `asked` whose facts change in a mirror."""
-        return changed_in_mirror(self.asked.values())
-
-    def query_mirrored(self, context: Context, unknown: Unknown = "error") -> Matches:
-        """The answer to a context as a mirror shows it. What is derived is computed from mirrored facts."""
-        try:
-            return self.query(mirrored_facts(context, self.mirroring), unknown)
-        except ContextError as error:
-            raise in_mirror(error) from None
-
-    def bound(self, matches: Matches, context: Context, unknown: Unknown = "error") -> Matches:
-        """An answer that knows what else hangs on the facts of its moment: what soft cells cost, and the answer in a mirror."""
-        if self.mirroring:
-            matches.with_mirrored(self.keeping(unknown)(context))
-        return matches.with_penalties(partial(self.penalties, self.keep(context), unknown)) if self.is_soft else matches
-
-    def keeping(self, unknown: Unknown) -> Callable[[Context], dict[str, object] | Callable[[], Matches]]:
-        """What makes of a context that an answer was asked with what `Matches.with_mirrored` takes."""
-        return self.keep if unknown == "error" else lambda context: partial(self.query_mirrored, self.keep(context), unknown)
-
-    @cached_property
-    def keep(self) -> Callable[[Context], dict[str, object]]:
-        """What copies a context, so that it stays as it is now."""
-        return kept_facts if any(c.domain.kind == "tags" for c in self.asked.values()) else dict
-
-    @cached_property
-    def is_soft(self) -> bool:
-        """Whether the table has soft cells."""
-        return any(self.soft)
-
-    @cached_property
-    def is_bound(self) -> bool:
-        """Whether answers must keep the facts that they were asked with."""
-        return self.is_soft or bool(self.mirroring)
-
-    def cells(self, at: int) -> tuple[Cell, ...]:
-        """What the distinct texts of condition number `at` mean, read once; Any for one that cannot be read, which no row holds."""
-        if at not in self._cells_read:
-            domain = self.conditions[at].domain
-            layers = None if self.ways is None else self.ways.layers[at]
-            if layers is not None:
-                self._cells_read[at] = layers.cells(domain)
-                return self._cells_read[at]
-            self._cells_read[at] = tuple(parse_cell(t, domain) if reads(t, domain) else ANY for t in self.texts[at].texts)
-        return self._cells_read[at]
-
-    @cached_property
-    def _cells_read(self) -> dict[int, tuple[Cell, ...]]:
-        return {}
-
-    @cached_property
-    def roles(self) -> TableRoles:
-        """The roles of the table and the rows that need them."""
-        from contextdb.compiled.casting.roles import TableRoles
-
-        return TableRoles(self)
-
-    def read_context(self, context: Context, unknown: Unknown = "error", names: Sequence[str] | None = None) -> dict[str, Fact]:
-        """The fact of every condition, or of those named, in canonical form, None where it is missing; raises ContextError as
-        `query` does."""
-        check_mode(unknown)
-        require_context(context)
-        facts: dict[str, Fact] = {}
-        faults: list[Fault] = []
-        derived: Mapping[str, object] = {}
-        try:
-            if self.derivation:
-                derived = (self.derivation if names is None else self.derivation.only(names)).compute(context)
-        except ContextError as error:
-            faults += error.faults
-        for condition in (*self.conditions, *self.ruled) if names is None else (self._condition_named(n) for n in names):
-            name = condition.name
-            try:
-                facts[name] = read_fact(derived.get(name) if name in derived else context.get(name), condition)
-            except ContextError as error:
-                faults += [fault for fault in error.faults if fault not in faults]
-        if faults:
-            raise ContextError(*faults)
-        if missing := [name for name, fact in facts.items() if fact is None]:
-            self.refuse_missing(missing, context, unknown)
-        return facts
-
-    def refuse_missing(self, missing: Sequence[str], context: Context, unknown: Unknown) -> None:
-        """Raise ContextError for missing facts of conditions, unless they are treated in another way; a misspelt one always."""
-        derivation = self.derivation
-        plain = [name for name in missing if derivation is None or name not in derivation.names]
-        for name in missing:
-            if derivation is not None and name in derivation.names:
-                plain += [n for n in derivation.lacking(name, context) if n not in plain]
-        extra = [name for name in context if name not in self.asked]
-        if slip := misspelt(plain, [name for name in extra if name not in self.declared]):
-            raise slip
-        if unknown == "error" and derivation is not None and not plain:
-            raise derivation.no_value(missing[0], context)
-        if unknown == "error":
-            raise missing_error(plain, extra)
-
-    def condition_bits(self, at: int, fact: Fact, unknown: Unknown = "error") -> tuple[int, int]:
-        """Rows whose cell accepts some, and rows whose cell accepts every, value of a fact in canonical form."""
-        return self._all_bits if fact is None and unknown == "any" else bits_of(self.masks[at], fact)
-
-    def fact_bits(self, name: str, value: object, unknown: Unknown) -> tuple[int, int, bool]:
-        """For one given fact: rows that accept some of it, rows that accept all of it, and whether it is missing."""
-        at = self.places[name]
-        fact = read_fact(value, self.conditions[at])
-        some_bits, every = self.condition_bits(at, fact, unknown)
-        return some_bits, every, fact is None
-
-    def matches(self, bits: int, always: int | None = None) -> Matches:
-        """An answer of this table from its rows as an integer."""
-        return Matches(bits, self.answering) if always is None or always == bits else SetMatches(bits, self.answering, always)
-
-    @cached_property
-    def single_lookups(self) -> dict[str, SingleLookup]:
-        """For each condition what finds the mask of a usual fact."""
-        return {c.name: single_lookup(c, m) for c, m in zip(self.conditions, self.masks, strict=True)}
-
-    @cached_property
-    def places(self) -> dict[str, int]:
-        """Where each condition stands among `conditions`."""
-        return {c.name: at for at, c in enumerate(self.conditions)}
-
-    @cached_property
-    def stack(self) -> MaskStack:
-        """Every mask of the table in one array, for the kernels."""
-        return MaskStack.of(self.masks, self.n_rows)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes that the masks take."""
-        return sum(nbytes(m) for m in self.masks)
 
     def save(self, path: str | Path) -> None:
         """Write the artefact for the game: .safetensors, atomic."""
-        from contextdb.compiled.artefact import save
-
         save(self, require_path(path))
 
     @classmethod
-    def open(cls, path: str | Path) -> CompiledTable:
+    def open(cls, path: str | Path) -> Self:
         """Open an artefact by memory map. A truncated, altered or foreign file is refused with ArtefactError."""
-        from contextdb.compiled.artefact import open_artefact
-
-        return open_artefact(require_path(path))
-
-    @cached_property
-    def memory(self) -> Memory:
-        """Which asset each random generator picked last."""
-        from contextdb.compiled.pick import Memory
-
-        memory: Memory = self.__dict__.setdefault("memory", Memory())  # one, whichever thread comes first
-        return memory
-
-    def remember_as(self, older: CompiledTable) -> None:
-        """Go on with what an older version of this table remembers of picks: no asset is repeated for a reload."""
-        self.__dict__["memory"] = older.memory
-
-    @property
-    def version(self) -> str:
-        """A digest of what the table says: the same for two that say the same, wherever they were compiled."""
-        return self.answering.version
-
-    @cached_property
-    def answering(self) -> Answering:
-        """What the answers of this table share."""
-        ask_mirrored = self.query_mirrored if self.mirroring else None
-        own = Answering(self.assets, self.leaves, self.name, partial(version_of, self._said), ask_mirrored)
-        answering: Answering = self.__dict__.setdefault("answering", own)  # one, whichever thread comes first
-        return answering
-
-    @property
-    def _said(self) -> tuple[object, ...]:
-        """All that an answer, and what is picked from it, hangs on."""
-        conditions = [(c.name, c.domain, c.expr, c.mirror) for c in (*self.conditions, *self.ruled)]
-        derived = [(step.condition.name, step.expression.text) for step in self.derivation.steps] if self.derivation else []
-        ways = [] if self.ways is None else [self.ways.numbers, self.ways.rows]
-        inner = () if self.ways is None else self.ways.tables
-        return (
-            (self.name, self.policy, self.fallback, list(self.assets), conditions, derived),
-            *(self.enabled, self.priorities, self.row_weights, *self.texts, *(self.slots or ())),
-            *((self.when.texts,) if self.when is not None else ()),
-            *(*ways, *(part for t in inner for part in ((t.name, t.policy), t.priorities, t.row_weights))),
-        )
-
-    @cached_property
-    def _all_bits(self) -> tuple[int, int]:
-        everything = (1 << self.n_rows) - 1
-        return everything, everything
-
-    def _build_and_ask(self, context: Context) -> Matches:
-        """The first question builds the function that answers all others."""
-        is_plain = self.is_bound and not (self.is_soft or self.when or self.derivation)
-        columns = list(zip(self.conditions, self.masks, strict=True))
-        ask = build_ask(columns, self.enabled_bits, self.answering, self.keep if is_plain else None)
-        if self.when is not None:
-            ask = ruled_ask(ask, self.when, self.answering)
-        if self.derivation is not None:
-            ask = _composed(ask, self.derivation.complete)
-        if self.is_bound and not is_plain:
-            ask = self._binding(ask)
-        object.__setattr__(self, "_ask", ask)
-        return ask(context)
-
-    def _binding(self, ask: Ask) -> Ask:
-        return lambda context: self.bound(ask(context), context)
-
-    def _bits_carefully(self, context: Context, unknown: Unknown) -> tuple[int, int]:
-        facts = self.read_context(context, unknown)
-        some_bits = every = self.enabled_bits
-        for at, condition in enumerate(self.conditions):
-            one, all_ = self.condition_bits(at, facts[condition.name], unknown)
-            some_bits &= one
-            every &= all_
-        return (some_bits, every) if self.when is None else self.when.left_with_care(some_bits, every, facts, unknown)
-
-    def _condition_named(self, name: str) -> Condition:
-        if name in self.places:
-            return self.conditions[self.places[name]]
-        derived = self.derivation.conditions if self.derivation else ()
-        return next(c for c in (*self.ruled, *derived) if c.name == name)
-
-    def refuse_rules(self, why: str) -> None:
-        """Raise ContextError for a table with rules."""
-        if self.when is not None:
-            raise ContextError(Fault(f"the table {in_quotes(self.name)} has rules: {why}.", "query, query_many or live"))
-
-
-def _composed(ask: Callable[[Context], Matches], complete: Callable[[Context], Context]) -> Callable[[Context], Matches]:
-    return lambda context: ask(complete(context))
+        return open_artefact(require_path(path), cls)

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.cells.arguments import (
     require_kind,
     require_many,
@@ -27,16 +27,16 @@ from contextdb.cells.arguments import (
 )
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
+from contextdb.compiled.data import SLOT_COLUMNS
+from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, Place, SchemaError, TableError, in_quotes, nearest, some
 from contextdb.expressions.rules import WhenColumn
+from contextdb.expressions.rules.rules import WhenRules
+from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults
 from contextdb.tables.condition_column import ConditionColumn, infer_condition
 from contextdb.tables.plain_columns import PlainColumns
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
-    from contextdb.files.texts import AnySource
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,10 +242,8 @@ class Table(Unchanging):
         TableError
             Cells that cannot be read, all of them; in tables inside the table too.
         """
-        from contextdb.compiled.table import CompiledTable
-
         self.require_readable()
-        return CompiledTable.of(self.flat(tables))
+        return compile_table(self.flat(tables))
 
     def flat(self, tables: Mapping[str, Table] | None = None) -> Table:
         """The table with the rows of its inner tables in place of those that stand for them: the rows that a query answers with.
@@ -323,6 +321,29 @@ def flat_table(table: Table, tables: Mapping[str, Table] | None) -> Table:
         fault = Fault(found, f'compile(tables={{"{name}": ...}}), or a table out of a folder', rule="no-such-table")
         raise TableError(fault.at(table.place(rows[0], table.asset_column)))
     return flatten(table, tables or {})
+
+
+def compile_table(table: Table) -> CompiledTable:
+    """Compile a flat table whose cells can all be read; columns compiled before are taken as they are."""
+    when = WhenRules.of(table.when)
+    return CompiledTable(
+        name=table.name,
+        assets=table.assets,
+        conditions=tuple(c.condition for c in table.conditions),
+        masks=tuple(c.masks for c in table.conditions),
+        enabled=bitmask.pack(table.enabled),
+        soft=tuple(c.soft for c in table.conditions),
+        priorities=table.priorities,
+        row_weights=table.row_weights,
+        texts=tuple(c.texts for c in table.conditions),
+        policy=table.settings.policy,
+        fallback=table.settings.fallback,
+        derivation=table.schema.derivation_of([*(c.condition.name for c in table.conditions), *(when.names if when else ())]),
+        slots=tuple(c for c in table.columns if c.name in SLOT_COLUMNS and c.name in table.settings.outputs),
+        when=when,
+        ways=getattr(table, "ways", None),
+        declared=frozenset(table.schema.conditions),
+    )
 
 
 def build_table(

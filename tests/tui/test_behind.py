@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 
 import contextdb as cdb
 from contextdb.checks.cases import check_cases
-from contextdb.compiled.table import CompiledTable
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.nesting.flat import flat_rows
 from contextdb.tables.nesting.links import Neighbours
-from contextdb.tables.table import Table
+from contextdb.tables.table import Table, compile_table
 from tui.model.context_list import ContextList
 from tui.model.coverage_run import measured
 from tui.model.query_row import QueryRow
@@ -59,7 +58,7 @@ def test_a_row_is_valid_and_counts_as_in_the_flat_table(tables, air, speed):
 
     flat = outer.flat()
     facts = {name: fact for name, fact in query.facts.items() if fact is not None}
-    flags = CompiledTable.of(flat).query(facts, "any").flags
+    flags = compile_table(flat).query(facts, "any").flags
     rows = flat_rows(outer, flat)
     assert query.valid.tolist() == [bool(flags[own].any()) for own in rows]
     for row, own in enumerate(rows):

@@ -18,11 +18,10 @@ from contextdb.cells.facts import Fact
 from contextdb.compiled.casting import Actor, CastMatches
 from contextdb.compiled.explain import Explanation
 from contextdb.compiled.matches import Matches
-from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError, ContextError, Fault
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.links import inner_rows
-from contextdb.tables.table import Table
+from contextdb.tables.table import Table, compile_table
 from tui.model.behind import Inside
 
 Offered = Mapping[str, Sequence[Actor]]
@@ -45,7 +44,7 @@ class Asked:
         except ContextDBError as error:
             self.flat, self.fault = table, error.faults[0]
         try:
-            self.compiled = CompiledTable.of(self.flat)
+            self.compiled = compile_table(self.flat)
             given = {name: fact for name, fact in facts.items() if fact is not None and name in self.compiled.asked}
             self.explained = self.compiled.explain(given, "any", actors or None)
         except ContextError as error:

@@ -37,7 +37,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, some
 from contextdb.tables.other_files import cases_path
-from contextdb.tables.table import Table
+from contextdb.tables.table import Table, compile_table
 from contextdb.telemetry.recordings import Recording, fact_text, open_recording
 from tui.model.wanted import wanted_by
 
@@ -253,7 +253,7 @@ class ContextList:
         if self._compiled is None:
             flat = self.table.flat()
             readable = readable_rows(self.table) if flat is self.table else (1 << flat.n_rows) - 1
-            self._compiled = CompiledTable.of(flat), readable
+            self._compiled = compile_table(flat), readable
         return self._compiled
 
     @property

@@ -37,7 +37,7 @@ from contextdb.schema.settings import TableSettings
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.links import is_nested
 from contextdb.tables.nesting.names import asset_name
-from contextdb.tables.table import Table
+from contextdb.tables.table import Table, compile_table
 from tui.model.asked import Asked, Offered, bits_of_rows
 from tui.model.behind import Behind, Counts, Inside
 from tui.model.wanted import Wanted, flat_of
@@ -319,7 +319,7 @@ class QueryRow:
         columns = tuple(table.text_column(name) for name in names if name is not None)
         known = self._ranked
         if known is None or known[0] != settings or any(a is not b for a, b in zip(known[1], columns, strict=True)):
-            compiled = CompiledTable.of(replace(table, conditions=(), settings=settings))
+            compiled = compile_table(replace(table, conditions=(), settings=settings))
             self._ranked = known = settings, columns, compiled
         return known[2]
 
@@ -425,7 +425,7 @@ class QueryRow:
         return [row for row in found if all(bits >> row.row & 1 for bits in self._readable.values())][:most]
 
     def _explained(self) -> Explanation:
-        compiled = CompiledTable.of(self._table)
+        compiled = compile_table(self._table)
         return compiled.explain({name: fact for name, fact in self.given.items() if name in compiled.asked}, unknown="any")
 
     def _read(self, fresh: Container[str] = ()) -> None:
@@ -459,7 +459,7 @@ def _accepting(column: ConditionColumn, fact: Fact) -> tuple[int, int]:
     if all(c.is_any for c in column.cells):  # a column of any type: the tables inside say of which
         return (1 << column.texts.n_rows) - 1, (1 << column.texts.n_rows) - 1
     if isinstance(fact, Cell):
-        one = CompiledTable.of(_alone(column))
+        one = compile_table(_alone(column))
         return one.condition_bits(0, fact)
     holds = np.array([c.is_soft or c.holds(fact) for c in column.cells], np.bool_)
     bits = bitmask.to_int(bitmask.pack(holds[column.texts.codes])) if len(holds) else 0

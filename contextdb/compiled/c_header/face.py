@@ -16,7 +16,7 @@ from importlib.resources import files
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import format_number
 from contextdb.compiled.c_header.spelling import Names, comment, literal
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 
 READER = 1
 """Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
@@ -87,7 +87,7 @@ class TableFace:
     enumerators: tuple[str, ...]
 
 
-def c_header_of(tables: Mapping[str, CompiledTable], guard: str = "CDB_TABLES_H") -> tuple[str, list[HeldBack]]:
+def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H") -> tuple[str, list[HeldBack]]:
     """The text of the header, ASCII with line feeds, and the tables that it leaves out; the same tables give the same text.
 
     Raises
@@ -124,7 +124,7 @@ def _reader() -> str:
     return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in PARTS)
 
 
-def _why_not(table: CompiledTable) -> str:
+def _why_not(table: CompiledData) -> str:
     """Why a table cannot be answered for in C; "" where it can."""
     return "its rows have rules of their own (when)" if table.when is not None else ""
 
@@ -147,7 +147,7 @@ def _with_those_above(tag: str) -> Iterator[str]:
     return (".".join(parts[: n + 1]) for n in range(len(parts)))
 
 
-def face_of(name: str, table: CompiledTable, names: Names) -> TableFace:
+def face_of(name: str, table: CompiledData, names: Names) -> TableFace:
     """Names for a table and its conditions."""
     base = names.of(name, "cdb_", _ENDINGS)
     head = f"CDB_{base.removeprefix('cdb_')}_".upper()
@@ -204,7 +204,7 @@ def _tag_set(choices: Choices) -> Iterator[str]:
     yield "}"
 
 
-def _table(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+def _table(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     yield comment(f"---- table {face.table}")
     yield ""
     yield from _facts_struct(table, face, choices)
@@ -214,7 +214,7 @@ def _table(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Ch
     yield from _functions(table, face, choices)
 
 
-def _facts_struct(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+def _facts_struct(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     yield f"typedef struct {face.base}_facts {{"
     lines = []
     for condition, name in zip(table.conditions, face.fields, strict=True):
@@ -249,7 +249,7 @@ def _end(bound: float) -> str:
     return format_number(bound) if math.isfinite(bound) else ""
 
 
-def _conditions_enum(table: CompiledTable, face: TableFace) -> Iterator[str]:
+def _conditions_enum(table: CompiledData, face: TableFace) -> Iterator[str]:
     """The conditions by number, as a fault names them."""
     yield f"typedef enum {face.base}_condition {{"
     yield from (f"    {name} = {number}," for number, name in enumerate(face.enumerators))
@@ -258,7 +258,7 @@ def _conditions_enum(table: CompiledTable, face: TableFace) -> Iterator[str]:
     yield ""
 
 
-def _schema(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+def _schema(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     yield f"static inline const cdb_schema *{face.base}_schema(void)"
     yield "{"
     if table.conditions:
@@ -278,7 +278,7 @@ def _schema(table: CompiledTable, face: TableFace, choices: Mapping[Condition, C
     yield ""
 
 
-def _missing_facts(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+def _missing_facts(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     yield "/* Facts of which none is known yet. */"
     yield f"static inline {face.base}_facts {face.base}_missing(void)"
     yield "{"
@@ -299,7 +299,7 @@ def _missing_facts(table: CompiledTable, face: TableFace, choices: Mapping[Condi
     yield ""
 
 
-def _functions(table: CompiledTable, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+def _functions(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     base, n = face.base, max(len(table.conditions), 1)
     yield f"typedef struct {base} {{"
     yield "    cdb_table table;"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +16,9 @@ from contextdb.compiled.casting.assigning import Part
 from contextdb.compiled.casting.facts import Actors, Offer, Prefer
 from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.casting.stage import CastMatches, Stage, set_stage
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, Failure, RowExplanation, cell_failures, describe_fact, rules_that_fail
-from contextdb.expressions.rules import told_facts
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
-    from contextdb.expressions.rules import WhenRules
+from contextdb.expressions.rules import WhenRules, told_facts
 
 
 class CastExplanation(Explanation):
@@ -34,7 +30,7 @@ class CastExplanation(Explanation):
 
     matches: CastMatches
 
-    def __init__(self, compiled: CompiledTable, stage: Stage, plain: Mapping[int, tuple[int, int]], matches: CastMatches) -> None:
+    def __init__(self, compiled: CompiledData, stage: Stage, plain: Mapping[int, tuple[int, int]], matches: CastMatches) -> None:
         facts = {compiled.conditions[at].name: fact for at, fact in stage.plain_facts.items()}
         super().__init__(compiled, facts, "error", matches)
         self.stage = stage
@@ -147,7 +143,7 @@ def _most_filled(parts: list[Part]) -> dict[str, Offer]:
 
 
 def explain_with_actors(
-    compiled: CompiledTable, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
+    compiled: CompiledData, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
 ) -> CastExplanation:
     """Explain every row of a table for one context and its actors; raises ContextError as `query` does."""
     stage, plain = set_stage(compiled, context, actors, prefer, unknown)

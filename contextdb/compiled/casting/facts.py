@@ -6,14 +6,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from contextdb.cells.facts import Context, Fact, Unknown, missing_error, misspelt, read_fact
 from contextdb.cells.mirroring import kept_facts, mirrored_facts
+from contextdb.compiled.casting.roles import roles_of_table
+from contextdb.compiled.data import CompiledData
 from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, shown
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
 
 Actor = Mapping[str, Any]
 Actors = Mapping[str, Sequence[Actor]]
@@ -60,7 +59,7 @@ def name_of(actor: Actor, place: int) -> str:
 
 
 def read_offers(
-    compiled: CompiledTable,
+    compiled: CompiledData,
     conditions: Mapping[str, Sequence[int]],
     context: Context,
     actors: Actors,
@@ -87,7 +86,7 @@ def read_offers(
 
 
 def mirrored_offers(
-    compiled: CompiledTable,
+    compiled: CompiledData,
     conditions: Mapping[str, Sequence[int]],
     context: Context,
     offers: Mapping[str, Sequence[Offer]],
@@ -115,7 +114,7 @@ def _kind(value: object) -> str:
 class _Reader:
     """Reads the actors of one moment."""
 
-    def __init__(self, compiled: CompiledTable, context: Context, prefer: Prefer, unknown: Unknown) -> None:
+    def __init__(self, compiled: CompiledData, context: Context, prefer: Prefer, unknown: Unknown) -> None:
         self.compiled, self.context, self.prefer, self.unknown = compiled, context, prefer, unknown
         self.known: dict[object, dict[str, object]] = {}
         """Every fact that was told of each actor with an id."""
@@ -200,7 +199,7 @@ class _Reader:
                 faults += error.faults
         if faults:
             raise ContextError(*faults)
-        told = self.compiled.roles.told_to_rules(role, self.compiled)
+        told = roles_of_table(self.compiled).told_to_rules(role, self.compiled)
         lacking = [c.name for c in told if read_fact(given.get(c.name), c) is None]
         if missing := [*(self.compiled.conditions[at].name for at, fact in facts.items() if fact is None), *lacking]:
             self._refuse_missing(role, missing, given, joint)

@@ -7,14 +7,11 @@ it was read. That costs a comparison of two dicts, where reading costs every fac
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from contextdb.cells.facts import Context, Unknown
 from contextdb.compiled.casting.facts import Actor, Actors, Prefer
 from contextdb.compiled.casting.stage import CastMatches, Offered, set_stage
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 
 _PLAIN = (float, int, str, bool, type(None), frozenset)
 """Types whose values do not change: an actor with others is read for every question."""
@@ -23,7 +20,7 @@ _PLAIN = (float, int, str, bool, type(None), frozenset)
 class LiveActors:
     """Actors offered for roles until others are, and who is preferred."""
 
-    def __init__(self, compiled: CompiledTable, actors: Actors, prefer: Prefer, unknown: Unknown) -> None:
+    def __init__(self, compiled: CompiledData, actors: Actors, prefer: Prefer, unknown: Unknown) -> None:
         self.compiled, self.actors, self.prefer, self.unknown = compiled, actors, prefer, unknown
         self._role_facts = tuple(n for n in compiled.asked if n.partition(".")[1])
         """Facts that, where the context gives them, make a role one that is not cast."""

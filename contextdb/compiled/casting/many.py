@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,18 +15,16 @@ from contextdb.compiled.batch import Answers
 from contextdb.compiled.batch_columns import Contexts, common_length, facts_of
 from contextdb.compiled.casting.facts import Actors, Prefer
 from contextdb.compiled.casting.stage import CastMatches, query_with_actors
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, Place, plural
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
 
 
 @dataclass(frozen=True, eq=False)
 class ManyCastMatches(Unchanging, Answers[CastMatches]):
     """The answers for N contexts with actors, as `ManyMatches` tells them, and each with its castings: `many[i].casting(row)`."""
 
-    compiled: CompiledTable
+    compiled: CompiledData
     answers: Sequence[CastMatches]
 
     @cached_property
@@ -68,7 +66,7 @@ class ManyCastMatches(Unchanging, Answers[CastMatches]):
 
 
 def query_many_with_actors(
-    compiled: CompiledTable, contexts: Contexts, actors: Actors | Sequence[Actors], prefer: Prefer, unknown: Unknown
+    compiled: CompiledData, contexts: Contexts, actors: Actors | Sequence[Actors], prefer: Prefer, unknown: Unknown
 ) -> ManyCastMatches:
     """Answer every context with its actors; raises ContextError as `query`, with the number of the context."""
     check_mode(unknown)

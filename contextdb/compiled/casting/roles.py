@@ -5,21 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING
 
 from contextdb import bitmask
+from contextdb.cells.conditions import Condition
 from contextdb.cells.words import slot_words
-
-if TYPE_CHECKING:
-    from contextdb.cells.conditions import Condition
-    from contextdb.columns import TextColumn
-    from contextdb.compiled.table import CompiledTable
+from contextdb.columns import TextColumn
+from contextdb.compiled.data import CompiledData
 
 
 class TableRoles:
     """What a compiled table says of its roles, worked out once. Masks are Python integers, row r as bit r."""
 
-    def __init__(self, compiled: CompiledTable) -> None:
+    def __init__(self, compiled: CompiledData) -> None:
         self.conditions: dict[str, tuple[int, ...]] = {}
         """The roles, and the numbers of the conditions that belong to each."""
         for at, condition in enumerate(compiled.conditions):
@@ -41,7 +38,7 @@ class TableRoles:
         self.slot_rows: Mapping[str, Mapping[str, int]] = {c.name: _slot_rows(c) for c in compiled.slots or ()}
         """For each column of slots, for each word, the rows that say it."""
 
-    def told_to_rules(self, role: str, compiled: CompiledTable) -> list[Condition]:
+    def told_to_rules(self, role: str, compiled: CompiledData) -> list[Condition]:
         """The conditions of a role that are no columns and that rules need: an actor tells them."""
         own = (name for name in self.needed_by_rules if role_of(name) == role and name not in compiled.places)
         return [compiled.asked[name] for name in own if name in compiled.asked]
@@ -51,13 +48,18 @@ class TableRoles:
         return reduce(or_, (self._constrained[at] for at in places), 0)
 
 
+def roles_of_table(compiled: CompiledData) -> TableRoles:
+    """The roles of a table, worked out when they are first asked for."""
+    return compiled.once(TableRoles)
+
+
 def role_of(name: str) -> str:
     """The role that a condition belongs to: what stands before its first dot, or nothing."""
     role, dot, fact = name.partition(".")
     return role if dot and fact else ""
 
 
-def _needed_by_rules(compiled: CompiledTable) -> dict[str, frozenset[str]]:
+def _needed_by_rules(compiled: CompiledData) -> dict[str, frozenset[str]]:
     if compiled.when is None:
         return {}
     steps = compiled.derivation.only(compiled.when.names).steps if compiled.derivation is not None else ()

@@ -12,18 +12,16 @@ from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from itertools import product
 from operator import and_, or_
-from typing import TYPE_CHECKING
 
 from contextdb import bitmask
 from contextdb.cells.facts import Context, Fact, Unknown, read_fact
 from contextdb.compiled.casting.assigning import assignments
 from contextdb.compiled.casting.facts import Offer
+from contextdb.compiled.casting.roles import roles_of_table
+from contextdb.compiled.data import CompiledData
+from contextdb.expressions import Derivation
+from contextdb.expressions.rules import WhenRules
 from contextdb.expressions.rules.rules import no_value, values_of
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
-    from contextdb.expressions import Derivation
-    from contextdb.expressions.rules import WhenRules
 
 Cast = Mapping[str, Offer]
 Truths = tuple[bool, bool]
@@ -43,9 +41,11 @@ class CastRules:
     _known: dict[tuple[object, ...], Truths] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, compiled: CompiledTable, context: Context, cast: Sequence[str], unknown: Unknown) -> CastRules | None:
+    def of(cls, compiled: CompiledData, context: Context, cast: Sequence[str], unknown: Unknown) -> CastRules | None:
         """The rules that name one of these roles; None where there are none."""
-        named = {number: tuple(role for role in cast if role in roles) for number, roles in enumerate(compiled.roles.of_rule)}
+        named = {
+            number: tuple(role for role in cast if role in roles) for number, roles in enumerate(roles_of_table(compiled).of_rule)
+        }
         own = {number: roles for number, roles in named.items() if roles}
         if compiled.when is None or not own:
             return None

@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import or_
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +25,11 @@ from contextdb.cells.facts import Context, Fact, Unknown, check_mode, require_co
 from contextdb.cells.mirroring import in_mirror, kept_facts, mirrored_facts
 from contextdb.compiled.casting.assigning import Chosen, Holds, Part, best, every
 from contextdb.compiled.casting.facts import Actor, Actors, Offer, Prefer, mirrored_offers, read_offers
+from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.rules import CastRules
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import SetMatches
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
 
 Casting = dict[str, Actor]
 
@@ -109,7 +107,7 @@ class Offered:
 class Stage:
     """The actors of one moment against the roles of a table."""
 
-    compiled: CompiledTable
+    compiled: CompiledData
     offered: Offered
     plain_facts: Mapping[int, Fact]
     """The facts of the conditions that are no role's, by their number."""
@@ -244,7 +242,7 @@ def _as_casting(chosen: Chosen) -> Casting:
 
 
 def query_with_actors(
-    compiled: CompiledTable, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
+    compiled: CompiledData, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
 ) -> CastMatches:
     """The rows valid for a context and actors; see `CompiledTable.query`.
 
@@ -258,7 +256,7 @@ def query_with_actors(
 
 
 def set_stage(
-    compiled: CompiledTable,
+    compiled: CompiledData,
     context: Context,
     actors: Actors,
     prefer: Prefer = None,
@@ -283,21 +281,21 @@ def set_stage(
     return Stage(compiled, offered, facts, unknown, read, kept_facts(context) if compiled.mirroring else context, rules), plain
 
 
-def _ruled_names(compiled: CompiledTable, roles: Roles) -> list[str]:
+def _ruled_names(compiled: CompiledData, roles: Roles) -> list[str]:
     """The facts that rules need and that no actor tells; of one derived from what actors tell, those that it is computed from."""
     steps = compiled.derivation.steps if compiled.derivation is not None else ()
     inputs = {step.condition.name: step.expression.names for step in steps}
     waiting = [*compiled.when.names] if compiled.when is not None else []
     found: dict[str, None] = {}
     for name in waiting:
-        if compiled.roles.needed_by_rules[name].isdisjoint(roles.names):
+        if roles_of_table(compiled).needed_by_rules[name].isdisjoint(roles.names):
             found[name] = None
         else:
             waiting += [n for n in inputs.get(name, ()) if n not in waiting]
     return list(found)
 
 
-def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles:
+def roles_of(compiled: CompiledData, context: Context, actors: Actors) -> Roles:
     """The roles that are cast: all but those whose facts stand in the context, as plain facts.
 
     Raises
@@ -311,7 +309,7 @@ def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles
         found = "this compiled file does not say which slots are mandatory."
         raise ContextError(Fault(found, "the table itself, compiled by Table.compile()"))
     require_context(context)
-    members, slots = compiled.roles.conditions, compiled.roles.slot_rows
+    members, slots = roles_of_table(compiled).conditions, roles_of_table(compiled).slot_rows
     _require_roles(actors, list(dict.fromkeys([*members, *(w for words in slots.values() for w in words)])))
     plain = {n for n in members if n not in actors and _given(compiled, n, context)}
     _refuse_both(compiled, actors, context)
@@ -319,18 +317,18 @@ def roles_of(compiled: CompiledTable, context: Context, actors: Actors) -> Roles
     mandatory, maybe = (slots.get(c, {}) for c in ("Mandatory_Slots", "Optional_Slots"))
     conditions = {n: members.get(n, ()) for n in names}
     optional = {n: maybe.get(n, 0) & ~mandatory.get(n, 0) for n in names}
-    constrained = {n: compiled.roles.constrained(conditions[n]) | compiled.roles.ruled.get(n, 0) for n in names}
+    constrained = {n: roles_of_table(compiled).constrained(conditions[n]) | roles_of_table(compiled).ruled.get(n, 0) for n in names}
     required = {n: (mandatory.get(n, 0) | constrained[n]) & ~optional[n] for n in names}
     return Roles(names, conditions, required, optional)
 
 
-def _given(compiled: CompiledTable, role: str, context: Context) -> list[str]:
+def _given(compiled: CompiledData, role: str, context: Context) -> list[str]:
     """The facts of a role that stand in the context itself."""
     known = (n for n in (*compiled.asked, *compiled.places) if n.startswith(f"{role}."))
     return [n for n in known if context.get(n) is not None]
 
 
-def _refuse_both(compiled: CompiledTable, actors: Actors, context: Context) -> None:
+def _refuse_both(compiled: CompiledData, actors: Actors, context: Context) -> None:
     for role in actors:
         for name in _given(compiled, role, context):
             found = f"{in_quotes(name)} is given as a fact, and actors are offered for {in_quotes(role)}."

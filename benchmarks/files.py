@@ -28,9 +28,9 @@ import polars as pl
 import contextdb as cdb
 from benchmarks import generator, timing
 from benchmarks.sections import print_aligned
-from contextdb.edits.diffing import diff, merge
-from contextdb.edits.edits import Edit
-from contextdb.tables.changes import Cells
+from contextdb.edits.diffing import diff
+from contextdb.tables.changes import Cells, Edit
+from contextdb.tables.merging.merging import merge
 from contextdb.tables.table import Table
 
 FULL = generator.Shape("100,000 x 60", 100_000, 36, 12, 12)

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
         TableError,
     )
     from contextdb.findings import Finding
-    from contextdb.tables.project import Project
-    from contextdb.tables.table import Table, load
+    from contextdb.tables.project import Project, load
+    from contextdb.tables.table import Table
     from contextdb.tables.watching import watch
 
 _HOMES = {
@@ -74,8 +74,8 @@ _HOMES = {
     "findings": ("Finding",),
     "compiled.live": ("LiveContext",),
     "compiled.matches": ("Matches",),
-    "tables.project": ("Project",),
-    "tables.table": ("Table", "load"),
+    "tables.project": ("Project", "load"),
+    "tables.table": ("Table",),
     "tables.watching": ("watch",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

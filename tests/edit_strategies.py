@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from contextdb.edits import edits
-from contextdb.edits.edits import Edit
+from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 
 TEXTS = [

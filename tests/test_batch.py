@@ -205,7 +205,7 @@ def test_the_kernels_are_loaded_when_there_is_much_work_or_they_are_there_alread
 
 
 def test_without_numba_numpy_answers(monkeypatch):
-    monkeypatch.delattr(contextdb, "kernels")
+    monkeypatch.delattr(contextdb.compiled, "kernels")
     monkeypatch.setitem(sys.modules, "contextdb.compiled.kernels", None)
     assert batch.load_kernels() is None
     compiled = big_table().compile()

@@ -9,7 +9,7 @@ from contextdb.cells.domains import BOOL, NUMBER, TEXT
 from contextdb.columns import TextColumn
 from contextdb.schema.settings import EMPTY
 from contextdb.tables.condition_column import infer_condition
-from contextdb.tables.table import build_table
+from contextdb.tables.table import Table
 
 
 def inferred(*texts: str) -> str:
@@ -51,7 +51,7 @@ def test_rows_that_are_any_say_nothing_of_the_type():
 
 
 def test_a_row_that_does_not_read_as_what_the_others_are_is_a_fault_and_no_any():
-    table = build_table("t", [TextColumn.of("a", "abcde"), TextColumn.of("x", ["0..5", "1", "2", "3", "1;2"])])
+    table = Table.build("t", [TextColumn.of("a", "abcde"), TextColumn.of("x", ["0..5", "1", "2", "3", "1;2"])])
     (fault,) = table.faults
     assert (fault.place.row, fault.place.column, fault.mend) == (4, "x", '"1, 2"')
 
@@ -63,7 +63,7 @@ def test_an_inferred_condition_says_that_nobody_declared_it():
 
 def test_a_declared_condition_is_not_inferred():
     schema = type(EMPTY)(conditions={"x": Condition("x", TEXT)})
-    table = build_table("t", [TextColumn.of("a", "ab"), TextColumn.of("x", ["True", "False"])], schema)
+    table = Table.build("t", [TextColumn.of("a", "ab"), TextColumn.of("x", ["True", "False"])], schema)
     assert table.condition("x").condition.domain == TEXT
 
 

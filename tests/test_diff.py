@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 from contextdb.columns import TextColumn
 from contextdb.edits import edits
 from contextdb.edits.diffing import Diff, diff
-from contextdb.edits.edits import Edit
 from contextdb.files.csv_rewrite import write_csv
 from contextdb.files.csv_source import read_csv
 from contextdb.schema.settings import EMPTY, TableSettings
-from contextdb.tables.changes import Rows
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.changes import Edit, Rows
+from contextdb.tables.table import Table
 
 NAMES = ["Asset", "speed", "hit", "Größe", "x,y"]
 RAW = 'Asset,speed,hit\nwalk,0..5,True\nrun,5..9,Any\njump,Any,False\ndive,"20, 9.99",True\n'
@@ -27,7 +26,7 @@ RAW = 'Asset,speed,hit\nwalk,0..5,True\nrun,5..9,Any\njump,Any,False\ndive,"20, 
 
 def table_of(text: str, **settings: object) -> Table:
     source, columns = read_csv(text.encode(), "t.csv")
-    return build_table("t", columns, EMPTY, replace(TableSettings("t"), **settings), source=source)
+    return Table.build("t", columns, EMPTY, replace(TableSettings("t"), **settings), source=source)
 
 
 def fresh(table: Table) -> bytes:
@@ -56,7 +55,7 @@ def any_tables(draw: st.DrawFn) -> Table:
     ]
     columns = {name: [row[at] for row in rows] for at, name in enumerate(names)}
     asset = draw(st.none() | st.sampled_from(names))
-    return build_table("t", [TextColumn.of(n, t) for n, t in columns.items()], EMPTY, TableSettings("t", asset=asset))
+    return Table.build("t", [TextColumn.of(n, t) for n, t in columns.items()], EMPTY, TableSettings("t", asset=asset))
 
 
 # ---- the edit
@@ -232,7 +231,7 @@ def test_a_thousand_changed_cells_of_twenty_thousand_rows_are_found_within_budge
     after = with_changes(table, 1000)
     order = Rows(np.roll(np.arange(table.n_rows), 7))
     after = Edit("", (order,)).apply(after)
-    again = build_table("t", read_csv(fresh(after), "t.csv")[1], EMPTY)
+    again = Table.build("t", read_csv(fresh(after), "t.csv")[1], EMPTY)
     found, taken_s = time_s(table, again)
     assert 990 <= found.n_changed <= 1000
     assert len(found.rows_moved) == 7

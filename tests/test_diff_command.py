@@ -8,7 +8,7 @@ import pytest
 from running import Result, run
 
 from contextdb import cli
-from contextdb.tables.table import load
+from contextdb.tables.project import load
 
 BEFORE = 'Asset,speed,hit\nwalk,0..5,True\nrun,5..9,Any\njump,Any,False\ndive,"20, 9.99",True\n'
 AFTER = 'Asset,hit,speed,new\nrun,True,5..8,x\nwalk,True,0..5,\nhop,False,Any,\ndive,True,"20.00, 9.990",\nland,,,\n'

@@ -14,21 +14,22 @@ from strategies import examples, tables
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.edits import edits
-from contextdb.edits.edits import Edit, edit_between
+from contextdb.edits.edits import edit_between
 from contextdb.edits.history import History
 from contextdb.errors import SchemaError, TableError
 from contextdb.files.csv_rewrite import write_csv
 from contextdb.files.csv_source import read_csv
 from contextdb.schema.sections import schema_to_dict
 from contextdb.schema.settings import EMPTY, TableSettings, read_schema
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.changes import Edit
+from contextdb.tables.table import Table
 
 RAW = b'Asset Name,"speed",hit\r\nwalk,0..5,True\nrun,"5, 1", Any\r\n"a ""b""","Any",False\n'
 
 
 def table_of(raw: bytes = RAW, settings: TableSettings | None = None) -> Table:
     source, columns = read_csv(raw, "t.csv")
-    return build_table("t", columns, EMPTY, settings, source=source)
+    return Table.build("t", columns, EMPTY, settings, source=source)
 
 
 def bytes_of(table: Table) -> bytes:
@@ -42,7 +43,7 @@ def texts_of(table: Table) -> dict[str, list[str]]:
 def saved(table: Table) -> Table:
     """The table as a save leaves it, without a disk."""
     source, columns = read_csv(bytes_of(table), "t.csv")
-    return build_table("t", columns, table.schema, table.settings, source=source)
+    return Table.build("t", columns, table.schema, table.settings, source=source)
 
 
 @given(st.data())
@@ -147,7 +148,7 @@ def test_the_edit_between_two_tables_leads_from_one_to_the_other(data):
 def test_an_edited_table_means_what_a_table_made_of_its_texts_means(table, data):
     edit = data.draw(edits_of(table))
     now = edit.apply(table)
-    fresh = build_table("t", now.columns, now.schema, now.settings)
+    fresh = Table.build("t", now.columns, now.schema, now.settings)
     assert [c.condition.name for c in now.conditions] == [c.condition.name for c in fresh.conditions]
     for one, other in zip(now.conditions, fresh.conditions, strict=True):
         if other.condition.is_declared:
@@ -315,7 +316,7 @@ order = [{ database = "a", threshold = 2 }, { database = "b" }]
 
 
 def test_a_selector_takes_another_order_and_another_threshold():
-    table = build_table("t", read_csv(RAW, "t.csv")[1], read_schema(MOTION, "contextdb.toml"))
+    table = Table.build("t", read_csv(RAW, "t.csv")[1], read_schema(MOTION, "contextdb.toml"))
     now = edits.set_selector(table, "s", [("b", 0.5), ("a", None)]).apply(table)
     assert now.schema.selectors["s"] == {"order": [{"database": "b", "threshold": 0.5}, {"database": "a"}]}
     assert edits.set_selector(now, "s", [("b", 0.5), ("a", None)]).changes == ()

@@ -20,7 +20,7 @@ from running import ROOT, Result, run
 from contextdb.edits.edits import set_cells, set_settings
 from contextdb.errors import ContextDBError
 from contextdb.motion import make_clip, write_bvh
-from contextdb.tables.table import load
+from contextdb.tables.project import load
 from tui.model.session import Session
 
 RAW = b"Asset,speed,hit\r\nwalk,0..5,True\r\nrun,5..9,Any\r\n"

@@ -14,8 +14,7 @@ from running import run
 
 from contextdb.files.file_names import alike, composed, confusable, spelled, why_unportable
 from contextdb.schema.settings import read_schema
-from contextdb.tables.project import Project, settings_of, table_files
-from contextdb.tables.table import load
+from contextdb.tables.project import Project, load, settings_of, table_files
 from tui.model.new_table import name_fault
 
 NAME = "mövès"

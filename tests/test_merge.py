@@ -12,20 +12,19 @@ from hypothesis import strategies as st
 
 from contextdb.columns import TextColumn
 from contextdb.edits import edits
-from contextdb.edits.diffing import Merge, merge
-from contextdb.edits.edits import Edit
 from contextdb.files.csv_rewrite import write_csv
 from contextdb.files.csv_source import read_csv
 from contextdb.schema.settings import EMPTY, TableSettings
-from contextdb.tables.changes import Rows
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.changes import Edit, Rows
+from contextdb.tables.merging.merging import Merge, merge
+from contextdb.tables.table import Table
 
 RAW = 'Asset,speed,hit,tags\r\nwalk,"0..5",True,+A\nrun,5..9,Any,\njump,Any,False,+B -C\ndive,"20, 9.99",True,Any\n'
 
 
 def table_of(text: str, **settings: object) -> Table:
     source, columns = read_csv(text.encode(), "t.csv")
-    return build_table("t", columns, EMPTY, replace(TableSettings("t"), **settings), source=source)
+    return Table.build("t", columns, EMPTY, replace(TableSettings("t"), **settings), source=source)
 
 
 def saved(table: Table) -> bytes:
@@ -309,7 +308,7 @@ def test_rows_disabled_on_one_side_are_disabled_in_the_merge(base):
 def test_a_large_merge_of_moved_rows_and_cells_is_both():
     n = 3000
     columns = [TextColumn.of("A", [f"a{i}" for i in range(n)]), TextColumn.of("x", [str(i % 7) for i in range(n)])]
-    base = build_table("t", columns)
+    base = Table.build("t", columns)
     ours = Edit("", (Rows(np.roll(np.arange(n), 5)),)).apply(base)
     theirs = base.with_cells([(i, "x", "9") for i in range(0, n, 10)])
     merged = clean(base, ours, theirs)

@@ -15,11 +15,11 @@ from running import ROOT, run
 
 from contextdb import cli
 from contextdb.columns import TextColumn
-from contextdb.edits.diffing import Merge, merge
 from contextdb.edits.diffing.markers import versions_of, with_markers
 from contextdb.files.csv_rewrite import rewritten
+from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.merging.reading import table_of
-from contextdb.tables.table import load
+from contextdb.tables.project import load
 
 BASE = "Asset,speed,hit\r\nwalk,0..5,True\r\nrun,5..9,Any\r\njump,Any,False\r\n"
 OURS = BASE.replace("walk,0..5", "walk,1..5")

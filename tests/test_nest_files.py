@@ -13,8 +13,8 @@ import contextdb as cdb
 from contextdb.checks.rows import check_rows
 from contextdb.checks.run import check
 from contextdb.schema.settings import TableSettings
-from contextdb.tables.nesting.flat import flat_rows, leaf_assets
 from contextdb.tables.nesting.links import inner_rows
+from contextdb.tables.table import flat_rows, leaf_assets
 
 
 def rules(findings: list[cdb.Finding]) -> dict[str, list[int | None]]:

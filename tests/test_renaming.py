@@ -16,8 +16,7 @@ from contextdb.checks.run import check
 from contextdb.edits.renaming import renaming, uses_of
 from contextdb.errors import ContextDBError, FileError
 from contextdb.expressions.names import names_in
-from contextdb.tables.project import Project
-from contextdb.tables.table import load
+from contextdb.tables.project import Project, load
 
 TOML = """# a game
 [conditions.speed]   # how fast

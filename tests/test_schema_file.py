@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from strategies import examples
 
 from contextdb.edits import edits
-from contextdb.edits.edits import Edit
 from contextdb.edits.schema_file import schema_change, write_schema
 from contextdb.errors import FileError, SchemaError
 from contextdb.schema import toml_edit
 from contextdb.schema.sections import schema_to_dict
-from contextdb.tables.project import Project
-from contextdb.tables.table import Table, load
+from contextdb.tables.changes import Edit
+from contextdb.tables.project import Project, load
+from contextdb.tables.table import Table
 
 TOML = """# a game
 [project]

@@ -13,7 +13,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import SchemaError, TableError
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.condition_column import MOST_MENDS
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.table import Table
 
 DECLARED = {"speed": {"type": "number"}, "state": {"type": "enum", "values": ["Ground", "Air"]}}
 TABLE = Table.from_columns(
@@ -24,7 +24,7 @@ TABLE = Table.from_columns(
 def faulty(columns: dict[str, list[str]], settings: TableSettings | None = None) -> Table:
     """A table as an editor opens it, with the cells that cannot be read."""
     schema = type(EMPTY)(conditions={name: Condition(name, NUMBER) for name in columns if name.startswith("n")})
-    return build_table("t", [TextColumn.of(name, texts) for name, texts in columns.items()], schema, settings)
+    return Table.build("t", [TextColumn.of(name, texts) for name, texts in columns.items()], schema, settings)
 
 
 def told(error: pytest.ExceptionInfo[TableError]) -> list[str]:
@@ -158,7 +158,7 @@ def test_a_table_after_any_edits_is_the_table_of_its_texts(edits):
     for edit in edits:
         edited = edited.with_cell(*edit)
     texts = {c.name: c.to_list() for c in edited.columns}
-    anew = build_table("table", [TextColumn.of(name, column) for name, column in texts.items()], TABLE.schema)
+    anew = Table.build("table", [TextColumn.of(name, column) for name, column in texts.items()], TABLE.schema)
     assert [str(fault) for fault in edited.faults] == [str(fault) for fault in anew.faults]
     if not edited.faults:
         for context in ({"speed": s, "state": t} for s in (0, 5, 6) for t in ("Ground", "Air")):
@@ -241,7 +241,7 @@ def test_a_priority_is_a_whole_number_that_can_be_kept(text):
             'there is no column "Wieght", which [tables.t] names as weight. Accepted: "Asset", "Weight". Did you mean "Weight"?',
         ),
         (
-            lambda: build_table("t", [TextColumn.of("Asset", "a"), TextColumn.of("Asset", "b")]),
+            lambda: Table.build("t", [TextColumn.of("Asset", "a"), TextColumn.of("Asset", "b")]),
             'the column name "Asset" stands twice. Accepted: each name once.',
         ),
     ],

@@ -16,8 +16,10 @@ from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES
 from textual.widget import Widget
 
-from contextdb.edits.diffing import Merge, Side
 from contextdb.errors import ContextDBError
+from contextdb.tables.merging.conflicts import Side
+from contextdb.tables.merging.merging import Merge
+from contextdb.tables.table import Table
 from tui.commands import BY_ID, COMMANDS, bindings, key_names
 from tui.editor_settings import EditorSettings
 from tui.model.conflicted import conflicts_in, write_decided
@@ -178,7 +180,7 @@ class EditorApp(App[None]):
             self.workspace.reopen(name, takes_over=True)
             self.open_table(name)
 
-    def _decide(self, name: str, merged: Merge) -> None:
+    def _decide(self, name: str, merged: Merge[Table]) -> None:
         path = self.workspace.files[name]
 
         def decided(sides: Mapping[int, Side] | None) -> None:

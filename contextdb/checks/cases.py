@@ -31,6 +31,7 @@ from contextdb.errors import CellError, ContextError, Fault, Place, TableError, 
 from contextdb.files.csv_rewrite import Origin
 from contextdb.files.texts import AnySource, new_source, read_texts
 from contextdb.findings import Finding
+from contextdb.tables.data import TableData
 from contextdb.tables.other_files import CASE_COLUMNS
 from contextdb.tables.table import Table
 
@@ -233,21 +234,21 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
     if table.faults:
         return []
     try:
-        table, compiled = table.flat(), table.compile()
+        flat, compiled = table.flat(), table.compile()
     except TableError:  # a table inside it cannot be used: said of the row that stands for it
         return []
-    found = list(_doubtful(table, cases, file))
-    known = _asked(table)
+    found = list(_doubtful(flat, cases, file))
+    known = _asked(flat)
     for case in cases:
         if not known.issuperset(case.facts):
             continue
         verdict = judge(compiled, case)
         for fault in verdict.faults:
             message = f"the case {in_quotes(case.name)} cannot be asked: {fault.message}"
-            found.append(Finding("unreadable-case", "error", message, table.name, file, line=case.line, column=fault.place.column))
+            found.append(Finding("unreadable-case", "error", message, flat.name, file, line=case.line, column=fault.place.column))
         if not verdict.faults and verdict.holds is False:
             message = f"the case {in_quotes(case.name)} fails: {told(verdict, compiled.assets)}."
-            found.append(Finding("case-failed", "error", message, table.name, file, line=case.line, column=EXPECTED))
+            found.append(Finding("case-failed", "error", message, flat.name, file, line=case.line, column=EXPECTED))
     return sorted(found, key=lambda finding: finding.line or 0)
 
 
@@ -323,7 +324,7 @@ def _no_asset(asset: str, assets: Sequence[str]) -> str:
     return f"the table has no asset {in_quotes(asset)}" + (f"; did you mean {in_quotes(near)}?" if near else "")
 
 
-def _doubtful(table: Table, cases: Sequence[Case], file: str | None) -> Iterator[Finding]:
+def _doubtful(table: TableData, cases: Sequence[Case], file: str | None) -> Iterator[Finding]:
     """Facts that no table of the project has a condition for; cases of one name; assets expected not to be valid that are none."""
     asked = set(_asked(table))
     assets, first_of = table.assets, dict[str, Case]()
@@ -343,7 +344,7 @@ def _doubtful(table: Table, cases: Sequence[Case], file: str | None) -> Iterator
             yield replace(place, level="warning", message=message, column=EXPECTED)
 
 
-def _asked(table: Table) -> set[str]:
+def _asked(table: TableData) -> set[str]:
     """The facts that a case may name: those of this table, and those that its project declares for others."""
     return {c.condition.name for c in table.conditions} | table.schema.conditions.keys()
 

@@ -24,7 +24,7 @@ from contextdb.findings import Finding
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.links import is_nested
 from contextdb.tables.nesting.plain import as_plain
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 
 WORK = 1_000_000
 """Steps for each question about a whole table."""
@@ -138,8 +138,8 @@ def _covered(report: CoverageReport | None) -> dict[str, object] | None:
 
 
 def effects(
-    before: Table,
-    after: Table,
+    before: EitherTable,
+    after: EitherTable,
     *,
     changes: Diff | None = None,
     work: int = WORK,
@@ -207,7 +207,9 @@ class MergeEffects:
         return bool(self.opened or self.findings)
 
 
-def merge_effects(ours: Table, theirs: Table, merged: Table, *, work: int = WORK, samples: int = SAMPLES) -> MergeEffects:
+def merge_effects(
+    ours: EitherTable, theirs: EitherTable, merged: EitherTable, *, work: int = WORK, samples: int = SAMPLES
+) -> MergeEffects:
     """Gaps and findings of a merge that neither side had. Raises as `effects` does."""
     mine, yours = (effects(side, merged, work=work, samples=samples) for side in (ours, theirs))
     ours, theirs, merged = _flat(ours), _flat(theirs), _flat(merged)
@@ -222,7 +224,7 @@ def merge_effects(ours: Table, theirs: Table, merged: Table, *, work: int = WORK
 # ---- which rows changed
 
 
-def _flat(table: Table) -> Table:
+def _flat(table: EitherTable) -> EitherTable:
     """A table with the rows of its inner tables, by what they say together."""
     flat = table.flat()
     if not isinstance(flat, FlatTable):
@@ -278,7 +280,7 @@ class Measure:
     samples: int
     seed: int
 
-    def whole(self, table: Table) -> CoverageReport:
+    def whole(self, table: EitherTable) -> CoverageReport:
         """The coverage of a whole table, under the conditions of both."""
         return self._report([(table, range(table.n_rows))])
 
@@ -303,7 +305,7 @@ class Measure:
         kept = tuple(sorted(parts.values(), key=lambda part: -part.share))
         return kept, share if beyond is None else (1.0 - beyond.covered) * share
 
-    def holes(self, table: Table, within: Sequence[Box]) -> tuple[list[Box], bool]:
+    def holes(self, table: EitherTable, within: Sequence[Box]) -> tuple[list[Box], bool]:
         """Contexts of some boxes that have no valid row in a table, and whether these are all of them."""
         found: list[Box] = []
         is_complete = len(within) <= MOST_BOXES
@@ -347,7 +349,9 @@ class Measure:
 Key = tuple[str, str, tuple[str, ...]]
 
 
-def _new_findings(after: Table, report: CoverageReport | None, earlier: tuple[Table, CoverageReport | None]) -> list[Finding]:
+def _new_findings(
+    after: EitherTable, report: CoverageReport | None, earlier: tuple[EitherTable, CoverageReport | None]
+) -> list[Finding]:
     """The dead rows and overlaps that were not there, placed in the table after."""
     if report is None or earlier[1] is None:
         return []
@@ -361,20 +365,20 @@ def _new_findings(after: Table, report: CoverageReport | None, earlier: tuple[Ta
     return new
 
 
-def _told(table: Table, report: CoverageReport) -> Iterator[Finding]:
+def _told(table: EitherTable, report: CoverageReport) -> Iterator[Finding]:
     rules = (*DEAD_RULES, *OVERLAP_RULES)
     return (f for f in report.findings if f.rule in rules and f.row is not None and f.row < table.n_rows)
 
 
-def _key(table: Table, finding: Finding) -> Key:
+def _key(table: EitherTable, finding: Finding) -> Key:
     others = sorted(table.assets[row] for row in finding.by if row < table.n_rows) if finding.rule in OVERLAP_RULES else ()
     return finding.rule, table.assets[finding.row or 0], tuple(others)
 
 
-def _keys(table: Table, findings: Sequence[Finding]) -> set[Key]:
+def _keys(table: EitherTable, findings: Sequence[Finding]) -> set[Key]:
     return {_key(table, finding) for finding in findings}
 
 
-def _placed(table: Table, finding: Finding) -> Finding:
+def _placed(table: EitherTable, finding: Finding) -> Finding:
     place = table.place(finding.row or 0)
     return replace(finding, table=table.name, file=place.file, line=place.line, asset=table.assets[finding.row or 0])

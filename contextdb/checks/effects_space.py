@@ -21,11 +21,11 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.schema.settings import Schema, TableSettings
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.table import EitherTable, Table
 
 Cells = dict[str, str]
 """A box: condition to cell; what is left away is not restricted."""
-Piece = tuple[Table, Sequence[int] | NDArray[np.int64]] | list[Cells]
+Piece = tuple[EitherTable, Sequence[int] | NDArray[np.int64]] | list[Cells]
 """Rows of a table, by number, or boxes."""
 Rows = Sequence[Piece]
 MOST_SPAN = 100
@@ -36,20 +36,20 @@ KEPT = ("priority", "weight")
 class Shared:
     """The conditions of two tables."""
 
-    before: Table
-    after: Table
+    before: EitherTable
+    after: EitherTable
     conditions: dict[str, Condition]
     schema: Schema
     asset: str
     enabled: str
     """Names of columns, which no condition has."""
 
-    def column(self, table: Table, name: str) -> TextColumn:
+    def column(self, table: EitherTable, name: str) -> TextColumn:
         """A column of a table; empty cells where it has none."""
         found = next((c for c in table.columns if c.name == name), None)
         return found or TextColumn(name, ("",), np.zeros(table.n_rows, np.int32))
 
-    def table(self, rows: Rows) -> Table:
+    def table(self, rows: Rows) -> EitherTable:
         """A table of these rows and boxes, under the conditions of both; rows that are switched off come last."""
         n_rows = sum(len(piece) if isinstance(piece, list) else len(piece[1]) for piece in rows)
         span = self._span
@@ -59,9 +59,9 @@ class Shared:
         texts[self.asset] = [f"row {i}" for i in range(n_rows + n_span)]
         texts[self.enabled] = [*self._enabled(rows), *["False"] * n_span]
         columns = [TextColumn.of(name, texts[name]) for name in (self.asset, self.enabled, *self.conditions, *self._jobs)]
-        return build_table(self.after.name, columns, self.schema, self._settings)
+        return Table.build(self.after.name, columns, self.schema, self._settings)
 
-    def boxes(self, table: Table, rows: Sequence[int]) -> list[Cells]:
+    def boxes(self, table: EitherTable, rows: Sequence[int]) -> list[Cells]:
         """What rows of a table hold, as boxes of cells; each once."""
         columns = [(name, self.column(table, name)) for name in self.conditions]
         found = ({name: column[row] for name, column in columns} for row in rows)
@@ -73,7 +73,7 @@ class Shared:
         read = parse_cell(text, self.conditions[name].domain)
         return read.is_any or read.is_soft
 
-    def compiled(self, table: Table) -> CompiledTable:
+    def compiled(self, table: EitherTable) -> CompiledTable:
         """A whole table under these conditions, nothing computed."""
         plain = {name: replace(c, expr=None) for name, c in self.conditions.items()}
         own = replace(self, conditions=plain, schema=replace(self.schema, conditions=plain))
@@ -126,7 +126,7 @@ class Shared:
             yield from ["True"] * len(piece) if isinstance(piece, list) else (str(bool(piece[0].enabled[r])) for r in piece[1])
 
 
-def shared_space(before: Table, after: Table) -> Shared:
+def shared_space(before: EitherTable, after: EitherTable) -> Shared:
     """The conditions of two tables together.
 
     Raises
@@ -142,7 +142,7 @@ def shared_space(before: Table, after: Table) -> Shared:
     return Shared(before, after, conditions, schema, _free("asset", names), _free("enabled", names))
 
 
-def _conditions(before: Table, after: Table) -> Iterator[tuple[str, Condition]]:
+def _conditions(before: EitherTable, after: EitherTable) -> Iterator[tuple[str, Condition]]:
     old, new = ({c.condition.name: c.condition for c in table.conditions} for table in (before, after))
     for name in [*new, *(name for name in old if name not in new)]:
         if name not in old or name not in new:

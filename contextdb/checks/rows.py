@@ -27,13 +27,13 @@ from contextdb.findings import Finding
 from contextdb.schema.settings import Schema
 from contextdb.schema.toml_lines import Path
 from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 
 WORK = 4_000_000
 """A tenth of what coverage may spend."""
 
 
-def check_rows(table: Table, work: int = WORK, progress: Tell | None = None) -> list[Finding]:
+def check_rows(table: EitherTable, work: int = WORK, progress: Tell | None = None) -> list[Finding]:
     """What is wrong with the rows of a table that can be read, those of the whole table first; nothing where cells cannot be read.
 
     The same table and work give the same findings. Rows that could not be decided within the work have none, and one
@@ -51,7 +51,7 @@ def check_rows(table: Table, work: int = WORK, progress: Tell | None = None) -> 
     return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
 
 
-def _judged(table: Table, work: int, progress: Progress) -> list[Finding]:
+def _judged(table: EitherTable, work: int, progress: Progress) -> list[Finding]:
     if table.n_rows == 0:
         return []
     try:
@@ -70,7 +70,7 @@ def _judged(table: Table, work: int, progress: Progress) -> list[Finding]:
     return judge.gathered(found)
 
 
-def _undecided(table: Table, n_undecided: int, n_rows: int) -> Finding:
+def _undecided(table: EitherTable, n_undecided: int, n_rows: int) -> Finding:
     file = str(table.path) if table.path else None
     message = (
         f"{n_undecided:,} of {plural(n_rows, 'row')} could not be decided within the work of a check, so others may make them "
@@ -79,7 +79,7 @@ def _undecided(table: Table, n_undecided: int, n_rows: int) -> Finding:
     return Finding("undecided-rows", "info", message, table.name, file)
 
 
-def _always_any(table: Table) -> Iterator[Finding]:
+def _always_any(table: EitherTable) -> Iterator[Finding]:
     if not table.enabled.any():
         return
     file = str(table.path) if table.path else None
@@ -90,7 +90,7 @@ def _always_any(table: Table) -> Iterator[Finding]:
             yield Finding("always-any", "info", message, table.name, file, column=column.condition.name)
 
 
-def unused_conditions(schema: Schema, tables: Iterable[Table], lines: Mapping[Path, int]) -> list[Finding]:
+def unused_conditions(schema: Schema, tables: Iterable[EitherTable], lines: Mapping[Path, int]) -> list[Finding]:
     """Declared conditions that none of the tables has, and that nothing these use is computed from.
 
     `lines` are the lines of the keys of contextdb.toml, as `toml_lines.key_lines` gives them.
@@ -113,6 +113,6 @@ def unused_conditions(schema: Schema, tables: Iterable[Table], lines: Mapping[Pa
     ]
 
 
-def _of_schema(table: Table, rule: str, message: str) -> Finding:
+def _of_schema(table: EitherTable, rule: str, message: str) -> Finding:
     text = f"[tables.{table.name}] assume {message}" if rule == "bad-assumption" else message
     return Finding(rule, "error", text, table.name, str(table.path) if table.path else table.schema.file)

@@ -32,11 +32,11 @@ from contextdb.report.results import as_path
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
+from contextdb.tables.table import EitherTable, Table
 
 if TYPE_CHECKING:
     from contextdb.covering.baseline import Earlier
     from contextdb.report.coverage_results import CoverageResults, Measured
-    from contextdb.tables.table import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -125,7 +125,7 @@ def _require_sense(arguments: argparse.Namespace) -> None:
         raise ContextError(Fault("--gap and --explain do not go together.", "one of them"))
 
 
-def _results(arguments: argparse.Namespace, tables: Sequence[Table], baseline: dict[str, Earlier] | None) -> CoverageResults:
+def _results(arguments: argparse.Namespace, tables: Sequence[EitherTable], baseline: dict[str, Earlier] | None) -> CoverageResults:
     from contextdb.report.coverage_results import CoverageResults, table_gone
 
     measured = tuple(_measured(arguments, table, baseline) for table in tables)
@@ -137,7 +137,7 @@ def _results(arguments: argparse.Namespace, tables: Sequence[Table], baseline: d
     return CoverageResults(measured, {name: table_gone(name, name in arguments.gone, new) for name in gone})
 
 
-def _measured(arguments: argparse.Namespace, table: Table, baseline: dict[str, Earlier] | None) -> Measured:
+def _measured(arguments: argparse.Namespace, table: EitherTable, baseline: dict[str, Earlier] | None) -> Measured:
     from dataclasses import replace
 
     from contextdb.covering.assumed import opened
@@ -159,7 +159,7 @@ def _measured(arguments: argparse.Namespace, table: Table, baseline: dict[str, E
     return coverage_telemetry.ranked(arguments, replace(found, change=change, gates=tuple(gates)), table)
 
 
-def measure(arguments: argparse.Namespace, table: Table) -> Measured:
+def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     """The coverage of one table and of its pairs of conditions, by the budgets of the arguments."""
     from contextdb.covering import coverage, pairs
     from contextdb.covering.pairs import SAMPLES as PAIR_SAMPLES
@@ -183,7 +183,7 @@ def measure(arguments: argparse.Namespace, table: Table) -> Measured:
     return Measured(report, file, tuple(table.assets), lines, compared, telemetry=seen, inside=_inside(table))
 
 
-def _inside(table: Table) -> dict[int, str]:
+def _inside(table: EitherTable) -> dict[int, str]:
     """For the rows that stand in other files than the table their files, from the table's folder."""
     if table.path is None or not isinstance(table, FlatTable):
         return {}
@@ -193,7 +193,7 @@ def _inside(table: Table) -> dict[int, str]:
 
 
 @contextmanager
-def _placed(table: Table) -> Iterator[None]:
+def _placed(table: EitherTable) -> Iterator[None]:
     """Say of a fault which table it is in."""
     try:
         yield
@@ -202,7 +202,7 @@ def _placed(table: Table) -> Iterator[None]:
         raise type(error)(*(f if f.place.file else f.at(Place(file, column=f.place.column)) for f in error.faults)) from None
 
 
-def _details(arguments: argparse.Namespace, table: Table) -> str:
+def _details(arguments: argparse.Namespace, table: EitherTable) -> str:
     from contextdb.report.coverage_details import gap_details, row_details
 
     width = terminal_width()
@@ -219,7 +219,7 @@ def _details(arguments: argparse.Namespace, table: Table) -> str:
     return gap_details(measured, found[0], table, width)
 
 
-def _row(text: str, table: Table) -> int:
+def _row(text: str, table: EitherTable) -> int:
     """The row that --explain means: a number from 1, else an asset that stands in one row."""
     rows = [row for row, asset in enumerate(table.assets) if asset == text]
     if len(rows) == 1:
@@ -235,7 +235,7 @@ def _row(text: str, table: Table) -> int:
     raise ContextError(Fault(f"there is no row {in_quotes(text)}.", accepted, in_quotes(near) if near else ""))
 
 
-def _only(tables: Sequence[Table]) -> Table:
+def _only(tables: Sequence[EitherTable]) -> EitherTable:
     if len(tables) != 1:
         names = ", ".join(in_quotes(table.name) for table in tables[:6])
         raise TableError(Fault(f"--gap and --explain are about one table, and there are {len(tables)}.", f"one of {names}"))

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Protocol
 from contextdb.console import printable
 from contextdb.covering.progress import PREPARING
 from contextdb.errors import ContextError, Fault
+from contextdb.tables.table import EitherTable
 
 if TYPE_CHECKING:
     from contextdb.covering import Gap
     from contextdb.report.coverage_results import Measured
-    from contextdb.tables.table import Table
     from contextdb.telemetry import Observed
 
 ENGINES = ("local", "dask")
@@ -70,7 +70,7 @@ def require_telemetry(arguments: argparse.Namespace) -> None:
             raise ContextError(Fault(f"{option} is about recorded contexts.", "--telemetry GLOB beside it"))
 
 
-def observed(arguments: argparse.Namespace, table: Table, known: Sequence[Gap]) -> Observed | None:
+def observed(arguments: argparse.Namespace, table: EitherTable, known: Sequence[Gap]) -> Observed | None:
     """What the recorded contexts say of a table and its gaps; None where no files were named. Files not read are told."""
     if not arguments.telemetry:
         return None
@@ -93,7 +93,7 @@ def observed(arguments: argparse.Namespace, table: Table, known: Sequence[Gap]) 
     return found
 
 
-def ranked(arguments: argparse.Namespace, measured: Measured, table: Table) -> Measured:
+def ranked(arguments: argparse.Namespace, measured: Measured, table: EitherTable) -> Measured:
     """What was measured, with the gaps ranked by the recorded contexts, where there are any."""
     if measured.telemetry is None:
         return measured

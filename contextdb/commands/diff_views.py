@@ -14,7 +14,7 @@ from contextdb.console import aligned, printable, styled
 from contextdb.edits.diffing import CellChange, Diff
 from contextdb.errors import row_name, shown
 from contextdb.report.render_markdown import MOST_BYTES, escaped
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 
 MARKS = {"added": ("+", "green"), "removed": ("-", "red"), "renamed": ("~", "yellow"), "moved": (">", "cyan")}
 MOST = 40
@@ -88,7 +88,7 @@ def _rows(found: Diff) -> list[Told]:
     return told + [("moved", f"{_asset(name)}, from {old} to {new}") for name, old, new in places]
 
 
-def _place(table: Table, row: int) -> str:
+def _place(table: EitherTable, row: int) -> str:
     line = table.place(row).line
     return row_name(row) if line is None else f"line {line}"
 

@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Print the table."""
     raw = read_bytes(arguments.file)
     try:
-        table = table_of(raw, arguments.file)
+        table = table_of(Table, raw, arguments.file)
     except TableError:  # in the middle of a merge, say; git diff must go on
         with output():
             sys.stdout.flush()

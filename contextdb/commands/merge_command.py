@@ -29,13 +29,15 @@ from pathlib import Path
 
 from contextdb.console import ExitCode, printable
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.edits.diffing import Merge, Side, diff, merge
+from contextdb.edits.diffing import diff
 from contextdb.edits.diffing.lines import merged_lines
 from contextdb.edits.diffing.markers import with_markers
 from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
 from contextdb.files.parquet import ParquetSource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.tables.merging.conflicts import Side
+from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.merging.reading import PARQUET, merged_bytes, table_of
 from contextdb.tables.project import neighbours, schema_for, settings_of
 from contextdb.tables.table import Table
@@ -85,7 +87,7 @@ def _merged_tables(path: Path, raws: Raws, arguments: argparse.Namespace) -> Mer
     return raw, lambda: _told(found, path, is_parquet, arguments)
 
 
-def _told(found: Merge, path: Path, is_parquet: bool, arguments: argparse.Namespace) -> ExitCode:
+def _told(found: Merge[Table], path: Path, is_parquet: bool, arguments: argparse.Namespace) -> ExitCode:
     """Tell what came of it."""
     _tell(found, path, is_parquet)
     if found.conflicts:
@@ -93,7 +95,7 @@ def _told(found: Merge, path: Path, is_parquet: bool, arguments: argparse.Namesp
     return ExitCode.FOUND if _tell_meaning(found, path) and arguments.strict else ExitCode.OK
 
 
-def _tell_meaning(found: Merge, path: Path) -> bool:
+def _tell_meaning(found: Merge[Table], path: Path) -> bool:
     """Tell what the merge brings that neither side had, and whether that is anything."""
     if not (diff(found.base, found.ours) and diff(found.base, found.theirs)):
         return False
@@ -176,7 +178,7 @@ def _tables(path: Path, raws: Raws, arguments: argparse.Namespace) -> list[Table
     faults: list[Fault] = []
     for raw, name in zip(raws, _names(path, arguments), strict=True):
         try:
-            tables.append(table_of(raw, name, schema, settings))
+            tables.append(table_of(Table, raw, name, schema, settings))
         except TableError as error:
             faults += error.faults
     if faults:
@@ -194,13 +196,13 @@ def _schema(path: Path) -> tuple[Schema, TableSettings]:
         return EMPTY, TableSettings(path.stem)
 
 
-def _decided(found: Merge, side: Side) -> Merge:
+def _decided(found: Merge[Table], side: Side) -> Merge[Table]:
     while found.conflicts:  # a row that comes back can bring new ones
         found = found.resolved(dict.fromkeys(range(len(found.conflicts)), side))
     return found
 
 
-def _tell(found: Merge, path: Path, is_parquet: bool) -> None:
+def _tell(found: Merge[Table], path: Path, is_parquet: bool) -> None:
     for one in found.conflicts[:MOST_TOLD]:
         texts = ", ".join(
             f"{name} {_said(text)}" for name, text in (("ours", one.ours), ("theirs", one.theirs), ("before", one.base))

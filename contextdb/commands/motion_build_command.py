@@ -31,8 +31,8 @@ from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.stored import save_database
-from contextdb.tables.nesting.flat import leaf_assets
 from contextdb.tables.project import SCHEMA_FILE, Project
+from contextdb.tables.table import leaf_assets
 
 HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed", "cached", "file")
 

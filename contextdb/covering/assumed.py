@@ -21,7 +21,8 @@ from contextdb.expressions.assume import WANTS, read_assumptions
 from contextdb.expressions.expression import read_expression
 from contextdb.expressions.faults import ExpressionError
 from contextdb.expressions.tokens import written_name
-from contextdb.tables.table import Table
+from contextdb.tables.nesting.flat import FlatTable
+from contextdb.tables.table import EitherTable, Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,7 @@ class Opened:
     """A table ready to be measured."""
 
     compiled: CompiledTable
-    table: Table | None
+    table: EitherTable | None
     """None where a compiled table was given: it has no lines and no assumptions."""
     space: Space
     drawer: Drawer | None
@@ -42,14 +43,14 @@ class Opened:
 
 
 def opened(
-    table: Table | CompiledTable,
+    table: EitherTable | CompiledTable,
     impossible: Sequence[CellBox] = (),
     weights: WeightsOf | None = None,
     assume: bool = True,
     progress: Progress = SILENT,
 ) -> Opened:
     """A table with its space; see `contextdb.covering.coverage` for the arguments and what is raised."""
-    require_kind(table, (Table, CompiledTable), "table", "a Table, or a CompiledTable")
+    require_kind(table, (Table, FlatTable, CompiledTable), "table", "a Table, or a CompiledTable")
     if isinstance(table, CompiledTable):
         table.refuse_rules("what they leave is worked out from the table itself")
         return Opened(table, None, Space.of(table, impossible, weights, progress), None)
@@ -97,7 +98,7 @@ def _with_inputs(names: Iterable[str], derivation: Derivation | None) -> set[str
     return own if derivation is None else own | {n for step in derivation.only(own).steps for n in step.expression.names}
 
 
-def _drawn(table: Table, assumed: Assumptions) -> Iterator[Condition]:
+def _drawn(table: EitherTable, assumed: Assumptions) -> Iterator[Condition]:
     """The derived conditions of a table that no boxes over its conditions tell."""
     names = {column.condition.name for column in table.conditions}
     told = {e.text for e in assumed.derived if all(box.keys() <= names for box in e.as_boxes(False) or ())}
@@ -107,7 +108,7 @@ def _drawn(table: Table, assumed: Assumptions) -> Iterator[Condition]:
             yield condition
 
 
-def assumptions_of(table: Table) -> Assumptions:
+def assumptions_of(table: EitherTable) -> Assumptions:
     """The assumptions of a table, as its settings in contextdb.toml say, and what its derived bools imply.
 
     Raises

@@ -24,7 +24,7 @@ from contextdb.covering.sample import LITTLE, Counts, Sampler
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 
 WORK = 40_000_000
 SAMPLES = 200_000
@@ -44,7 +44,7 @@ class Covered:
 
 
 def coverage(
-    table: Table | CompiledTable,
+    table: EitherTable | CompiledTable,
     *,
     seed: int = 0,
     work: int = WORK,

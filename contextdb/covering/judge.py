@@ -32,7 +32,7 @@ from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
 from contextdb.findings import Finding, Level
 from contextdb.tables.alike import identical_rows, named
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 from contextdb.tables.variety import gathered, lets_choose, needless, softened
 
 MOST_CAUSES = 24
@@ -53,7 +53,7 @@ class Judge:
 
     space: Space
     compiled: CompiledTable
-    table: Table | None
+    table: EitherTable | None
     steps: int
     progress: Progress = SILENT
     drawer: Drawer | None = None

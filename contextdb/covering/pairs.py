@@ -25,7 +25,7 @@ from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.sample import Codes, Sampler, lookup
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 
 SAMPLES = 50_000
 DIGITS = 12
@@ -158,7 +158,7 @@ class PairTable:
 
 
 def pairs(
-    table: Table | CompiledTable,
+    table: EitherTable | CompiledTable,
     *,
     seed: int = 0,
     samples: int = SAMPLES,

@@ -24,7 +24,7 @@ from contextdb.expressions.tokens import written_name, written_text
 from contextdb.findings import Finding
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable, Table
 
 _DEAD = "the row is valid in no context: its rule, its cells and what is assumed never hold together."
 MOST_NAMED = 200
@@ -35,7 +35,7 @@ MOST_NAMED = 200
 class RuledTable:
     """A table without rules that is valid where one with rules is."""
 
-    table: Table
+    table: EitherTable
     column: str | None = None
     """The column of rules; None where there is none, and `table` is the table itself."""
     rules: Mapping[str, str] = field(default_factory=dict)
@@ -82,7 +82,7 @@ class RuledTable:
         return f"{written_name(name)} in {written_text(text)}"
 
 
-def without_rules(table: Table) -> RuledTable:
+def without_rules(table: EitherTable) -> RuledTable:
     """The table with its rules as cells and conditions; the table itself where it has none."""
     when = WhenRules.of(table.when)
     if when is None:
@@ -96,7 +96,7 @@ def without_rules(table: Table) -> RuledTable:
 class _Folder:
     """Puts one rule after the other into columns."""
 
-    def __init__(self, table: Table, when: WhenRules) -> None:
+    def __init__(self, table: EitherTable, when: WhenRules) -> None:
         self.table, self.when = table, when
         self.columns = {column.condition.name: column for column in table.conditions}
         self.rules: dict[str, str] = {}

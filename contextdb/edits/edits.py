@@ -22,52 +22,10 @@ from contextdb.expressions.rules import check_rule
 from contextdb.files.csv_source import name_faults
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
 from contextdb.schema.settings import conditions_from_dict
-from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Rows, Sections, change_from_json
+from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
 from contextdb.tables.table import Table
 
 Job = Literal["condition", "output", "enabled", "priority", "weight"]
-
-
-@dataclass(frozen=True)
-class Edit:
-    """One step that a person takes: its name, and the changes it is made of, in order."""
-
-    name: str
-    changes: tuple[Change, ...]
-
-    def apply(self, table: Table) -> Table:
-        """The table after the edit.
-
-        Raises
-        ------
-        TableError, SchemaError
-            The edit does not fit the table: a row or column that is not there, a name that stands twice.
-        """
-        for change in self.changes:
-            table = change.apply(table)
-        return table
-
-    @property
-    def moves_rows(self) -> bool:
-        """Whether rows come, go or change their places."""
-        return any(isinstance(change, Rows) for change in self.changes)
-
-    def came_from(self, n_rows: int) -> CameFrom:
-        """For each row after the edit the row it was before, -1 for a new one: int64; `n_rows` is how many there were before."""
-        found = np.arange(n_rows)
-        for change in self.changes:
-            if isinstance(change, Rows):
-                found = np.append(found, -1)[change.came_from]
-        return found
-
-    def to_json(self) -> dict[str, object]:
-        """The edit as plain data, for a journal."""
-        return {"name": self.name, "changes": [change.to_json() for change in self.changes]}
-
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Edit:
-        """The edit that `to_json` wrote."""
-        return cls(data["name"], tuple(change_from_json(change) for change in data["changes"]))
 
 
 # ---- what a person typed

@@ -13,8 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from contextdb.edits.edits import Edit
-from contextdb.tables.changes import CameFrom
+from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.table import Table
 
 MOST_BYTES = 256 << 20

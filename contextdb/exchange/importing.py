@@ -21,7 +21,7 @@ from contextdb.files.texts import new_source
 from contextdb.schema.sections import condition_to_dict, job_faults
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.project import schema_for, settings_of
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.table import Table
 
 if TYPE_CHECKING:
     from contextdb.files.texts import AnySource
@@ -118,7 +118,7 @@ def table_of(
         raise TableError(*(fault.at(Place(str(path) if path else None)) for fault in faults))
     texts = [_renamed(column.cells or reading.columns[at], column.name) for at, column in kept]
     source, field_of = _source(reading, path), tuple(at for at, _ in kept)
-    table = build_table(settings.name, texts, schema, settings, path, source)
+    table = Table.build(settings.name, texts, schema, settings, path, source)
     return replace(table, origin=np.arange(table.n_rows) if source else np.full(table.n_rows, -1)), field_of if source else (
         -1,
     ) * len(kept)

@@ -18,6 +18,7 @@ from contextdb.exchange.proposals import n_unreadable, names_of, pair_in, propos
 from contextdb.exchange.reading import Reading
 from contextdb.schema.sections import condition_to_dict
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.tables.table import Table
 
 Job = Literal["asset", "condition", "output", "enabled", "priority", "weight", "when", "left out"]
 JOBS: tuple[Job, ...] = ("asset", "condition", "output", "enabled", "priority", "weight", "when", "left out")
@@ -239,10 +240,9 @@ def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> Job | 
 def _fits(column: TextColumn, job: Job) -> bool:
     """Whether every cell of a column can be read for a job."""
     from contextdb.edits.edits import check_cell
-    from contextdb.tables.table import build_table
 
     settings = replace(TableSettings("table", asset="asset"), **{str(job): column.name})  # type: ignore[arg-type]
-    empty = build_table("table", [TextColumn.of("asset", ()), TextColumn.of(column.name, ())], settings=settings)
+    empty = Table.build("table", [TextColumn.of("asset", ()), TextColumn.of(column.name, ())], settings=settings)
     return all(check_cell(empty, column.name, text) is None for text in column.texts)
 
 

@@ -12,16 +12,16 @@ from contextdb.errors import plural, row_name
 from contextdb.report.coverage_results import Measured
 from contextdb.report.coverage_words import nearest_sentence
 from contextdb.report.render_text import wrapped
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 from contextdb.tables.variety import VARIETY
 
 
-def gap_details(measured: Measured, gap: Gap, table: Table, width: int) -> str:
+def gap_details(measured: Measured, gap: Gap, table: EitherTable, width: int) -> str:
     """Everything about a gap: its cells, a context of it to try, and how each cell of the nearest row stands to it."""
     return "".join(f"{line}\n" for line in _gap_lines(measured, gap, table, width))
 
 
-def _gap_lines(measured: Measured, gap: Gap, table: Table, width: int) -> Iterator[str]:
+def _gap_lines(measured: Measured, gap: Gap, table: EitherTable, width: int) -> Iterator[str]:
     report = measured.report
     size = f"{'' if gap.is_exact else 'about '}{format_percent(gap.share)} of the contexts" if gap.share else "single points"
     yield f"Gap {report.gaps.index(gap) + 1} of {len(report.gaps)} in {printable(report.table)} ({gap.id}): {size}"

@@ -9,10 +9,10 @@ import numpy as np
 from contextdb.errors import in_quotes, row_name
 from contextdb.findings import Finding, Level
 from contextdb.tables.condition_column import ConditionColumn
-from contextdb.tables.table import Table
+from contextdb.tables.data import TableData
 
 
-def where(table: Table, row: int, other: int) -> str:
+def where(table: TableData, row: int, other: int) -> str:
     """Where a row stands, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
     place = table.place(row)
     if place.line is None:
@@ -21,7 +21,7 @@ def where(table: Table, row: int, other: int) -> str:
     return f"line {place.line} of {place.file}" if is_inside else f"line {place.line}"
 
 
-def identical_rows(table: Table) -> Iterator[Finding]:
+def identical_rows(table: TableData) -> Iterator[Finding]:
     """Rows whose every condition accepts the same values, whatever way it is written. A disabled row is like no other.
 
     Each is caused by the first such row of the same asset, or else by the first of all.
@@ -42,13 +42,13 @@ def identical_rows(table: Table) -> Iterator[Finding]:
             yield finding_at(table, row, "identical-rows", "warning", message, None, (other,))
 
 
-def named(table: Table, other: int, row: int) -> str:
+def named(table: TableData, other: int, row: int) -> str:
     """A row by its place and its asset, in a sentence about another."""
     return f"{where(table, other, row)} ({in_quotes(table.assets[other])})"
 
 
 def finding_at(
-    table: Table, row: int, rule: str, level: Level, message: str, column: str | None, by: tuple[int, ...] = ()
+    table: TableData, row: int, rule: str, level: Level, message: str, column: str | None, by: tuple[int, ...] = ()
 ) -> Finding:
     """A finding at a row of a table, or at one of its cells."""
     place = table.place(row, column)

@@ -35,7 +35,7 @@ from contextdb.schema.sections import (
 )
 from contextdb.schema.settings import Schema, TableSettings, expression_faults
 from contextdb.tables.condition_column import ConditionColumn, infer_condition
-from contextdb.tables.table import Table
+from contextdb.tables.data import AnyTable, TableData
 
 CameFrom = NDArray[np.int64]
 """For each row the row it was before, or -1 for a new one."""
@@ -50,7 +50,7 @@ class Rows:
 
     came_from: CameFrom
 
-    def apply(self, table: Table) -> Table:
+    def apply(self, table: AnyTable) -> AnyTable:
         """The table with these rows; a row taken twice is new the second time."""
         taken, n_before = self.came_from, table.n_rows
         wrong = taken[(taken < -1) | (taken >= n_before)]
@@ -80,7 +80,7 @@ class Cells:
 
     texts: Mapping[str, Mapping[int, str]]
 
-    def apply(self, table: Table) -> Table:
+    def apply(self, table: AnyTable) -> AnyTable:
         """The table with these texts."""
         changed = {name: _with_texts(table.text_column(name), texts) for name, texts in self.texts.items()}
         return _with_columns(table, [changed.get(c.name, c) for c in table.columns], table.origin)
@@ -96,7 +96,7 @@ class Columns:
 
     layout: tuple[tuple[str, str | None], ...]
 
-    def apply(self, table: Table) -> Table:
+    def apply(self, table: AnyTable) -> AnyTable:
         """The table with these columns. Its settings and schema follow what was renamed."""
         faults = list(name_faults([name for name, _ in self.layout]))
         if faults or not self.layout:
@@ -130,7 +130,7 @@ class Sections:
     """Section to name to all keys: `{"conditions": {"speed": {"type": "number"}}}`; None takes the name away."""
 
     @classmethod
-    def between(cls, before: Table, after: Table) -> Sections:
+    def between(cls, before: TableData, after: TableData) -> Sections:
         """What leads from what one table says to what another says."""
         settings = differences(settings_to_dict(before.settings), settings_to_dict(after.settings))
         old, new = schema_to_dict(before.schema), schema_to_dict(after.schema)
@@ -142,7 +142,7 @@ class Sections:
         """Whether nothing is said anew."""
         return not self.settings and not any(self.parts.values())
 
-    def apply(self, table: Table) -> Table:
+    def apply(self, table: AnyTable) -> AnyTable:
         """The table under these settings and this schema; columns whose meaning stays are not read again."""
         schema = schema_with(table.schema, self.parts)
         settings = settings_with(table.settings, self.settings)
@@ -174,10 +174,52 @@ def change_from_json(data: Mapping[str, Any]) -> Change:
     return Rows(np.concatenate([np.empty(0, np.int64), *parts]))
 
 
+@dataclass(frozen=True)
+class Edit:
+    """One step that a person takes: its name, and the changes it is made of, in order."""
+
+    name: str
+    changes: tuple[Change, ...]
+
+    def apply(self, table: AnyTable) -> AnyTable:
+        """The table after the edit.
+
+        Raises
+        ------
+        TableError, SchemaError
+            The edit does not fit the table: a row or column that is not there, a name that stands twice.
+        """
+        for change in self.changes:
+            table = change.apply(table)
+        return table
+
+    @property
+    def moves_rows(self) -> bool:
+        """Whether rows come, go or change their places."""
+        return any(isinstance(change, Rows) for change in self.changes)
+
+    def came_from(self, n_rows: int) -> CameFrom:
+        """For each row after the edit the row it was before, -1 for a new one: int64; `n_rows` is how many there were before."""
+        found = np.arange(n_rows)
+        for change in self.changes:
+            if isinstance(change, Rows):
+                found = np.append(found, -1)[change.came_from]
+        return found
+
+    def to_json(self) -> dict[str, object]:
+        """The edit as plain data, for a journal."""
+        return {"name": self.name, "changes": [change.to_json() for change in self.changes]}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Edit:
+        """The edit that `to_json` wrote."""
+        return cls(data["name"], tuple(change_from_json(change) for change in data["changes"]))
+
+
 # ---- parts
 
 
-def _with_columns(table: Table, columns: Sequence[TextColumn], origin: CameFrom) -> Table:
+def _with_columns(table: AnyTable, columns: Sequence[TextColumn], origin: CameFrom) -> AnyTable:
     now = {c.name: c for c in columns}
     conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in table.conditions)
     return replace(table, columns=tuple(columns), conditions=conditions, origin=origin)
@@ -215,7 +257,7 @@ def _codes(known: tuple[str, ...], texts: Sequence[str]) -> tuple[tuple[str, ...
     return (*known, *new) if new else known, [code_of[text] for text in texts]
 
 
-def _column(table: Table, before: Mapping[str, TextColumn], name: str, old: str | None) -> TextColumn:
+def _column(table: TableData, before: Mapping[str, TextColumn], name: str, old: str | None) -> TextColumn:
     if old is None:
         return TextColumn(name, ("",) if table.n_rows else (), np.zeros(table.n_rows, np.int32))
     if old not in before:
@@ -224,8 +266,8 @@ def _column(table: Table, before: Mapping[str, TextColumn], name: str, old: str 
 
 
 def _under(
-    table: Table, columns: Sequence[TextColumn], came_from: Mapping[str, str | None], schema: Schema, settings: TableSettings
-) -> Table:
+    table: AnyTable, columns: Sequence[TextColumn], came_from: Mapping[str, str | None], schema: Schema, settings: TableSettings
+) -> AnyTable:
     """The table of these columns under another schema and other settings."""
     before = {c.condition.name: c for c in table.conditions}
     jobs = (settings.enabled, settings.priority, settings.weight, settings.when)

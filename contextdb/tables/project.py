@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from contextdb.cells.arguments import require_kind, require_path
+from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import names_a_table, path_in_quotes, read_bytes
 from contextdb.disk.together import finish
@@ -19,10 +20,7 @@ from contextdb.files.file_names import alike, composed, spelled
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
 from contextdb.tables.nesting.links import Neighbours, inner_tables, is_nested, require_sound
 from contextdb.tables.other_files import other_form, stray_sentence
-from contextdb.tables.table import Table, build_table
-
-if TYPE_CHECKING:
-    from contextdb.compiled.table import CompiledTable
+from contextdb.tables.table import Table
 
 SCHEMA_FILE = "contextdb.toml"
 T = TypeVar("T")
@@ -124,6 +122,24 @@ class Project(Unchanging, ByName[Table]):
         return {name: table.compile() for name, table in self.tables.items()}
 
 
+def load(path: str | Path, strict: bool = True) -> Table:
+    """Read one table and the contextdb.toml beside it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A .csv or .parquet file.
+    strict : bool
+        False keeps cells that cannot be read, in `table.faults`, as an editor needs it.
+
+    Raises
+    ------
+    FileError, SchemaError, TableError
+        Each with every fault it found, its place, what is accepted and the nearest mend.
+    """
+    return load_table(require_path(path), strict)
+
+
 def load_table(path: Path, strict: bool = True) -> Table:
     """Read one table under the contextdb.toml beside it, or above it where that one declares the file."""
     folder, schema = schema_for(path)
@@ -134,7 +150,7 @@ def load_table(path: Path, strict: bool = True) -> Table:
     return table
 
 
-def neighbours(path: Path) -> Neighbours:
+def neighbours(path: Path) -> Neighbours[Table]:
     """The tables that the rows of a table file may stand for: those of its folder, each read when it is first asked for."""
     return Neighbours(_Folder(*schema_for(path)))
 
@@ -307,7 +323,7 @@ def folder_of(path: Path) -> Path:
 def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: Mapping[str, Table] | None = None) -> Table:
     settings = settings_of(path, folder, schema)
     source, columns = files.read_texts(path)
-    table = replace(build_table(settings.name, columns, schema, settings, path, source), around=around)
+    table = replace(Table.build(settings.name, columns, schema, settings, path, source), around=around)
     if strict:
         table.require_readable()
     return table

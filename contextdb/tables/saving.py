@@ -12,17 +12,18 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.disk import Was, read_bytes, write_atomic
-from contextdb.edits.diffing import Conflict, merge
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, plural, shown
 from contextdb.files.texts import new_source
+from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.merging.alignment import align
+from contextdb.tables.merging.conflicts import Conflict
+from contextdb.tables.merging.merging import merge
 from contextdb.tables.merging.reading import table_of
-from contextdb.tables.table import Table
 
 MOST_NAMED = 3
 
 
-def save_table(table: Table, target: Path, overwrite: bool) -> Table:
+def save_table(table: AnyTable, target: Path, overwrite: bool) -> AnyTable:
     """Write a table; see `Table.save`."""
     is_own = not overwrite and table.path is not None and table.source is not None and _is_same(table.path, target)
     while True:
@@ -34,7 +35,7 @@ def save_table(table: Table, target: Path, overwrite: bool) -> Table:
             return replace(now, path=target, source=source, origin=np.arange(now.n_rows))
 
 
-def require_related(base: Table, on_disk: Table, mend: str) -> None:
+def require_related(base: TableData, on_disk: TableData, mend: str) -> None:
     """Raise TableError when what stands in a file has no row in common with the table that was read from it."""
     if base.n_rows and not (align(base, on_disk).rows >= 0).any():
         said = "what stands in the file now has no row in common with the table that was read from it."
@@ -50,7 +51,7 @@ def _bytes_of(file: Path) -> bytes | None:
     return read_bytes(file) if os.path.exists(file) else None
 
 
-def _joined(table: Table, file: Path, there: bytes) -> Table:
+def _joined(table: AnyTable, file: Path, there: bytes) -> AnyTable:
     """The table with what others wrote into its file since it was read.
 
     Raises
@@ -64,7 +65,7 @@ def _joined(table: Table, file: Path, there: bytes) -> Table:
     place = Place(str(file))
     mend = "to load it again and repeat the edits, or save(overwrite=True)"
     try:
-        base, theirs = (table_of(raw, str(file), table.schema, table.settings) for raw in (table.source.raw, there))
+        base, theirs = (table_of(type(table), raw, str(file), table.schema, table.settings) for raw in (table.source.raw, there))
         require_related(base, theirs, mend)
     except ContextDBError as error:
         said = f"the file has been changed since it was read, and cannot be merged: {error.faults[0].found}"

@@ -15,7 +15,7 @@ from contextdb.covering.report import Gap
 from contextdb.covering.ruled import RuledTable
 from contextdb.covering.space import Space, require_counts
 from contextdb.errors import ContextError, Fault, FileError, in_quotes, nearest, some
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.engines import ENGINES, Engine, with_dask
 from contextdb.telemetry.gap_list import box_of
@@ -34,7 +34,7 @@ Tell = Callable[[float, int], None]
 
 
 def observe(
-    table: Table | CompiledTable,
+    table: EitherTable | CompiledTable,
     files: str | Path | Sequence[str | Path],
     *,
     count: str | None = None,

@@ -20,7 +20,7 @@ from contextdb.exchange.mapping import propose
 from contextdb.exchange.xlsx_parts import NEVER
 from contextdb.files.csv_source import read_csv
 from contextdb.schema.settings import EMPTY, TableSettings
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.table import Table
 
 NAMES = ("csv", "tsv", "xlsx", "parquet", "json", "jsonl")
 TEXTS = st.one_of(
@@ -74,7 +74,7 @@ def test_a_workbook_gives_any_text_back_as_it_was(names: list[str], data: st.Dat
     n_rows = data.draw(st.integers(0, 4))
     columns = {name: data.draw(st.lists(TEXTS, min_size=n_rows, max_size=n_rows)) for name in names}
     assume(not any(NEVER.search(text) for text in (*names, *(t for c in columns.values() for t in c))))
-    table = build_table("t", [TextColumn.of(name, texts) for name, texts in columns.items()])
+    table = Table.build("t", [TextColumn.of(name, texts) for name, texts in columns.items()])
     reading = read(write(table, FORMATS["xlsx"])[0], "t.xlsx")
     assert texts_of(reading.columns) == columns
 
@@ -84,7 +84,7 @@ def test_a_workbook_gives_any_text_back_as_it_was(names: list[str], data: st.Dat
 def test_tab_separated_text_and_json_give_any_text_back_as_it_was(rows: list[tuple[str, str]]):
     columns = {"name": [f"A{i}{a}" for i, (a, _) in enumerate(rows)], "cell": [b for _, b in rows]}
     assume(rows)
-    table = build_table("t", [TextColumn.of(name, texts) for name, texts in columns.items()])
+    table = Table.build("t", [TextColumn.of(name, texts) for name, texts in columns.items()])
     for name in ("tsv", "json", "jsonl"):
         assert texts_of(read(write(table, FORMATS[name])[0], f"t.{name}").columns) == columns
 
@@ -92,7 +92,7 @@ def test_tab_separated_text_and_json_give_any_text_back_as_it_was(rows: list[tup
 @given(file=csv_files())
 def test_a_csv_of_our_own_is_exported_byte_for_byte(file: CsvFile):
     source, columns = read_csv(file.raw, "x.csv")
-    table = build_table("x", columns, source=source)
+    table = Table.build("x", columns, source=source)
     assert write(table, FORMATS["csv"])[0] == file.raw
 
 
@@ -116,7 +116,7 @@ def test_what_a_workbook_keeps_of_a_table_survives_a_project_that_knows_nothing_
     }
     table = Table.from_columns({"A": ["x"]}, declared)
     settings = TableSettings("t", asset="A", outputs=("note",), priority="P", fallback="idle", policy="priority")
-    table = build_table("t", columns, table.schema, settings)
+    table = Table.build("t", columns, table.schema, settings)
     again = back(table, "xlsx")
     assert [c.condition for c in again.conditions] == [c.condition for c in table.conditions]
     assert (again.settings.outputs, again.settings.priority, again.settings.policy) == (("note",), "P", "priority")
@@ -127,7 +127,7 @@ def test_what_a_workbook_keeps_of_a_table_survives_a_project_that_knows_nothing_
 def test_a_column_of_rules_comes_back_as_one(name: str):
     columns = [TextColumn.of(n, t) for n, t in {"A": ["x", "y"], "speed": ["5", "Any"], "only": ["speed > 3", ""]}.items()]
     schema = Table.from_columns({"A": ["x"]}, {"speed": {"type": "number"}}).schema
-    table = build_table("table", columns, schema, TableSettings("table", asset="A", when="only"))
+    table = Table.build("table", columns, schema, TableSettings("table", asset="A", when="only"))
     again = back(table, name)
     assert again.settings.when == "only"
     assert [c.condition for c in again.conditions] == [c.condition for c in table.conditions]

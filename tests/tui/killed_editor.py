@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.edits import edits
-from contextdb.edits.edits import Edit
+from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.model.session import Session, bytes_for
 from tui.model.watched import digest_of

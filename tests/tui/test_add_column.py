@@ -10,7 +10,8 @@ from textual.app import App
 from textual.widgets import Input, Select
 
 from contextdb.edits.edits import NewColumn
-from contextdb.tables.table import Table, load
+from contextdb.tables.project import load
+from contextdb.tables.table import Table
 from tui.model.column_choices import Insertion, NewColumnForm, blueprint_fault, blueprints, choices, missing_conditions, places
 from tui.model.condition_form import ConditionForm
 from tui.screens.add_column import AddColumn

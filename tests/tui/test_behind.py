@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 import contextdb as cdb
 from contextdb.checks.cases import check_cases
 from contextdb.schema.settings import TableSettings
-from contextdb.tables.nesting.flat import flat_rows
+from contextdb.tables.compiling import compile_table
 from contextdb.tables.nesting.links import Neighbours
-from contextdb.tables.table import Table, compile_table
+from contextdb.tables.table import Table, flat_rows
 from tui.model.context_list import ContextList
 from tui.model.coverage_run import measured
 from tui.model.query_row import QueryRow

@@ -10,7 +10,7 @@ from terminal import drive, screen_text
 from textual.app import App
 from textual.pilot import Pilot
 
-from contextdb.edits.diffing import Conflict
+from contextdb.tables.merging.conflicts import Conflict
 from tui.model.lock import Holder
 from tui.screens.conflicts import ConflictsDialog, told
 from tui.screens.dialog import Dialog

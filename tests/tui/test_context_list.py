@@ -9,7 +9,8 @@ import polars as pl
 import pytest
 
 from contextdb.errors import ContextDBError, ContextError, FileError, TableError
-from contextdb.tables.table import Table, load
+from contextdb.tables.project import load
+from contextdb.tables.table import Table
 from tui.model import context_list
 from tui.model.context_list import ContextList, expectation_fault, readable_rows, summary
 from tui.model.query_row import QueryRow

@@ -15,7 +15,8 @@ from textual.events import Paste
 from textual.widgets import Input
 
 from contextdb.checks.cases import read_cases
-from contextdb.tables.table import Table, load
+from contextdb.tables.project import load
+from contextdb.tables.table import Table
 from tui.model.context_list import ContextList
 from tui.screens.contexts import ContextsDialog, Loaded, columns_of, shown_facts
 

@@ -14,7 +14,7 @@ from textual.strip import Strip
 
 from contextdb.columns import TextColumn
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.table import Table
 from tui.commands import GRID
 from tui.model.layout import layout
 from tui.model.session import bytes_for
@@ -51,7 +51,7 @@ def sheet_of(columns: dict[str, list[str]] = ROWS, enabled: str | None = "Enable
     """A sheet of texts that need not be readable."""
     declared = Schema(conditions=conditions_from_dict({n: SCHEMA[n] for n in SCHEMA if n in columns}))
     texts = [TextColumn.of(name, values) for name, values in columns.items()]
-    return Sheet(build_table("t", texts, declared, TableSettings("t", enabled=enabled if enabled in columns else None)))
+    return Sheet(Table.build("t", texts, declared, TableSettings("t", enabled=enabled if enabled in columns else None)))
 
 
 def look_of(sheet: Sheet, width: int = 80, height: int = 10, **more: object) -> Look:

@@ -9,7 +9,8 @@ from terminal import drive, screen_text
 from textual.app import App, ComposeResult
 from textual.widgets import Input, Select
 
-from contextdb.tables.table import Table, load
+from contextdb.tables.project import load
+from contextdb.tables.table import Table
 from tui.messages import Edited
 from tui.model.condition_form import ConditionForm, names_in
 from tui.model.options import columns_for, with_expression

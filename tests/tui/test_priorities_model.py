@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.tables.table import load
+from contextdb.tables.project import load
 from tui.model.priorities import (
     EXAMPLE,
     DatabaseNow,

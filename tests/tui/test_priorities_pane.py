@@ -10,7 +10,7 @@ from terminal import drive, screen_text
 from textual.app import App, ComposeResult
 from textual.widgets import Input, OptionList
 
-from contextdb.tables.table import load
+from contextdb.tables.project import load
 from tui.messages import Edited, Told
 from tui.model.sheet import Sheet
 from tui.panes.priorities import PrioritiesPane

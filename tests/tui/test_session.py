@@ -19,7 +19,8 @@ from contextdb.errors import ContextDBError, FileError, TableError
 from contextdb.files.csv_source import read_csv
 from contextdb.files.journal_lines import line_of
 from contextdb.files.parquet import rewritten_parquet
-from contextdb.tables.table import Table, load
+from contextdb.tables.project import load
+from contextdb.tables.table import Table
 from tui.model import session as session_module
 from tui.model.journal import journal_path
 from tui.model.lock import Holder, Lock

@@ -19,7 +19,7 @@ from terminal import press, said, screen_text, with_editor
 
 import contextdb as cdb
 from contextdb.checks.cases import exactly, read_expected
-from contextdb.tables.nesting.flat import flat_rows
+from contextdb.tables.table import flat_rows
 from tui.model.context_list import ContextList
 from tui.model.sheet import Sheet
 from tui.model.why import why_row

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from strategies import examples, sets, tables
 
 from contextdb.schema.settings import TableSettings
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.table import Table
 from tui.model.query_row import QueryRow
 from tui.model.why import nearest_rows, why_row
 
@@ -44,7 +44,7 @@ def small(*rows: str, enabled: str | None = None, is_strict: bool = True) -> Tab
     texts = [column.with_text(0, columns[column.name][0]) for column in table.columns]
     for row in range(1, len(rows)):
         texts = [column.with_text(row, columns[column.name][row]) for column in texts]
-    return build_table("t", texts, table.schema, settings)
+    return Table.build("t", texts, table.schema, settings)
 
 
 def test_the_cells_that_fail_stand_first_and_each_says_its_state():

@@ -6,7 +6,7 @@ import pytest
 
 from contextdb.columns import TextColumn
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
-from contextdb.tables.table import build_table
+from contextdb.tables.table import Table
 from tui.model.sheet import Sheet
 from tui.model.views import Filter, Sort
 from tui.model.window import Window
@@ -22,7 +22,7 @@ def sheet() -> Sheet:
     }
     schema = Schema(conditions=conditions_from_dict({"speed": {"type": "number"}, "hit": {"type": "bool"}}))
     texts = [TextColumn.of(name, values) for name, values in columns.items()]
-    return Sheet(build_table("t", texts, schema, TableSettings("t", enabled="on")))
+    return Sheet(Table.build("t", texts, schema, TableSettings("t", enabled="on")))
 
 
 def test_a_row_says_its_number_in_the_file_and_whether_it_is_enabled_and_valid(sheet):

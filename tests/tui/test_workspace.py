@@ -63,7 +63,7 @@ def test_without_a_path_and_without_a_folder_tables_those_that_are_here_are_take
 
 
 def test_two_tables_of_one_name_are_one_and_the_csv_is_the_one(folder):
-    from contextdb.tables.table import load
+    from contextdb.tables.project import load
 
     load(folder / "a.csv").save(folder / "a.parquet")
     space = Workspace(folder)
@@ -72,7 +72,7 @@ def test_two_tables_of_one_name_are_one_and_the_csv_is_the_one(folder):
 
 
 def test_a_file_whose_name_another_has_is_still_the_one_that_opens(folder):
-    from contextdb.tables.table import load
+    from contextdb.tables.project import load
 
     load(folder / "a.csv").save(folder / "a.parquet")
     space = Workspace(folder / "a.parquet")

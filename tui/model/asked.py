@@ -19,9 +19,10 @@ from contextdb.compiled.casting import Actor, CastMatches
 from contextdb.compiled.explain import Explanation
 from contextdb.compiled.matches import Matches
 from contextdb.errors import ContextDBError, ContextError, Fault
+from contextdb.tables.compiling import compile_table
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.nesting.links import inner_rows
-from contextdb.tables.table import Table, compile_table
+from contextdb.tables.table import EitherTable, Table
 from tui.model.behind import Inside
 
 Offered = Mapping[str, Sequence[Actor]]
@@ -40,7 +41,7 @@ class Asked:
         self.explained: Explanation | None = None
         """Why rows are valid or not; None where the question cannot be put."""
         try:
-            self.flat = table.flat()
+            self.flat: EitherTable = table.flat()
         except ContextDBError as error:
             self.flat, self.fault = table, error.faults[0]
         try:
@@ -58,8 +59,8 @@ class Asked:
     @cached_property
     def own(self) -> NDArray[np.int64]:
         """For each row that is asked the row of the sheet."""
-        is_flat = isinstance(self.flat, FlatTable)
-        return self.flat.expansion.rows[0].astype(np.int64) if is_flat else np.arange(self.flat.n_rows)  # type: ignore[attr-defined]
+        flat = self.flat
+        return flat.expansion.rows[0].astype(np.int64) if isinstance(flat, FlatTable) else np.arange(flat.n_rows)
 
     @property
     def bits(self) -> int:

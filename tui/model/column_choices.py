@@ -8,9 +8,10 @@ from typing import get_args
 
 from contextdb.cells.conditions import Condition
 from contextdb.edits import edits
-from contextdb.edits.edits import Edit, Job, NewColumn
+from contextdb.edits.edits import Job, NewColumn
 from contextdb.errors import ContextDBError, in_quotes, plural, shown
 from contextdb.schema.shapes import wrong_name
+from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.model.condition_form import ConditionForm, plain
 

@@ -8,14 +8,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.edits.diffing import Merge, merge
 from contextdb.edits.diffing.markers import versions_of
 from contextdb.errors import ContextDBError
+from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.merging.reading import merged_bytes, table_of
 from contextdb.tables.project import schema_for, settings_of
+from contextdb.tables.table import Table
 
 
-def conflicts_in(path: str | Path) -> Merge | None:
+def conflicts_in(path: str | Path) -> Merge[Table] | None:
     """The merge that a file's marks stand for, to be decided; None where it has none, or no table stands between them."""
     try:
         versions = versions_of(read_bytes(path))
@@ -23,13 +24,13 @@ def conflicts_in(path: str | Path) -> Merge | None:
             return None
         folder, schema = schema_for(Path(path))
         settings = settings_of(Path(path), folder, schema)
-        base, ours, theirs = (table_of(raw, str(path), schema, settings) for raw in versions)
+        base, ours, theirs = (table_of(Table, raw, str(path), schema, settings) for raw in versions)
     except ContextDBError:
         return None
     return merge(base, ours, theirs)
 
 
-def write_decided(path: str | Path, decided: Merge) -> None:
+def write_decided(path: str | Path, decided: Merge[Table]) -> None:
     """Write the file without marks; what is not decided is as ours has it.
 
     Raises

@@ -36,8 +36,9 @@ from contextdb.checks.cases import (
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, some
+from contextdb.tables.compiling import compile_table
 from contextdb.tables.other_files import cases_path
-from contextdb.tables.table import Table, compile_table
+from contextdb.tables.table import Table
 from contextdb.telemetry.recordings import Recording, fact_text, open_recording
 from tui.model.wanted import wanted_by
 

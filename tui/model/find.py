@@ -16,9 +16,8 @@ import polars as pl
 
 from contextdb.bitmask import Flags, Rows
 from contextdb.columns import TextColumn
-from contextdb.edits.edits import Edit
 from contextdb.errors import ContextDBError, Fault, in_quotes, plural, shown
-from contextdb.tables.changes import Cells
+from contextdb.tables.changes import Cells, Edit
 from contextdb.tables.table import Table
 
 

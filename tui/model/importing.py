@@ -14,15 +14,15 @@ import numpy as np
 
 from contextdb.cells.domains import KINDS
 from contextdb.columns import TextColumn
-from contextdb.edits.edits import Edit, edit_between
+from contextdb.edits.edits import edit_between
 from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, shown
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
 from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.proposals import names_of
 from contextdb.exchange.reading import Reading, listed
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
-from contextdb.tables.changes import CameFrom
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.changes import CameFrom, Edit
+from contextdb.tables.table import Table
 
 Mode = Literal["merge", "append", "replace"]
 MODES: dict[Mode, str] = {
@@ -189,7 +189,7 @@ class Draft:
         names = [*self._names, *(name for name in texts if name not in self._names)]
         columns = [self._column(name, came_from, texts.get(name)) for name in names]
         schema, settings = self._said([column for _, column in taken])
-        after = build_table(self.table.name, columns, schema, settings, self.table.path)
+        after = Table.build(self.table.name, columns, schema, settings, self.table.path)
         return edit_between(self.table, after, came_from, f"Import {shown(self.name)}")
 
     def summary(self) -> str:

@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.edits.edits import Edit, edit_between
+from contextdb.edits.edits import edit_between
 from contextdb.edits.history import History, Step
 from contextdb.edits.schema_file import SchemaChange
 from contextdb.errors import ContextDBError, Fault, Place, plural
@@ -35,7 +35,8 @@ from contextdb.files.csv_source import read_csv
 from contextdb.files.journal_lines import Record, line_of, n_lost, read_records
 from contextdb.files.parquet import read_parquet
 from contextdb.files.texts import AnySource
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.changes import Edit
+from contextdb.tables.table import Table
 from tui.model.lock import FOLDER, own_folder
 from tui.model.watched import digest_of
 
@@ -260,7 +261,7 @@ def _base_of(table: Table, digest: object) -> Table | None:
         is_csv = table.path.suffix.lower() == ".csv"
         source: AnySource
         source, columns = read_csv(raw, str(table.path)) if is_csv else read_parquet(raw, str(table.path))
-        base = build_table(table.name, columns, table.schema, table.settings, table.path, source)
+        base = Table.build(table.name, columns, table.schema, table.settings, table.path, source)
         return replace(base, around=table.around)
     except ContextDBError:
         return None

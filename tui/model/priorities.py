@@ -17,8 +17,8 @@ from pathlib import Path, PurePosixPath
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
-from contextdb.tables.project import table_files
-from contextdb.tables.table import Table, load
+from contextdb.tables.project import load, table_files
+from contextdb.tables.table import Table
 from tui.model.query_row import QueryRow
 from tui.model.sheet import Sheet
 

@@ -34,10 +34,11 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, some
 from contextdb.expressions.rules import WhenColumn, WhenRules
 from contextdb.schema.settings import TableSettings
+from contextdb.tables.compiling import compile_table
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.links import is_nested
 from contextdb.tables.nesting.names import asset_name
-from contextdb.tables.table import Table, compile_table
+from contextdb.tables.table import Table
 from tui.model.asked import Asked, Offered, bits_of_rows
 from tui.model.behind import Behind, Counts, Inside
 from tui.model.wanted import Wanted, flat_of

@@ -7,11 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from contextdb.edits.edits import Edit
 from contextdb.errors import SchemaError
 from contextdb.schema.sections import EDITED_SECTIONS, settings_to_dict
 from contextdb.schema.settings import Schema, TableSettings
-from contextdb.tables.changes import Sections
+from contextdb.tables.changes import Edit, Sections
 from contextdb.tables.table import Table
 
 

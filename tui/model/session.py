@@ -16,11 +16,12 @@ import numpy as np
 from contextdb.disk import Was, path_in_quotes, read_bytes, write_atomic
 from contextdb.disk.folder_lock import sweep
 from contextdb.disk.together import NewFile, write_together
-from contextdb.edits.diffing import Merge, diff, merge
+from contextdb.edits.diffing import diff
 from contextdb.edits.history import History
 from contextdb.edits.schema_file import schema_change
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.files.texts import new_source
+from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.project import SCHEMA_FILE, load_table, schema_for
 from contextdb.tables.saving import require_related
 from contextdb.tables.table import Table
@@ -121,7 +122,7 @@ class Session:
         """Whether nothing can be saved to the file."""
         return bool(self.why_read_only)
 
-    def merge_from_disk(self) -> Merge:
+    def merge_from_disk(self) -> Merge[Table]:
         """Merge what stands on the disk with the sheet. Without conflicts it is taken at once, as one step.
 
         With conflicts nothing has changed yet: decide them with `Merge.resolved`, and `take` the result.
@@ -140,7 +141,7 @@ class Session:
             self.take(found)
         return found
 
-    def take(self, merged: Merge) -> Done:
+    def take(self, merged: Merge[Table]) -> Done:
         """Make a merge of `merge_from_disk` the sheet's, as one step. What is not decided stays as in the sheet."""
         if merged.ours is not self.sheet.table:
             merged = merge(merged.base, self.sheet.table, merged.theirs, merged.decided)

@@ -14,11 +14,11 @@ import numpy as np
 
 from contextdb.bitmask import Rows
 from contextdb.edits import edits
-from contextdb.edits.edits import Edit, Job
+from contextdb.edits.edits import Job
 from contextdb.edits.history import History, Step
 from contextdb.edits.renaming import uses_of
 from contextdb.errors import Fault, TableError, in_quotes, plural, shown
-from contextdb.tables.changes import Cells, Change
+from contextdb.tables.changes import Cells, Change, Edit
 from contextdb.tables.table import Table
 from tui.model.clipboard import format_tsv, parse_tsv, place_paste
 from tui.model.find import Search, find, next_hit, replace_all

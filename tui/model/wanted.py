@@ -15,7 +15,7 @@ from contextdb.cells.facts import Fact, read_fact, read_fact_text
 from contextdb.errors import ContextDBError, ContextError, Fault, shown, some
 from contextdb.expressions import Derivation
 from contextdb.tables.nesting.links import is_nested
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Wanted:
     """How the computed ones are; None where none is."""
 
     @classmethod
-    def of(cls, table: Table) -> Wanted:
+    def of(cls, table: EitherTable) -> Wanted:
         """What a table asks for; with the tables inside it, where it was made flat."""
         ruled = table.when.names if table.when is not None else ()
         columns = [column.condition for column in table.conditions]
@@ -77,7 +77,7 @@ class Wanted:
         return f"{how} Type the facts that it is computed from: {inputs}."
 
 
-def flat_of(table: Table) -> Table | None:
+def flat_of(table: EitherTable) -> EitherTable | None:
     """The table with the rows of the tables inside it; the table itself where there are none; None where it cannot be made."""
     if not is_nested(table):
         return table
@@ -87,6 +87,6 @@ def flat_of(table: Table) -> Table | None:
         return None
 
 
-def wanted_by(table: Table) -> Wanted:
+def wanted_by(table: EitherTable) -> Wanted:
     """What a table asks for, and the tables inside it, where they can be read."""
     return Wanted.of(flat_of(table) or table)

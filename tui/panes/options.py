@@ -22,10 +22,10 @@ from textual.widgets.selection_list import Selection
 
 from contextdb.cells.domains import KINDS
 from contextdb.edits import edits
-from contextdb.edits.edits import Edit
 from contextdb.errors import ContextDBError
 from contextdb.schema.sections import has_place
 from contextdb.schema.shapes import POLICIES
+from contextdb.tables.changes import Edit
 from contextdb.tables.condition_column import ConditionColumn
 from tui.messages import Edited
 from tui.model.condition_form import KIND_WORDS, ConditionForm, plain

@@ -18,8 +18,9 @@ from textual.widgets import Button, Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from contextdb.edits import edits
-from contextdb.edits.edits import Edit, NewColumn
+from contextdb.edits.edits import NewColumn
 from contextdb.errors import shown
+from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.model.column_choices import Blueprint, Insertion, blueprint_fault, blueprints, conditions_of
 from tui.screens.dialog import Dialog

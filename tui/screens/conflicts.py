@@ -12,8 +12,8 @@ from textual.content import Content
 from textual.message import Message
 from textual.widgets import Static
 
-from contextdb.edits.diffing import Conflict, Side
 from contextdb.errors import plural, shown
+from contextdb.tables.merging.conflicts import Conflict, Side
 from tui.screens.dialog import Dialog
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 

@@ -11,8 +11,11 @@ from typing import Any, Literal, Protocol
 
 from textual.screen import Screen
 
-from contextdb.edits.diffing import Merge, Side, diff
+from contextdb.edits.diffing import diff
 from contextdb.errors import ContextDBError, FileError
+from contextdb.tables.merging.conflicts import Side
+from contextdb.tables.merging.merging import Merge
+from contextdb.tables.table import Table
 from tui.model.session import Session
 from tui.screens.conflicts import ConflictsDialog
 
@@ -100,7 +103,7 @@ class DiskCare:
             self._left = self._session.disk_stamp
             self._say_once(str(error), "error")
 
-    def _ask(self, merged: Merge, then: Callable[[], None]) -> None:
+    def _ask(self, merged: Merge[Table], then: Callable[[], None]) -> None:
         def decided(sides: Mapping[int, Side] | None) -> None:
             if sides is None:
                 self._left = self._session.disk_stamp
@@ -115,7 +118,7 @@ class DiskCare:
 
         self._screen.app.push_screen(ConflictsDialog(merged.conflicts, self._session.path.name), decided)
 
-    def _merged(self, merged: Merge, then: Callable[[], None]) -> None:
+    def _merged(self, merged: Merge[Table], then: Callable[[], None]) -> None:
         self._changed()
         self._say(f"Merged from disk: {diff(merged.base, merged.theirs).summary}. Ctrl+Z takes it back.")
         then()

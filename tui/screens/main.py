@@ -15,9 +15,9 @@ from textual.screen import Screen
 from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
-from contextdb.edits.edits import Edit
 from contextdb.edits.renaming import Uses, uses_of
 from contextdb.errors import ContextDBError, in_quotes, plural, some
+from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.clipboard import Clipboard
 from tui.commands import ASSETS, BY_ID, SCREEN, bindings

@@ -1,14 +1,11 @@
-"""What changed between two tables, cell by cell, and two sets of changes made one.
+"""What changed between two tables, cell by cell.
 
 Rows are compared by asset and not by line; a change of meaning is told from one that only writes the same otherwise. `diff` gives
-what changed, and the edit that does it; `merge` joins what two sides made of one table and gives what they disagree about as data.
-The parts stand in `contextdb.edits.diffing`. Nothing here touches the disk.
+what changed, and the edit that does it. Nothing here touches the disk.
 """
 
 from __future__ import annotations
 
 from contextdb.edits.diffing.differences import CellChange, Diff, Renamed, RowMove, diff
-from contextdb.tables.merging.conflicts import Conflict, Side
-from contextdb.tables.merging.merging import Merge, merge
 
-__all__ = ["CellChange", "Conflict", "Diff", "Merge", "Renamed", "RowMove", "Side", "diff", "merge"]
+__all__ = ["CellChange", "Diff", "Renamed", "RowMove", "diff"]

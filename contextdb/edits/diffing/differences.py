@@ -9,14 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.edits.edits import Edit
 from contextdb.errors import plural
-from contextdb.tables.changes import CameFrom
+from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.merging.alignment import Alignment, align, inverse, moved
 from contextdb.tables.merging.building import edit_to
 from contextdb.tables.merging.meaning import is_same, meaning_of
 from contextdb.tables.merging.shared import Places, Shared
-from contextdb.tables.table import Table
+from contextdb.tables.table import EitherTable
 
 FORMAT = 1
 
@@ -58,8 +57,8 @@ class RowMove:
 class Diff:
     """What changed from `before` to `after`. False when every text, row and column is the same."""
 
-    before: Table
-    after: Table
+    before: EitherTable
+    after: EitherTable
     alignment: Alignment
     changed: Mapping[int, Places]
     """Column of after to the rows of after whose text is another, of rows and columns that were there before."""
@@ -197,7 +196,7 @@ class Diff:
         return [c.name for c in self.after.columns].index(self.after.asset_column)
 
 
-def diff(before: Table, after: Table) -> Diff:
+def diff(before: EitherTable, after: EitherTable) -> Diff:
     """What changed from one table to another.
 
     Near-linear in cells: 100,000 rows x 60 columns with 1,000 changed cells take about half a second. Cells may be unreadable; such
@@ -214,7 +213,7 @@ def diff(before: Table, after: Table) -> Diff:
     return Diff(before, after, alignment, changed, rewritten)
 
 
-def _changed_rows(before: Table, after: Table, b: int, a: int, rows_before: Places, rows_after: Places) -> Places:
+def _changed_rows(before: EitherTable, after: EitherTable, b: int, a: int, rows_before: Places, rows_after: Places) -> Places:
     old, new = before.columns[b], after.columns[a]
     if old.codes is new.codes and old.texts is new.texts and np.array_equal(rows_before, rows_after):
         return rows_after[:0]
@@ -223,7 +222,9 @@ def _changed_rows(before: Table, after: Table, b: int, a: int, rows_before: Plac
     return np.asarray(rows_after[is_changed], np.int64)
 
 
-def _is_writing_only(before: Table, after: Table, b: int, a: int, rows_before: Places, rows_after: Places) -> NDArray[np.bool_]:
+def _is_writing_only(
+    before: EitherTable, after: EitherTable, b: int, a: int, rows_before: Places, rows_after: Places
+) -> NDArray[np.bool_]:
     old, new = before.columns[b], after.columns[a]
     read_old, read_new = meaning_of(before, b), meaning_of(after, a)
     pairs = np.stack([old.codes[rows_before], new.codes[rows_after]], axis=1)
@@ -232,6 +233,6 @@ def _is_writing_only(before: Table, after: Table, b: int, a: int, rows_before: P
     return np.array(same, np.bool_)[which.reshape(-1)]
 
 
-def _row(table: Table, row: int) -> dict[str, object]:
+def _row(table: EitherTable, row: int) -> dict[str, object]:
     place = table.place(row)
     return {"row": row, "asset": table.assets[row], "line": place.line}

@@ -33,7 +33,7 @@ Versions = tuple[bytes, bytes, bytes]
 """Base, ours, theirs."""
 
 
-def with_markers(merge: Merge) -> bytes:
+def with_markers(merge: Merge[Table]) -> bytes:
     """The merged CSV, with what is not decided between marks."""
     source = merge.ours.source
     end = source.line_end.encode() if isinstance(source, Source) else b"\n"
@@ -80,7 +80,7 @@ def versions_of(raw: bytes) -> Versions | None:
 class _Lines:
     """The lines of a merge, by row."""
 
-    def __init__(self, merge: Merge, table: Table | None = None) -> None:
+    def __init__(self, merge: Merge[Table], table: Table | None = None) -> None:
         table = table or merge.table
         source = merge.ours.source if isinstance(merge.ours.source, Source) else None
         origin = table.origin if source is not None else np.full(table.n_rows, -1)
@@ -120,7 +120,7 @@ def _woven(mine: _Lines, yours: _Lines, was: dict[Known, bytes], end: bytes) -> 
             at, other = at + 1, other + 1
 
 
-def _base_lines(merge: Merge, mine: _Lines, yours: _Lines) -> dict[Known, bytes]:
+def _base_lines(merge: Merge[Table], mine: _Lines, yours: _Lines) -> dict[Known, bytes]:
     """What stood in base of each row in question, in the merged columns."""
     asked: dict[int, list[Conflict]] = {}
     for one in merge.conflicts:
@@ -137,7 +137,7 @@ def _base_lines(merge: Merge, mine: _Lines, yours: _Lines) -> dict[Known, bytes]
     return found
 
 
-def _base_cells(merge: Merge, base: int, row: int, asked: Sequence[Conflict]) -> Iterator[tuple[int, str, str]]:
+def _base_cells(merge: Merge[Table], base: int, row: int, asked: Sequence[Conflict]) -> Iterator[tuple[int, str, str]]:
     """The cells of base that a row in question had: all where the row itself is, else those in question."""
     is_whole = any(one.kind == "row" for one in asked)
     wanted = {one.column for one in asked}

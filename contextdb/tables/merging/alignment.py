@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.tables.changes import CameFrom
+from contextdb.tables.data import TableData
 from contextdb.tables.merging.matching import (
     LEAST_NAME_ALIKE,
     MOST_PAIRS,
@@ -28,7 +29,6 @@ from contextdb.tables.merging.matching import (
     with_neighbours,
 )
 from contextdb.tables.merging.shared import Places, Shared
-from contextdb.tables.table import Table
 
 LEAST_ALIKE = 0.5
 """Share of the cells that say something, in either row or column, that must be equal for a rename."""
@@ -42,7 +42,7 @@ class Alignment:
     columns: CameFrom
 
 
-def align(before: Table, after: Table) -> Alignment:
+def align(before: TableData, after: TableData) -> Alignment:
     """Find what became of each row and column."""
     names = {c.name: at for at, c in enumerate(before.columns)}
     by_name = [names.get(c.name, -1) for c in after.columns]
@@ -95,7 +95,7 @@ def _longest_increasing(places: list[int]) -> list[int]:
 # ---- rows
 
 
-def _align_rows(before: Table, after: Table, by_place: Mapping[tuple[int, int], Shared]) -> CameFrom:
+def _align_rows(before: TableData, after: TableData, by_place: Mapping[tuple[int, int], Shared]) -> CameFrom:
     names = Shared.of((before.text_column(before.asset_column), after.text_column(after.asset_column)))
     if np.array_equal(names.codes[0], names.codes[1]) and len(np.unique(names.codes[0])) == before.n_rows:
         return np.arange(before.n_rows)
@@ -131,7 +131,7 @@ def _pair_renamed(matching: Matching, names: Shared, others: Sequence[Shared]) -
 # ---- two sides of a merge
 
 
-def row_twins(ours: Table, theirs: Table, new_ours: Places, new_theirs: Places) -> CameFrom:
+def row_twins(ours: TableData, theirs: TableData, new_ours: Places, new_theirs: Places) -> CameFrom:
     """For each row of theirs the row of ours that both sides inserted: of the same asset, or without one the same in every cell."""
     found = np.full(theirs.n_rows, -1, np.int64)
     if not len(new_ours) or not len(new_theirs):
@@ -152,7 +152,7 @@ def row_twins(ours: Table, theirs: Table, new_ours: Places, new_theirs: Places) 
 # ---- columns
 
 
-def _align_columns(before: Table, after: Table, rows: CameFrom, by_name: CameFrom) -> CameFrom:
+def _align_columns(before: TableData, after: TableData, rows: CameFrom, by_name: CameFrom) -> CameFrom:
     found = by_name.copy()
     assets = _asset_place(before), _asset_place(after)
     if found[assets[1]] < 0 and assets[0] not in found:
@@ -169,7 +169,7 @@ def _align_columns(before: Table, after: Table, rows: CameFrom, by_name: CameFro
     return found
 
 
-def _column_likeness(before: Table, after: Table, b: int, a: int, rows_before: Places, rows_after: Places) -> float:
+def _column_likeness(before: TableData, after: TableData, b: int, a: int, rows_before: Places, rows_after: Places) -> float:
     shared = Shared.of((before.columns[b], after.columns[a]))
     old, now = shared.at(0, rows_before), shared.at(1, rows_after)
     said = ~(shared.is_any[old] & shared.is_any[now])
@@ -179,5 +179,5 @@ def _column_likeness(before: Table, after: Table, b: int, a: int, rows_before: P
     return likeness if likeness >= LEAST_NAME_ALIKE else 0.0
 
 
-def _asset_place(table: Table) -> int:
+def _asset_place(table: TableData) -> int:
     return [c.name for c in table.columns].index(table.asset_column)

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from contextdb.columns import TextColumn
-from contextdb.edits.edits import Edit
 from contextdb.errors import SchemaError
 from contextdb.schema.sections import condition_to_dict, differences, settings_to_dict
 from contextdb.schema.settings import Schema, TableSettings
-from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Rows, Sections
+from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
+from contextdb.tables.data import TableData
 from contextdb.tables.merging.shared import Shared
-from contextdb.tables.table import Table
 
 JOBS = ("asset", "outputs", "enabled", "priority", "weight", "when")
 """What settings say of columns."""
@@ -22,7 +21,7 @@ _EMPTY = TextColumn("", ("",), np.zeros(1, np.int32))
 
 
 def edit_to(
-    before: Table,
+    before: TableData,
     columns: Sequence[TextColumn],
     rows: CameFrom,
     fields: CameFrom,
@@ -49,7 +48,7 @@ def edit_to(
     return Edit(name, (*changes, Cells(texts)) if texts else tuple(changes))
 
 
-def _said_of(table: Table, columns: Sequence[TextColumn], settings: TableSettings, schema: Schema) -> Sections:
+def _said_of(table: TableData, columns: Sequence[TextColumn], settings: TableSettings, schema: Schema) -> Sections:
     old, new = settings_to_dict(table.settings), settings_to_dict(settings)
     jobs = differences({k: v for k, v in old.items() if k in JOBS}, {k: v for k, v in new.items() if k in JOBS})
     known = table.schema.conditions
@@ -58,7 +57,7 @@ def _said_of(table: Table, columns: Sequence[TextColumn], settings: TableSetting
     return Sections(jobs, {"conditions": declared} if declared else {})
 
 
-def _fits(table: Table, said: Sections) -> bool:
+def _fits(table: TableData, said: Sections) -> bool:
     try:
         said.apply(table.with_rows_taken([]))
     except SchemaError:
@@ -66,7 +65,7 @@ def _fits(table: Table, said: Sections) -> bool:
     return True
 
 
-def _differences(before: Table, column: TextColumn, rows: CameFrom, field: int) -> dict[int, str]:
+def _differences(before: TableData, column: TextColumn, rows: CameFrom, field: int) -> dict[int, str]:
     """The rows whose text is not what the column has after its rows and columns were put in place; new cells are empty then."""
     old = before.columns[field] if field >= 0 else None
     is_shared = old is not None and old.codes is column.codes and old.texts is column.texts

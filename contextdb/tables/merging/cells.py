@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.columns import TextColumn
+from contextdb.tables.data import TableData
 from contextdb.tables.merging.conflicts import Conflict, Decided
 from contextdb.tables.merging.meaning import Meaning, is_same, meaning_of
 from contextdb.tables.merging.order import Flags, Origins
 from contextdb.tables.merging.shared import Places, Shared
-from contextdb.tables.table import Table
 
-Tables = tuple[Table, Table, Table]
+Tables = tuple[TableData, TableData, TableData]
 """Base, ours, theirs."""
 
 _EMPTY = TextColumn("", ("",), np.zeros(1, np.int32))
@@ -95,7 +95,7 @@ def _judged(
             yield Conflict("cell", "", name, row, texts[base] if base >= 0 else None, texts[ours], texts[theirs], key)
 
 
-def changed_in(tables: tuple[Table, Table], columns: Places, rows: tuple[Places, Places]) -> Flags:
+def changed_in(tables: tuple[TableData, TableData], columns: Places, rows: tuple[Places, Places]) -> Flags:
     """Whether any cell of some rows of a side differs from base's: bool [rows].
 
     `tables` are base and the side, `columns` says for each column of the side which one of base it was, and `rows` are places in

@@ -9,13 +9,13 @@ from contextdb.cells.words import truth_of
 from contextdb.errors import CellError
 from contextdb.expressions.rules import has_no_rule
 from contextdb.tables.condition_column import ConditionColumn
-from contextdb.tables.table import Table
+from contextdb.tables.data import TableData
 
 Meaning = Callable[[str], object]
 """What a text means; None where nothing is known but the text itself."""
 
 
-def meaning_of(table: Table, column: int) -> Meaning:
+def meaning_of(table: TableData, column: int) -> Meaning:
     """How texts of a column are read: as cells, truths or numbers; an asset, an output and what cannot be read mean themselves."""
     name, settings = table.columns[column].name, table.settings
     condition = next((c for c in table.conditions if c.condition.name == name), None)

@@ -11,30 +11,29 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Generic
 
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
-from contextdb.edits.edits import Edit
 from contextdb.schema.sections import job_faults
 from contextdb.schema.settings import Schema, TableSettings
-from contextdb.tables.changes import CameFrom
+from contextdb.tables.changes import CameFrom, Edit
+from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.merging.alignment import align
 from contextdb.tables.merging.building import JOBS, edit_to
 from contextdb.tables.merging.cells import merge_column
 from contextdb.tables.merging.conflicts import Conflict, Decided, Side
 from contextdb.tables.merging.order import Origins
 from contextdb.tables.merging.structure import merge_columns, merge_rows
-from contextdb.tables.table import Table
 
 
 @dataclass(frozen=True, eq=False)
-class Merge:
+class Merge(Generic[AnyTable]):
     """The merge of `ours` and `theirs`, which were both made of `base`."""
 
-    base: Table
-    ours: Table
-    theirs: Table
+    base: AnyTable
+    ours: AnyTable
+    theirs: AnyTable
     rows: Origins
     fields: Origins
     """The same for columns."""
@@ -47,7 +46,7 @@ class Merge:
     decided: Decided
 
     @cached_property
-    def table(self) -> Table:
+    def table(self) -> AnyTable:
         """The merged table, with the source of ours: saving it changes only lines that theirs changed."""
         return self.edit_of_ours().apply(self.ours)
 
@@ -59,16 +58,16 @@ class Merge:
         """The edit that makes theirs the merge."""
         return self._edit(self.theirs, self.rows.theirs, self.fields.theirs, name)
 
-    def resolved(self, sides: Mapping[int, Side]) -> Merge:
+    def resolved(self, sides: Mapping[int, Side]) -> Merge[AnyTable]:
         """The merge with some of its conflicts decided, each by its place in `conflicts`."""
         decided = {**self.decided, **{self.conflicts[at].key: side for at, side in sides.items()}}
         return merge(self.base, self.ours, self.theirs, decided)
 
-    def _edit(self, side: Table, rows: CameFrom, fields: CameFrom, name: str) -> Edit:
+    def _edit(self, side: TableData, rows: CameFrom, fields: CameFrom, name: str) -> Edit:
         return edit_to(side, self.columns, rows, fields, self.settings, self.schema, name)
 
 
-def merge(base: Table, ours: Table, theirs: Table, decided: Decided | None = None) -> Merge:
+def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | None = None) -> Merge[AnyTable]:
     """Join what two sides made of a table.
 
     Parameters
@@ -107,7 +106,9 @@ def _asset_texts(columns: Sequence[TextColumn], settings: TableSettings) -> Text
 # ---- what is said of the columns
 
 
-def _settings(base: Table, ours: Table, theirs: Table, fields: Origins, names: Sequence[str], schema: Schema) -> TableSettings:
+def _settings(
+    base: TableData, ours: TableData, theirs: TableData, fields: Origins, names: Sequence[str], schema: Schema
+) -> TableSettings:
     """The settings of ours, with what only theirs said anew where that goes together, under the names of the merge."""
     was, mine, yours = (
         _jobs(table, dict(zip(places.tolist(), names, strict=True)))
@@ -124,7 +125,7 @@ def _settings(base: Table, ours: Table, theirs: Table, fields: Origins, names: S
     return replace(ours.settings, **said)
 
 
-def _jobs(table: Table, name_of: Mapping[int, str]) -> dict[str, Any]:
+def _jobs(table: TableData, name_of: Mapping[int, str]) -> dict[str, Any]:
     """What the settings say, under the names that columns have in the merge; of a column that is not there nothing."""
     places = {c.name: at for at, c in enumerate(table.columns)}
 

@@ -12,15 +12,17 @@ from contextdb.files.csv_source import read_csv
 from contextdb.files.parquet import ParquetSource, read_parquet, rewritten_parquet
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.tables.data import AnyTable
 from contextdb.tables.merging.merging import Merge
-from contextdb.tables.table import Table, build_table
 
 PARQUET = b"PAR1"
 """How a Parquet file begins."""
 
 
-def table_of(raw: bytes, file: str, schema: Schema = EMPTY, settings: TableSettings | None = None) -> Table:
-    """A table from bytes, CSV or Parquet as they are; `file` is its name in messages.
+def table_of(
+    kind: type[AnyTable], raw: bytes, file: str, schema: Schema = EMPTY, settings: TableSettings | None = None
+) -> AnyTable:
+    """A table from bytes, CSV or Parquet as they are; `file` is its name in messages, `kind` the class to make.
 
     Jobs of columns that this version of the table does not have yet are left out.
 
@@ -32,10 +34,10 @@ def table_of(raw: bytes, file: str, schema: Schema = EMPTY, settings: TableSetti
     source: AnySource
     source, columns = read_parquet(raw, file) if raw.startswith(PARQUET) else read_csv(raw, file)
     settings = _fitting(settings or TableSettings(Path(file).stem), columns)
-    return build_table(settings.name, columns, schema, settings, Path(file), source)
+    return kind.build(settings.name, columns, schema, settings, Path(file), source)
 
 
-def merged_bytes(merge: Merge) -> bytes:
+def merged_bytes(merge: Merge[AnyTable]) -> bytes:
     """The bytes of a merge, written over those of ours: what theirs did not change stays, under a renamed column too."""
     table, fields = merge.table, merge.fields.ours.tolist()
     if isinstance(table.source, ParquetSource):

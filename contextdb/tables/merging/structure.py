@@ -9,19 +9,19 @@ import numpy as np
 
 from contextdb.errors import shown
 from contextdb.tables.changes import CameFrom
+from contextdb.tables.data import TableData
 from contextdb.tables.merging.alignment import Alignment, inverse, row_twins
 from contextdb.tables.merging.cells import changed_in
 from contextdb.tables.merging.conflicts import Conflict, Decided
 from contextdb.tables.merging.order import Origins, Sides, merged_order
 from contextdb.tables.merging.shared import Shared
-from contextdb.tables.table import Table
 
 MOST_CHANGES = 3
 """Changed cells of a row that a conflict tells."""
 
 
 def merge_rows(
-    base: Table, ours: Table, theirs: Table, of_ours: Alignment, of_theirs: Alignment, decided: Decided
+    base: TableData, ours: TableData, theirs: TableData, of_ours: Alignment, of_theirs: Alignment, decided: Decided
 ) -> tuple[Origins, list[Conflict]]:
     """Which rows stand in the merge; a conflict for each that one side took away and the other changed."""
     twins = row_twins(ours, theirs, np.flatnonzero(of_ours.rows < 0), np.flatnonzero(of_theirs.rows < 0))
@@ -42,7 +42,7 @@ def merge_rows(
     return rows, [_placed(c, int(places[c.row or 0])) for c in found]
 
 
-def _row_conflict(base: Table, side: Table, aligned: Alignment, row: int, is_ours: bool) -> Conflict:
+def _row_conflict(base: TableData, side: TableData, aligned: Alignment, row: int, is_ours: bool) -> Conflict:
     """A row that this side changed and the other took away; its row is that of base."""
     was = int(aligned.rows[row])
     said = ", ".join(_changes(base, side, aligned.columns, was, row))
@@ -50,7 +50,7 @@ def _row_conflict(base: Table, side: Table, aligned: Alignment, row: int, is_our
     return Conflict("row", asset, "", was, shown(asset), said if is_ours else None, None if is_ours else said, ("row", was))
 
 
-def _changes(base: Table, side: Table, columns: CameFrom, was: int, row: int) -> Iterator[str]:
+def _changes(base: TableData, side: TableData, columns: CameFrom, was: int, row: int) -> Iterator[str]:
     changed = [at for at, b in enumerate(columns.tolist()) if b >= 0 and base.columns[b][was] != side.columns[at][row]]
     yield from (f"{shown(side.columns[at].name)}: {shown(side.columns[at][row])}" for at in changed[:MOST_CHANGES])
     if len(changed) > MOST_CHANGES:
@@ -65,7 +65,7 @@ def _placed(conflict: Conflict, row: int) -> Conflict:
 
 
 def merge_columns(
-    base: Table, ours: Table, theirs: Table, of_ours: Alignment, of_theirs: Alignment, decided: Decided
+    base: TableData, ours: TableData, theirs: TableData, of_ours: Alignment, of_theirs: Alignment, decided: Decided
 ) -> tuple[Origins, list[str], list[Conflict]]:
     """Which columns stand in the merge and under which names; a conflict for each that one side took away and the other changed, or
     that has two names."""
@@ -85,26 +85,28 @@ def merge_columns(
     return fields, names, [c for c in (*conflicts, *of_names) if c.key not in decided]
 
 
-def _column_twins(ours: Table, theirs: Table, of_ours: Alignment, of_theirs: Alignment) -> CameFrom:
+def _column_twins(ours: TableData, theirs: TableData, of_ours: Alignment, of_theirs: Alignment) -> CameFrom:
     """For each new column of theirs the new one of ours with the same name."""
     new = {c.name: at for at, c in enumerate(ours.columns) if of_ours.columns[at] < 0}
     found = [new.get(c.name, -1) if of_theirs.columns[at] < 0 else -1 for at, c in enumerate(theirs.columns)]
     return np.array(found, np.int64)
 
 
-def _is_changed(base: Table, side: Table, aligned: Alignment, at: int) -> bool:
+def _is_changed(base: TableData, side: TableData, aligned: Alignment, at: int) -> bool:
     """Whether a side changed a text of a column in a row that it kept."""
     kept = np.flatnonzero(aligned.rows >= 0)
     shared = Shared.of((base.columns[int(aligned.columns[at])], side.columns[at]))
     return not np.array_equal(shared.at(0, aligned.rows[kept]), shared.at(1, kept))
 
 
-def _column_conflict(side: Table, was: int, at: int, is_ours: bool) -> Conflict:
+def _column_conflict(side: TableData, was: int, at: int, is_ours: bool) -> Conflict:
     name = side.columns[at].name
     return Conflict("column", "", name, None, name, "changed" if is_ours else None, None if is_ours else "changed", ("column", was))
 
 
-def _names(base: Table, ours: Table, theirs: Table, fields: Origins, decided: Decided) -> tuple[list[str], list[Conflict]]:
+def _names(
+    base: TableData, ours: TableData, theirs: TableData, fields: Origins, decided: Decided
+) -> tuple[list[str], list[Conflict]]:
     """The name of each column: as the side has it that renamed it. Two that would have one name get a number behind it."""
     names: list[str] = []
     conflicts = []

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,8 @@ from numpy.typing import NDArray
 from contextdb.columns import TextColumn
 from contextdb.compiled.layers import Layers
 from contextdb.errors import Fault, Place, TableError, in_quotes
+from contextdb.tables.data import TableData
 from contextdb.tables.nesting.links import inner_rows
-
-if TYPE_CHECKING:
-    from contextdb.tables.table import Table
 
 Numbers = NDArray[np.int32]
 MOST_ROWS = 1_000_000
@@ -31,7 +28,7 @@ class Expansion:
     """The ways of all flat rows."""
 
     names: tuple[str, ...]
-    tables: tuple[Table, ...]
+    tables: tuple[TableData, ...]
     """Every table once, the outer one first."""
     numbers: Numbers
     """Which of `tables` a way passes at each depth: int32 [D, n]; -1 below its end."""
@@ -61,7 +58,7 @@ class Expansion:
 NO_ROWS = Expansion((), (), np.empty((1, 0), np.int32), np.empty((1, 0), np.int32))
 
 
-def expand(tables: Mapping[str, Table]) -> Expansion:
+def expand(tables: Mapping[str, TableData]) -> Expansion:
     """The flat rows of the first of some sound tables; the others are those that stand in it.
 
     Raises
@@ -78,7 +75,7 @@ def expand(tables: Mapping[str, Table]) -> Expansion:
     return Expansion(tuple(tables), tuple(tables.values()), numbers, rows)
 
 
-def _count(name: str, tables: Mapping[str, Table], known: dict[str, int]) -> int:
+def _count(name: str, tables: Mapping[str, TableData], known: dict[str, int]) -> int:
     if name not in known:
         inner = inner_rows(tables[name])
         plain = tables[name].n_rows - sum(map(len, inner.values()))
@@ -87,7 +84,7 @@ def _count(name: str, tables: Mapping[str, Table], known: dict[str, int]) -> int
 
 
 def _ways(
-    name: str, tables: Mapping[str, Table], order: Mapping[str, int], known: dict[str, tuple[Numbers, Numbers]]
+    name: str, tables: Mapping[str, TableData], order: Mapping[str, int], known: dict[str, tuple[Numbers, Numbers]]
 ) -> tuple[Numbers, Numbers]:
     if name not in known:
         below = {row: _ways(other, tables, order, known) for other, rows in inner_rows(tables[name]).items() for row in rows}

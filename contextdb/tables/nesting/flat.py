@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,23 +16,25 @@ import numpy as np
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
+from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.ways import Ways, WayTable
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.schema.settings import Schema, TableSettings
+from contextdb.tables.compiling import compile_table
 from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.data import TableData
 from contextdb.tables.nesting.expansion import NO_ROWS, Expansion, expand
 from contextdb.tables.nesting.flat_columns import FlatColumn
 from contextdb.tables.nesting.flat_texts import free_name, outputs_of, paths_and_leaves, rules_of
 from contextdb.tables.nesting.links import Neighbours, require_sound
 from contextdb.tables.plain_columns import PlainColumns
-from contextdb.tables.table import Table
 
 if TYPE_CHECKING:
     Sources = Mapping[str, list[tuple[int, ConditionColumn]]]
 
 
 @dataclass(frozen=True, eq=False)
-class FlatTable(Table):
+class FlatTable(TableData):
     """A table with its inner tables' rows; get one from `Table.flat()`. Its assets are paths, its row numbers those of matches."""
 
     expansion: Expansion = NO_ROWS
@@ -74,25 +75,25 @@ class FlatTable(Table):
         """Where the rows of a way stand, outermost first."""
         return [table.place(inner) for table, inner in self._steps(row)]
 
-    def _steps(self, row: int) -> list[tuple[Table, int]]:
+    def _steps(self, row: int) -> list[tuple[TableData, int]]:
         numbers, rows = (of[:, row].tolist() for of in (self.expansion.numbers, self.expansion.rows))
         return [(self.expansion.tables[n], r) for n, r in zip(numbers, rows, strict=True) if n >= 0]
 
-    def flat(self, tables: Mapping[str, Table] | None = None) -> Table:
+    def flat(self) -> FlatTable:
         """The table itself."""
         return self
 
-    def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
-        """Refuse: a flat table is worked out from others."""
-        raise TableError(Fault("a table with its inner tables' rows is no file.", "the tables that it is made of"))
+    def compile(self) -> CompiledTable:
+        """Compile into masks, as `Table.compile`."""
+        return compile_table(self)
 
 
-def _way_table(name: str, table: Table) -> WayTable:
+def _way_table(name: str, table: TableData) -> WayTable:
     file = str(table.path) if table.path else None
     return WayTable(name, file, table.settings.policy, table.priorities, table.row_weights, None, table, table.settings.when)
 
 
-def flatten(table: Table, tables: Mapping[str, Table]) -> FlatTable:
+def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
     """The flat table of a table whose inner tables are among some others.
 
     Raises
@@ -142,7 +143,7 @@ def _together(fault: Fault) -> Fault:
     return replace(fault, found=f"the rules of this row and of those that stand for its table, taken together: {fault.found}")
 
 
-def _expansion(tables: Mapping[str, Table], last: FlatTable | None) -> Expansion:
+def _expansion(tables: Mapping[str, TableData], last: FlatTable | None) -> Expansion:
     """The flat rows; those of the last time where no asset cell has changed since."""
     was = last.expansion if last is not None else None
     if was is None or was.names != tuple(tables):
@@ -193,7 +194,7 @@ def _unlike(expansion: Expansion, first: int, number: int, name: str, one: Condi
     return Fault(f"the condition {found} in {there}.", accepted, mend, place, "unlike-conditions")
 
 
-def _two(expansion: Expansion, *numbers: int) -> list[tuple[int, Table]]:
+def _two(expansion: Expansion, *numbers: int) -> list[tuple[int, TableData]]:
     return [(n, expansion.tables[n]) for n in numbers]
 
 
@@ -238,17 +239,3 @@ def _plain(expansion: Expansion) -> PlainColumns:
             enabled[here] &= table.enabled[rows[here]]
             weights[here] *= table.row_weights[rows[here]]
     return PlainColumns(enabled, expansion.tables[0].priorities[expansion.rows[0]], weights, ())
-
-
-def leaf_assets(table: Table) -> list[str]:
-    """The assets that the rows of a table and those inside it name, without paths."""
-    flat = table.flat()
-    return list(flat.leaves) if isinstance(flat, FlatTable) else flat.assets
-
-
-def flat_rows(table: Table, flat: Table) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
-    """For each row of a table its rows in the flat table."""
-    if not isinstance(flat, FlatTable):
-        return list(np.arange(table.n_rows).reshape(-1, 1))
-    own = flat.expansion.rows[0]
-    return np.split(np.arange(len(own)), np.searchsorted(own, np.arange(1, table.n_rows))) if table.n_rows else []

@@ -4,27 +4,24 @@ themselves. Tables are given as a mapping by name, whose reading may fail; nothi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contextdb.cells.words import MARK
 from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, nearest, some
+from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.nesting.names import inner_name, says_nesting
 
-if TYPE_CHECKING:
-    from contextdb.tables.table import Table
-
-    Tables = Mapping[str, Table]
+Tables = Mapping[str, TableData]
 
 
-class Neighbours(Mapping[str, "Table"]):
+class Neighbours(Mapping[str, AnyTable]):
     """The tables that the rows of one table may stand for, by name, and what was worked out with them last.
 
     The versions of a table that come of edits share it, so that flattening anew costs what changed.
     """
 
-    def __init__(self, tables: Tables, last: object = None) -> None:
+    def __init__(self, tables: Mapping[str, AnyTable], last: object = None) -> None:
         self.tables = tables
         self.last = last
         """The flat table that was made last."""
@@ -33,7 +30,7 @@ class Neighbours(Mapping[str, "Table"]):
         """What is pickled: not what can be worked out again."""
         return {"tables": self.tables, "last": None}
 
-    def __getitem__(self, name: str) -> Table:
+    def __getitem__(self, name: str) -> AnyTable:
         return self.tables[name]
 
     def __contains__(self, name: object) -> bool:
@@ -46,12 +43,12 @@ class Neighbours(Mapping[str, "Table"]):
         return len(self.tables)
 
 
-def is_nested(table: Table) -> bool:
+def is_nested(table: TableData) -> bool:
     """Whether an asset cell of the table says more than the name of an asset."""
     return bool(table.columns) and says_nesting(table.text_column(table.asset_column).texts)
 
 
-def inner_rows(table: Table) -> dict[str, list[int]]:
+def inner_rows(table: TableData) -> dict[str, list[int]]:
     """The tables that rows stand for, by name, with those rows."""
     if not table.columns:
         return {}
@@ -63,12 +60,12 @@ def inner_rows(table: Table) -> dict[str, list[int]]:
     return found
 
 
-def inner_tables(tables: Iterable[Table]) -> set[str]:
+def inner_tables(tables: Iterable[TableData]) -> set[str]:
     """The names of the tables that rows of some tables stand for."""
     return {name for table in tables for name in inner_rows(table)}
 
 
-def reached(table: Table, tables: Tables) -> dict[str, Table]:
+def reached(table: TableData, tables: Tables) -> dict[str, TableData]:
     """The table and all that stand in it, by name, each once; the table itself first. Those that cannot be read are left out."""
     found = {table.name: table}
     waiting = [table]
@@ -80,7 +77,7 @@ def reached(table: Table, tables: Tables) -> dict[str, Table]:
     return found
 
 
-def nesting_faults(table: Table, tables: Tables, name: str | None = None) -> list[Fault]:
+def nesting_faults(table: TableData, tables: Tables, name: str | None = None) -> list[Fault]:
     """What is wrong with the rows of one table, known as `name`, that stand for others, in the order of its rows."""
     found: list[tuple[int, Fault]] = []
     for inner, rows in inner_rows(table).items():
@@ -89,7 +86,7 @@ def nesting_faults(table: Table, tables: Tables, name: str | None = None) -> lis
     return [fault for _, fault in sorted(found, key=lambda item: item[0])]
 
 
-def require_sound(table: Table, tables: Tables) -> dict[str, Table]:
+def require_sound(table: TableData, tables: Tables) -> dict[str, TableData]:
     """The tables that stand in a table, as `reached`.
 
     Raises
@@ -106,7 +103,7 @@ def require_sound(table: Table, tables: Tables) -> dict[str, Table]:
     return found
 
 
-def _unread(found: Iterable[Table], tables: Tables) -> Iterator[Fault]:
+def _unread(found: Iterable[TableData], tables: Tables) -> Iterator[Fault]:
     for name in dict.fromkeys(name for table in found for name in inner_rows(table)):
         if name in tables:
             try:
@@ -115,7 +112,7 @@ def _unread(found: Iterable[Table], tables: Tables) -> Iterator[Fault]:
                 yield from error.faults
 
 
-def _read(name: str, tables: Tables) -> Table | None:
+def _read(name: str, tables: Tables) -> TableData | None:
     try:
         return tables.get(name)
     except ContextDBError:  # told by `require_sound`, and in the file itself

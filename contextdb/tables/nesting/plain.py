@@ -13,10 +13,9 @@ from contextdb.cells.nesting_cells import TagMeet
 from contextdb.columns import TextColumn
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.flat import FlatTable
-from contextdb.tables.table import Table
 
 
-def as_plain(flat: FlatTable) -> Table | None:
+def as_plain(flat: FlatTable) -> FlatTable | None:
     """The table; None where tags are asked for in a way that one cell cannot say."""
     columns = [_plain_column(column) for column in flat.conditions]
     conditions = tuple(column for column in columns if column is not None)

@@ -7,20 +7,17 @@ slots: what a row asks for is not loosened by the table around it, nor by the on
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.words import quoted, slot_words
 from contextdb.columns import TextColumn
+from contextdb.expressions import Expression
+from contextdb.expressions.rules import WhenColumn
 from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.data import TableData
 from contextdb.tables.nesting.expansion import Expansion
-
-if TYPE_CHECKING:
-    from contextdb.expressions import Expression
-    from contextdb.expressions.rules import WhenColumn
-    from contextdb.tables.table import Table
 
 MANDATORY, OPTIONAL = "Mandatory_Slots", "Optional_Slots"
 Flags = NDArray[np.bool_]
@@ -58,18 +55,18 @@ def _constrained(expansion: Expansion, role: str) -> Flags:
     return found
 
 
-def _roles(table: Table) -> set[str]:
+def _roles(table: TableData) -> set[str]:
     """The roles that a table's columns and rules speak of."""
     rules = table.when.rules if table.when is not None else ()
     return {c.condition.role for c in table.conditions if c.condition.role}.union(*(_ruled(table, rule) for rule in rules))
 
 
-def _rules(table: Table, when: WhenColumn, role: str) -> Flags:
+def _rules(table: TableData, when: WhenColumn, role: str) -> Flags:
     says = np.array([role in _ruled(table, rule) for rule in when.rules], np.bool_)
     return says[when.texts.codes]
 
 
-def _ruled(table: Table, rule: Expression | None) -> set[str]:
+def _ruled(table: TableData, rule: Expression | None) -> set[str]:
     """The roles of the facts that a rule names, and of those that they are computed from."""
     if rule is None:
         return set()

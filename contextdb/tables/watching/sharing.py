@@ -18,23 +18,23 @@ from contextdb.columns import TextColumn
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.condition_column import ConditionColumn, infer_condition
-from contextdb.tables.table import Table, build_table
+from contextdb.tables.table import Table
 
 
 def table_like(
     old: Table | None, columns: Sequence[TextColumn], schema: Schema, settings: TableSettings, path: Path, source: AnySource
 ) -> Table:
-    """The table that `build_table` gives; equal columns of `old` are shared.
+    """The table that `Table.build` gives; equal columns of `old` are shared.
 
     Raises
     ------
     TableError
-        As `build_table`. Cells that cannot be read stand in the table's `faults`.
+        As `Table.build`. Cells that cannot be read stand in the table's `faults`.
     """
     if old is None:
-        return build_table(settings.name, columns, schema, settings, path, source)
+        return Table.build(settings.name, columns, schema, settings, path, source)
     empty = [TextColumn(c.name, (), np.empty(0, np.int32)) for c in columns]
-    frame = build_table(settings.name, empty, schema, settings, path, source)  # which columns are conditions
+    frame = Table.build(settings.name, empty, schema, settings, path, source)  # which columns are conditions
     texts = {c.name: _shared_texts(c, old) for c in columns}
     known = {c.condition.name: c for c in old.conditions}
     conditions = tuple(

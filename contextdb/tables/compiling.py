@@ -1,0 +1,32 @@
+"""A flat table as masks."""
+
+from __future__ import annotations
+
+from contextdb import bitmask
+from contextdb.compiled.data import SLOT_COLUMNS
+from contextdb.compiled.table import CompiledTable
+from contextdb.expressions.rules.rules import WhenRules
+from contextdb.tables.data import TableData
+
+
+def compile_table(table: TableData) -> CompiledTable:
+    """Compile a flat table whose cells can all be read; columns compiled before are taken as they are."""
+    when = WhenRules.of(table.when)
+    return CompiledTable(
+        name=table.name,
+        assets=table.assets,
+        conditions=tuple(c.condition for c in table.conditions),
+        masks=tuple(c.masks for c in table.conditions),
+        enabled=bitmask.pack(table.enabled),
+        soft=tuple(c.soft for c in table.conditions),
+        priorities=table.priorities,
+        row_weights=table.row_weights,
+        texts=tuple(c.texts for c in table.conditions),
+        policy=table.settings.policy,
+        fallback=table.settings.fallback,
+        derivation=table.schema.derivation_of([*(c.condition.name for c in table.conditions), *(when.names if when else ())]),
+        slots=tuple(c for c in table.columns if c.name in SLOT_COLUMNS and c.name in table.settings.outputs),
+        when=when,
+        ways=table.ways,
+        declared=frozenset(table.schema.conditions),
+    )

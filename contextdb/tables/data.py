@@ -1,0 +1,265 @@
+"""What a table is: assets (rows) against conditions (columns), as texts and as the cells they mean.
+
+It is never changed: an edit gives a new one that shares every column it did not touch, and with it whatever was already
+worked out for that column (its cells, its masks). Texts that cannot be read stay as they are and stand in `faults`; only
+`compile` insists on none. Nothing here touches the disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.arguments import (
+    require_many,
+    require_mapping,
+    require_row,
+    require_text,
+    require_whole,
+)
+from contextdb.cells.conditions import Condition
+from contextdb.columns import TextColumn
+from contextdb.compiled.unchanging import Unchanging
+from contextdb.compiled.ways import Ways
+from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, some
+from contextdb.expressions.rules import WhenColumn
+from contextdb.files.texts import AnySource
+from contextdb.schema.settings import EMPTY, Schema, TableSettings
+from contextdb.tables.condition_column import ConditionColumn, infer_condition
+from contextdb.tables.plain_columns import PlainColumns
+
+AnyTable = TypeVar("AnyTable", bound="TableData")
+
+
+@dataclass(frozen=True, eq=False)
+class TableData(Unchanging):
+    """Assets against conditions, as texts and as the cells they mean; `Table` has what a table can do besides."""
+
+    name: str
+    settings: TableSettings
+    columns: tuple[TextColumn, ...]
+    """Every column of the file, in its order."""
+    conditions: tuple[ConditionColumn, ...]
+    """The columns that are conditions, in the file's order."""
+    schema: Schema = EMPTY
+    path: Path | None = None
+    source: AnySource | None = None
+    origin: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    """Which record of the source each row came from; -1 for a new row."""
+    around: Mapping[str, TableData] | None = field(default=None, repr=False)
+    """The tables of its folder by name, for rows that stand for another table; None where they are not known."""
+
+    @classmethod
+    def build(
+        cls,
+        name: str,
+        columns: Sequence[TextColumn],
+        schema: Schema = EMPTY,
+        settings: TableSettings | None = None,
+        path: Path | None = None,
+        source: AnySource | None = None,
+    ) -> Self:
+        """A table of texts under a schema; cells that cannot be read are kept and stand in its `faults`.
+
+        Raises
+        ------
+        TableError
+            A column that the settings name is not there, or two columns have one name.
+        """
+        settings = settings or TableSettings(name=name)
+        _require_columns(columns, settings, path)
+        plain = _plain_names(columns, settings)
+        conditions = tuple(
+            ConditionColumn.read(c, schema.conditions.get(c.name) or infer_condition(c)) for c in columns if c.name not in plain
+        )
+        n_rows = columns[0].n_rows if columns else 0
+        return cls(name, settings, tuple(columns), conditions, schema, path, source, np.arange(n_rows))
+
+    @property
+    def n_rows(self) -> int:
+        """How many rows the table has."""
+        return self.columns[0].n_rows if self.columns else 0
+
+    def __len__(self) -> int:
+        return self.n_rows
+
+    @cached_property
+    def assets(self) -> list[str]:
+        """The asset of each row."""
+        return self.text_column(self.asset_column).to_list() if self.columns else []
+
+    @property
+    def asset_column(self) -> str:
+        """The name of the column that names the assets."""
+        return self.settings.asset or (self.columns[0].name if self.columns else "")
+
+    def text_column(self, name: str) -> TextColumn:
+        """The texts of a column."""
+        return self.columns[self._column_at(name)]
+
+    def condition(self, name: str) -> ConditionColumn:
+        """The column of a condition."""
+        require_text(name, "name")
+        for column in self.conditions:
+            if column.condition.name == name:
+                return column
+        raise TableError(_no_such("condition", name, [c.condition.name for c in self.conditions]))
+
+    def text(self, row: int, column: str) -> str:
+        """The text of one cell; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        return self.text_column(column)[require_row(row, self.n_rows)]
+
+    def place(self, row: int, column: str | None = None) -> Place:
+        """Where a row stands: its file and line where it has one, else its number."""
+        row = require_whole(row, "row")
+        file = str(self.path) if self.path else None
+        record = int(self.origin[row]) if self.source is not None and row < len(self.origin) else -1
+        line = self.source.line(record) if self.source is not None and record >= 0 else None
+        return Place(file, line, column, row)
+
+    @cached_property
+    def faults(self) -> list[Fault]:
+        """Every cell that cannot be read, in the order of rows."""
+        return self._in_order(())
+
+    def _in_order(self, more: Iterable[Fault]) -> list[Fault]:
+        """The faults of cells, and others that have their places already, in the order of rows."""
+        found = [(row, at, fault) for at, column in enumerate(self.conditions) for row, fault in column.faulty_rows()]
+        found += [(row, -1, fault.at(self.place(row, fault.place.column))) for row, fault in self._plain.faults]
+        if self.when is not None:
+            found += [(row, -1, fault.at(self.place(row, self.when.name))) for row, fault in self.when.faulty_rows()]
+        found += [(fault.place.row or 0, -1, fault) for fault in more]
+        names = [c.condition.name for c in self.conditions]
+        found.sort(key=lambda item: item[:2])
+        return [f if at < 0 else f.at(self.place(row, names[at])) for row, at, f in found]
+
+    def require_readable(self) -> None:
+        """Raise TableError with every cell that cannot be read, if there is one."""
+        if self.faults:
+            raise TableError(*self.faults)
+
+    def with_cell(self, row: int, column: str, text: str) -> Self:
+        """The table with one cell changed; every other column is shared."""
+        return self.with_cells([(row, column, text)])
+
+    def with_cells(self, edits: Iterable[tuple[int, str, str]]) -> Self:
+        """The table with some cells changed, given as (row, column, text)."""
+        changed: dict[int, TextColumn] = {}
+        accepted = "a row, a column and a text for each cell"
+        for edit in require_many(edits, "edits", accepted):
+            if not isinstance(edit, (tuple, list)) or len(edit) != 3:
+                raise ContextError(Fault("edits hold what is no edit.", accepted))
+            row, name, text = require_whole(edit[0], "row"), edit[1], require_text(edit[2], "text")
+            at = self._column_at(name)
+            if not 0 <= row < self.n_rows:
+                raise TableError(self._no_row(row))
+            changed[at] = changed.get(at, self.columns[at]).with_text(row, text)
+        return self._with_columns([changed.get(i, c) for i, c in enumerate(self.columns)], self.origin)
+
+    def with_rows(self, at: int, rows: Sequence[Mapping[str, str]]) -> Self:
+        """The table with new rows before row `at`; columns that a row leaves out are empty (Any)."""
+        at, rows = require_whole(at, "at"), list(require_many(rows, "rows", "a list of mappings of columns to texts"))
+        for row in rows:
+            for name, text in require_mapping(row, "a row of rows", "a mapping of columns to texts").items():
+                self._column_at(name)
+                require_text(text, f"the text for {in_quotes(name)}")
+        if not 0 <= at <= self.n_rows:
+            raise TableError(Fault(f"there is no row {at}.", f"0 to {self.n_rows}, to insert before"))
+        columns = [c.with_inserted(at, [row.get(c.name, "") for row in rows]) for c in self.columns]
+        return self._with_columns(columns, np.insert(self.origin, at, np.full(len(rows), -1)))
+
+    def with_rows_taken(self, rows: Sequence[int] | NDArray[np.int64]) -> Self:
+        """The table of the given rows in the given order: deletes, moves, sorts."""
+        numbers = rows.tolist() if isinstance(rows, np.ndarray) else require_many(rows, "rows", "a list of row numbers")
+        numbers = [require_whole(row, "a row of rows") for row in require_many(numbers, "rows", "a list of row numbers")]
+        if wrong := [row for row in numbers if not 0 <= row < self.n_rows]:
+            raise TableError(self._no_row(wrong[0]))
+        taken = np.array(numbers, np.int64)
+        return self._with_columns([c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
+
+    @property
+    def ways(self) -> Ways | None:
+        """The way of each row through tables inside tables, for a table that was made of several; else None."""
+        return None
+
+    @property
+    def enabled(self) -> NDArray[np.bool_]:
+        """Whether each row may match at all: bool [n_rows]."""
+        return self._plain.enabled
+
+    @property
+    def priorities(self) -> NDArray[np.int64]:
+        """The priority of each row, higher first: int64 [n_rows]; 0 without a priority column."""
+        return self._plain.priorities
+
+    @property
+    def row_weights(self) -> NDArray[np.float64]:
+        """The weight of each row in a random pick: float64 [n_rows]; 1 without a weight column."""
+        return self._plain.weights
+
+    @cached_property
+    def when(self) -> WhenColumn | None:
+        """The rows' own rules; None without a `when` column."""
+        if self.settings.when is None:
+            return None
+        return WhenColumn.read(self.text_column(self.settings.when), self.known_conditions)
+
+    @property
+    def known_conditions(self) -> dict[str, Condition]:
+        """The conditions that rules may name: those of the table, and all that are declared."""
+        return {**self.schema.conditions, **{c.condition.name: c.condition for c in self.conditions}}
+
+    @cached_property
+    def _plain(self) -> PlainColumns:
+        return PlainColumns.read(self.columns, self.settings)
+
+    def _no_row(self, row: int) -> Fault:
+        accepted = f"rows 0 to {self.n_rows - 1}" if self.n_rows else "no row: the table is empty"
+        return Fault(f"there is no row {row}.", accepted)
+
+    def _column_at(self, name: str) -> int:
+        require_text(name, "column")
+        for at, column in enumerate(self.columns):
+            if column.name == name:
+                return at
+        raise TableError(_no_such("column", name, [c.name for c in self.columns]))
+
+    def _with_columns(self, columns: Sequence[TextColumn], origin: NDArray[np.int64]) -> Self:
+        now = {c.name: c for c in columns}
+        conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in self.conditions)
+        return replace(self, columns=tuple(columns), conditions=conditions, origin=origin)
+
+
+def _no_such(what: str, name: str, known: list[str]) -> Fault:
+    near = nearest(name, known)
+    return Fault(
+        f"there is no {what} {in_quotes(name)}.", some(known) or f"no {what}: there is none", in_quotes(near) if near else ""
+    )
+
+
+def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, path: Path | None) -> None:
+    names = [c.name for c in columns]
+    place = Place(str(path) if path else None)
+    faults = [
+        Fault(f"the column name {in_quotes(n)} stands twice.", "each name once", place=place)
+        for n in sorted({n for n in names if names.count(n) > 1})
+    ]
+    wanted = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
+    for key, name in [*wanted, *(("outputs", n) for n in settings.outputs)]:
+        if name is not None and name not in names:
+            fault = _no_such("column", name, names)
+            faults.append(replace(fault, found=f"{fault.found[:-1]}, which [tables.{settings.name}] names as {key}.", place=place))
+    if faults:
+        raise TableError(*faults)
+
+
+def _plain_names(columns: Sequence[TextColumn], settings: TableSettings) -> set[str]:
+    asset = settings.asset or (columns[0].name if columns else None)
+    jobs = (asset, settings.enabled, settings.priority, settings.weight, settings.when, *settings.outputs)
+    return {name for name in jobs if name is not None}

@@ -12,6 +12,7 @@ from contextdb.commands.demo_command import make_sample
 from contextdb.motion.made import recipes as made
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.selector import Selector
+from contextdb.motion.storage.building import build
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.schema.settings import Schema, read_schema
 
@@ -152,7 +153,7 @@ def searched(tmp_path_factory: pytest.TempPathFactory) -> tuple[MotionDatabase, 
     folder = tmp_path_factory.mktemp("tables") / "sample"
     make_sample(FOLDER, folder)
     config = MotionConfig.from_dict(SCHEMA.motion, tables=SCHEMA.tables)
-    databases = config.build(folder)
+    databases = build(config, folder, cache=None)
     return databases["loco"], config.selector("locomotion", databases)
 
 

@@ -9,7 +9,7 @@ from functools import partial
 from typing import ClassVar
 
 from textual import events
-from textual.app import App, SystemCommand
+from textual.app import SystemCommand
 from textual.binding import BindingType
 from textual.dom import DOMNode
 from textual.screen import Screen
@@ -21,6 +21,7 @@ from contextdb.tables.merging.conflicts import Side
 from contextdb.tables.merging.merging import Merge
 from contextdb.tables.table import Table
 from tui.commands import BY_ID, COMMANDS, bindings, key_names
+from tui.editor import Editor
 from tui.editor_settings import EditorSettings
 from tui.model.conflicted import conflicts_in, write_decided
 from tui.model.session import Session
@@ -38,7 +39,7 @@ LOW = 14
 """On a screen of fewer lines the tools and the details give way to the rows."""
 
 
-class EditorApp(App[None]):
+class EditorApp(Editor):
     """The terminal editor."""
 
     TITLE = "contextdb"
@@ -128,6 +129,10 @@ class EditorApp(App[None]):
     def main(self) -> MainScreen:
         """The screen of the table that is seen."""
         return next(screen for screen in reversed(self.screen_stack) if isinstance(screen, MainScreen))
+
+    def say_renamed(self, text: str) -> None:
+        """Say on the screen that is shown now that a condition was renamed, also after its next change."""
+        self.main.renamed = text
 
     def open_table(self, name: str) -> None:
         """Show a table; one with a conflict between marks asks first which side holds."""

@@ -35,6 +35,7 @@ from contextdb.motion import (
     write_made_clips,
 )
 from contextdb.motion.features.extraction import Features
+from contextdb.motion.storage.building import build
 from contextdb.tables.project import SCHEMA_FILE, Project
 
 TACKLE = {
@@ -185,7 +186,7 @@ class Stage:
         config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
         clips = folder / "clips"
         table = project["locomotion"].compile()
-        databases = config.build(folder, {"locomotion": table.assets})
+        databases = build(config, folder, {"locomotion": table.assets}, cache=None)
         return cls(
             table,
             databases,

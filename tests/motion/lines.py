@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from contextdb.motion import MotionDatabase
-from contextdb.motion.markup.marks import Marks
+from contextdb.motion.markup.marking import marks_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search.filters import Biases
 
@@ -22,5 +22,5 @@ def line(markup="", *, end_s=0.0, continuing=0.0, base=0.0, **assets):
     stops = np.cumsum(lengths)
     features = np.concatenate([np.asarray(places, float) for places in assets.values()]).reshape(-1, 1)
     database = MotionDatabase.from_features(features, stops - lengths, stops, list(assets))
-    marks = Marks.of(Markup.parse(HEADER + markup), database.assets, database.starts, database.stops, RATE, end_s)
+    marks = marks_of(Markup.parse(HEADER + markup), database.assets, database.starts, database.stops, RATE, end_s)
     return replace(database, marks=marks, biases=Biases(base=base, continuing=continuing))

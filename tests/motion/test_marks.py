@@ -146,7 +146,7 @@ def marked(draw):
 
 def marks_of(case):
     markup, assets, starts, stops, rate, end_s, n_frames = case
-    return Marks.of(markup, assets, starts, stops, rate, end_s, n_frames=n_frames)
+    return marks_of(markup, assets, starts, stops, rate, end_s, n_frames=n_frames)
 
 
 def frames_of(case):
@@ -225,7 +225,7 @@ def test_a_filter_leaves_out_and_charges_what_asking_every_tag_tells(case, wante
 
 
 def one_clip(*spans, length=31, rate=30.0, end_s=0.0, asset="jog"):
-    return Marks.of(Markup(spans), [asset], [0], [length], rate, end_s)
+    return marks_of(Markup(spans), [asset], [0], [length], rate, end_s)
 
 
 def frames_with(marks, mark):
@@ -305,7 +305,7 @@ def test_cost_modifiers_that_overlap_add_up():
 
 
 def test_two_ranges_of_one_asset_are_marked_alike_each_from_its_own_start():
-    marks = Marks.of(Markup((Span("jog", "Move", 0.0, 0.1),)), ["jog", "jog"], [0, 12], [10, 22], 30.0)
+    marks = marks_of(Markup((Span("jog", "Move", 0.0, 0.1),)), ["jog", "jog"], [0, 12], [10, 22], 30.0)
     assert [bool(marks.tags_of(i)) for i in range(22)] == [i in (0, 1, 2, 3, 12, 13, 14, 15) for i in range(22)]
 
 
@@ -320,8 +320,8 @@ def test_kinds_do_not_depend_on_the_order_of_spans():
 def test_more_kinds_than_fit_16_bits_take_32():
     n = 33_000  # each span holds three frames and shares the last with the next: two kinds of frames a span
     spans = tuple(Span("jog", "CostModifier", 0.02 * i, 0.02 * i + 0.02, math.sqrt(i + 2)) for i in range(n))
-    few = Marks.of(Markup(spans[:9]), ["jog"], [0], [2 * n], 100.0)
-    many = Marks.of(Markup(spans), ["jog"], [0], [2 * n], 100.0)
+    few = marks_of(Markup(spans[:9]), ["jog"], [0], [2 * n], 100.0)
+    many = marks_of(Markup(spans), ["jog"], [0], [2 * n], 100.0)
     assert (few.kinds.dtype, many.kinds.dtype) == (np.uint16, np.int32)
     assert many.n_kinds > 1 << 16
     assert many.bias(2 * n - 2) == math.fsum([math.sqrt(n), math.sqrt(n + 1)])
@@ -343,18 +343,18 @@ def test_what_is_said_of_a_frame_is_told_in_the_words_of_the_file():
 
 
 def test_without_markup_nothing_is_said_but_ends():
-    marks = Marks.of(None, ["jog"], [0], [31], 30.0, 0.3)
+    marks = marks_of(None, ["jog"], [0], [31], 30.0, 0.3)
     assert marks.tags == ()
     assert frames_with(marks, Mark.CLIP_END) == list(range(22, 31))
-    plain, none = Marks.of(None, ["jog"], [0], [31], 30.0), Marks.none(31, 1)
+    plain, none = marks_of(None, ["jog"], [0], [31], 30.0), Marks.none(31, 1)
     for name in ("kinds", "kind_tags", "kind_marks", "kind_biases", "kind_root_weights", "looping", "warps"):
         np.testing.assert_array_equal(getattr(plain, name), getattr(none, name))
         assert getattr(plain, name).dtype == getattr(none, name).dtype
 
 
 def test_a_database_without_ranges_has_marks_too():
-    assert Marks.of(None, [], [], [], 30.0, n_frames=3).kinds.tolist() == [0, 0, 0]
-    assert Marks.of(None, [], [], [], 30.0).n_kinds == 1
+    assert marks_of(None, [], [], [], 30.0, n_frames=3).kinds.tolist() == [0, 0, 0]
+    assert marks_of(None, [], [], [], 30.0).n_kinds == 1
 
 
 # ---- bad input
@@ -365,21 +365,21 @@ def test_a_database_without_ranges_has_marks_too():
 )
 def test_a_rate_or_an_end_that_is_none_is_refused(rate, end_s):
     with pytest.raises(MotionError, match="Accepted"):
-        Marks.of(None, ["jog"], [0], [10], rate, end_s)
+        marks_of(None, ["jog"], [0], [10], rate, end_s)
 
 
 def test_ranges_that_do_not_fit_are_refused():
     with pytest.raises(MotionError, match="the number of frames"):
-        Marks.of(None, ["jog"], [0], [10], 30.0, n_frames=9)
+        marks_of(None, ["jog"], [0], [10], 30.0, n_frames=9)
     with pytest.raises(MotionError, match="as many of each"):
-        Marks.of(None, ["jog", "walk"], [0], [10], 30.0)
+        marks_of(None, ["jog", "walk"], [0], [10], 30.0)
 
 
 def test_patterns_that_contradict_each_other_on_an_asset_are_refused_when_the_asset_is_there():
     markup = Markup((Span("jog*", "WarpPosition", 0.0, 1.0), Span("*left", "WarpPosition", 1.0, 2.0)))
-    Marks.of(markup, ["jog", "left"], [0, 10], [10, 20], 30.0)
+    marks_of(markup, ["jog", "left"], [0, 10], [10, 20], 30.0)
     with pytest.raises(MotionError, match='for the asset "jog_left": span 0 gives'):
-        Marks.of(markup, ["jog_left"], [0], [10], 30.0)
+        marks_of(markup, ["jog_left"], [0], [10], 30.0)
 
 
 @pytest.mark.parametrize("frame", [-1, 31, 1.5, True, None])
@@ -445,7 +445,7 @@ def test_a_tag_that_the_markup_does_not_know_is_refused_with_the_nearest():
 
 
 def test_a_tag_covers_those_below_it_and_no_others():
-    marks = Marks.of(Markup((Span("a", "Move.Run"), Span("b", "Moved"))), ["a", "b"], [0, 5], [5, 10], 30.0)
+    marks = marks_of(Markup((Span("a", "Move.Run"), Span("b", "Moved"))), ["a", "b"], [0, 5], [5, 10], 30.0)
     assert [marks.left_out(["Move"])[marks.kinds[i]] for i in (0, 5)] == [LeftOut.NO, LeftOut.TAGS]
     assert tags_of("Move") == tags_of(["Move"]) == TagFilter(["Move"])
 

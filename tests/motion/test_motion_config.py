@@ -9,6 +9,7 @@ import pytest
 from contextdb.errors import ClipError, MotionError, SchemaError
 from contextdb.motion import DatabaseSettings, MotionConfig, Reason, make_clip, query_from, steady_path, write_bvh
 from contextdb.motion.selection.controller_settings import ControllerSettings
+from contextdb.motion.storage.building import build
 
 SECTIONS = {
     "features": {
@@ -41,7 +42,7 @@ def folder(tmp_path):
 
 def test_the_sections_become_a_selector_over_built_databases(folder):
     config = MotionConfig.from_dict(SECTIONS, tables=["locomotion"])
-    databases = config.build(folder, {"locomotion": ["walk", "jog", "swim"]})
+    databases = build(config, folder, {"locomotion": ["walk", "jog", "swim"]}, cache=None)
     assert {name: database.assets for name, database in databases.items()} == {"jog": ("jog", "walk"), "jog_tired": ("jog_tired",)}
     assert databases["jog"].normalisation is databases["jog_tired"].normalisation
     selector = config.selector("locomotion", databases)
@@ -53,13 +54,13 @@ def test_the_sections_become_a_selector_over_built_databases(folder):
 
 
 def test_without_a_table_s_assets_all_clips_of_the_pattern_are_loaded(folder):
-    built = MotionConfig.from_dict(SECTIONS).build(folder)
+    built = build(MotionConfig.from_dict(SECTIONS), folder, cache=None)
     assert built["jog"].assets == ("idle", "jog", "jog_tired", "walk")
 
 
 def test_a_database_that_was_not_built_counts_as_not_loaded(folder):
     config = MotionConfig.from_dict(SECTIONS)
-    databases = config.build(folder)
+    databases = build(config, folder, cache=None)
     selector = config.selector("locomotion", {"jog": databases["jog"]})
     assert selector.search(databases["jog"].raw(0)).database == "jog"
 
@@ -97,7 +98,7 @@ def test_a_database_is_not_mirrored_and_cannot_be_entered_near_the_ends_of_clips
 
 def test_nothing_is_a_config_too():
     assert MotionConfig.from_dict({}) == MotionConfig()
-    assert MotionConfig().build("nowhere") == {}
+    assert build(MotionConfig(), "nowhere", cache=None) == {}
 
 
 def test_a_pattern_that_is_none_is_told(folder):
@@ -113,7 +114,7 @@ def test_no_clips_and_broken_clips_are_told(folder):
         config.load_clips("jog_tired", folder / "clips")
     (folder / "clips" / "broken.bvh").write_text("HIERARCHY")
     with pytest.raises(ClipError, match=r"broken\.bvh, line 1"):
-        config.build(folder)
+        build(config, folder, cache=None)
 
 
 def test_an_unknown_name_is_refused_with_the_nearest(folder):

@@ -2,24 +2,66 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
+
+from textual.app import App
 
 from contextdb.edits.edits import set_cells
+from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
+from tui.clipboard import Clipboard
 from tui.messages import GoToCell, SetContext
 from tui.model.context_list import ContextList
+from tui.model.session import Session
 from tui.model.teams import Teams, roles_of
+from tui.screens.actors import ActorsDialog
+from tui.screens.contexts import ContextsDialog, Loaded
+from tui.screens.nearest import CellAnswer, NearestDialog
 
-if TYPE_CHECKING:
-    from tui.screens.contexts import Loaded
-    from tui.screens.main import MainScreen
-    from tui.screens.nearest import CellAnswer
+
+class Valid(Protocol):
+    """What shows which assets are valid: the pane of assets."""
+
+    def refresh_valid(self) -> None:
+        """Show them anew."""
+
+
+class Asking(Protocol):
+    """What the test row needs of the screen that it stands on: `tui.screens.main.MainScreen`."""
+
+    session: Session
+    clipboard: Clipboard
+
+    @property
+    def app(self) -> App[Any]:
+        """The app around it."""
+        ...
+
+    @property
+    def assets(self) -> Valid:
+        """The pane of assets."""
+        ...
+
+    def say(self, text: str, level: str = "information") -> None:
+        """Say something in a line below."""
+
+    def show(self) -> None:
+        """Show what has changed."""
+
+    def set_context(self, event: SetContext) -> None:
+        """Fill the test row."""
+
+    def go_to_cell(self, event: GoToCell) -> None:
+        """Go to a cell."""
+
+    def apply(self, edit: Edit) -> None:
+        """Make an edit."""
 
 
 class TestRow:
     """The test row of one screen."""
 
-    def __init__(self, screen: MainScreen) -> None:
+    def __init__(self, screen: Asking) -> None:
         self.screen, self.session = screen, screen.session
         self.list: ContextList | None = None
         """The contexts that F7 and F8 step through."""
@@ -36,7 +78,6 @@ class TestRow:
 
     def contexts(self) -> None:
         """Look through saved or recorded contexts."""
-        from tui.screens.contexts import ContextsDialog
 
         def loaded(answer: Loaded | None) -> None:
             if answer is not None:
@@ -63,8 +104,6 @@ class TestRow:
 
     def actors(self) -> None:
         """Say who may play each role."""
-        from tui.screens.actors import ActorsDialog
-
         sheet = self.session.sheet
         if not roles_of(sheet.table):
             self.screen.say("This table has no roles: a condition of one is named like Defender.DepthChart.")
@@ -88,8 +127,6 @@ class TestRow:
 
     def why(self) -> None:
         """Why the row of the cursor is not valid, and which rows are nearest."""
-        from tui.screens.nearest import NearestDialog
-
         sheet = self.session.sheet
         if sheet.query.is_empty:
             self.screen.say("The test row asks for nothing yet: F6 goes there, F9 loads a context.")

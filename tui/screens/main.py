@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
 from rich.text import Text
 from textual import on
@@ -21,8 +21,10 @@ from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.clipboard import Clipboard
 from tui.commands import ASSETS, BY_ID, SCREEN, bindings
+from tui.editor import Editor
 from tui.messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, Told
 from tui.model.coverage_run import CoverageRun
+from tui.model.importing import Import
 from tui.model.new_table import make_table, name_fault
 from tui.model.session import Session
 from tui.model.workspace import Workspace
@@ -35,15 +37,11 @@ from tui.panes.problems import ProblemsPane
 from tui.screens.ask import AskDialog, ChooseDialog
 from tui.screens.asking import TestRow
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
+from tui.screens.export_table import Export
 from tui.screens.steps import StepsDialog
 from tui.widgets.bar import Bar, Item, StatusLine
 from tui.widgets.grid import Grid
 from tui.widgets.key_line import KeyLine
-
-if TYPE_CHECKING:
-    from tui.app import EditorApp
-    from tui.model.importing import Import
-    from tui.screens.export_table import Export
 
 Chosen = TypeVar("Chosen")
 
@@ -74,7 +72,7 @@ class MainScreen(Screen[None]):
     }
     """
 
-    app: EditorApp
+    app: Editor
 
     def __init__(self, workspace: Workspace, name: str) -> None:
         super().__init__()
@@ -369,7 +367,7 @@ class MainScreen(Screen[None]):
         files = self.workspace.rename(self.table_name, old, new, only_here)
         self.app.open_table(self.table_name)
         where = "here" if only_here else "everywhere"
-        self.app.main.renamed = f"Renamed {old} to {new} {where}, in {some(files)}. To take it back, rename it back."
+        self.app.say_renamed(f"Renamed {old} to {new} {where}, in {some(files)}. To take it back, rename it back.")
 
     def action_blueprints(self) -> None:
         """Insert the conditions of a blueprint, or keep the selected ones as one."""

@@ -2,27 +2,84 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable
+from typing import Any, Literal, Protocol
 
 from textual import events
+from textual.app import App
 from textual.timer import Timer
 
 from tui.model.layout import NARROWEST
 from tui.model.selection import Selection
+from tui.model.sheet import Sheet
 from tui.widgets.grid_paint import Look
-
-if TYPE_CHECKING:
-    from tui.widgets.grid import Grid
 
 Dragged = Literal["cells", "rows", "columns", "width"]
 PULL_EVERY_S = 0.06
 """So often a drag that rests at an edge takes in one more row or column."""
 
 
+class Pointed(Protocol):
+    """What the mouse needs of a grid: `tui.widgets.grid.Grid`."""
+
+    sheet: Sheet
+    is_in_test_row: bool
+
+    @property
+    def look(self) -> Look:
+        """What is painted where."""
+        ...
+
+    @property
+    def app(self) -> App[Any]:
+        """The app around it."""
+        ...
+
+    def moving(self, move: Callable[[], None]) -> None:
+        """Move the cursor, and show what has changed."""
+
+    def go_to_field(self, column: int) -> None:
+        """Go to a field of the test row."""
+
+    def set_width(self, column: int, width: int | None) -> None:
+        """Set the width of a column; None fits it."""
+
+    def sort_by(self, column: int) -> None:
+        """Sort what is shown by a column."""
+
+    def action_edit(self) -> None:
+        """Edit the cell."""
+
+    def action_open_row(self) -> None:
+        """Go into the table that the row stands for."""
+
+    def action_select_rows(self) -> None:
+        """Select whole rows."""
+
+    def action_select_columns(self) -> None:
+        """Select whole columns."""
+
+    def focus(self) -> object:
+        """Take the keys."""
+
+    def refresh(self) -> object:
+        """Paint again."""
+
+    def capture_mouse(self) -> None:
+        """Take every event of the mouse."""
+
+    def release_mouse(self) -> None:
+        """Take them no more."""
+
+    def set_interval(self, interval: float, callback: Callable[[], None]) -> Timer:
+        """Call something again and again."""
+        ...
+
+
 class Pointer:
     """The mouse on one grid."""
 
-    def __init__(self, grid: Grid) -> None:
+    def __init__(self, grid: Pointed) -> None:
         self.grid = grid
         self._dragged: Dragged | None = None
         self._column = 0
@@ -76,7 +133,8 @@ class Pointer:
 
     def pull_again(self) -> None:
         """The mouse rests past an edge; one that was let go elsewhere pulls no more."""
-        if self._edge() != (0, 0) and self.grid.app.mouse_captured is self.grid:
+        captured: object = self.grid.app.mouse_captured
+        if self._edge() != (0, 0) and captured is self.grid:
             self.pull()
         else:
             self._pull_on(False)

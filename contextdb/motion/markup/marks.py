@@ -16,10 +16,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntFlag
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from contextdb.errors import Fault, QueryError, in_quotes, nearest, some
 from contextdb.motion.arguments import Flags, frame_of
@@ -27,9 +27,6 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.tag_filter import ANY_TAGS, TagFilter, covers, tags_of
-
-if TYPE_CHECKING:
-    from contextdb.motion.markup.markup import Markup
 
 __all__ = ["ANY_TAGS", "Mark", "Marks", "TagFilter", "covers", "tags_of"]
 
@@ -93,56 +90,6 @@ class Marks:
             value = getattr(self, field.name)
             if isinstance(value, np.ndarray):
                 object.__setattr__(self, field.name, _read_only(value.view()))
-
-    @classmethod
-    def of(
-        cls,
-        markup: Markup | None,
-        assets: Sequence[str],
-        starts: ArrayLike,
-        stops: ArrayLike,
-        rate: float,
-        end_s: float = 0.0,
-        *,
-        n_frames: int | None = None,
-    ) -> Marks:
-        """The markup of some ranges. Frame i of a range is at i / rate seconds, in a mirrored one too.
-
-        Parameters
-        ----------
-        markup : Markup or None
-            None: nothing is said, but for the ends of ranges.
-        assets : sequence of str, length R
-            The asset of each range.
-        starts, stops : integer arrays, shape (R,)
-            Range i is the frames from starts[i] up to, not including, stops[i]. They do not overlap.
-        rate : float
-            Frames a second.
-        end_s : float
-            Frames less than so many seconds before the last one of a range cannot be entered, unless the range loops. Its first
-            frame always can: a shorter clip could never play otherwise.
-        n_frames : int, optional
-            Frames of the database. Default: up to the last range's end. Frames between ranges are of kind 0.
-
-        Returns
-        -------
-        Marks
-            Kind 0 is that of which nothing is said; the others follow in the order in which they are met in the ranges.
-
-        Raises
-        ------
-        MotionError
-            Ranges that do not fit, a wrong rate or end, or patterns that fit one asset and contradict each other.
-
-        Notes
-        -----
-        A span holds the frames from `from` to `to`, both within, to a millionth of a second. Cost modifiers add up. Of root motion
-        weights, and of warps, one that names the asset is stronger than one with a pattern. A warp ends with its range; one that
-        starts behind the end is as good as none.
-        """
-        from contextdb.motion.markup.marking import marks_of
-
-        return marks_of(markup, assets, starts, stops, rate, end_s, n_frames)
 
     @classmethod
     def none(cls, n_frames: int, n_ranges: int) -> Marks:

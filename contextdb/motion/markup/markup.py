@@ -7,8 +7,8 @@
 
 Plain CSV. Columns in any order; `value` may be left out. Times are seconds since the start of the clip, both ends within; an empty
 `from` is the start, an empty `to` the end. `*` in an asset stands for any text. A tag is a reserved one, known in any case, or a
-plain one of the project's own, with dots for hierarchy. A span is data; `Marks.of` turns spans into frames. Only `load` touches the
-disk.
+plain one of the project's own, with dots for hierarchy. A span is data; `marking.marks_of` turns spans
+into frames. Only `load` touches the disk.
 
 Source: the tags DoNotChoose, NextNaturalOnly and root motion weight of EA's talk; ignore tag, soft categories, match range and warp
 range of Remedy's; cost modifiers of Unreal's pose search.

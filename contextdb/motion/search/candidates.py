@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from contextdb.errors import Fault, QueryError
 from contextdb.motion.clips.quaternions import Floats
@@ -21,9 +20,7 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search import cost, scan
 from contextdb.motion.search.filters import Filter
-
-if TYPE_CHECKING:
-    from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.searched import Searched
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,7 @@ class Candidates:
         return iter(self.rows)
 
 
-def of(database: MotionDatabase, query: Floats, chosen: Filter, k: int, with_left_out: bool) -> Candidates:
+def of(database: Searched, query: Floats, chosen: Filter, k: int, with_left_out: bool) -> Candidates:
     """The k best frames for a normalised query."""
     if k < 0:
         raise QueryError(Fault(f"{k} candidates were asked for.", "0 or more"))
@@ -100,13 +97,12 @@ def of(database: MotionDatabase, query: Floats, chosen: Filter, k: int, with_lef
     return Candidates(tuple(_candidates(database, query, chosen, frames[best], totals[best], why)), counts, why)
 
 
-def best_of_assets(database: MotionDatabase, query: ArrayLike, chosen: Filter, name: str) -> tuple[list[Candidate], Floats]:
+def best_of_assets(database: Searched, wanted: Floats, chosen: Filter, name: str) -> tuple[list[Candidate], Floats]:
     """Of each range whose asset's name holds a text the best frame, chosen or not; and the costs of all frames that may be chosen.
 
-    A frame that may be chosen comes before one that may not. `query` is in the schema's units.
+    A frame that may be chosen comes before one that may not. `wanted` is a normalised query.
     """
     lay, kinds = database.layout, database.marks.kinds
-    wanted = database.normalised(query)
     why = chosen.why(lay.frame_ranges, kinds)
     frames = lay.frames
     totals = scan.totals(lay, wanted, database.slices, database.weights, chosen, kinds, frames)
@@ -131,7 +127,7 @@ def _least_first(totals: Floats, is_other: NDArray[np.bool_], k: int) -> Ints:
 
 
 def _candidates(
-    database: MotionDatabase, query: Floats, chosen: Filter, frames: Ints, totals: Floats, why: NDArray[np.uint8]
+    database: Searched, query: Floats, chosen: Filter, frames: Ints, totals: Floats, why: NDArray[np.uint8]
 ) -> Iterator[Candidate]:
     by_channel = (
         cost.channel_costs(database.layout, frames, query, database.slices, database.weights) if len(frames) else np.empty((0, 0))
@@ -152,7 +148,7 @@ def _candidates(
         )
 
 
-def _biases(database: MotionDatabase, chosen: Filter, frame: int, at: int) -> dict[str, float]:
+def _biases(database: Searched, chosen: Filter, frame: int, at: int) -> dict[str, float]:
     """The parts of a frame's bias that are not 0; `at` is its range."""
     marks, kind = database.marks, int(database.marks.kinds[frame])
     looping = database.biases.looping if marks.looping[at] else 0.0

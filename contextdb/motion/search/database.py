@@ -31,6 +31,7 @@ from contextdb.motion.features.extraction import ClipFeatures, clip_features
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.left_out import Skip
+from contextdb.motion.markup.marking import marks_of
 from contextdb.motion.markup.marks import Marks
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.ranges import check_ranges
@@ -40,6 +41,7 @@ from contextdb.motion.search.cost import weights_of_features
 from contextdb.motion.search.filtering import FilterMaker, Penalties, SearchOptions, Tags
 from contextdb.motion.search.filters import NO_BIAS, Biases, Filter
 from contextdb.motion.search.layout import Features, Layout
+from contextdb.motion.search.searched import Searched
 from contextdb.motion.search.searcher import Searcher
 
 
@@ -71,7 +73,7 @@ NOTHING = Hit(None, -1, -1, math.inf)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MotionDatabase:
+class MotionDatabase(Searched):
     """Frames to search. Make one with `build` from clips, or with `from_features` from arrays.
 
     Attributes
@@ -98,20 +100,6 @@ class MotionDatabase:
     schema : FeatureSchema or None
         None for a database made from features.
     """
-
-    layout: Layout
-    starts: Ints
-    stops: Ints
-    assets: tuple[str, ...]
-    mirrored: Flags
-    channel_names: tuple[str, ...]
-    slices: tuple[slice, ...]
-    weights: Floats
-    normalisation: Normalisation
-    marks: Marks
-    biases: Biases = NO_BIAS
-    root: Features | None = None
-    schema: FeatureSchema | None = None
 
     @classmethod
     def build(
@@ -169,7 +157,7 @@ class MotionDatabase:
         features = np.zeros((int(lengths.sum()), schema.n_features), np.float32)
         for part, start, stop in zip(parts, starts, stops, strict=True):
             features[start:stop] = shared.apply(part.features)
-        marks = Marks.of(Markup() if markup is None else markup, assets, starts, stops, schema.rate, end_s)
+        marks = marks_of(Markup() if markup is None else markup, assets, starts, stops, schema.rate, end_s)
         slices = tuple(schema.slices.values())
         return cls(
             Layout.of(features, starts, stops, weights_of_features(slices, schema.weights)),

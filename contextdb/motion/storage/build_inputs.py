@@ -11,7 +11,6 @@ import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from contextdb.disk import read_bytes
 from contextdb.errors import ClipError, ContextDBError, Fault, FileError, MotionError, Place, plural
@@ -19,10 +18,8 @@ from contextdb.motion.features.schema_dict import schema_to_dict
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage import stored
 from contextdb.motion.storage.clip_files import ClipFile, clip_files
+from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
-
-if TYPE_CHECKING:
-    from contextdb.motion.storage.config import MotionConfig
 
 NOWHERE = Place()
 Assets = Mapping[str, Collection[str]]

@@ -12,7 +12,6 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from contextdb.errors import ArtefactError, Fault, FileError, in_quotes, plural
 from contextdb.motion.clips.doubts import ClipFinding, doubts
@@ -23,11 +22,9 @@ from contextdb.motion.search.filters import Biases
 from contextdb.motion.storage import stored
 from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, Tolerates
 from contextdb.motion.storage.clip_files import ClipFile, Extracted, extract
+from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.feature_cache import FeatureCache, file_name
-
-if TYPE_CHECKING:
-    from contextdb.motion.storage.config import MotionConfig
 
 CACHE_FOLDER = ".contextdb-cache"
 SAVED_SUFFIX = ".motion.safetensors"

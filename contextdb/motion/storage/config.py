@@ -26,9 +26,6 @@ from contextdb.motion.selection.controller_settings import ControllerSettings, r
 from contextdb.motion.selection.decision import Recorder
 from contextdb.motion.selection.selector import Entry, Selector
 from contextdb.motion.selection.variation import Rng
-from contextdb.motion.storage import building
-from contextdb.motion.storage.build_inputs import Assets
-from contextdb.motion.storage.building import Progress
 from contextdb.motion.storage.clip_files import clip_files
 from contextdb.motion.storage.database_settings import DatabaseSettings, read_databases
 
@@ -128,16 +125,6 @@ class MotionConfig:
             for name, schema in self.features.items()
         }
         return replace(self, features=given)
-
-    def build(
-        self, folder: str | Path, assets: Assets | None = None, progress: Progress | None = None
-    ) -> dict[str, MotionDatabase]:
-        """Build all databases from the clips in a folder, in memory; those of one feature schema share a normalisation.
-
-        `assets` gives for a table's name the assets in it: a database of that table holds the clips of these alone.
-        `contextdb.motion.storage.building.build` keeps on the disk what it computes.
-        """
-        return building.build(self, folder, assets, progress, cache=None)
 
     def selector(self, name: str, databases: Mapping[str, MotionDatabase]) -> Selector:
         """The selector of a name over built databases; one that is not among them counts as not loaded."""

@@ -45,7 +45,8 @@ def reasked(decision: Decision, databases: Mapping[str, MotionDatabase], name: s
     found: list[tuple[str, Candidate]] = []
     free: list[Floats] = []
     for database, chosen in decision.filters:
-        rows, totals = candidates.best_of_assets(databases[database], decision.query, chosen, name)
+        wanted = databases[database].normalised(decision.query)
+        rows, totals = candidates.best_of_assets(databases[database], wanted, chosen, name)
         found += [(database, row) for row in rows]
         free.append(totals)
     ordered = np.sort(np.concatenate(free)) if free else np.empty(0)

@@ -1,0 +1,32 @@
+"""What a screen of the editor needs of the app around it."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+
+from textual.app import App
+
+from tui.editor_settings import EditorSettings
+
+
+class Editor(App[None]):
+    """The app around a screen; `tui.app.EditorApp` is the one there is."""
+
+    settings: EditorSettings
+
+    @abstractmethod
+    def open_table(self, name: str) -> None:
+        """Show a table of the workspace."""
+
+    @abstractmethod
+    def go_into(self, name: str, outer: str, facts: Mapping[str, str]) -> None:
+        """Show the table that a row of the table `outer` stands for, with the facts of its test row."""
+
+    @abstractmethod
+    def go_back(self) -> bool:
+        """Show the table that `go_into` came from; False where there is none."""
+
+    @abstractmethod
+    def say_renamed(self, text: str) -> None:
+        """Say on the screen that is shown now that a condition was renamed, also after its next change."""

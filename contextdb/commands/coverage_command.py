@@ -20,23 +20,20 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from contextdb.commands import coverage_telemetry
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
+from contextdb.covering.baseline import Earlier
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
 from contextdb.report import coverage_formats
+from contextdb.report.coverage_results import CoverageResults, Measured
 from contextdb.report.results import as_path
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import EitherTable, Table
-
-if TYPE_CHECKING:
-    from contextdb.covering.baseline import Earlier
-    from contextdb.report.coverage_results import CoverageResults, Measured
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

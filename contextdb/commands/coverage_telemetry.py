@@ -7,17 +7,15 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from contextdb.console import printable
+from contextdb.covering import Gap
 from contextdb.covering.progress import PREPARING
 from contextdb.errors import ContextError, Fault
+from contextdb.report.coverage_results import Measured
 from contextdb.tables.table import EitherTable
-
-if TYPE_CHECKING:
-    from contextdb.covering import Gap
-    from contextdb.report.coverage_results import Measured
-    from contextdb.telemetry import Observed
+from contextdb.telemetry import Observed
 
 ENGINES = ("local", "dask")
 

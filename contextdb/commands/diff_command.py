@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
 
+from contextdb.checks.effects import Effects
 from contextdb.commands.diff_views import as_markdown, as_text
 from contextdb.commands.effects_views import effects_json, effects_markdown, effects_text
 from contextdb.console import ExitCode, output, wants_colour
@@ -21,9 +21,6 @@ from contextdb.report.render_json import as_json
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.places import table_path
 from contextdb.tables.project import load_table
-
-if TYPE_CHECKING:
-    from contextdb.checks.effects import Effects
 
 FORMATS = ("text", "markdown", "json")
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
+from contextdb.checks.effects import Box, Effects, Reach
 from contextdb.console import printable, styled
 from contextdb.errors import Fault, plural, shown
+from contextdb.findings import Finding
 from contextdb.report.render_markdown import escaped
-
-if TYPE_CHECKING:
-    from contextdb.checks.effects import Box, Effects, Reach
-    from contextdb.findings import Finding
 
 TITLE = "what it does"
 MOST = 10

@@ -21,7 +21,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
@@ -38,9 +37,7 @@ from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Pla
 from contextdb.report.render_json import as_json
 from contextdb.tables.places import open_compiled
 from contextdb.telemetry.contexts import context_files
-
-if TYPE_CHECKING:
-    from contextdb.telemetry.evaluate_file import Answered
+from contextdb.telemetry.evaluate_file import Answered
 
 N_SHOWN = 15
 OUT_SUFFIXES = (".csv", ".parquet")

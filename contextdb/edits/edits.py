@@ -18,6 +18,7 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.cells.words import truth_of
 from contextdb.columns import TextColumn
 from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, plural, row_name, shown
+from contextdb.expressions import assumption_faults
 from contextdb.expressions.rules import check_rule
 from contextdb.files.csv_source import name_faults
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
@@ -245,8 +246,6 @@ def set_settings(table: Table, **said: Any) -> Edit:
 
 def _require_known(table: Table, assume: Sequence[str]) -> None:
     """Raise SchemaError where an assumption cannot be read, or names what is no condition of the table and not declared."""
-    from contextdb.expressions import assumption_faults
-
     known = {**table.schema.conditions, **{c.condition.name: c.condition for c in table.conditions}}
     if faults := list(assumption_faults(assume, known)):
         raise SchemaError(*faults)

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest
+from contextdb.exchange.formulas import Formulas
 from contextdb.exchange.reading import Reading, Remark
 from contextdb.files.strangers import seems_to_be
 from contextdb.tables.table import Table
-
-if TYPE_CHECKING:
-    from contextdb.exchange.formulas import Formulas
 
 
 @dataclass(frozen=True, slots=True)

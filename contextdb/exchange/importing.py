@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,14 +17,11 @@ from contextdb.edits.schema_file import SchemaChange, schema_change
 from contextdb.errors import Fault, FileError, Place, TableError
 from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, propose
 from contextdb.exchange.reading import Reading
-from contextdb.files.texts import new_source
+from contextdb.files.texts import AnySource, new_source
 from contextdb.schema.sections import condition_to_dict, job_faults
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.project import schema_for, settings_of
 from contextdb.tables.table import Table
-
-if TYPE_CHECKING:
-    from contextdb.files.texts import AnySource
 
 
 @dataclass(frozen=True, eq=False)

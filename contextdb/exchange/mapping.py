@@ -13,6 +13,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import NUMERIC, Domain
 from contextdb.cells.grammar import reads
 from contextdb.columns import TextColumn
+from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, plural, some
 from contextdb.exchange.proposals import n_unreadable, names_of, pair_in, propose_type
 from contextdb.exchange.reading import Reading
@@ -239,7 +240,6 @@ def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> Job | 
 
 def _fits(column: TextColumn, job: Job) -> bool:
     """Whether every cell of a column can be read for a job."""
-    from contextdb.edits.edits import check_cell
 
     settings = replace(TableSettings("table", asset="asset"), **{str(job): column.name})  # type: ignore[arg-type]
     empty = Table.build("table", [TextColumn.of("asset", ()), TextColumn.of(column.name, ())], settings=settings)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
-if TYPE_CHECKING:
-    from contextdb.report.coverage_results import CoverageResults
+from contextdb.report.coverage_results import CoverageResults
 
 CoverageFormat = Literal["text", "json", "github", "junit", "sarif", "markdown", "html"]
 FORMATS: tuple[CoverageFormat, ...] = get_args(CoverageFormat)

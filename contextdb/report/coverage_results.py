@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
 from contextdb.covering.baseline import Change, digest_of
@@ -13,9 +12,7 @@ from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.findings import Finding
 from contextdb.report.results import CheckReport, TableSummary
-
-if TYPE_CHECKING:
-    from contextdb.telemetry.observed import Observed, SeenGap
+from contextdb.telemetry.observed import Observed, SeenGap
 
 ROUNDING = 1e-12
 """Shares are as exact as this; a bar of 100 % takes nothing less all the same."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from contextdb.covering import CoverageReport, Gap, Slice, format_percent
 from contextdb.covering.baseline import Change
@@ -12,9 +11,7 @@ from contextdb.errors import in_quotes, nearest, plural
 from contextdb.findings import Finding
 from contextdb.report.coverage_results import Measured, has_moments
 from contextdb.tables.variety import VARIETY
-
-if TYPE_CHECKING:
-    from contextdb.telemetry.observed import FactNote, Observed
+from contextdb.telemetry.observed import FactNote, Observed
 
 MOST_TOLD = 8
 """Conditions and assumptions that are told one by one."""

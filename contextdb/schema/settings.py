@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from contextdb.cells.conditions import Condition, Mirror
 from contextdb.cells.domains import KINDS, Domain
@@ -20,13 +20,11 @@ from contextdb.cells.grammar import covers
 from contextdb.cells.mirroring import NEGATED_KINDS, SWAPPED_KINDS, sided_pairs, swap_faults, swapped_tag
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
+from contextdb.expressions import Derivation, assumption_faults, derivation_faults, derive
 from contextdb.files.file_names import alike, composed
 from contextdb.schema import toml_values
 from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
 from contextdb.schema.toml_lines import Path, key_lines, line_of, read_toml
-
-if TYPE_CHECKING:
-    from contextdb.expressions import Derivation
 
 Found = tuple[Path, Fault]
 Section = Mapping[str, Any]
@@ -101,8 +99,6 @@ class Schema:
         """
         if not any(condition.expr for condition in self.conditions.values()):
             return None
-        from contextdb.expressions import derive
-
         return derive(self.conditions)
 
     def derivation_of(self, names: Iterable[str]) -> Derivation | None:
@@ -201,8 +197,6 @@ def _expression_faults(conditions: Mapping[str, Condition], assumed: Mapping[str
     yield from _derivation_faults(conditions)
     for name, assume in assumed.items():
         if assume:
-            from contextdb.expressions import assumption_faults
-
             path = ("tables", name)
             for fault in assumption_faults(assume, conditions):
                 if fault.rule != "unknown-fact":
@@ -211,8 +205,6 @@ def _expression_faults(conditions: Mapping[str, Condition], assumed: Mapping[str
 
 def _derivation_faults(conditions: Mapping[str, Condition]) -> Iterator[Found]:
     if any(condition.expr for condition in conditions.values()):
-        from contextdb.expressions import derivation_faults
-
         for name, fault in derivation_faults(conditions):
             path = ("conditions", name)
             mend = fault.mend or ("to declare it, in a section [conditions.NAME]" if fault.rule == "unknown-fact" else "")

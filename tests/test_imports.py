@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+from running import ROOT
 
 HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "tomlkit", "python_calamine", "openpyxl"}
 
@@ -24,3 +29,27 @@ def test_import_contextdb_leaves_heavy_packages_unloaded():
 def test_every_public_name_resolves_without_the_terminal_editor():
     loaded = modules_after("import contextdb; [getattr(contextdb, name) for name in contextdb.__all__]")
     assert not loaded & {"textual", "tui", "dask"}
+
+
+def module_of(path: Path) -> str:
+    """The dotted name of a module's file."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imports_of(path: Path, modules: set[str]) -> set[str]:
+    """The modules that a file imports, wherever in the file, for types too."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= (names & modules) | ({node.module} if names - modules else set())
+    return (found & modules) - {module_of(path)}
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    files = {module_of(path): path for package in ("contextdb", "tui") for path in (ROOT / package).rglob("*.py")}
+    assert len(files) > 400
+    TopologicalSorter({name: imports_of(path, set(files)) for name, path in files.items()}).prepare()  # raises CycleError

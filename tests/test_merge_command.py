@@ -20,6 +20,7 @@ from contextdb.files.csv_rewrite import rewritten
 from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.merging.reading import table_of
 from contextdb.tables.project import load
+from contextdb.tables.table import Table
 
 BASE = "Asset,speed,hit\r\nwalk,0..5,True\r\nrun,5..9,Any\r\njump,Any,False\r\n"
 OURS = BASE.replace("walk,0..5", "walk,1..5")
@@ -158,11 +159,11 @@ def test_what_stands_between_marks_can_be_merged_again_to_either_side(data):
         columns = [TextColumn.of(name, [row[at] for row in rows]) for at, name in enumerate(["Asset", "speed", "hit"])]
         return rewritten(columns, None, np.full(len(rows), -1)).raw.decode()
 
-    base, ours, theirs = (table_of(side().encode(), "t.csv") for _ in range(3))
+    base, ours, theirs = (table_of(Table, side().encode(), "t.csv") for _ in range(3))
     found = merge(base, ours, theirs)
     if not found.conflicts:
         return
-    again = merge(*(table_of(raw, "t.csv") for raw in versions_of(with_markers(found))))
+    again = merge(*(table_of(Table, raw, "t.csv") for raw in versions_of(with_markers(found))))
     for one in ("ours", "theirs"):
         decided = [m.resolved(dict.fromkeys(range(len(m.conflicts)), one)) for m in (found, again)]
         assert texts_of(decided[0]) == texts_of(decided[1])
@@ -170,7 +171,7 @@ def test_what_stands_between_marks_can_be_merged_again_to_either_side(data):
 
 def test_marks_that_git_itself_wrote_without_a_base_are_read_too():
     text = "A,x\na,1\n<<<<<<< HEAD\nb,2\n=======\nb,3\n>>>>>>> branch\nc,4\n"
-    base, ours, theirs = (table_of(raw, "t.csv") for raw in versions_of(text.encode()))
+    base, ours, theirs = (table_of(Table, raw, "t.csv") for raw in versions_of(text.encode()))
     found = merge(base, ours, theirs)
     assert [(c.asset, c.column, c.base, c.ours, c.theirs) for c in found.conflicts] == [("b", "x", None, "2", "3")]
     assert found.table.assets == ["a", "b", "c"]

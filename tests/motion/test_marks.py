@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.markup.marking import marks_of
 from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter, covers, tags_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag
@@ -144,7 +145,7 @@ def marked(draw):
     )
 
 
-def marks_of(case):
+def marks_of_case(case):
     markup, assets, starts, stops, rate, end_s, n_frames = case
     return marks_of(markup, assets, starts, stops, rate, end_s, n_frames=n_frames)
 
@@ -163,7 +164,7 @@ def frames_of(case):
 @given(marked())
 def test_a_frame_is_marked_as_asking_every_span_tells(case):
     markup, _, _, _, rate, end_s, n_frames = case
-    marks = marks_of(case)
+    marks = marks_of_case(case)
     within = set()
     for frame, asset, i, length in frames_of(case):
         within.add(frame)
@@ -177,7 +178,7 @@ def test_a_frame_is_marked_as_asking_every_span_tells(case):
 
 @given(marked())
 def test_no_two_kinds_say_the_same_and_the_first_says_nothing(case):
-    marks = marks_of(case)
+    marks = marks_of_case(case)
     rows = [
         (marks.kind_tags[k].tobytes(), int(marks.kind_marks[k]), float(marks.kind_biases[k]), float(marks.kind_root_weights[k]))
         for k in range(marks.n_kinds)
@@ -190,7 +191,7 @@ def test_no_two_kinds_say_the_same_and_the_first_says_nothing(case):
 @given(marked())
 def test_looping_and_warps_are_those_of_the_spans_and_end_with_their_range(case):
     markup, assets, starts, stops, rate, _, _ = case
-    marks = marks_of(case)
+    marks = marks_of_case(case)
     assert marks.looping.tolist() == [is_looping(markup, asset) for asset in assets]
     for i, asset in enumerate(assets):
         last_s = (int(stops[i] - starts[i]) - 1) / rate
@@ -210,7 +211,7 @@ filters = st.builds(TagFilter, names, names, names, penalties, penalties)
 
 @given(marked(), filters, st.booleans())
 def test_a_filter_leaves_out_and_charges_what_asking_every_tag_tells(case, wanted, in_match_range):
-    marks = marks_of(case)
+    marks = marks_of_case(case)
     assume(all(any(covers(tag, known) for known in marks.tags) for tag in wanted.names))
     why, added, playable = marks.left_out(wanted, in_match_range=in_match_range), marks.tag_biases(wanted), marks.playable()
     for kind in range(marks.n_kinds):

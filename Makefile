@@ -20,11 +20,12 @@ INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
 .DEFAULT_GOAL := help
 # A set-up that failed half-way is done again from its start.
 .DELETE_ON_ERROR:
-.PHONY: help demo test check format docs bench fuzz clean
+.PHONY: help demo test cover check format docs bench fuzz clean
 
 help:
 	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
 	@$(info make test     run the tests)
+	@$(info make cover    run the tests and list the lines and branches of the code that none of them reaches)
 	@$(info make check    formatting, lint, types and import contracts)
 	@$(info make format   format the code and mend what lint can mend)
 	@$(info make docs     run the commands of README.md and docs/ and write down what they print now)
@@ -38,6 +39,9 @@ demo: $(VENV)/.runtime
 
 test: $(VENV)/.dev
 	$(PY) -m pytest --numprocesses auto --dist worksteal
+
+cover: $(VENV)/.dev
+	$(PY) -m pytest --numprocesses auto --dist worksteal --cov
 
 check: $(VENV)/.dev
 	$(PY) -m ruff format --check .

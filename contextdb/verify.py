@@ -42,13 +42,13 @@ def verified(path: Path) -> Verdict:
     FileError
         There is no such file, the disk refuses, or the file is of no kind that contextdb writes.
     """
+    if not os.path.isfile(path):
+        read_bytes(path)  # raises, with the reason
     check = CHECKS.get(path.suffix.lower())
     if check is None:
         accepted = f"a file that contextdb writes: {', '.join(CHECKS)}"
         found = f"{in_quotes(path.name)} is not a file of contextdb."
         raise FileError(Fault(found, accepted, place=Place(str(path))))
-    if not os.path.isfile(path):
-        read_bytes(path)  # raises, with the reason
     kind = "file"
     try:
         for kind, message in check(path):

@@ -111,7 +111,12 @@ def test_tables_in_csv_are_readable_and_hold_no_digest():
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("README.md", "not a file of contextdb"), ("nowhere.json", "no such file"), (".ci", "holds no file of contextdb")],
+    [
+        ("README.md", "not a file of contextdb"),
+        ("nowhere.json", "no such file"),
+        ("nowhere", "no such file"),
+        (".ci", "holds no file of contextdb"),
+    ],
 )
 def test_what_is_no_file_of_ours_exits_with_2(name: str, said: str):
     result = run("verify", str(ROOT / name))

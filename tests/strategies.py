@@ -37,6 +37,10 @@ NOTHING = {"int": "5..3", "number": "5..3", "angle": "(5..5)", "tags": "+Move.Ru
 """Cells that no fact matches, though each part of them could."""
 
 
+IS_FULL = not settings.default.derandomize
+"""Whether every state is tried, and not only a choice of them: see conftest.py."""
+
+
 def examples(times: float, *unchecked: HealthCheck) -> settings:
     """So many times the examples that the profile asks for (see conftest.py), without some more of hypothesis' own checks."""
     profile = settings.default

@@ -24,7 +24,7 @@ INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
 
 help:
 	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
-	@$(info make test     run the tests)
+	@$(info make test     run the tests; EXAMPLES=full draws all examples from a new seed, SEED=1 draws the same ones again)
 	@$(info make cover    run the tests and list the lines and branches of the code that none of them reaches)
 	@$(info make check    formatting, lint, types and import contracts)
 	@$(info make format   format the code and mend what lint can mend)
@@ -37,8 +37,10 @@ help:
 demo: $(VENV)/.runtime
 	@$(PY) -m contextdb demo
 
+test: export EXAMPLES := $(EXAMPLES)
+test: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/.dev
-	$(PY) -m pytest --numprocesses auto --dist worksteal
+	$(PY) -m pytest --numprocesses auto --dist worksteal $(if $(SEED),--hypothesis-seed=$(SEED))
 
 cover: $(VENV)/.dev
 	$(PY) -m pytest --numprocesses auto --dist worksteal --cov

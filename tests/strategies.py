@@ -10,7 +10,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 import oracles
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from contextdb.conditions import Condition
@@ -37,9 +37,16 @@ NOTHING = {"int": "5..3", "number": "5..3", "angle": "(5..5)", "tags": "+Move.Ru
 """Cells that no fact matches, though each part of them could."""
 
 
-def examples(times: float) -> settings:
-    """So many times the examples that the profile asks for: see conftest.py."""
-    return settings(max_examples=math.ceil(times * settings.default.max_examples))
+IS_FULL = not settings.default.derandomize
+"""Whether every state is tried, and not only a choice of them: see conftest.py."""
+
+
+def examples(times: float, *unchecked: HealthCheck) -> settings:
+    """So many times the examples that the profile asks for (see conftest.py), without some more of hypothesis' own checks."""
+    profile = settings.default
+    return settings(
+        max_examples=math.ceil(times * profile.max_examples), suppress_health_check=[*profile.suppress_health_check, *unchecked]
+    )
 
 
 def one_of(*values: object) -> st.SearchStrategy:

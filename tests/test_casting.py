@@ -6,8 +6,9 @@ from dataclasses import replace
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 import contextdb as cdb
 from contextdb.errors import ContextError
@@ -64,7 +65,7 @@ def as_ids(cast):
     return {role: actor["id"] for role, actor in cast.items()}
 
 
-@settings(max_examples=120, deadline=None)
+@examples(1.2)
 @given(moments(max_actors=5, max_rows=4))
 def test_valid_rows_and_castings_are_those_of_trying_every_assignment(moment):
     rows, context, actors = moment
@@ -80,7 +81,7 @@ def test_valid_rows_and_castings_are_those_of_trying_every_assignment(moment):
         assert castings[0] == matches.casting(row)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(0.4)
 @given(moments(max_actors=22, max_rows=70))
 def test_every_valid_row_has_a_casting_and_every_other_a_reason(moment):
     rows, context, actors = moment
@@ -229,7 +230,7 @@ def castings_of_many(row, actors):
     return best
 
 
-@settings(max_examples=60, deadline=None)
+@examples(0.6)
 @given(moments(max_actors=22, max_rows=2))
 def test_with_two_teams_the_best_casting_is_that_of_trying_every_assignment(moment):
     rows, context, actors = moment

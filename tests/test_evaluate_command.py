@@ -14,7 +14,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 import strategies
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from running import ROOT, Result, run
 
@@ -235,7 +235,7 @@ def test_columns_whose_names_look_like_patterns_are_read(here: Path):
 
 
 @pytest.mark.parametrize("is_parquet", [False, True], ids=["csv", "parquet"])
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@strategies.examples(1, HealthCheck.function_scoped_fixture)
 @given(strategies.tables(least_conditions=1), st.data(), st.sampled_from(["any", "never"]))
 def test_each_context_of_a_file_is_answered_as_when_it_is_asked_alone(
     here: Path, is_parquet: bool, table: Table, data: st.DataObject, unknown: str

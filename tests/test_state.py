@@ -303,7 +303,7 @@ class RuledForks(Forks):
 TestForksOfAPlainTable = PlainForks.TestCase
 TestForksOfATableWithRules = RuledForks.TestCase
 for machine in (TestForksOfAPlainTable, TestForksOfATableWithRules):
-    machine.settings = settings(max_examples=40, stateful_step_count=25)
+    machine.settings = settings(strategies.examples(0.4), stateful_step_count=25)
 
 
 def test_a_fork_does_not_see_what_the_original_is_told():

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lines import DT, RATE, line
+from strategies import examples
 
 from contextdb.errors import ArtefactError, FileError, MotionError
 from contextdb.motion import Entry, Selector, TagFilter
@@ -103,7 +104,7 @@ def trace_of(decisions, **options):
 # ---- what comes back
 
 
-@settings(max_examples=60)
+@examples(0.6)
 @given(st.lists(DECISIONS, max_size=4))
 def test_a_saved_session_comes_back_as_it_was(decisions):
     trace = trace_of(decisions)

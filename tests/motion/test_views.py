@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 from test_trace import DECISIONS, recorded
 
 from contextdb.console import width_of
@@ -268,7 +269,7 @@ def test_a_recorded_session_reads_the_same_as_the_decisions_it_was_made_of():
 # ---- widths
 
 
-@settings(max_examples=30)
+@examples(0.3)
 @given(st.lists(DECISIONS, max_size=2), st.sampled_from(View))
 def test_whatever_was_decided_can_be_told_on_lines_that_move_no_cursor(decisions, view):
     lines = [line for each in decisions for line in decision_lines(each, view)]

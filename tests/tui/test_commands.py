@@ -8,6 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from strategies import IS_FULL
 from terminal import press, screen_text, settled, with_editor
 
 from tui.app import EditorApp
@@ -138,25 +139,27 @@ async def leave(app: EditorApp, pilot) -> None:
     await settled(pilot, 1)
 
 
-@pytest.mark.parametrize(
-    ("name", "state"),
-    [
-        ("ordinary", in_cells),
-        ("ordinary", in_the_test_row),
-        ("ordinary", with_all_rows_hidden),
-        ("no_rows", in_cells),
-        ("one_column", with_a_bar_open),
-    ],
-)
+STATES = [
+    ("ordinary", in_cells),
+    ("ordinary", in_the_test_row),
+    ("ordinary", with_all_rows_hidden),
+    ("no_rows", in_cells),
+    ("one_column", with_a_bar_open),
+]
+
+
+@pytest.mark.parametrize(("name", "state"), STATES)
 def test_every_command_runs_wherever_one_is(tmp_path, name, state):
     file = tmp_path / f"{name}.csv"
     file.write_text(TABLES[name])
+    commands = [command for command in COMMANDS if command.id != "quit"]
+    if not IS_FULL:  # each command in two of the states
+        place = STATES.index((name, state))
+        commands = [command for i, command in enumerate(commands) if (i - place) % len(STATES) < 2]
 
     async def script(app: EditorApp, pilot) -> list[str]:
         ran = []
-        for command in COMMANDS:
-            if command.id == "quit":
-                continue
+        for command in commands:
             state(app)
             await app.main.run_command(command.id)
             await settled(pilot)
@@ -166,7 +169,7 @@ def test_every_command_runs_wherever_one_is(tmp_path, name, state):
             assert app._exception is None, f"after {command.id}: {app._exception}"
         return ran
 
-    assert len(with_editor(file, script)) == len(COMMANDS) - 1
+    assert with_editor(file, script) == [command.id for command in commands]
     assert file.read_text() == TABLES[name]
 
 

@@ -17,7 +17,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, plural, shown, some
 from contextdb.exchange.described import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
-from contextdb.exchange.reading import ERRORS, Reading, Remark, capped, listed
+from contextdb.exchange.reading import ERRORS, Reading, Remark, SheetWanted, capped, listed
 from contextdb.exchange.values import DATES, text_of_value
 from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook
 from contextdb.schema import EMPTY, Schema, read_schema
@@ -36,7 +36,9 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     Raises
     ------
     TableError
-        The workbook is locked or broken, has no such sheet, or several of which none is named; or the sheet holds no table.
+        The workbook is locked or broken, has no such sheet, or the sheet holds no table.
+    SheetWanted
+        Several sheets hold cells, and none is named.
     """
     require_workbook(raw, file)
     book = _opened(raw, file)
@@ -119,7 +121,7 @@ def _only(sheets: dict[str, _Sheet], hidden: frozenset[str], file: str) -> tuple
     seen = [name for name in filled if name not in hidden]
     if len(seen or filled) > 1:
         found = f"{len(seen or filled)} sheets hold cells: {listed(seen or filled)}."
-        raise TableError(Fault(found, "one of them", f"to name it: --sheet {in_quotes((seen or filled)[0])}", Place(file)))
+        raise SheetWanted(Fault(found, "one of them", f"to name it: --sheet {in_quotes((seen or filled)[0])}", Place(file)))
     if not filled:
         return next(iter(sheets)), []
     if not seen:

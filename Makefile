@@ -70,6 +70,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/c_header.py
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/editor.py
+	$(PY) benchmarks/start.py
 
 clean:
 	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in '$(VENV) build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache'.split()]"

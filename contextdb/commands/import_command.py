@@ -22,12 +22,20 @@ from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.domains import KINDS
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural, row_name
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
-from contextdb.exchange.importing import Plan, declared_differently, plan_import, project_of
+from contextdb.exchange.importing import (
+    NAMES,
+    Plan,
+    declared_differently,
+    has_whole_names,
+    plan_import,
+    project_of,
+    whole_names_told,
+)
 from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
 from contextdb.exchange.reading import Reading, listed
 from contextdb.exit_codes import ExitCode
 from contextdb.file_names import why_unportable
-from contextdb.project import SCHEMA_FILE, schema_for
+from contextdb.project import SCHEMA_FILE
 from contextdb.shapes import KIND_SYNONYMS
 
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|"}
@@ -55,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--delimiter", metavar="NAME", choices=DELIMITERS, help=between)
     parser.add_argument("--decimal", choices=("comma", "point"), help="what stands in 3,5 (default: told from the cells)")
     whole = "whether Mid Air is one name (whole) or two (words), in columns that are new (default: whole, but in our own workbooks)"
-    parser.add_argument("--names", choices=("whole", "words"), help=whole)
+    parser.add_argument("--names", choices=NAMES, help=whole)
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
     parser.add_argument("--force", action="store_true", help="write over a table that is there")
 
@@ -74,7 +82,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     for remark in reading.remarks:
         print(printable(f"{name}: {remark}"), file=sys.stderr)
     plan = _plan(reading, target, arguments)
-    if arguments.names is None and (told := _whole_names(plan, reading)):
+    if arguments.names is None and (told := whole_names_told(plan.columns, reading, "--names words")):
         print(printable(f"{name}: {told}"), file=sys.stderr)
     if not arguments.dry_run:
         if is_large:
@@ -113,21 +121,8 @@ def _bytes(source: str) -> tuple[bytes, str]:
 def _options(arguments: argparse.Namespace) -> ReadOptions:
     is_comma = None if arguments.decimal is None else arguments.decimal == "comma"
     delimiter = None if arguments.delimiter is None else DELIMITERS[arguments.delimiter]
-    is_whole = arguments.names == "whole" if arguments.names else False if _is_of_a_project(arguments.source) else None
+    is_whole = has_whole_names(arguments.names, None if arguments.source == "-" else Path(arguments.source))
     return ReadOptions(arguments.format, arguments.sheet, arguments.encoding, delimiter, is_comma, is_whole)
-
-
-def _is_of_a_project(source: str) -> bool:
-    """Whether a contextdb.toml declares a file as a table, so that its cells are cells of ours."""
-    path = Path(source)
-    if path.suffix.lower() not in TABLE_SUFFIXES or not path.is_file():
-        return False
-    try:
-        folder, schema = schema_for(path)
-    except ContextDBError:  # it is no concern of this import
-        return False
-    said = (path.parent.resolve() / path.name).relative_to(folder.resolve()).as_posix()
-    return any(said in settings.files for settings in schema.tables.values())
 
 
 def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> Plan:
@@ -176,18 +171,6 @@ def _typed(mapped: Sequence[Mapped], reading: Reading, types: dict[str, str]) ->
 
 
 # ---- what is said
-
-
-def _whole_names(plan: Plan, reading: Reading) -> str:
-    """Which columns have texts that became one name each though blanks part names in a cell, with the first such text."""
-    changed = [(column, reading.column(column.source)) for column in plan.columns if column.cells is not None]
-    names = [column.source for column, _ in changed]
-    texts = (text for _, column in changed for text in column.texts if " " in text.strip())
-    example = next(texts, None)
-    if example is None:
-        return ""
-    where = "column" if len(names) == 1 else "columns"
-    return f"{where} {listed(names)}: each text is one name, such as {in_quotes(example)}; --names words reads each word as a name."
 
 
 def _lines(plan: Plan, reading: Reading, name: str, is_dry: bool) -> list[str]:

@@ -44,6 +44,9 @@ FORMATS: Mapping[str, Format] = {
 }
 _GRIDS = ("csv", "tsv", "xlsx")
 """Formats in which only its place says that a row names the columns."""
+_OTHER_WORKBOOKS = (".ods", ".fods", ".xlsb", ".numbers")
+"""Workbooks that are not read, nor written."""
+SAVE_AS_XLSX = 'to save it as "Excel workbook" (.xlsx)'
 _BINARY_SIGNS = {"an Excel workbook (.xlsx)": "xlsx", "an old Excel workbook (.xls)": "xlsx", "a Parquet file": "parquet"}
 
 
@@ -87,13 +90,14 @@ def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writin
     if found and not (for_writing and suffix not in found.suffixes[:1] and found.name == "xlsx"):
         return found
     suffixes = [one.suffixes[0] for one in known.values() if one.suffixes]
-    near = nearest(suffix, suffixes)
+    near = ".xlsx" if suffix in _OTHER_WORKBOOKS else nearest(suffix, suffixes)
+    mend = SAVE_AS_XLSX if suffix in _OTHER_WORKBOOKS and not for_writing else in_quotes(near) if near else ""
     said = (
         f"a file that ends in {in_quotes(suffix)} is of no known format."
         if suffix
         else "the name has no suffix that tells a format."
     )
-    raise FileError(Fault(said, f"{', '.join(suffixes)}, or --as with a format", in_quotes(near) if near else "", Place(name)))
+    raise FileError(Fault(said, f"{', '.join(suffixes)}, or --as with a format", mend, Place(name)))
 
 
 def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading:
@@ -111,7 +115,7 @@ def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading
     TableError
         The file cannot be read as what it is, with the place of every fault.
     FileError
-        It is of no known format, or what reads it is not installed.
+        It is of no known format.
     """
     kind = format_of(name, options.format, raw)
     reading = _read(kind.name, raw, name, options)
@@ -133,8 +137,8 @@ def sheet_names(raw: bytes, name: str) -> list[str]:
 
     Raises
     ------
-    TableError, FileError
-        It is no workbook that can be read, or what reads it is not installed.
+    TableError
+        It is no workbook that can be read.
     """
     from contextdb.exchange.xlsx_read import sheets_of
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from contextdb.columns import TextColumn
 from contextdb.conditions import Condition
-from contextdb.disk import write_atomic
-from contextdb.errors import Fault, FileError, Place, TableError
+from contextdb.disk import TABLE_SUFFIXES, write_atomic
+from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes
 from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, propose
-from contextdb.exchange.reading import Reading
+from contextdb.exchange.reading import Reading, listed
 from contextdb.files import new_source
 from contextdb.project import schema_for, settings_of
 from contextdb.schema import Schema, TableSettings, conditions_from_dict
@@ -25,6 +25,43 @@ from contextdb.together import NewFile, write_together
 
 if TYPE_CHECKING:
     from contextdb.files import AnySource
+
+
+NAMES = {"whole": "each text is one name", "words": "each word is a name"}
+"""How the texts of a column that nobody declares may be read, as `--names` and the dialog of the editor call it."""
+
+
+def has_whole_names(names: str | None, path: Path | None) -> bool | None:
+    """Whether a text is one name, where that is said; else not in a table of ours, and None, which leaves it to the format."""
+    if names:
+        return names == "whole"
+    return False if path is not None and _is_of_a_project(path) else None
+
+
+def _is_of_a_project(path: Path) -> bool:
+    """Whether a contextdb.toml declares a file as a table, so that its cells are cells of ours."""
+    if path.suffix.lower() not in TABLE_SUFFIXES or not path.is_file():
+        return False
+    try:
+        folder, schema = schema_for(path)
+    except ContextDBError:  # it is no concern of this import
+        return False
+    said = (path.parent.resolve() / path.name).relative_to(folder.resolve()).as_posix()
+    return any(said in settings.files for settings in schema.tables.values())
+
+
+def whole_names_told(columns: Sequence[Mapped], reading: Reading, other_way: str) -> str:
+    """Which columns have texts that became one name each though blanks part names in a cell, with the first such text.
+
+    `other_way` says how to read each word as a name; the sentence is empty where there is no such text.
+    """
+    changed = [(column, reading.column(column.source)) for column in columns if column.cells is not None]
+    names = [column.source for column, _ in changed]
+    example = next((text for _, column in changed for text in column.texts if " " in text.strip()), None)
+    if example is None:
+        return ""
+    where = "column" if len(names) == 1 else "columns"
+    return f"{where} {listed(names)}: each text is one name, such as {in_quotes(example)}; {other_way} reads each word as a name."
 
 
 @dataclass(frozen=True, eq=False)

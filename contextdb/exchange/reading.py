@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from contextdb.cell_words import ANY_WORDS, quoted
 from contextdb.columns import TextColumn
-from contextdb.errors import shown
+from contextdb.errors import TableError, shown
 from contextdb.files import AnySource
 from contextdb.schema import EMPTY, Schema
 
@@ -34,6 +34,10 @@ ERRORS = frozenset(
 
 MOST_REMARKS = 20
 """Remarks of one kind that are listed; then how many more there are is told."""
+
+
+class SheetWanted(TableError):
+    """Several sheets of a workbook hold cells, and none of them is named."""
 
 
 @dataclass(frozen=True, slots=True)

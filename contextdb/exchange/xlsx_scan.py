@@ -99,7 +99,7 @@ def _other_kind(archive: zipfile.ZipFile) -> Fault | None:
         return None
     others = {"content.xml": "an OpenDocument file", "xl/workbook.bin": "a binary workbook (.xlsb)"}
     kind = next((kind for name, kind in others.items() if name in names), "an archive")
-    return Fault(f"this is {kind}, no .xlsx.", "a workbook as Excel saves it (.xlsx)", 'to save it as "Excel workbook"')
+    return Fault(f"this is {kind}, no .xlsx.", "a workbook as Excel saves it (.xlsx)", 'to save it as "Excel workbook" (.xlsx)')
 
 
 def _unreadable_part(archive: zipfile.ZipFile) -> Fault | None:

@@ -39,7 +39,7 @@ demo: $(VENV)/.runtime
 
 test: export EXAMPLES := $(EXAMPLES)
 test: export PYTHONDONTWRITEBYTECODE :=
-test: $(VENV)/.dev
+test: $(VENV)/.dev $(VENV)/.kernels
 	$(PY) -m pytest --numprocesses auto --dist worksteal $(if $(SEED),--hypothesis-seed=$(SEED))
 
 cover: $(VENV)/.dev
@@ -85,6 +85,11 @@ $(VENV)/.runtime: pyproject.toml | $(VENV)/pyvenv.cfg
 
 $(VENV)/.dev: pyproject.toml | $(VENV)/pyvenv.cfg
 	$(INSTALL) ".[dev]"
+	$(STAMP)
+
+# What numba compiles is kept in its cache. Two workers of the tests that found nothing there would both compile everything.
+$(VENV)/.kernels: $(wildcard contextdb/*kernels.py contextdb/*/*kernels.py contextdb/*/*/*kernels.py) | $(VENV)/.dev
+	$(PY) tests/kernels.py
 	$(STAMP)
 
 $(VENV)/.bench: pyproject.toml | $(VENV)/pyvenv.cfg

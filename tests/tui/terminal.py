@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import threading
-import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 from unittest.mock import patch
 
-from textual._wait import wait_for_idle
+from quick_apps import quick
 from textual.app import App
 from textual.pilot import Pilot
 
@@ -20,9 +18,6 @@ from tui.editor_settings import EditorSettings
 from tui.model.workspace import Workspace
 
 T = TypeVar("T")
-N_UPDATES = 2
-"""What is laid out anew may have to be painted anew."""
-LONGEST_WAIT_S = 10.0
 
 
 def screen_text(app: App[Any]) -> str:
@@ -34,44 +29,17 @@ def screen_text(app: App[Any]) -> str:
 def drive(app: App[Any], script: Callable[[Pilot[Any]], Awaitable[T]], size: tuple[int, int] = (80, 24)) -> T:
     """Run an app on a screen of (columns, rows) while `script` presses keys; gives what the script gives."""
 
-    async def rested(min_sleep: float = 0.0, max_sleep: float = 1.0) -> None:
-        await _rested(app, n_threads)
-
     async def run() -> T:
         app.animation_level = "none"
         async with app.run_test(size=size) as pilot:
             await pilot.pause()
             return await script(pilot)
 
-    n_threads = threading.active_count()
-    with patch("textual.app.wait_for_idle", rested), patch("textual.pilot.wait_for_idle", rested):
+    with quick():
         return asyncio.run(run())
 
 
-async def _rested(app: App[Any], n_threads: int) -> None:
-    """Wait until no part of the app has anything to do; Textual itself sleeps, until the process has used little of the processor.
-
-    A thread that is at work may send the app something later: as long as there is one, Textual's way is the only one.
-    """
-    for _ in range(N_UPDATES):
-        await _nothing_ready()
-        if app._exception is None and app._running and app.screen_stack:
-            app.screen._on_timer_update()
-    await _nothing_ready()
-    if threading.active_count() > n_threads:
-        await wait_for_idle(0)
-
-
-async def _nothing_ready() -> None:
-    """Give way until the event loop has nothing else to run."""
-    loop: Any = asyncio.get_running_loop()
-    end = time.monotonic() + LONGEST_WAIT_S
-    await asyncio.sleep(0)
-    while loop._ready and time.monotonic() < end:
-        await asyncio.sleep(0)
-
-
-async def settled(pilot: Pilot[Any], n_rounds: int = 4) -> None:
+async def settled(pilot: Pilot[Any]) -> None:
     """Wait until what was pressed has gone its way: a message goes on from part to part, and each may tell another."""
     await pilot.pause()
 

@@ -136,7 +136,7 @@ async def leave(app: EditorApp, pilot) -> None:
     app.main.assets.action_show_all()
     sheet.set_sort(None)
     app.main.show()
-    await settled(pilot, 1)
+    await settled(pilot)
 
 
 STATES = [
@@ -197,7 +197,7 @@ def test_the_palette_lists_every_command_with_its_key_and_runs_it(tmp_path):
         titles = {command.title for command in app.get_system_commands(app.screen)}
         await press(pilot, "ctrl+p", *"duplicate")
         await press(pilot, "enter")
-        await settled(pilot, 8)
+        await settled(pilot)
         return titles, app.main.session.sheet.table.n_rows
 
     titles, n_rows = with_editor(file, script)

@@ -1,4 +1,4 @@
-"""The parts of an XLSX file that are the same for every table, and how texts stand in them.
+"""The parts of an XLSX file that are the same for every table, and how texts are in them.
 
 Source: ECMA-376, Office Open XML, part 1 (SpreadsheetML) and 22.9.2.19 (ST_Xstring: "_x000D_").
 """

@@ -145,7 +145,7 @@ def _rows(columns: Sequence[TextColumn], asset: int, strings: dict[str, int]) ->
 
 
 def _pieces(column: TextColumn, at: int, n_columns: int, is_asset: bool, strings: dict[str, int]) -> np.ndarray:
-    """For each text of a column what stands behind its row's number: the cell, and the beginning of the next."""
+    """For each text of a column what is behind its row's number: the cell, and the beginning of the next."""
     after = "</row>" if at == n_columns - 1 else f'<c r="{column_letters(at + 1)}'
     style = parts.ASSET if is_asset else parts.TEXT
     found = np.empty(len(column.texts), object)
@@ -182,7 +182,7 @@ def _lists(table: Table) -> dict[str, tuple[str, ...]]:
 
 
 def _drop_downs(columns: Sequence[TextColumn], n_rows: int, lists: dict[str, tuple[str, ...]]) -> Iterator[str]:
-    """Lists to choose from, which stand on the sheet of types: a list in the rule itself is limited to 255 characters."""
+    """Lists to choose from, which are on the sheet of types: a list in the rule itself is limited to 255 characters."""
     if not lists:
         return
     bottom = min(n_rows + 1 + SPARE_ROWS, parts.MOST_ROWS)

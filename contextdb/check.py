@@ -53,7 +53,7 @@ def capped(findings: Iterable[Finding]) -> Iterator[Finding]:
 
 
 def where(table: Table, row: int, other: int) -> str:
-    """Where a row stands, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
+    """Where a row is, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
     place = table.place(row)
     if place.line is None:
         return row_name(row)
@@ -80,7 +80,7 @@ def _undeclared(table: Table, column: ConditionColumn, file: str | None) -> Find
     near = nearest(name, [c for c in table.schema.conditions if c not in present])
     hint = f" Did you mean {in_quotes(near)}?" if near else ""
     level: Level = "warning" if table.schema.conditions else "info"
-    message = f"the condition is not declared in contextdb.toml; its cells read as {kind}.{hint}"
+    message = f"the condition is not declared in contextdb.toml; type inferred from its cells: {kind}.{hint}"
     return Finding("undeclared-condition", level, message, table.name, file, column=name)
 
 
@@ -114,7 +114,7 @@ def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
     spans = cell.accepts.spans
     bounds = _declared(low, high)
     if spans[-1][1] < low or spans[0][0] > high:
-        return "outside-domain", "warning", f"lies wholly outside {bounds}, so the row matches no expected value."
+        return "outside-domain", "warning", f"is wholly outside {bounds}, so the row matches no expected value."
     ends = [e for span in spans for e in span if np.isfinite(e)]
     if ends and (min(ends) < low or max(ends) > high):
         return "beyond-domain", "info", f"reaches beyond {bounds}."
@@ -155,7 +155,7 @@ def _assets(table: Table) -> Iterator[Finding]:
                 yield _at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
         elif len(rows) > 1 and inner_name(asset) is None:
             for row in rows[1:]:
-                message = f"the asset {in_quotes(asset)} stands in {where(table, rows[0], row)} too."
+                message = f"the asset {in_quotes(asset)} is also in {where(table, rows[0], row)}."
                 yield _at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
 
 

@@ -1,6 +1,6 @@
 """Compile a table into bitmasks, and look contexts up in them.
 
-Each condition's domain is cut into the fewest classes its column tells apart; each class keeps one bit a row. A query finds the
+Each condition's domain is cut into the fewest classes its column distinguishes; each class keeps one bit a row. A query finds the
 class of every fact and ANDs the masks, so its cost grows with conditions x rows / 64 and not with how the cells are written.
 
 W = ceil(n_rows / 64). Bit r % 64 of word r // 64 is row r; bits past the last row are 0, always. A compiled table is never
@@ -94,7 +94,7 @@ class CompiledTable(Unchanging):
     ways: Ways | None = None
     """The way of each row through tables inside tables; None for a table without."""
     declared: frozenset[str] = frozenset()
-    """Conditions that the project declares: facts of these names are of other tables, and no slips."""
+    """Conditions the project declares. A fact with one of these names belongs to another table; it is not a typo."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -154,7 +154,7 @@ class CompiledTable(Unchanging):
 
     @cached_property
     def ruled(self) -> tuple[Condition, ...]:
-        """The conditions that rules name and that are no columns of the table."""
+        """The conditions that rules name and that are not columns of the table."""
         return tuple(c for c in self.when.conditions if c.name not in self.places) if self.when else ()
 
     @cached_property
@@ -174,7 +174,7 @@ class CompiledTable(Unchanging):
             What a missing fact (absent, None or NaN) does: raises; its condition is ignored; only cells that are Any accept it.
         actors : mapping of str to sequence of mapping, optional
             Who may play each role: `{"Defender": [{"id": 7, "DepthChart": "CB"}]}`. `m.casting(row)` then says who plays what.
-            An actor offered for several roles, as one object or with an equal "id", plays one. A role whose facts stand in the
+            An actor offered for several roles, as one object or with an equal "id", plays one. A role whose facts are in the
             context instead is not cast; one with neither has nobody.
         prefer : str, mapping of role to str, or function of role and actor, optional
             The number fact by which actors are preferred, lowest first ("-speed": highest first). The casting with the lowest sum
@@ -283,7 +283,7 @@ class CompiledTable(Unchanging):
 
     @property
     def policies(self) -> frozenset[str]:
-        """The policies of the table and of those that stand in it."""
+        """The policies of the table and of those that are in it."""
         return frozenset((self.policy,) if self.ways is None else (table.policy for table in self.ways.tables))
 
     def explain(
@@ -453,7 +453,7 @@ class CompiledTable(Unchanging):
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Where each condition stands among `conditions`."""
+        """Where each condition is among `conditions`."""
         return {c.name: at for at, c in enumerate(self.conditions)}
 
     @cached_property

@@ -2,7 +2,7 @@
 
 Rows are compared by asset and not by line; a change of meaning is told from one that only writes the same otherwise. `diff` gives
 what changed, and the edit that does it; `merge` joins what two sides made of one table and gives what they disagree about as data.
-The parts stand in `contextdb.diffing`. Nothing here touches the disk.
+The parts are in `contextdb.diffing`. Nothing here touches the disk.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ class Edit:
         Raises
         ------
         TableError, SchemaError
-            The edit does not fit the table: a row or column that is not there, a name that stands twice.
+            The edit does not fit the table: a row or column that is missing, a name that appears twice.
         """
         for change in self.changes:
             table = change.apply(table)
@@ -286,7 +286,7 @@ def set_settings(table: Table, **said: Any) -> Edit:
 
 
 def _require_known(table: Table, assume: Sequence[str]) -> None:
-    """Raise SchemaError where an assumption cannot be read, or names what is no condition of the table and not declared."""
+    """Raise SchemaError where an assumption cannot be read, or names what is not a condition of the table and not declared."""
     from contextdb.expressions import assumption_faults
 
     known = {**table.schema.conditions, **{c.condition.name: c.condition for c in table.conditions}}

@@ -1,6 +1,6 @@
 """Why a row is valid for a context, or is not: which of its cells fail, with which fact, and what to change.
 
-Winner first: valid rows stand before all others, then the rows nearest to valid, with the fewest failing cells. The details of a
+Winner first: valid rows are before all others, then the rows nearest to valid, with the fewest failing cells. The details of a
 row are worked out when they are asked for.
 """
 
@@ -59,7 +59,7 @@ class Failure:
     mend: str
     """The cell with which the row would match, as near to the present one as can be."""
     step: Step | None = None
-    """Where tables stand in tables: the row of the table whose cell it is."""
+    """Where tables are in tables: the row of the table whose cell it is."""
 
     def __str__(self) -> str:
         where = "" if self.step is None else f" ({self.step})"
@@ -241,7 +241,7 @@ def explain(compiled: CompiledTable, context: Context, unknown: Unknown = "error
 
 @dataclass(frozen=True, slots=True)
 class RulePart:
-    """A row's own rule; where tables stand in tables, that of one row of the way."""
+    """A row's own rule; where tables are in tables, that of one row of the way."""
 
     column: str
     text: str
@@ -280,7 +280,7 @@ def _rule_parts(compiled: CompiledTable, row: int) -> list[RulePart]:
 
 
 def cell_failures(compiled: CompiledTable, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
-    """The cell of a row that does not accept a fact; where tables stand in tables, each cell that does not."""
+    """The cell of a row that does not accept a fact; where tables are in tables, each cell that does not."""
     condition = compiled.conditions[at]
     layers = None if compiled.ways is None else compiled.ways.layers[at]
     if compiled.ways is None or layers is None:

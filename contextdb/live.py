@@ -1,7 +1,7 @@
 """A context that the game keeps: set what changed, then ask. The cheap way to query every frame.
 
 Most facts stay as they are from one frame to the next. The masks of those are intersected once, and a question costs one `&` for
-each fact that has been moving; a fact that starts to move joins those, and the rest is intersected anew.
+each fact that has been moving; a fact that starts to move joins those, and the rest is intersected again.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SHARED = frozenset(("_lookups", "_others"))
 """What a context never changes, and shares with its copies."""
 
 CAST = ""
-"""What stands among the unusual facts while actors are offered, so that a question without actors has nothing to check."""
+"""What is among the unusual facts while actors are offered, so that a question without actors has nothing to check."""
 
 
 class LiveContext(MutableMapping[str, object]):
@@ -143,7 +143,7 @@ class LiveContext(MutableMapping[str, object]):
         Raises
         ------
         ContextError
-            A name is very likely that of a condition misspelt, whose fact is not given beside it: then none is set. Names that the
+            A name is very likely that of a condition misspelt, whose fact is not given next to it: then none is set. Names that the
             project declares are of other tables, and no slips. Or a value is wrong, which names the fact.
         """
         if type(facts) is not dict:
@@ -169,7 +169,7 @@ class LiveContext(MutableMapping[str, object]):
             self._passed.add(name)
         for near in self._alike[name]:
             if near not in facts:
-                found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is not given beside it."
+                found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is not given."
                 raise NoSuchFact(Fault(found, NAMES, in_quotes(near), rule="unknown-fact"))
 
     def copy(self) -> Self:
@@ -309,9 +309,9 @@ class SoftLiveContext(LiveContext):
 
 
 class AskingLiveContext(LiveContext):
-    """The same for a table with derived facts or rules, which asks for facts that are no columns.
+    """The same for a table with derived facts or rules, which asks for facts that are not columns.
 
-    Derived facts are computed anew when one that they need was set since the last question.
+    Derived facts are computed again when one that they need was set since the last question.
     """
 
     __slots__ = ("_computed", "_given", "_is_stale", "_others")
@@ -386,7 +386,7 @@ class AskingLiveContext(LiveContext):
 
 
 class RuledLiveContext(AskingLiveContext):
-    """The same for a table with rules: one is asked anew when a fact that it names has changed."""
+    """The same for a table with rules: one is asked again when a fact that it names has changed."""
 
     __slots__ = ("_is_set", "_left", "_named", "_truths", "_values", "_when")
 

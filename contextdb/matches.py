@@ -79,7 +79,7 @@ class Answering:
 
 
 _OWN_ANSWER = "an answer of this compiled table"
-_ASK_AGAIN = "to ask this table again: query(facts)"
+_ASK_AGAIN = "to query this table again: query(facts)"
 
 
 class Matches:
@@ -189,7 +189,7 @@ class Matches:
             return self
         known = getattr(self, "_mirrored", None)
         if known is None:
-            found = "this answer was not asked with facts, so there are none to mirror."
+            found = "this answer was computed without facts, so there are none to mirror."
             raise ContextError(Fault(found, "an answer of query, query_many or live"))
         if isinstance(known, dict):
             assert self._table.ask_mirrored is not None, "what was pickled has its answer"
@@ -209,7 +209,7 @@ class Matches:
 
     def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
         """Who plays which role in a valid row, as {role: actor}; for an answer to a query with actors."""
-        raise ContextError(Fault("this question was asked without actors, so nobody is cast.", "query(facts, actors={...})"))
+        raise ContextError(Fault("this query had no actors, so nobody is cast.", "query(facts, actors={...})"))
 
     def castings(self, row: int) -> Sequence[Mapping[str, Mapping[str, Any]]]:
         """All castings of a valid row, best first; for an answer to a query with actors."""

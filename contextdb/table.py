@@ -1,7 +1,7 @@
 """A table: assets (rows) against conditions (columns), as texts and as the cells they mean.
 
 A Table is never changed: an edit gives a new one that shares every column it did not touch, and with it whatever was already
-worked out for that column (its cells, its masks). Texts that cannot be read stay as they are and stand in `faults`; only
+worked out for that column (its cells, its masks). Texts that cannot be read stay as they are and are in `faults`; only
 `compile` insists on none. Nothing here touches the disk; `load` and `Table.save` call the modules that do.
 """
 
@@ -47,7 +47,7 @@ class Table(Unchanging):
     origin: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     """Which record of the source each row came from; -1 for a new row."""
     around: Mapping[str, Table] | None = field(default=None, repr=False)
-    """The tables of its folder by name, for rows that stand for another table; None where they are not known."""
+    """The tables of its folder by name, for rows that refer to another table; None where they are not known."""
 
     @classmethod
     def from_columns(
@@ -73,7 +73,7 @@ class Table(Unchanging):
         Raises
         ------
         SchemaError
-            The schema cannot be meant.
+            The schema is invalid.
         TableError
             Columns of unequal length, or cells that cannot be read.
         """
@@ -130,7 +130,7 @@ class Table(Unchanging):
         return self.text_column(column)[require_row(row, self.n_rows)]
 
     def place(self, row: int, column: str | None = None) -> Place:
-        """Where a row stands: its file and line where it has one, else its number."""
+        """Where a row is: its file and line where it has one, else its number."""
         row = require_whole(row, "row")
         file = str(self.path) if self.path else None
         record = int(self.origin[row]) if self.source is not None and row < len(self.origin) else -1
@@ -167,7 +167,7 @@ class Table(Unchanging):
         accepted = "a row, a column and a text for each cell"
         for edit in require_many(edits, "edits", accepted):
             if not isinstance(edit, (tuple, list)) or len(edit) != 3:
-                raise ContextError(Fault("edits hold what is no edit.", accepted))
+                raise ContextError(Fault("edits contain something that is not an edit.", accepted))
             row, name, text = require_whole(edit[0], "row"), edit[1], require_text(edit[2], "text")
             at = self._column_at(name)
             if not 0 <= row < self.n_rows:
@@ -197,9 +197,9 @@ class Table(Unchanging):
         return self._with_columns([c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
 
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
-        """Write the table: atomic, only changed lines differ. Gives the table as it now stands on the disk.
+        """Write the table: atomic, only changed lines differ. Gives the table as it now is on the disk.
 
-        What others wrote into its file since it was read is merged, cell by cell. A file that is gone is made anew.
+        What others wrote into its file since it was read is merged, cell by cell. A file that is gone is made again.
 
         Parameters
         ----------
@@ -241,7 +241,7 @@ class Table(Unchanging):
 
     def flat(self, tables: Mapping[str, Table] | None = None) -> Table:
         """The table with the rows of its inner tables in place of those that stand for them: the rows that a query answers with.
-        The table itself where no row stands for a table. `tables` and what is raised as in `compile`."""
+        The table itself where no row refers to a table. `tables` and what is raised as in `compile`."""
         from contextdb.nesting.links import is_nested
 
         if tables is not None:
@@ -311,7 +311,7 @@ def flat_table(table: Table, tables: Mapping[str, Table] | None) -> Table:
     inner = inner_rows(table)
     if tables is None and inner:
         name, rows = next(iter(inner.items()))
-        found = f"{in_quotes('@' + name)} stands for a table, and no other tables are known."
+        found = f"{in_quotes('@' + name)} refers to a table, but no other tables are given."
         fault = Fault(found, f'compile(tables={{"{name}": ...}}), or a table out of a folder', rule="no-such-table")
         raise TableError(fault.at(table.place(rows[0], table.asset_column)))
     return flatten(table, tables or {})
@@ -325,12 +325,12 @@ def build_table(
     path: Path | None = None,
     source: AnySource | None = None,
 ) -> Table:
-    """A table of texts under a schema; cells that cannot be read are kept and stand in its `faults`.
+    """A table of texts under a schema; cells that cannot be read are kept and are in its `faults`.
 
     Raises
     ------
     TableError
-        A column that the settings name is not there, or two columns have one name.
+        A column that the settings name is missing, or two columns have one name.
     """
     settings = settings or TableSettings(name=name)
     _require_columns(columns, settings, path)
@@ -343,7 +343,7 @@ def build_table(
 
 
 def load(path: str | Path, strict: bool = True) -> Table:
-    """Read one table and the contextdb.toml beside it.
+    """Read one table and the contextdb.toml next to it.
 
     Parameters
     ----------
@@ -373,7 +373,7 @@ def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, pat
     names = [c.name for c in columns]
     place = Place(str(path) if path else None)
     faults = [
-        Fault(f"the column name {in_quotes(n)} stands twice.", "each name once", place=place)
+        Fault(f"the column name {in_quotes(n)} appears twice.", "each name once", place=place)
         for n in sorted({n for n in names if names.count(n) > 1})
     ]
     wanted = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]

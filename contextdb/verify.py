@@ -62,7 +62,7 @@ def verified(path: Path) -> Verdict:
 
 
 def files_under(folder: Path) -> list[Path]:
-    """The files below a folder that contextdb may have written, in order; what stands in hidden folders counts too."""
+    """The files below a folder that contextdb may have written, in order; what is in hidden folders counts too."""
     return sorted(path for path in folder.rglob("*") if path.suffix.lower() in CHECKS and path.is_file())
 
 
@@ -82,7 +82,7 @@ def _safetensors(path: Path) -> Told:
         yield "motion database", None
         open_database(path, verify=True)
     elif CLIP_FEATURES.key in keys:
-        yield "features of a clip", "kept by a build; the next build checks them and computes them again where they are altered"
+        yield "features of a clip", "cached by a build; the next build checks them and computes altered ones again"
     else:
         yield "compiled table", None
         open_artefact(path)
@@ -132,7 +132,7 @@ def _json(path: Path) -> Told:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ArtefactError(Fault(f"the file is no JSON: {error}.", ACCEPTED)) from None
+        raise ArtefactError(Fault(f"the file is not JSON: {error}.", ACCEPTED)) from None
     if not isinstance(document, dict) or not {"format", "tables"} <= document.keys():
         yield "JSON", "a document of another program, or of another command; nothing to compare"
         return

@@ -160,7 +160,7 @@ def test_a_role_whose_facts_are_given_as_plain_facts_is_not_cast():
         ({"Defender": [{}]}, r"Defender\[0\].*missing"),
         ({"Defender": [{"knd": "a"}]}, "Defender.knd"),
         ({"Defender": [actor("z")]}, "not a declared value"),
-        ({"Defender": [{"kind": "a", "Defender.kind": "b"}]}, "told twice"),
+        ({"Defender": [{"kind": "a", "Defender.kind": "b"}]}, "given twice"),
         ({"Defender": [{"kind": "a", 3: 4}]}, "name is of type int"),
         ({"Defender": [actor("a", id=[])]}, "id of .* is of type list"),
         ({"Defender": [actor("a", id=1)], "Receiver": [actor("b", id=1)]}, 'have the id "1", and "kind" differs'),
@@ -185,7 +185,7 @@ def test_without_actors_a_role_s_fact_is_a_plain_fact_and_nobody_is_cast():
     facts = {"is_wet": True, **{f"{r}.kind": "a" for r in ROLES}}
     matches = compiled.query(facts)
     assert len(matches) == 1
-    with pytest.raises(ContextError, match="without actors"):
+    with pytest.raises(ContextError, match="had no actors"):
         matches.casting(0)
 
 
@@ -197,7 +197,7 @@ def test_nobody_is_cast_for_a_row_that_is_not_valid():
 
 @pytest.mark.parametrize(
     ("prefer", "told"),
-    [("distnce", 'no actor tells "distnce".*"distance"'), (3, "is of type int"), ("kind", "cannot be preferred by")],
+    [("distnce", 'no actor has "distnce".*"distance"'), (3, "is of type int"), ("kind", "cannot be preferred by")],
 )
 def test_a_preference_that_cannot_be_meant_is_refused(prefer, told):
     with pytest.raises(ContextError, match=told):

@@ -398,7 +398,7 @@ def test_several_assets_of_a_context_stand_in_one_cell_of_a_csv(here: Path):
     ("out", "message"),
     [
         ("answers.json", "answers.json: answers cannot be written to such a file. Accepted: a name that ends in .csv or .parquet."),
-        ("none/answers.csv", 'none/answers.csv: there is no folder "none". Accepted: a folder that is there.'),
+        ("none/answers.csv", 'none/answers.csv: there is no folder "none". Accepted: an existing folder.'),
         ("data/../data/a.csv", "data/../data/a.csv: the answers would be written over the contexts. Accepted: another file."),
     ],
 )
@@ -464,7 +464,7 @@ def test_the_place_of_a_fault_counts_what_was_read_before(here: Path, monkeypatc
 
 def test_a_scheduler_wants_the_engine_that_has_one(here: Path):
     assert refused("moves", "data/a.csv", "--scheduler", "tcp://x:1") == [
-        "--scheduler is the address of Dask's. Accepted: --engine dask beside it."
+        "--scheduler is the address of Dask's. Accepted: --engine dask with it."
     ]
 
 

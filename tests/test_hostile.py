@@ -211,7 +211,7 @@ def test_any_bytes_are_a_schema_or_refused(here: Path, toml: bytes):
         ),
         ("[conditions.speed]\ntype = 3\n", "contextdb.toml, line 2: [conditions.speed] type = 3: this is a number, not text."),
         ('[conditions.speed]\ntype = "number"\nmni = 0\n', 'contextdb.toml, line 3: [conditions.speed] has no key "mni".'),
-        ('[condition.speed]\ntype = "number"\n', 'contextdb.toml, line 1: "condition" is no section.'),
+        ('[condition.speed]\ntype = "number"\n', 'contextdb.toml, line 1: "condition" is not a section.'),
         (
             '[conditions.speed]\ntype = "number"\nmin = 5\nmax = 1\n',
             "contextdb.toml, line 3: [conditions.speed] min = 5 is above max = 1.",

@@ -146,7 +146,7 @@ def test_a_motion_search_finds_the_clips_of_rows_inside(tmp_path: Path):
 def test_a_flat_table_is_not_saved_over_the_table_that_it_comes_from(tmp_path: Path):
     flat = cdb.load(write(tmp_path) / "tackle.csv").flat()
     assert isinstance(flat, FlatTable)
-    with pytest.raises(cdb.TableError, match="is no file"):
+    with pytest.raises(cdb.TableError, match="is not a file"):
         flat.save()
     assert (tmp_path / "tackle.csv").read_text() == TACKLE
 

@@ -209,7 +209,7 @@ class EditorApp(App[None]):
         self.call_later(self.main.run_command, name)
 
     async def action_quit(self) -> None:
-        """Leave; unsaved edits are asked about."""
+        """Quit; asks about unsaved edits."""
         unsaved = self.workspace.unsaved
         if unsaved:
             self.push_screen(LeavingDialog(unsaved), self._left)

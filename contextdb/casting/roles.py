@@ -42,7 +42,7 @@ class TableRoles:
         """For each column of slots, for each word, the rows that say it."""
 
     def told_to_rules(self, role: str, compiled: CompiledTable) -> list[Condition]:
-        """The conditions of a role that are no columns and that rules need: an actor tells them."""
+        """The conditions of a role that are not columns and that rules need: an actor tells them."""
         own = (name for name in self.needed_by_rules if role_of(name) == role and name not in compiled.places)
         return [compiled.asked[name] for name in own if name in compiled.asked]
 
@@ -52,7 +52,7 @@ class TableRoles:
 
 
 def role_of(name: str) -> str:
-    """The role that a condition belongs to: what stands before its first dot, or nothing."""
+    """The role that a condition belongs to: what is before its first dot, or nothing."""
     role, dot, fact = name.partition(".")
     return role if dot and fact else ""
 

@@ -1,7 +1,7 @@
 """Import a table from another program into a folder of tables: CSV in any dialect, TSV, Excel, Parquet, JSON, DMN, Unreal.
 
-Columns are matched with the conditions that contextdb.toml declares; for others a type is proposed from their cells, and declared
-there with the new table. What was decided, and why, is printed; --dry-run prints it alone.
+Columns are matched with the conditions that contextdb.toml declares. For others the command infers a type from their cells, and
+declares it there with the new table. It prints its decisions and their reasons; --dry-run writes nothing else.
 
   contextdb import moves.xlsx tables/moves.csv --dry-run
   contextdb import moves.xlsx tables/moves.csv --sheet Moves --map Sped=speed --map Notes=
@@ -53,19 +53,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sheet", metavar="NAME", help="a sheet of a workbook, or cells of it (Moves!A1:F20); a decision of a DMN file"
     )
     parser.add_argument(
-        "--map", metavar="COLUMN=NAME", action="append", default=[], help="what a column is called here; COLUMN= leaves it out"
+        "--map", metavar="COLUMN=NAME", action="append", default=[], help="the name of a column in the table; COLUMN= leaves it out"
     )
     parser.add_argument(
         "--type", metavar="NAME=TYPE", action="append", default=[], help="the type of a new condition, or output, priority, …"
     )
-    parser.add_argument("--encoding", help="the encoding of a text file (default: told from its bytes)")
-    between = f"what stands between fields: {', '.join(DELIMITERS)} (default: told from the file)"
+    parser.add_argument("--encoding", help="the encoding of a text file (default: detected)")
+    between = f"the delimiter between fields: {', '.join(DELIMITERS)} (default: detected)"
     parser.add_argument("--delimiter", metavar="NAME", choices=DELIMITERS, help=between)
-    parser.add_argument("--decimal", choices=("comma", "point"), help="what stands in 3,5 (default: told from the cells)")
-    whole = "whether Mid Air is one name (whole) or two (words), in columns that are new (default: whole, but in our own workbooks)"
+    parser.add_argument(
+        "--decimal", choices=("comma", "point"), help="the decimal sign of the file (default: detected from its cells)"
+    )
+    whole = "whether Mid Air is one name (whole) or two (words), in new columns (default: whole, except in our own workbooks)"
     parser.add_argument("--names", choices=NAMES, help=whole)
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
-    parser.add_argument("--force", action="store_true", help="write over a table that is there")
+    parser.add_argument("--force", action="store_true", help="overwrite an existing table")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -105,12 +107,12 @@ def _target(text: str, may_overwrite: bool) -> Path:
         mend = path_in_quotes(target.with_suffix(".csv")) if target.name else ""
         raise FileError(Fault("a table file does not end so.", f"a name that ends in {' or '.join(TABLE_SUFFIXES)}", mend, place))
     if why := why_unportable(target.name):
-        raise FileError(Fault(f"this is no name for a table: {why}.", "a name that every system can have", place=place))
+        raise FileError(Fault(f"this is not a valid table name: {why}.", "a name that every system can have", place=place))
     if not os.path.isdir(target.parent):
         folder = path_in_quotes(target.parent)
         raise FileError(Fault(f"there is no folder {folder}.", "a folder of tables", place=place, rule="no-such-path"))
     if os.path.exists(target) and not may_overwrite:
-        raise FileError(Fault("the file is there already.", "a new name, or --force to write over it", place=place))
+        raise FileError(Fault("the file already exists.", "a new name, or --force to write over it", place=place))
     return target
 
 
@@ -129,7 +131,7 @@ def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> Plan
     schema, settings = project_of(target)
     mapped = propose(reading, schema, settings, _pairs(arguments.map, "--map", "COLUMN=NAME"))
     for name in declared_differently(reading, schema):
-        told = f"the file declares {in_quotes(name)} otherwise than contextdb.toml, which holds."
+        told = f"the file declares {in_quotes(name)} differently from contextdb.toml, which takes precedence."
         print(printable(told), file=sys.stderr)
     return plan_import(reading, target, mapped=_typed(mapped, reading, _pairs(arguments.type, "--type", "NAME=TYPE")))
 

@@ -78,7 +78,7 @@ def _restricted(space: Space) -> set[str]:
 
 
 def _that_matter(unboxed: Sequence[Expression], derivation: Derivation | None, restricted: Iterable[str]) -> tuple[Expression, ...]:
-    """The assumptions that have to do with what rows restrict, if only by way of others; the rest changes no share."""
+    """The assumptions that have to do with what rows restrict, if only through others; the rest changes no share."""
     linked = _with_inputs(restricted, derivation)
     left, found = list(unboxed), set[str]()
     while near := [e for e in left if not linked.isdisjoint(_with_inputs(e.names, derivation))]:

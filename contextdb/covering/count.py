@@ -164,7 +164,7 @@ def _tiny(
 
 
 def is_prepared() -> bool:
-    """Whether the loop was compiled on this machine already, or runs as it stands."""
+    """Whether the loop was compiled on this machine already, or runs as it is."""
     from contextdb.covering.kernels import IS_COMPILED
 
     if not IS_COMPILED:

@@ -89,7 +89,7 @@ def coverage(
     TableError
         The table has cells that cannot be read, or a condition whose domain is empty.
     ContextError, CellError
-        `impossible` or `weights` name what is not there.
+        `impossible` or `weights` name what is missing.
     Cancelled
         `should_stop` said so.
 

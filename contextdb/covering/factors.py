@@ -136,7 +136,10 @@ class TagFactor:
             chances = after
             if len(chances) > MOST_ANSWERS:
                 raise TableError(
-                    Fault(f"{plural(len(tags), 'tag')} that hang together answer in too many ways.", f"{MOST_ANSWERS:,}")
+                    Fault(
+                        f"{plural(len(tags), 'tag')} that depend on each other have too many combinations of answers.",
+                        f"{MOST_ANSWERS:,}",
+                    )
                 )
         answers = tuple(sorted(chances))
         return cls(tuple(tags), answers, np.array([chances[a] for a in answers]))
@@ -244,7 +247,7 @@ def _whole_domain(domain: Domain) -> Span:
     span = (domain.minimum, domain.maximum)
     whole = intervals.whole((span,)) if domain.kind == "int" else (span,)
     if not whole or span[0] > span[1]:
-        raise TableError(Fault(f"no {domain.kind} lies between min {span[0]:g} and max {span[1]:g}.", "a domain that is not empty"))
+        raise TableError(Fault(f"no {domain.kind} is between min {span[0]:g} and max {span[1]:g}.", "a domain that is not empty"))
     return whole[0]
 
 

@@ -116,7 +116,7 @@ class Judge:
             self._asked_of = i
             equal = self._equal[box]
             if self.space.impossible and not self._is_possible(box):
-                yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions rule out.")
+                yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions exclude.")
                 continue
             if equal & ((1 << i) - 1):
                 if self.space.rows[i] not in told:
@@ -150,7 +150,7 @@ class Judge:
                 self._asked_of = i
                 before = self._before(i) & self._meeting(box)
                 if before and self._covered(box, before | self._impossible) and self._is_possible(box):
-                    why = "stands above it" if self.compiled.policy == "first" else "has a higher priority"
+                    why = "is above it" if self.compiled.policy == "first" else "has a higher priority"
                     why = why if ways is None else "comes before it"
                     message = f"the row is never chosen: wherever it is valid, a valid row {why}."
                     yield self._at(
@@ -205,7 +205,7 @@ class Judge:
         return self.drawer is None or self.drawer.may_happen(box, np.random.default_rng(0))
 
     def _covered(self, box: Box, by: int) -> bool:
-        """Whether some boxes hold all of a box; "no" where that cannot be told within the steps."""
+        """Whether some boxes hold all of a box; "no" where that cannot be reported within the steps."""
         allowed = min(self.steps, max(200, self.steps // QUESTIONS))
         if self._questions is not None:
             return self._asked(self._questions, box, by & self._meeting(box), allowed)

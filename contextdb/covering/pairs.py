@@ -170,8 +170,8 @@ def pairs(
 ) -> PairTable:
     """Work out the coverage of pairs of conditions.
 
-    Exact where the contexts that cells tell apart are few enough to go through; else out of random contexts. That no row accepts
-    two parts is certain in either case. Rows' own rules count, and stand in no pair themselves. The arguments, and what is raised,
+    Exact where the contexts that cells distinguish are few enough to go through; else out of random contexts. That no row accepts
+    two parts is certain in either case. Rows' own rules count, and are in no pair themselves. The arguments, and what is raised,
     are those of `coverage`.
     """
     require_counts(samples=samples, seed=seed)

@@ -13,7 +13,7 @@ Stops = Callable[[], bool]
 
 
 PREPARING = "Preparing the count, for the first time on this machine only"
-"""What is told while the loops are compiled."""
+"""What is reported while the loops are compiled."""
 
 
 class Cancelled(ContextDBError):

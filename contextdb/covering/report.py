@@ -1,4 +1,4 @@
-"""What coverage tells of a table: numbers, gaps and findings. Data only; `to_json` is what `coverage --format json` prints."""
+"""What coverage says of a table: numbers, gaps and findings. Data only; `to_json` is what `coverage --format json` prints."""
 
 from __future__ import annotations
 

@@ -256,7 +256,7 @@ def factors_of(accepted: Sequence[Accepted], condition: Condition, parts: Mappin
         sides[side] = sides.get(side, 0.0) + weight
     if sides.get(0, 0.0) > 0.0 or sum(sides.values()) <= 0.0:
         place = Place(column=condition.name)
-        raise ContextError(Fault("the weights lie outside the domain, or are all 0.", "a weight above 0 inside", place=place))
+        raise ContextError(Fault("the weights are outside the domain, or all 0.", "a weight above 0 inside", place=place))
     return [weighted(factor, {s: w for s, w in sides.items() if w > 0.0})]
 
 
@@ -281,11 +281,11 @@ def _read_weights(name: str, parts: Mapping[object, float], conditions: Sequence
     condition = _condition(name, conditions)
     place = Place(column=name)
     if condition.domain.kind == "tags":
-        raise ContextError(Fault("tags take no weights.", "a condition of another type", place=place))
+        raise ContextError(Fault("tags do not accept weights.", "a condition of another type", place=place))
     read: dict[Cell, float] = {}
     for text, weight in require_mapping(parts, f"weights of {in_quotes(name)}", _WEIGHTS).items():
         if not (isinstance(weight, (int, float)) and 0.0 <= weight < float("inf")):
-            raise ContextError(Fault(f"the weight {weight!r} is no share.", "a number from 0 up", place=place))
+            raise ContextError(Fault(f"the weight {weight!r} is not a share.", "a number from 0 up", place=place))
         cell = parse_cell(str(text), condition.domain)
         read[cell] = read.get(cell, 0.0) + float(weight)
     return read

@@ -150,7 +150,7 @@ class BoxSet:
     def points(self, within: Box, steps: Steps) -> Iterator[Point]:
         """Contexts of `within` that are in no box, one after the other, until there is none.
 
-        Before the next one is asked for, a box that holds the last one must be added. The search goes on where it was: what was
+        Before the next one is asked for, a box that holds the last one must be added. The search continues where it was: what was
         searched once is not searched again. Raises OutOfSteps when the steps, which count down, are used up.
         """
         open_boxes = self.all

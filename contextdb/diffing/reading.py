@@ -27,7 +27,7 @@ def table_of(raw: bytes, file: str, schema: Schema = EMPTY, settings: TableSetti
     Raises
     ------
     TableError
-        The bytes are no table.
+        The bytes are not a table.
     """
     source: AnySource
     source, columns = read_parquet(raw, file) if raw.startswith(PARQUET) else read_csv(raw, file)

@@ -1,6 +1,6 @@
 """A table as a DMN 1.3 decision table: conditions are inputs, the asset the first output, other columns further outputs.
 
-What unary tests cannot say is told with its place: a row that can never match or is disabled is left out, a soft cell excludes
+What unary tests cannot say is reported with its place: a row that can never match or is disabled is left out, a soft cell excludes
 nothing, a column of tags becomes an annotation.
 """
 
@@ -67,7 +67,7 @@ def _require_xml(table: Table) -> None:
 
 
 def _plain(table: Table) -> list[str]:
-    """The columns that are no conditions; the enabled one is told by which rows there are."""
+    """The columns that are not conditions; the enabled one is told by which rows there are."""
     conditions = {column.condition.name for column in table.conditions}
     return [c.name for c in table.columns if c.name not in conditions and c.name != table.settings.enabled]
 
@@ -133,14 +133,14 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
         said = "tags become an annotation, which excludes nothing: DMN has no tests of sets."
         yield Remark(said, f"column {in_quotes(column.condition.name)}", True)
     if any(_is_angle(column.condition.domain) for column in table.conditions):
-        yield Remark("angles are told from -180 to 180; give the decision angles within these.")
+        yield Remark("angles are written from -180 to 180; give the decision angles in this range.")
     if table.settings.policy == "priority":
         yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
     if table.settings.when:
         said = "its rules become an output, which excludes nothing: a cell of a decision table looks at one fact."
         yield Remark(said, f"column {in_quotes(table.settings.when)}", True)
     if table.settings.assume:
-        yield Remark("assume is not kept: a decision table has no such thing.", is_loss=True)
+        yield Remark("assume is not kept: a decision table has no equivalent.", is_loss=True)
 
 
 def _is_angle(domain: Domain) -> bool:

@@ -31,7 +31,7 @@ class Format:
 FORMATS: Mapping[str, Format] = {
     one.name: one
     for one in (
-        Format("csv", "CSV; commas, semicolons or tabs are told apart when it is read", (".csv", ".txt")),
+        Format("csv", "CSV; commas, semicolons or tabs are detected on reading", (".csv", ".txt")),
         Format("tsv", "tab-separated text, as on the clipboard", (".tsv", ".tab")),
         Format("xlsx", "an Excel workbook", (".xlsx", ".xlsm", ".xls")),
         Format("parquet", "Parquet", (".parquet", ".pq")),
@@ -75,7 +75,7 @@ def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writin
     Raises
     ------
     FileError
-        There is no such format, or the suffix tells of none.
+        There is no such format, or the suffix gives none.
     """
     known = {key: one for key, one in FORMATS.items() if (one.is_written if for_writing else one.is_read)}
     if wanted is not None:
@@ -95,7 +95,7 @@ def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writin
     said = (
         f"a file that ends in {in_quotes(suffix)} is of no known format."
         if suffix
-        else "the name has no suffix that tells a format."
+        else "the name has no suffix that gives a format."
     )
     raise FileError(Fault(said, f"{', '.join(suffixes)}, or --as with a format", mend, Place(name)))
 
@@ -138,7 +138,7 @@ def sheet_names(raw: bytes, name: str) -> list[str]:
     Raises
     ------
     TableError
-        It is no workbook that can be read.
+        It is not a workbook that can be read.
     """
     from contextdb.exchange.xlsx_read import sheets_of
 
@@ -171,7 +171,7 @@ def _read_parquet(raw: bytes, name: str) -> Reading:
 
 
 def _own_csv(raw: bytes, name: str) -> Reading | None:
-    """A CSV that contextdb reads as it stands, so that it is written as it stands; None for every other."""
+    """A CSV that contextdb reads as it is, so that it is written as it is; None for every other."""
     from contextdb.exchange.conflicts import begins_like_a_mark
     from contextdb.exchange.unreal import is_unreal_header
     from contextdb.source import read_csv

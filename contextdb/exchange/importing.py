@@ -78,7 +78,7 @@ class Plan:
 
     @property
     def new_conditions(self) -> list[str]:
-        """The conditions that contextdb.toml will declare anew."""
+        """The conditions that contextdb.toml will newly declare."""
         return [column.name for column in self.columns if column.is_new and column.job == "condition"]
 
     def write(self) -> None:
@@ -162,7 +162,7 @@ def table_of(
 
 
 def _named_beside(reading: Reading, kept: Sequence[Mapped], schema: Schema) -> dict[str, Condition]:
-    """Conditions that the file declares and that are no columns: facts that its rules name, where those come in."""
+    """Conditions that the file declares and that are not columns: facts that its rules name, where those come in."""
     if not any(column.job == "when" for column in kept):
         return {}
     taken = {*reading.names, *(column.name for column in kept), *schema.conditions}
@@ -192,6 +192,6 @@ def _settings(settings: TableSettings, kept: Sequence[Mapped], reading: Reading)
 
 
 def declared_differently(reading: Reading, schema: Schema) -> list[str]:
-    """Conditions that the file itself declares otherwise than the project, which goes first."""
+    """Conditions that the file itself declares differently from the project, which goes first."""
     ours, theirs = schema.conditions, reading.schema.conditions
     return [name for name in theirs if name in ours and condition_to_dict(ours[name]) != condition_to_dict(theirs[name])]

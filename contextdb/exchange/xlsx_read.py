@@ -166,7 +166,7 @@ def _kept_types(book: calamine.CalamineWorkbook, file: str) -> tuple[Schema | No
 
 
 def _own_block(grid: Sequence[Sequence[str]]) -> Block | None:
-    """All of the sheet, as far as its first row has names; None where somebody put cells beside the table."""
+    """All of the sheet, as far as its first row has names; None where somebody put cells next to the table."""
     if not grid:
         return None
     width = max((at for at, name in enumerate(grid[0], 1) if name), default=0)
@@ -192,7 +192,7 @@ def _fill_merged(grid: list[list[str]], merged: Sequence[tuple[tuple[int, int], 
         block, text = Block(top, left, min(bottom + 1, len(grid)), min(right + 1, len(grid[0]))), grid[top][left]
         n_left -= (block.bottom - block.top) * (block.right - block.left)
         if n_left < 0:
-            fault = Fault("the workbook is broken: merged areas lie over each other.", "a workbook as Excel saves it")
+            fault = Fault("the workbook is broken: merged areas overlap.", "a workbook as Excel saves it")
             raise TableError(fault.at(Place(file)))
         for row in grid[block.top : block.bottom]:
             row[block.left : block.right] = [text] * (block.right - block.left)
@@ -214,9 +214,9 @@ def _date(value: object, row: int, column: int) -> Remark:
 
 
 def _fill_errors(grid: list[list[str]], marks: Marks, is_old: bool) -> Sequence[Remark]:
-    """Write the errors of Excel into their cells, which the reader of workbooks leaves empty, and say where they stand."""
+    """Write the errors of Excel into their cells, which the reader of workbooks leaves empty, and say where they are."""
     if is_old:
-        told = "errors of Excel in an .xls cannot be told from empty cells, which say Any; saved as .xlsx they are named."
+        told = "Excel errors in an .xls file look like empty cells, which mean Any; in an .xlsx file they are reported."
         return [Remark(told, is_loss=True)]
     for row, column, error in marks.errors:
         if row < len(grid) and column < len(grid[row]):

@@ -80,7 +80,9 @@ class FlatTable(Table):
 
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
         """Refuse: a flat table is worked out from others."""
-        raise TableError(Fault("a table with its inner tables' rows is no file.", "the tables that it is made of"))
+        raise TableError(
+            Fault("a table that includes the rows of its inner tables is not a file.", "the tables that it is made of")
+        )
 
 
 def flatten(table: Table, tables: Mapping[str, Table]) -> FlatTable:
@@ -89,7 +91,7 @@ def flatten(table: Table, tables: Mapping[str, Table]) -> FlatTable:
     Raises
     ------
     TableError
-        Inner tables that are not there or cannot be read, cycles, conditions of unlike types, or too many rows; with every fault.
+        Inner tables that are missing or cannot be read, cycles, conditions of unlike types, or too many rows; with every fault.
     """
     last = tables.last if isinstance(tables, Neighbours) and isinstance(tables.last, FlatTable) else None
     expansion = _expansion(require_sound(table, tables), last)
@@ -130,7 +132,7 @@ def flatten(table: Table, tables: Mapping[str, Table]) -> FlatTable:
 
 def _together(fault: Fault) -> Fault:
     """A fault of the rules of a way, each of which can be read alone."""
-    return replace(fault, found=f"the rules of this row and of those that stand for its table, taken together: {fault.found}")
+    return replace(fault, found=f"the rules of this row and of those that refer to its table, combined: {fault.found}")
 
 
 def _expansion(tables: Mapping[str, Table], last: FlatTable | None) -> Expansion:
@@ -180,7 +182,7 @@ def _unlike(expansion: Expansion, first: int, number: int, name: str, one: Condi
     )
     place = Place(here, None, name)
     mend = "" if one.is_declared and other.is_declared else f"to declare it in contextdb.toml: [conditions.{name}]"
-    accepted = "one type in all tables that stand in each other"
+    accepted = "one type in all tables that contain each other"
     return Fault(f"the condition {found} in {there}.", accepted, mend, place, "unlike-conditions")
 
 

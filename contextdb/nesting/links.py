@@ -1,4 +1,4 @@
-"""Which tables the rows of a table stand for, and what is wrong with that: a table that is not there, tables that come back to
+"""Which tables the rows of a table stand for, and what is wrong with that: a table that is missing, tables that come back to
 themselves. Tables are given as a mapping by name, whose reading may fail; nothing here touches the disk."""
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class Neighbours(Mapping[str, "Table"]):
     """The tables that the rows of one table may stand for, by name, and what was worked out with them last.
 
-    The versions of a table that come of edits share it, so that flattening anew costs what changed.
+    The versions of a table that come of edits share it, so that flattening again costs what changed.
     """
 
     def __init__(self, tables: Tables, last: object = None) -> None:
@@ -68,7 +68,7 @@ def inner_tables(tables: Iterable[Table]) -> set[str]:
 
 
 def reached(table: Table, tables: Tables) -> dict[str, Table]:
-    """The table and all that stand in it, by name, each once; the table itself first. Those that cannot be read are left out."""
+    """The table and all that are in it, by name, each once; the table itself first. Those that cannot be read are left out."""
     found = {table.name: table}
     waiting = [table]
     while waiting:
@@ -89,12 +89,12 @@ def nesting_faults(table: Table, tables: Tables, name: str | None = None) -> lis
 
 
 def require_sound(table: Table, tables: Tables) -> dict[str, Table]:
-    """The tables that stand in a table, as `reached`.
+    """The tables that are in a table, as `reached`.
 
     Raises
     ------
     TableError
-        With what is wrong in any of them: files and cells that cannot be read, tables that are not there, cycles.
+        With what is wrong in any of them: files and cells that cannot be read, tables that are missing, cycles.
     """
     found = reached(table, tables)
     faults = dict.fromkeys(_unread(found.values(), tables))
@@ -128,19 +128,19 @@ def _missing(outer: str, name: str, tables: Tables) -> Fault | None:
     near = nearest(name, others)
     known = some(f"{MARK}{other}" for other in others) or "an asset, as there is no other table"
     mend = in_quotes(MARK + near) if near else f'to put an asset of this name in quotes: "{MARK}{name}"' if name else ""
-    found = f"there is no table {in_quotes(name)} to stand here." if name else f'after "{MARK}" the name of a table is missing.'
+    found = f"there is no table {in_quotes(name)}." if name else f'after "{MARK}" the name of a table is missing.'
     return Fault(found, known, mend, rule="no-such-table")
 
 
 def _cycle(outer: str, name: str, tables: Tables) -> Fault | None:
-    """A fault when the table `outer` stands in itself by way of the table `name`; the shortest way is told."""
+    """A fault when the table `outer` is in itself through the table `name`; the shortest way is reported."""
     ways: dict[str, tuple[str, ...]] = {name: (outer, name)}
     waiting = [name]
     while waiting:
         at = waiting.pop(0)
         if at == outer:
             way = " > ".join(ways[at])
-            return Fault(f"the table stands in itself: {way}.", "tables that do not come back to themselves", rule="cyclic-tables")
+            return Fault(f"the table contains itself: {way}.", "tables that do not contain themselves", rule="cyclic-tables")
         inner = _read(at, tables)
         for following in inner_rows(inner) if inner is not None else ():
             if following not in ways:

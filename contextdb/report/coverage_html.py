@@ -1,6 +1,6 @@
 """Coverage as one HTML page that needs no network: every text of a table is escaped, and nothing of it can become markup or script.
 
-What stands in the page is complete without its script, which only sorts tables and opens the squares of the map.
+What is in the page is complete without its script, which only sorts tables and opens the squares of the map.
 """
 
 from __future__ import annotations

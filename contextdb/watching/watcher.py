@@ -1,8 +1,8 @@
-"""Keep the newest good version of a folder of tables at hand while its files change. An edge: this looks at disk and clock.
+"""Keep the newest good version of a folder of tables available while its files change. An edge: this looks at disk and clock.
 
 The files are read when they have rested (`contextdb.watching.rest`), so that half-written ones, rapid saves and editors that delete
 or rename on their way are passed over. A version is swapped in by one assignment: whoever asks in another thread has the old one or
-the new one. A version with a fault is not swapped in; its faults are told once.
+the new one. A version with a fault is not swapped in; its faults are reported once.
 
 Equal stamps (`contextdb.watching.stamps`) are believed when the last change lies `COARSEST_TICK_S` back; until then the bytes are
 read and their digests compared.
@@ -122,7 +122,7 @@ class Watch(ByName[CompiledTable]):
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """Why what is on the disk is not the version at hand; empty when nothing is wrong with it."""
+        """Why what is on the disk is not the version available; empty when nothing is wrong with it."""
         return self._told
 
     def poll(self) -> bool:
@@ -148,7 +148,7 @@ class Watch(ByName[CompiledTable]):
         self._thread.start()
 
     def close(self) -> None:
-        """Stop looking. The last version stays at hand."""
+        """Stop looking. The last version stays available."""
         self._is_closed.set()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()

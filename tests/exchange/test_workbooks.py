@@ -216,7 +216,7 @@ def test_merged_cells_hold_their_value_everywhere_and_are_told():
 def test_a_title_above_the_table_is_left_out_and_told():
     reading = read_book(book(moves=[["Moves of 2026"], [], ["Asset", "speed"], ["jog", 1], [], ["run", 2]]))
     assert texts(reading) == {"Asset": ["jog", "run"], "speed": ["1", "2"]}
-    assert 'cells A1: left out, as it is no table: "Moves of 2026".' in told(reading)
+    assert 'cells A1: left out because it is not a table: "Moves of 2026".' in told(reading)
     assert "sheet row 5: 1 blank sheet row left out." in told(reading)
 
 
@@ -286,7 +286,7 @@ def test_a_sheet_of_types_that_somebody_broke_is_told_and_the_table_is_read_all_
     assert 'sheet "contextdb": the types it keeps cannot be used' in told(reading)
 
 
-# ---- what is no workbook
+# ---- what is not a workbook
 
 
 def test_a_locked_workbook_is_told_as_locked():

@@ -270,8 +270,8 @@ def test_an_altered_index_is_found_without_being_asked_for(walking, saved):
             if name in large:
                 assert len(open_database(saved).assets) == len(walking.assets)
             else:
-                assert refusal(saved) == "the file was altered: its contents do not give its digest."
-            assert refusal(saved, verify=True) == "the file was altered: its contents do not give its digest."
+                assert refusal(saved) == "the file was altered: its contents do not match its digest."
+            assert refusal(saved, verify=True) == "the file was altered: its contents do not match its digest."
 
 
 def test_a_file_cut_off_anywhere_is_refused(saved):

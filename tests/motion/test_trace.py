@@ -290,11 +290,11 @@ def test_files_that_are_no_session_are_refused_with_the_reason(tmp_path: Path):
     foreign = io.BytesIO()
     pl.DataFrame({"tick": [0]}).write_parquet(foreign)
     assert refused(b"", tmp_path) == "the file is empty."
-    assert refused(b"tick,time_s\n0,0\n", tmp_path) == "this is no Parquet file."
+    assert refused(b"tick,time_s\n0,0\n", tmp_path) == "this is not a Parquet file."
     assert refused(b"PAR1", tmp_path).startswith("the file is cut off")
     assert refused(raw[:-1], tmp_path).startswith("the file is cut off")
     assert refused(raw[: len(raw) // 2], tmp_path).startswith("the file is cut off")
-    assert refused(foreign.getvalue(), tmp_path) == "this Parquet file is no recorded session."
+    assert refused(foreign.getvalue(), tmp_path) == "this Parquet file is not a recorded session."
 
 
 def altered(change, **metadata):

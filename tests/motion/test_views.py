@@ -178,7 +178,7 @@ def test_the_view_of_events_tells_the_markup_of_each_frame():
 def test_a_name_leaves_candidates_with_their_ranks_and_says_when_there_are_none():
     rows = tables(View.SUMMARY, name="WALK").splitlines()
     assert [row.split()[:2] for row in rows] == [["rank", "asset"], ["3", "walk"], ["5", "walk_tired"]]
-    assert 'none whose name holds "swim"' in list(decision_lines(JUMP, name="swim"))
+    assert 'none whose name contains "swim"' in list(decision_lines(JUMP, name="swim"))
 
 
 def test_of_a_decision_without_a_search_only_the_status_is_told():

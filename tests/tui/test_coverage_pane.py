@@ -329,7 +329,7 @@ def test_a_gap_over_a_condition_that_is_gone_is_not_filled():
 
     app, _ = shown(play)
     assert [(type(m), m.level) for m in app.told] == [(Told, "warning")]
-    assert '"speed" is no condition any more' in app.told[0].text
+    assert '"speed" is not a condition any more' in app.told[0].text
 
 
 def test_a_table_with_unreadable_cells_says_why_it_cannot_be_measured(tmp_path):

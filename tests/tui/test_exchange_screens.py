@@ -425,7 +425,7 @@ def test_an_export_asks_before_it_writes_over_a_file(table: Table, keys: tuple[s
         ("x.xslx", "✗ a file that ends in"),
         (".", "✗ This is a folder; a file is wanted."),
         ("../moves.csv", "✗ This is the open table itself; Ctrl+S saves it."),
-        ("x\0.csv", "✗ This is no path of a file."),
+        ("x\0.csv", "✗ This is not the path of a file."),
     ],
 )
 def test_a_path_that_cannot_be_exported_to_stays_with_its_reason(table: Table, path: str, said: str):

@@ -166,7 +166,7 @@ def test_a_table_that_cannot_be_read_is_refused_and_the_one_that_is_seen_stays(p
 
     name, text = with_editor(path, script)
     assert name == "t"
-    assert "stands twice" in text
+    assert "appears twice" in text
 
 
 def test_going_to_a_row_takes_its_number_or_the_beginning_of_its_name(path):

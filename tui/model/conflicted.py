@@ -16,7 +16,7 @@ from contextdb.project import schema_for, settings_of
 
 
 def conflicts_in(path: str | Path) -> Merge | None:
-    """The merge that a file's marks stand for, to be decided; None where it has none, or no table stands between them."""
+    """The merge that a file's marks stand for, to be decided; None where it has none, or no table is between them."""
     try:
         versions = versions_of(read_bytes(path))
         if versions is None:

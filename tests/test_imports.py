@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "tomlkit", "python_calamine", "openpyxl"}
+HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "tomlkit", "python_calamine", "xlsxwriter"}
 
 
 def modules_after(statement: str) -> set[str]:

@@ -128,7 +128,7 @@ class Answers(Sequence[Answer]):
 
 @dataclass(frozen=True, eq=False)
 class ManyMatches(Unchanging, Answers[Matches]):
-    """The valid rows of many contexts: a sequence of `Matches`. What is asked for is worked out then, and kept; arrays are
+    """The valid rows of many contexts: a sequence of `Matches`. Results are computed on first use and kept; arrays are
     read-only."""
 
     compiled: CompiledTable
@@ -142,7 +142,7 @@ class ManyMatches(Unchanging, Answers[Matches]):
 
     @property
     def mirrored(self) -> ManyMatches:
-        """The valid rows of the same contexts as a mirror shows them; see `Matches.mirrored`. The same object where no fact of the
+        """The valid rows of the same contexts with mirrored facts; see `Matches.mirrored`. The same object where no fact of the
         table changes in a mirror."""
         return self._mirrored if self.compiled.mirroring else self
 

@@ -239,7 +239,7 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
         return []
     try:
         table, compiled = table.flat(), table.compile()
-    except TableError:  # a table inside it cannot be used: said of the row that stands for it
+    except TableError:  # a table inside it cannot be used: said of the row that refers to it
         return []
     found = list(_doubtful(table, cases, file))
     known = _asked(table)

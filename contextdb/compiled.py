@@ -67,7 +67,7 @@ SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 class CompiledTable(Unchanging):
     """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`.
 
-    It can be pickled at any time. What was pickled answers the same; only which assets were picked last (`pick`) is not pickled.
+    It can be pickled at any time. The copy gives the same answers; only the memory of `pick` is not pickled.
     """
 
     name: str
@@ -127,7 +127,7 @@ class CompiledTable(Unchanging):
 
     @property
     def n_rows(self) -> int:
-        """How many rows the table has."""
+        """The number of rows."""
         return len(self.assets)
 
     @property
@@ -163,15 +163,15 @@ class CompiledTable(Unchanging):
         return bitmask.to_int(self.enabled)
 
     def query(self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None) -> Matches:
-        """Find the rows whose every cell accepts its fact, and whose roles can be filled.
+        """Find the rows whose cells all accept their facts, and whose roles can be filled.
 
         Parameters
         ----------
         context : mapping of str to fact
-            A value for each condition of `asked`; a set of values as `cdb.cell("0 ± 90")`. Facts that the table does not ask for
-            are passed over.
+            A value for each condition of `asked`; a set of values as `cdb.cell("0 ± 90")`. Facts that the table does not use
+            are ignored.
         unknown : {"error", "any", "never"}
-            What a missing fact (absent, None or NaN) does: raises; its condition is ignored; only cells that are Any accept it.
+            How to treat a missing fact (absent, None or NaN): raise; ignore its condition; let only cells that are Any accept it.
         actors : mapping of str to sequence of mapping, optional
             Who may play each role: `{"Defender": [{"id": 7, "DepthChart": "CB"}]}`. `m.casting(row)` then says who plays what.
             An actor offered for several roles, as one object or with an equal "id", plays one. A role whose facts are in the
@@ -224,7 +224,7 @@ class CompiledTable(Unchanging):
         Parameters
         ----------
         contexts : polars DataFrame, or mapping of str to list or array
-            One column for each condition, equally long; others are passed over.
+            One column for each condition, equally long; others are ignored.
         actors : mapping, or sequence of one mapping for each context, optional
             Who may play each role, as in `query`; one mapping is for all contexts. `many[i]` is then the answer of context i.
 
@@ -249,14 +249,14 @@ class CompiledTable(Unchanging):
         return live
 
     def prepare(self, casting: bool = False, batches: bool = False) -> None:
-        """Do now, while the game loads, what is otherwise done when the table is first asked; answers stay the same.
+        """Do the work of the first queries now, while the game loads; answers stay the same.
 
         Parameters
         ----------
         casting : bool
-            Also what the first question with actors does.
+            Also the work of the first query with actors.
         batches : bool
-            Also what the first batches do, small and large: numba is loaded, where it is installed, and the kernels are compiled or
+            Also the work of the first batches: numba is loaded, where it is installed, and the kernels are compiled or
             read from its cache, which takes about a second.
         """
         from contextdb.preparing import prepare
@@ -290,7 +290,7 @@ class CompiledTable(Unchanging):
         self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
     ) -> Explanation:
         """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
-        which role cannot be filled, and whose fact is in the way."""
+        which role cannot be filled, and whose fact fails."""
         if actors is not None:
             from contextdb.casting.explaining import explain_with_actors
 
@@ -467,14 +467,14 @@ class CompiledTable(Unchanging):
         return sum(nbytes(m) for m in self.masks)
 
     def save(self, path: str | Path) -> None:
-        """Write the artefact for the game: .safetensors, atomic."""
+        """Write the compiled file for the game, a .safetensors file, atomically."""
         from contextdb.artefact import save
 
         save(self, require_path(path))
 
     @classmethod
     def open(cls, path: str | Path) -> CompiledTable:
-        """Open an artefact by memory map. A truncated, altered or foreign file is refused with ArtefactError."""
+        """Open a compiled file by memory map. A truncated, altered or foreign file is refused with ArtefactError."""
         from contextdb.artefact import open_artefact
 
         return open_artefact(require_path(path))
@@ -493,7 +493,7 @@ class CompiledTable(Unchanging):
 
     @property
     def version(self) -> str:
-        """A digest of what the table says: the same for two that say the same, wherever they were compiled."""
+        """A digest of the table's contents: the same for two tables with the same contents, wherever they were compiled."""
         return self.answering.version
 
     @cached_property

@@ -49,7 +49,7 @@ ONE_BOUND = 1e-12
 class Failure:
     """One cell that does not accept its fact, or a rule that does not hold.
 
-    Of a rule `condition` is the column of rules, `fact` tells the facts that it names, and the mend is to have none.
+    For a rule, `condition` is the column of rules, `fact` gives the facts that it names, and `mend` is to have no rule.
     """
 
     condition: str
@@ -108,7 +108,7 @@ class Explanation:
         return self.row(int(self.order[require_place(place, len(self), "place")]))
 
     def row(self, row: int) -> RowExplanation:
-        """Why this row is valid or not; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        """Why this row is valid or not; raises NoSuchPlace, also an IndexError, for a row that the table does not have."""
         row = require_row(row, len(self))
         at = np.flatnonzero(self._fails[:, row]).tolist()
         failures = [failure for i in at for failure in self._failures(i, row)]
@@ -117,7 +117,7 @@ class Explanation:
         return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
 
     def asset(self, asset: str) -> list[RowExplanation]:
-        """Why the rows of this asset, told with its path or without, are valid or not; ContextError names the nearest asset when no
+        """Why the rows of this asset, with or without its path, are valid or not; ContextError names the nearest asset when no
         row has it."""
         require_text(asset, "asset")
         names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
@@ -130,7 +130,7 @@ class Explanation:
         return found
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
-        """The rows that are not valid but nearest to it: fewest failing cells, then least far off."""
+        """The nearest rows that are not valid: those with the fewest failing cells first, then the smallest distance."""
         most = require_whole(most, "most")
         rows = np.flatnonzero(self.n_failures)
         if most <= 0:

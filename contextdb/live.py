@@ -38,10 +38,10 @@ CAST = ""
 
 
 class LiveContext(MutableMapping[str, object]):
-    """Facts kept between questions. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` asks.
+    """Facts kept between queries. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` answers.
 
-    A mapping of the facts that are set; a name that is not among them raises NoSuchFact, which is a KeyError too. `copy()` gives a
-    context that goes its own way. Two are equal when they are one.
+    A mapping of the facts that are set; a name that is not among them raises NoSuchFact, which is also a KeyError. `copy()` gives a
+    context of its own. A live context is equal only to itself.
     """
 
     __slots__ = (
@@ -138,13 +138,13 @@ class LiveContext(MutableMapping[str, object]):
         return self._facts[name]
 
     def update(self, facts: Mapping[str, object] | Iterable[tuple[str, object]]) -> None:  # type: ignore[override]
-        """Set several facts; those that no condition of the table asks for are passed over, as in `query`.
+        """Set several facts; facts that the table does not use are ignored, as in `query`.
 
         Raises
         ------
         ContextError
-            A name is very likely that of a condition misspelt, whose fact is not given next to it: then none is set. Names that the
-            project declares are of other tables, and no slips. Or a value is wrong, which names the fact.
+            A name looks like the misspelt name of a condition whose fact is not given: then none is set. Names that the
+            project declares belong to other tables and are not misspelt. Or a value is wrong; the message names the fact.
         """
         if type(facts) is not dict:
             facts = as_context(facts)
@@ -173,7 +173,7 @@ class LiveContext(MutableMapping[str, object]):
                 raise NoSuchFact(Fault(found, NAMES, in_quotes(near), rule="unknown-fact"))
 
     def copy(self) -> Self:
-        """A context of its own with the same facts and actors, which shares the compiled table. The actors' mappings are shared."""
+        """An independent context with the same facts and actors, which shares the compiled table and the actors' mappings."""
         new: Self = object.__new__(type(self))
         for name, value in self._state().items():
             setattr(new, name, copy(value) if type(value) in (dict, set) and name not in _SHARED else value)
@@ -201,9 +201,9 @@ class LiveContext(MutableMapping[str, object]):
         return _live_again, (self._compiled, self._unknown, self.facts, cast)
 
     def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
-        """Offer actors for roles from now on, as `query` takes them; None takes them back. They are read when next asked.
+        """Offer actors for roles from now on, as `query` accepts them; None withdraws them. They are read at the next query.
 
-        The mappings are kept, not copied: what the game changes in them counts in the next question. While they say the same, they
+        The mappings are kept, not copied: what the game changes in them counts in the next query. While they do not change, they
         are not read again.
         """
         self._cast = None

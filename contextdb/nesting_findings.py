@@ -19,7 +19,7 @@ from contextdb.table import Table
 
 
 def check_nesting(table: Table) -> Iterator[Finding]:
-    """What is wrong with the rows of a readable table that stand for others; nothing where no others are known."""
+    """What is wrong with the rows of a readable table that refer to others; nothing where no others are known."""
     if not is_nested(table) or table.around is None or table.faults:
         return
     unusable = list(_unusable(table))

@@ -98,13 +98,13 @@ class Project(Unchanging, ByName[Table]):
         return len(self.tables)
 
     def with_table(self, table: Table) -> Project:
-        """The project with one table in another version, for those too whose rows stand for it."""
+        """The project with one table in another version, for those too whose rows refer to it."""
         require_kind(table, Table, "table", "a Table")
         return replace(self, tables=around_each_other({**self.tables, table.name: table}))
 
     @property
     def inner(self) -> set[str]:
-        """The names of the tables that rows of other tables stand for."""
+        """The names of the tables that rows of other tables refer to."""
         return inner_tables(self.tables.values()) & set(self.tables)
 
     def require_sound(self) -> None:
@@ -135,7 +135,7 @@ def load_table(path: Path, strict: bool = True) -> Table:
 
 
 def neighbours(path: Path) -> Neighbours:
-    """The tables that the rows of a table file may stand for: those of its folder, each read when it is first asked for."""
+    """The tables that the rows of a table file may refer to: those of its folder, each read when it is first asked for."""
     return Neighbours(_Folder(*schema_for(path)))
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Table(Unchanging):
-    """Assets against conditions. Get one from `cdb.load`, `Table.from_columns` or a `Project`."""
+    """Assets and their conditions. Get one from `cdb.load`, `Table.from_columns` or a `Project`."""
 
     name: str
     settings: TableSettings
@@ -64,11 +64,11 @@ class Table(Unchanging):
         columns : mapping of str to sequence of str
             The cells of each column, equally many; the first column names the assets unless `settings.asset` says otherwise.
         schema : mapping, optional
-            What `[conditions.NAME]` of contextdb.toml would hold: `{"speed": {"type": "number"}}`. Others are inferred.
+            The contents of `[conditions.NAME]` in contextdb.toml: `{"speed": {"type": "number"}}`. Others are inferred.
         settings : contextdb.schema.TableSettings, optional
-            What `[tables.NAME]` of contextdb.toml would hold.
+            The contents of `[tables.NAME]` in contextdb.toml.
         name : str, optional
-            The name of the table. Default: that of the settings, "table" without.
+            The name of the table. Default: that of the settings, or "table".
 
         Raises
         ------
@@ -97,7 +97,7 @@ class Table(Unchanging):
 
     @property
     def n_rows(self) -> int:
-        """How many rows the table has."""
+        """The number of rows."""
         return self.columns[0].n_rows if self.columns else 0
 
     def __len__(self) -> int:
@@ -126,7 +126,7 @@ class Table(Unchanging):
         raise TableError(_no_such("condition", name, [c.condition.name for c in self.conditions]))
 
     def text(self, row: int, column: str) -> str:
-        """The text of one cell; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        """The text of one cell; raises NoSuchPlace, also an IndexError, for a row that the table does not have."""
         return self.text_column(column)[require_row(row, self.n_rows)]
 
     def place(self, row: int, column: str | None = None) -> Place:
@@ -197,21 +197,21 @@ class Table(Unchanging):
         return self._with_columns([c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
 
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
-        """Write the table: atomic, only changed lines differ. Gives the table as it now is on the disk.
+        """Write the table atomically; only edited lines change. Returns the table as it is on disk.
 
-        What others wrote into its file since it was read is merged, cell by cell. A file that is gone is made again.
+        Changes that others wrote to its file since it was read are merged, cell by cell. A deleted file is created again.
 
         Parameters
         ----------
         path : str or Path, optional
-            Another file, which is written over whatever it holds. Default: the file that the table was read from.
+            Another file, which is overwritten. Default: the file that the table was read from.
         overwrite : bool
-            Write over what others wrote into its own file, too.
+            Also overwrite what others wrote to the table's own file.
 
         Raises
         ------
         FileError
-            The disk refuses, or others changed the same cells otherwise (rule "merge-conflict", which names them). The old file is
+            The disk refuses, or others changed the same cells differently (rule "merge-conflict", with the cells). The old file is
             then whole.
         """
         from contextdb.saving import save_table
@@ -227,7 +227,7 @@ class Table(Unchanging):
         Parameters
         ----------
         tables : mapping of str to Table, optional
-            The tables that rows `@name` stand for. Default: those of the table's folder.
+            The tables that rows `@name` refer to. Default: those of the table's folder.
 
         Raises
         ------
@@ -240,7 +240,7 @@ class Table(Unchanging):
         return CompiledTable.of(self.flat(tables))
 
     def flat(self, tables: Mapping[str, Table] | None = None) -> Table:
-        """The table with the rows of its inner tables in place of those that stand for them: the rows that a query answers with.
+        """The table with the rows of its inner tables in place of those that refer to them: the rows that a query answers with.
         The table itself where no row refers to a table. `tables` and what is raised as in `compile`."""
         from contextdb.nesting.links import is_nested
 
@@ -355,7 +355,7 @@ def load(path: str | Path, strict: bool = True) -> Table:
     Raises
     ------
     FileError, SchemaError, TableError
-        Each with every fault it found, its place, what is accepted and the nearest mend.
+        Each with every fault, its place, what is accepted and the nearest correction.
     """
     from contextdb.project import load_table
 

@@ -141,7 +141,7 @@ class EditorApp(App[None]):
         self._show_table(name, session)
 
     def go_into(self, name: str, outer: str, facts: Mapping[str, str]) -> None:
-        """Show the table that a row of another stands for, at its first row that is valid for these facts."""
+        """Show the table that a row of another refers to, at its first row that is valid for these facts."""
         try:
             sheet = self.workspace.session(name).sheet
         except ContextDBError as error:

@@ -56,12 +56,12 @@ def coverage(
     progress: Tell | None = None,
     should_stop: Stops | None = None,
 ) -> CoverageReport:
-    """Work out which contexts have a valid row.
+    """Compute which contexts have a valid row.
 
     Parameters
     ----------
     table : Table or CompiledTable
-        Findings of a Table carry lines, and tell rows that are written alike; a CompiledTable has no assumptions.
+        Findings of a Table have lines, and include rows that are written alike; a CompiledTable has no assumptions.
     seed : int
         Where samples start; the same input and seed give the same report.
     work : int
@@ -69,14 +69,14 @@ def coverage(
     samples : int
         Random contexts, for the estimate where the count is not finished and for overlap. 0: none.
     max_gaps : int
-        The report names at most so many gaps, the largest.
+        The report names at most this many gaps, the largest.
     impossible : sequence of mapping of str to Cell or cell text
-        Contexts that cannot happen, as boxes, besides those that the table's own `assume` rules out: they belong to no share.
+        Contexts that cannot occur, as boxes, besides those that the table's own `assume` excludes: no share counts them.
     weights : mapping of str to mapping of value or cell text to float, optional
-        For some conditions how often their values come up, in any unit; a cell's weight is spread over it. Default: all values
+        For some conditions, how often their values occur, in any unit; a cell's weight is spread over it. Default: all values
         alike, numbers by length.
     assume : bool
-        False leaves aside what contextdb.toml says of contexts: `assume` of the table, and that derived facts are computed.
+        False ignores what contextdb.toml says about contexts: the `assume` of the table, and how derived facts are computed.
     progress : callable of (str, float), optional
         Is told what is being worked out and which share of the whole is done; the report is the same without it.
     should_stop : callable that gives bool, optional

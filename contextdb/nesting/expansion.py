@@ -1,6 +1,6 @@
-"""The rows of a table with the rows of its inner tables in place of those that stand for them.
+"""The rows of a table with the rows of its inner tables in place of those that refer to them.
 
-D = depth, n = rows of the flat table. A flat row is a way through the tables: a row of the outer one, and where that stands for a
+D = depth, n = rows of the flat table. A flat row is a way through the tables: a row of the outer one, and where that refers to a
 table, a row of that one, and so on. The order is that of the files: inner rows stand where the outer row is.
 """
 

@@ -1,4 +1,4 @@
-"""A table with the rows of its inner tables in place of those that stand for them: the table that is compiled and measured.
+"""A table with the rows of its inner tables in place of those that refer to them: the table that is compiled and measured.
 
 Cells of one condition in the tables of a way must all hold; a row is enabled when every row of its way is. Columns of slots and
 rules add up, of other outputs the innermost text counts. Nothing here touches the disk.

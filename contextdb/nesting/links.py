@@ -1,4 +1,4 @@
-"""Which tables the rows of a table stand for, and what is wrong with that: a table that is missing, tables that come back to
+"""Which tables the rows of a table refer to, and what is wrong with that: a table that is missing, tables that come back to
 themselves. Tables are given as a mapping by name, whose reading may fail; nothing here touches the disk."""
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Neighbours(Mapping[str, "Table"]):
-    """The tables that the rows of one table may stand for, by name, and what was worked out with them last.
+    """The tables that the rows of one table may refer to, by name, and what was worked out with them last.
 
     The versions of a table that come of edits share it, so that flattening again costs what changed.
     """
@@ -51,7 +51,7 @@ def is_nested(table: Table) -> bool:
 
 
 def inner_rows(table: Table) -> dict[str, list[int]]:
-    """The tables that rows stand for, by name, with those rows."""
+    """The tables that rows refer to, by name, with those rows."""
     if not table.columns:
         return {}
     column = table.text_column(table.asset_column)
@@ -63,7 +63,7 @@ def inner_rows(table: Table) -> dict[str, list[int]]:
 
 
 def inner_tables(tables: Iterable[Table]) -> set[str]:
-    """The names of the tables that rows of some tables stand for."""
+    """The names of the tables that rows of some tables refer to."""
     return {name for table in tables for name in inner_rows(table)}
 
 
@@ -80,7 +80,7 @@ def reached(table: Table, tables: Tables) -> dict[str, Table]:
 
 
 def nesting_faults(table: Table, tables: Tables, name: str | None = None) -> list[Fault]:
-    """What is wrong with the rows of one table, known as `name`, that stand for others, in the order of its rows."""
+    """What is wrong with the rows of one table, known as `name`, that refer to others, in the order of its rows."""
     found: list[tuple[int, Fault]] = []
     for inner, rows in inner_rows(table).items():
         if fault := _missing(name or table.name, inner, tables) or _cycle(name or table.name, inner, tables):

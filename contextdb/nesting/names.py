@@ -15,7 +15,7 @@ _QUOTED = re.compile(r'"(@(?:[^"]|"")*)"')
 
 
 def inner_name(text: str) -> str | None:
-    """The name of the table that an asset cell stands for; None for an asset."""
+    """The name of the table that an asset cell refers to; None for an asset."""
     bare = text.strip()
     return bare[len(MARK) :].strip() if bare.startswith(MARK) else None
 

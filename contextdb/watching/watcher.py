@@ -54,13 +54,13 @@ def watch(
     on_change : callable, optional
         Called with the new `Snapshot` after each swap.
     on_error : callable, optional
-        Called with a ContextDBError that holds the new faults, each once, when what is on the disk cannot be used; the last good
+        Called with a ContextDBError that holds the new faults, each once, when the files on disk cannot be used; the last good
         version stays. Default: they are logged, to the logger "contextdb".
     poll_s : float or None, optional
         Seconds between two looks at the files, in a thread of the watch, which also makes the calls. None: no thread; call `poll`.
     settle_s : float, optional
-        Seconds for which the files must have rested before they are read. A change is thus swapped in at most `poll_s + settle_s`,
-        and the time that reading takes, after the last write. Where files are replaced without rest, a version is taken about
+        Seconds without a change before the files are read. A change is thus swapped in at most `poll_s + settle_s`,
+        and the time that reading takes, after the last write. Where files are replaced without a pause, a version is taken about
         every second.
     clock : callable, optional
         Seconds from any start, never backwards.
@@ -68,7 +68,7 @@ def watch(
     Raises
     ------
     ContextDBError
-        The files cannot be used as they are now, with every fault: there is no good version to begin with.
+        The files cannot be used as they are now, with every fault: there is no good version to start from.
     """
     require_callable(on_change, "on_change")
     require_callable(on_error, "on_error")

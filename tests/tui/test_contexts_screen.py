@@ -194,7 +194,7 @@ def test_an_expectation_that_cannot_be_read_is_not_saved(table: Table, tmp_path:
 def test_a_test_row_with_a_fact_that_cannot_be_read_is_saved_only_to_be_looked_at(table: Table, tmp_path: Path):
     app = Stage(table, {"speed": "quick"})
     text = pressed(app, "f6", *"bad")
-    assert "What is valid now cannot be told" in text
+    assert "The valid assets cannot be determined" in text
     pressed(Stage(table, {"speed": "quick"}), "f6", *"bad", "enter")
     assert read_cases(tmp_path / "t.cases.csv")[-1].expected == ""
 

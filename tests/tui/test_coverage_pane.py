@@ -269,7 +269,7 @@ def test_while_contexts_are_counted_no_list_says_that_there_is_nothing(section):
     shown(play, of=large, run=run)
     assert "Not counted yet: R counts." in seen[0]
     assert "  Counting …" in seen[1]
-    assert not any(word in text for text in seen for word in ("No gap", "Nowhere", "No row is said"))
+    assert not any(word in text for text in seen for word in ("No gap", "Nowhere", "No row was found"))
 
 
 def test_after_an_edit_a_large_report_is_called_stale_and_r_renews_it():
@@ -285,7 +285,7 @@ def test_after_an_edit_a_large_report_is_called_stale_and_r_renews_it():
         pilot.app.sheet.type_text("Any")
         pilot.app.pane.show()
         await pilot.pause()
-        assert "The table has changed since. R works it out anew." in screen_text(pilot.app)
+        assert "The table has changed since. R measures it again." in screen_text(pilot.app)
         await pilot.press("r")
         await settled(pilot)
 

@@ -195,7 +195,7 @@ def test_why_needs_a_test_row_that_asks(path):
         await press(pilot, "f12")
         return said(app)
 
-    assert with_editor(path, script).startswith("The test row asks for nothing yet")
+    assert with_editor(path, script).startswith("The test row is empty")
 
 
 @pytest.mark.parametrize("size", [(20, 8), (40, 12), (80, 24), (160, 48)])

@@ -101,7 +101,7 @@ def test_escape_leaves_without_an_answer():
 
 
 def test_a_test_row_that_asks_for_nothing_and_a_fact_that_cannot_be_read_are_told():
-    assert "asks for nothing" in pressed(Stage(0))
+    assert "The test row is empty" in pressed(Stage(0))
     assert "The fact speed cannot be read" in pressed(Stage(0, speed="quick", gait="Run"))
 
 

@@ -162,7 +162,7 @@ def test_a_fact_of_the_test_row_that_cannot_be_read_is_a_problem_too(table):
 def test_a_sound_table_has_nothing_to_show():
     sound = cdb.Table.from_columns({"Asset": ["A"], "up": ["True"]}, {"up": {"type": "bool"}})
     app, screen = shown(sound, "enter", "down", "end", "4")
-    assert "Nothing is wrong with this table" in screen
+    assert "found nothing wrong with this table" in screen
     assert app.told == []
 
 

@@ -77,7 +77,7 @@ class Asked:
         if not self._inner:
             return bits_of_rows(rows, self._table.n_rows)
         found = bitmask.to_int(bitmask.pack(np.bincount(self.own[rows], minlength=self._table.n_rows) > 0))
-        if self.fault is not None:  # the flat table could not be made: rows that stand for others have no answer
+        if self.fault is not None:  # the flat table could not be made: rows that refer to others have no answer
             found &= ~sum(1 << row for row in self._inner)
         return found
 

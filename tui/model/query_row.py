@@ -143,7 +143,7 @@ class QueryRow:
 
     @property
     def _asks_inside(self) -> bool:
-        """Whether tables that rows stand for are asked, each by itself, for facts that this one has no condition for."""
+        """Whether tables that rows refer to are asked, each by itself, for facts that this one has no condition for."""
         is_alone = self.is_nested and self._flat is None
         return is_alone and any(text.strip() for name, text in self.texts.items() if name not in self.wanted.given)
 
@@ -156,7 +156,7 @@ class QueryRow:
 
     @property
     def behind(self) -> Behind | None:
-        """The tables that rows stand for, each asked by itself; None where there are none, or the compiled table is asked."""
+        """The tables that rows refer to, each asked by itself; None where there are none, or the compiled table is asked."""
         if self._behind is None and self.is_nested and self.asked is None:
             self._behind = Behind(self._table, self._ask)
         return self._behind

@@ -173,7 +173,7 @@ class Session:
         self._show()
 
     def know(self, around: Mapping[str, Table]) -> None:
-        """Know of other versions of the tables that rows stand for."""
+        """Know of other versions of the tables that rows refer to."""
         self._history.renewed(lambda table: replace(table, around=around))
         self._show()
 

@@ -144,7 +144,7 @@ def _rule(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:
 
 
 def _behind(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:
-    """The table that the row stands for."""
+    """The table that the row refers to."""
     if (inside := query.inside(row)) is not None:
         is_wrong = inside.fault is not None or inside.n_valid == 0
         state: State = "fails" if is_wrong else "not given" if inside.n_valid is None else "holds"

@@ -67,7 +67,7 @@ class Workspace:
         return self.sessions[name]
 
     def know_others(self, name: str) -> None:
-        """Let a table whose rows stand for others know of those as they are being edited."""
+        """Let a table whose rows refer to others know of those as they are being edited."""
         session = self.sessions[name]
         table = session.sheet.table
         if table.around is None or not session.sheet.query.is_nested:

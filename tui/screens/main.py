@@ -240,7 +240,7 @@ class MainScreen(Screen[None]):
 
     @on(Grid.OpenWanted)
     def _open_row(self, event: Grid.OpenWanted) -> None:
-        """Go into the table that a row stands for, with the facts of the test row."""
+        """Go into the table that a row refers to, with the facts of the test row."""
         query = self.session.sheet.query
         inside = query.inside(event.row)
         if inside is None:
@@ -251,7 +251,7 @@ class MainScreen(Screen[None]):
             self.app.go_into(inside.table, self.table_name, {} if query.is_empty else dict(query.texts))
 
     def action_back(self) -> None:
-        """Go back to the row that stands for this table."""
+        """Go back to the row that refers to this table."""
         if not self.app.go_back():
             self.say("You did not come here from a row. Press Alt+O on a row that refers to a table to open it.")
 

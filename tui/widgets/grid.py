@@ -50,7 +50,7 @@ class Grid(GridView, can_focus=True):
 
     @dataclass
     class OpenWanted(Message):
-        """Go into the table that a row stands for."""
+        """Go into the table that a row refers to."""
 
         row: int
         """The row of the file, from 0."""
@@ -256,7 +256,7 @@ class Grid(GridView, can_focus=True):
             self.post_message(self.EditWanted(text, is_typing, opens_list))
 
     def action_open_row(self) -> None:
-        """Go into the table that the row of the cursor stands for."""
+        """Go into the table that the row of the cursor refers to."""
         if len(self.sheet.view):
             self.post_message(self.OpenWanted(self.sheet.row_number(self.sheet.cursor[0]) - 1))
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, lru_cache
+from typing import TypeVar
 
 import numpy as np
 import oracles
@@ -19,6 +20,7 @@ from contextdb.facts import cell
 from contextdb.schema import EMPTY, TableSettings
 from contextdb.table import Table
 
+T = TypeVar("T")
 NAMES = ["CB", "FS", "Half Back", "Any", "not", "5", "-", 'say "no"', "A~2", "Move.Run", "a:b/c-d", "Größe", "1..2", "-x", "inf"]
 TAGS = ["InAir", "Move", "Move.Run", "Move.Run.Fast", "Moved", "Half Way"]
 CONDITIONS = ["speed", "Defender.Tags", "it's", 'a "b" c', "None"]
@@ -39,6 +41,11 @@ NOTHING = {"int": "5..3", "number": "5..3", "angle": "(5..5)", "tags": "+Move.Ru
 
 IS_FULL = not settings.default.derandomize
 """Whether every state is tried, and not only a choice of them: see conftest.py."""
+
+
+def some(states: Iterable[T], n: int = 2) -> list[T]:
+    """Every n-th of the states, and all of them with EXAMPLES=full."""
+    return list(states)[:: 1 if IS_FULL else n]
 
 
 def examples(times: float, *unchecked: HealthCheck) -> settings:

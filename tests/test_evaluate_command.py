@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from pathlib import Path
 
 import polars as pl
@@ -496,8 +497,7 @@ sys.exit(cli.main(sys.argv[2:]))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="limits as POSIX has them")
-@pytest.mark.parametrize("n_bytes", [100, 6_000, 30_000])
-@pytest.mark.parametrize("name", ["answers.csv", "answers.parquet"])
+@pytest.mark.parametrize(("name", "n_bytes"), strategies.some(product(["answers.csv", "answers.parquet"], [100, 6_000, 30_000]), 5))
 def test_a_full_disk_is_told_of_the_file_that_was_asked_for(here: Path, name: str, n_bytes: int):
     rows = "".join(f"{i % 97 / 10},{i % 3 == 0}\n" for i in range(30_000))
     (here / "c.csv").write_text("speed,ok\n" + rows, encoding="utf-8")

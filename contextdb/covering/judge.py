@@ -26,8 +26,8 @@ from contextdb import bitmask
 from contextdb.check import identical_rows, named
 from contextdb.compiled import CompiledTable
 from contextdb.covering.draw import Drawer
-from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.questions import MANY, Questions
+from contextdb.covering.progress import PREPARING, SILENT, Progress
+from contextdb.covering.questions import MANY, Questions, is_prepared
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
@@ -252,7 +252,11 @@ class Judge:
     def _questions(self) -> Questions | None:
         """Compiled loops that answer where boxes are many."""
         boxes = self.space.boxes + self.space.impossible
-        return Questions(boxes, self.space.full) if len(boxes) >= MANY and self.space.full else None
+        if len(boxes) < MANY or not self.space.full:
+            return None
+        if not is_prepared():
+            self.progress.within(PREPARING, self.progress.start, self.progress.start)
+        return Questions(boxes, self.space.full)
 
     def _asked(self, questions: Questions, box: Box, by: int, allowed: int) -> bool:
         self.progress.check()

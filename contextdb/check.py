@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import cast
@@ -69,15 +69,16 @@ def _whole_table(table: Table) -> Iterator[Finding]:
         ends = ", ".join(f"{n:,} in {LINE_ENDS[end]}" for end, n in table.source.line_ends.items())
         message = f"the lines end in different ways: {ends}; they are kept as they are."
         yield Finding("mixed-line-ends", "info", message, table.name, file)
+    present = {c.name for c in table.columns}
+    absent = [name for name in table.schema.conditions if name not in present]
     for column in table.conditions:
         if not column.condition.is_declared:
-            yield _undeclared(table, column, file)
+            yield _undeclared(table, column, file, absent)
 
 
-def _undeclared(table: Table, column: ConditionColumn, file: str | None) -> Finding:
+def _undeclared(table: Table, column: ConditionColumn, file: str | None, absent: Sequence[str]) -> Finding:
     name, kind = column.condition.name, column.condition.domain.kind
-    present = {c.name for c in table.columns}
-    near = nearest(name, [c for c in table.schema.conditions if c not in present])
+    near = nearest(name, absent)
     hint = f" Did you mean {in_quotes(near)}?" if near else ""
     level: Level = "warning" if table.schema.conditions else "info"
     message = f"the condition is not declared in contextdb.toml; type inferred from its cells: {kind}.{hint}"

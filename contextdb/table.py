@@ -7,6 +7,7 @@ worked out for that column (its cells, its masks). Texts that cannot be read sta
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -374,7 +375,7 @@ def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, pat
     place = Place(str(path) if path else None)
     faults = [
         Fault(f"the column name {in_quotes(n)} appears twice.", "each name once", place=place)
-        for n in sorted({n for n in names if names.count(n) > 1})
+        for n in sorted(n for n, count in Counter(names).items() if count > 1)
     ]
     wanted = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
     for key, name in [*wanted, *(("outputs", n) for n in settings.outputs)]:

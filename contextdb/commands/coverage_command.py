@@ -35,7 +35,9 @@ from contextdb.report import coverage_formats
 from contextdb.report.results import as_path
 
 if TYPE_CHECKING:
+    from contextdb.covering import PairTable
     from contextdb.covering.baseline import Earlier
+    from contextdb.covering.progress import Tell
     from contextdb.report.coverage_results import CoverageResults, Measured
     from contextdb.table import Table
 
@@ -162,8 +164,7 @@ def _measured(arguments: argparse.Namespace, table: Table, baseline: dict[str, E
 
 def measure(arguments: argparse.Namespace, table: Table) -> Measured:
     """The coverage of one table and of its pairs of conditions, by the budgets of the arguments."""
-    from contextdb.covering import coverage, pairs
-    from contextdb.covering.pairs import SAMPLES as PAIR_SAMPLES
+    from contextdb.covering import coverage
     from contextdb.report.coverage_results import Measured
 
     with _placed(table):
@@ -175,13 +176,30 @@ def measure(arguments: argparse.Namespace, table: Table) -> Measured:
                 work=arguments.work,
                 samples=arguments.samples,
                 max_gaps=MOST_GAPS,
-                progress=None if told is None else lambda part, share: told(int(1000 * share), 1000, part),
+                progress=_tell(told),
             )
         seen = coverage_telemetry.observed(arguments, table, report.gaps)
-        compared = pairs(table, seed=arguments.seed, samples=min(arguments.samples, PAIR_SAMPLES))
+        compared = _pairs(arguments, table)
     lines = tuple(table.place(row).line for row in range(table.n_rows))
     file = str(table.path) if table.path else None
     return Measured(report, file, tuple(table.assets), lines, compared, telemetry=seen, inside=_inside(table))
+
+
+def _pairs(arguments: argparse.Namespace, table: Table) -> PairTable | None:
+    """The coverage of pairs of conditions; None where the conditions are too many."""
+    from contextdb.covering import pairs
+    from contextdb.covering.pairs import MOST_CONDITIONS, SAMPLES
+
+    if len(table.conditions) > MOST_CONDITIONS:
+        return None
+    n_cells = table.n_rows * len(table.conditions)
+    with coverage_telemetry.bar(f"comparing conditions of {printable(table.name)}", n_cells) as told:
+        return pairs(table, seed=arguments.seed, samples=min(arguments.samples, SAMPLES), progress=_tell(told))
+
+
+def _tell(told: coverage_telemetry.Bar | None) -> Tell | None:
+    """What tells a bar of a computation."""
+    return None if told is None else lambda part, share: told(int(1000 * share), 1000, part)
 
 
 def _inside(table: Table) -> dict[int, str]:

@@ -123,16 +123,16 @@ def bar(label: str, n_cells: int = 0) -> Iterator[Bar | None]:
 
 
 def log_of(label: str, n_cells: int) -> Bar | None:
-    """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal, and where cells are
-    not very many."""
-    if sys.stderr.isatty() or n_cells < MANY_CELLS:
+    """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal. Where cells are not
+    very many it tells only that loops are compiled."""
+    if sys.stderr.isatty():
         return None
     told: set[object] = set()
 
     def tell(done: float, total: int, part: str = "") -> None:
         tenth = int(10 * done / total) if total else 0
         mark = part if part == PREPARING else tenth
-        if mark not in told:
+        if mark not in told and (mark == PREPARING or n_cells >= MANY_CELLS):
             told.add(mark)
             print(f"contextdb: {label}: {10 * tenth} % {part}".rstrip(), file=sys.stderr, flush=True)
 

@@ -55,7 +55,7 @@ def _judged(table: Table, work: int, progress: Progress) -> list[Finding]:
     if table.n_rows == 0:
         return []
     try:
-        ready = opened(table)
+        ready = opened(table, is_cut=True)
     except ContextDBError:  # such as a domain without a value: said of the cells already
         return []
     judging = progress.within("Comparing rows", 0.0, 1.0)

@@ -23,7 +23,7 @@ from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
 from contextdb.covering.sample import LITTLE, Counts, Sampler
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
-from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
+from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_counts
 from contextdb.table import Table
 
 WORK = 40_000_000
@@ -129,7 +129,8 @@ def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, w
     if drawer is not None:
         gaps = [gap for gap in gaps if gap.share > 0.0]
     judging = watcher.within("Comparing rows", FINDINGS_AT, CROWDS_AT)
-    judge = Judge(space, compiled, opened.table, finding_steps(work, len(space.boxes)), judging, drawer)
+    compared = space.first(comparable_rows(compiled))
+    judge = Judge(compared, compiled, opened.table, finding_steps(work, len(compared.boxes)), judging, drawer)
     findings = judge.findings()
     middle = (possible.lower + possible.upper) / 2.0
     if middle == 0.0 and drawer is None:

@@ -24,7 +24,7 @@ from operator import and_
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb import intervals
+from contextdb import bitmask, intervals
 from contextdb.cells import Accepted, Cell, NumberSet, TagSet, ValueSet, format_cell, format_number, tags_above
 from contextdb.classes import Value
 from contextdb.domains import Domain
@@ -58,8 +58,12 @@ class ValueFactor:
     def classes(self, accepts: Accepted) -> int:
         """The classes that a set holds."""
         assert isinstance(accepts, ValueSet)
-        held = sum(1 << k for k, value in enumerate(self.values) if accepts.holds(value))
-        return held | (1 << len(self.values) if self.has_others and accepts.is_complement else 0)
+        held = bitmask.int_of(sorted(self._class_of[value] for value in accepts.values if value in self._class_of))
+        return ((1 << len(self.values) + self.has_others) - 1) ^ held if accepts.is_complement else held
+
+    @cached_property
+    def _class_of(self) -> dict[Value, int]:
+        return {value: k for k, value in enumerate(self.values)}
 
     def accepts(self, classes: int) -> Accepted:
         """The values of some classes."""

@@ -28,6 +28,8 @@ from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
 from contextdb.table import Table
 
 SAMPLES = 50_000
+MOST_CONDITIONS = 120
+"""A report compares no more conditions than so many with each other: pairs, and what they take, grow with their square."""
 DIGITS = 12
 """Shares that are equal to so many decimals are sorted as equal."""
 

@@ -12,7 +12,7 @@ Tell = Callable[[str, float], None]
 Stops = Callable[[], bool]
 
 
-PREPARING = "Preparing the count, for the first time on this machine only"
+PREPARING = "Preparing the loops, for the first time on this machine only"
 """What is reported while the loops are compiled."""
 
 

@@ -86,6 +86,8 @@ def _section(measured: Measured, number: int) -> str:
     parts += [*_change(measured), *_telemetry(measured), *_gaps(measured)]
     if measured.pairs is not None:
         parts.append(heat_map(measured.pairs, number))
+    elif measured.left_out:
+        parts.append(_paragraph(measured.left_out, "muted"))
     parts += [*_overlap(measured), *_findings(measured), *_rows(measured)]
     return f"<article>\n{''.join(parts)}</article>\n"
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
 from contextdb.covering.baseline import Change, digest_of
+from contextdb.covering.pairs import MOST_CONDITIONS
 from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.findings import Finding
@@ -72,6 +73,14 @@ class Measured:
         """The gaps of the recording that are not in the list of gaps."""
         listed = {gap.id for gap in self.report.gaps}
         return () if self.telemetry is None else tuple(gap for gap in self.telemetry.gaps if gap.id not in listed)
+
+    @property
+    def left_out(self) -> str:
+        """What was not measured as the table is too large for it, as a sentence; "" where nothing was left out."""
+        if self.pairs is not None or self.report.n_conditions <= MOST_CONDITIONS:
+            return ""
+        n_conditions = plural(self.report.n_conditions, "condition")
+        return f"Pairs of conditions are not compared: the table has {n_conditions}, and at most {MOST_CONDITIONS} are."
 
     def worst_pairs(self, most: int) -> list[Slice]:
         """Of each pair of conditions the combination that is covered least; the worst of these, the largest of equals first."""

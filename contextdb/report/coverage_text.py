@@ -130,6 +130,8 @@ def _overlap(measured: Measured, colour: bool, width: int) -> Iterator[str]:
 
 
 def _pairs(measured: Measured, colour: bool, width: int, most: int) -> Iterator[str]:
+    if measured.left_out:
+        yield from wrapped(measured.left_out, width)
     worst = measured.worst_pairs(most)
     if not worst:
         return

@@ -97,7 +97,7 @@ def test_the_detail_has_the_whole_message_and_the_cure(table):
     _, screen = shown(table, "down")
     assert 'Error unreadable-cell: row 2, Run, column "speed"' in screen
     assert 'Did you mean "1..5"?' in screen
-    assert "The text of a cell is not in the grammar of its type." in screen
+    assert "The text of a cell does not follow the grammar of its type." in screen
 
 
 def test_enter_goes_to_the_cell(table):

@@ -36,7 +36,7 @@ def find_crowds(space: Space, seeds: Iterable[Point], most: int = MOST_CROWDS, p
     for point in seeds:
         progress.check()
         top = _climbed(space, rows, impossible, point)
-        found[_holding(rows, top)] = top
+        found[_holding(rows, list(top))] = top
     kept: list[int] = []
     for bits in sorted(found, key=lambda b: (-b.bit_count(), b)):
         if bits.bit_count() > 1 and not any(bits & ~other == 0 for other in kept):

@@ -20,11 +20,12 @@ INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
 .DEFAULT_GOAL := help
 # A set-up that failed half-way is done again from its start.
 .DELETE_ON_ERROR:
-.PHONY: help demo test check format docs bench fuzz clean
+.PHONY: help demo test cover check format docs bench fuzz clean
 
 help:
 	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
-	@$(info make test     run the tests)
+	@$(info make test     run the tests; EXAMPLES=full draws all examples from a new seed, SEED=1 draws the same ones again)
+	@$(info make cover    run the tests and list the lines and branches of the code that none of them reaches)
 	@$(info make check    formatting, lint, types and import contracts)
 	@$(info make format   format the code and mend what lint can mend)
 	@$(info make docs     run the commands of README.md and docs/ and write down what they print now)
@@ -36,8 +37,13 @@ help:
 demo: $(VENV)/.runtime
 	@$(PY) -m contextdb demo
 
-test: $(VENV)/.dev
-	$(PY) -m pytest --numprocesses auto --dist worksteal
+test: export EXAMPLES := $(EXAMPLES)
+test: export PYTHONDONTWRITEBYTECODE :=
+test: $(VENV)/.dev $(VENV)/.kernels
+	$(PY) -m pytest --numprocesses auto --dist worksteal $(if $(SEED),--hypothesis-seed=$(SEED))
+
+cover: $(VENV)/.dev
+	$(PY) -m pytest --numprocesses auto --dist worksteal --cov
 
 check: $(VENV)/.dev
 	$(PY) -m ruff format --check .
@@ -64,6 +70,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/c_header.py
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/editor.py
+	$(PY) benchmarks/start.py
 
 clean:
 	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in '$(VENV) build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache'.split()]"
@@ -78,6 +85,11 @@ $(VENV)/.runtime: pyproject.toml | $(VENV)/pyvenv.cfg
 
 $(VENV)/.dev: pyproject.toml | $(VENV)/pyvenv.cfg
 	$(INSTALL) ".[dev]"
+	$(STAMP)
+
+# What numba compiles is kept in its cache. Two workers of the tests that found nothing there would both compile everything.
+$(VENV)/.kernels: $(wildcard contextdb/*kernels.py contextdb/*/*kernels.py contextdb/*/*/*kernels.py) | $(VENV)/.dev
+	$(PY) tests/kernels.py
 	$(STAMP)
 
 $(VENV)/.bench: pyproject.toml | $(VENV)/pyvenv.cfg

@@ -6,6 +6,7 @@ last row are 0, always. As a Python integer, row r is bit r.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -69,6 +70,14 @@ def from_int(bits: int, n_rows: int) -> Words:
     """One mask from a Python integer whose bits are all below `n_rows`; read-only."""
     octets = bits.to_bytes(n_words(n_rows) * 8, "little")
     return read_only(np.frombuffer(octets, "<u8").astype(np.uint64, copy=False))
+
+
+def int_of(row_numbers: Sequence[int]) -> int:
+    """One mask as a Python integer from the numbers of its rows, ascending; it costs what the last of them is, once."""
+    octets = bytearray((row_numbers[-1] >> 3) + 1 if row_numbers else 0)
+    for row in row_numbers:
+        octets[row >> 3] |= 1 << (row & 7)
+    return int.from_bytes(octets, "little")
 
 
 def places(masks: Words) -> tuple[Rows, Rows]:

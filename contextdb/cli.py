@@ -25,16 +25,16 @@ COMMANDS = {
     "query": "which assets are valid for one context",
     "evaluate": "every context of a file: how many assets are valid in each",
     "check": "what is wrong with the tables",
-    "coverage": "which contexts have no asset, and whether that is enough",
+    "coverage": "which contexts have a valid asset, and which have none",
     "diff": "what changed between two versions of a table",
-    "merge": "join what two sides made of one table",
+    "merge": "merge two versions of a table",
     "git": "let git merge and show tables cell by cell",
-    "import": "bring in a table from another program: CSV, Excel, JSON, DMN, Unreal",
+    "import": "import a table from another program: CSV, Excel, JSON, DMN, Unreal",
     "export": "write a table for another program",
-    "compile": "write the binary artefact for the game",
+    "compile": "write the compiled file for the game",
     "verify": "whether files are as contextdb wrote them",
     "motion": "motion databases: build, search, select, run, replay",
-    "demo": "the whole way on the sample tables",
+    "demo": "a tour of the sample tables",
 }
 
 
@@ -46,7 +46,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors name the nearest thing that would have been right."""
 
     def parse(self, given: Sequence[str]) -> argparse.Namespace:
-        """The arguments; options may stand anywhere between the others, but none behind "--"."""
+        """The arguments; options may be anywhere between the others, but none behind "--"."""
         at = given.index("--") if "--" in given else len(given)
         for text in given[:at]:
             if text.startswith("-") and text not in self._option_string_actions and os.path.isfile(text):
@@ -207,7 +207,7 @@ def _overview(commands: Mapping[str, str]) -> str:
     return (
         "usage: contextdb COMMAND …\n\n"
         + "\n".join(lines)
-        + '\n\n"contextdb COMMAND --help" tells more of one; --version prints the version.\n'
+        + '\n\n"contextdb COMMAND --help" shows its options; --version prints the version.\n'
     )
 
 

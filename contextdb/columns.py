@@ -1,6 +1,6 @@
 """A column of texts, kept as its distinct texts and one code a row.
 
-A table of assets repeats itself: `Any` stands in most cells. So a column keeps each distinct text once and an int32 code for each
+A table of assets repeats itself: `Any` is in most cells. So a column keeps each distinct text once and an int32 code for each
 row, and whatever is worked out from a text (its cell, its mask) is worked out once.
 """
 

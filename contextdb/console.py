@@ -76,7 +76,7 @@ def width_of(text: str) -> int:
 
 
 def aligned(rows: Sequence[Sequence[str]], right: Sequence[int] = (), indent: str = "") -> Iterator[str]:
-    """Rows of texts as lines with aligned columns, two spaces between; columns in `right` stand to the right."""
+    """Rows of texts as lines with aligned columns, two spaces between; columns in `right` are to the right."""
     clean = [[printable(t) for t in row] for row in rows]
     widths = [max(map(width_of, column)) for column in zip(*clean, strict=True)]
     for row in clean:

@@ -1,18 +1,18 @@
-"""What can go wrong, said so that it can be mended.
+"""Every error, worded so that the reader can fix it.
 
-An error carries one or more faults. A fault says where (a `Place`), what was found, what is accepted and the nearest mend, in that
-order. All faults of a file travel together in one error.
+An error carries one or more faults. A fault gives the place (a `Place`), what was found, what is accepted and the nearest
+correction, in that order. One error reports all faults of a file together.
 
     ContextDBError
-    ├── CellError       a cell whose text is not in the grammar
-    ├── SchemaError     contextdb.toml says something that cannot be meant
+    ├── CellError       a cell whose text does not follow the grammar
+    ├── SchemaError     contextdb.toml has an invalid setting
     ├── TableError      a table file that cannot be read, or rows that cannot be compiled
-    │   └── NoSuchTable     a name that no table has; a KeyError too
-    ├── FileError       the disk says no: missing, not permitted, full, changed under us
-    ├── ContextError    facts that a table cannot be asked with, or an argument that cannot be meant
-    │   ├── NoSuchFact      a fact that is not there; a KeyError too
-    │   └── NoSuchPlace     a row, or a place in an answer, that is not there; an IndexError too
-    ├── PolicyError     a table breaks the promise of its own policy
+    │   └── NoSuchTable     a name that no table has; also a KeyError
+    ├── FileError       the disk refuses: missing, not permitted, full, changed under us
+    ├── ContextError    facts that a query cannot use, or an invalid argument
+    │   ├── NoSuchFact      a fact that does not exist; also a KeyError
+    │   └── NoSuchPlace     a row, or a place in an answer, that does not exist; also an IndexError
+    ├── PolicyError     a table breaks its own policy
     ├── ArtefactError   a compiled file that is truncated, altered or from another version
     └── MotionError     clips, features and searches
         ├── ClipError   a clip that cannot be read
@@ -35,7 +35,7 @@ def row_name(row: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a fault stands: a file with a line (from 1), or a table's row (from 0, from 1 in the text of it) and column."""
+    """Where a fault is: a file with a line (from 1), or a table's row (from 0, from 1 in the text of it) and column."""
 
     file: str | None = None
     line: int | None = None
@@ -55,7 +55,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong: its place, what was found, what is accepted, and the nearest mend.
+    """One problem in the input: its place, what was found, what is accepted, and the nearest correction.
 
     `mend` is what was probably meant, or what to do: "to save it as UTF-8".
     """
@@ -86,7 +86,7 @@ class Fault:
 
 
 class ContextDBError(Exception):
-    """Something contextdb refuses, with every fault that made it refuse."""
+    """An input that contextdb refuses, with every fault."""
 
     def __init__(self, *faults: Fault | str) -> None:
         self.faults: tuple[Fault, ...] = tuple(Fault(f) if isinstance(f, str) else f for f in faults)
@@ -100,11 +100,11 @@ class ContextDBError(Exception):
 
 
 class CellError(ContextDBError):
-    """A cell whose text is not in the grammar of its type."""
+    """A cell whose text does not follow the grammar of its type."""
 
 
 class SchemaError(ContextDBError):
-    """contextdb.toml, or a schema given in Python, says something that cannot be meant."""
+    """contextdb.toml, or a schema given in Python, has an invalid setting."""
 
 
 class TableError(ContextDBError):
@@ -120,11 +120,11 @@ class FileError(ContextDBError):
 
 
 class ContextError(ContextDBError):
-    """Facts that a table cannot be asked with: missing, unknown, of the wrong type, or outside the domain."""
+    """Facts that a query cannot use: missing, unknown, of the wrong type, or outside the domain."""
 
 
 class NoSuchFact(ContextError, KeyError):
-    """A fact that a live context does not have: no condition is about it, or it is not set."""
+    """A fact that a live context does not have: the table has no such condition, or the fact is not set."""
 
 
 class NoSuchPlace(ContextError, IndexError):
@@ -132,7 +132,7 @@ class NoSuchPlace(ContextError, IndexError):
 
 
 class PolicyError(ContextDBError):
-    """A table breaks the promise of its own policy: two rows valid at once where it says "unique"."""
+    """A table breaks its own policy: two rows are valid at once although the policy is "unique"."""
 
 
 class ArtefactError(ContextDBError):

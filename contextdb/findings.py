@@ -14,7 +14,7 @@ LEVELS: tuple[Level, ...] = get_args(Level)
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that a check found. `row` counts from 0, `line` from 1; `by` are the rows that cause it."""
+    """One result of a check. `row` counts from 0, `line` from 1; `by` are the rows that cause it."""
 
     rule: str
     level: Level

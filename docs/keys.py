@@ -17,8 +17,8 @@ HEAD = """# Keys
 
 Every command of [the editor](editor.md), with its keys, and its name for a
 [file of your own keys](editor.md#keys-and-colours-of-your-own). The first key of each command works in every terminal, the others
-[where the terminal sends them](editor.md#terminals). A command without keys is in the palette (Ctrl+P) or on the line of
-tools. In a dialog the keys stand at its foot. This page is written by `python docs/keys.py`.
+[where the terminal sends them](editor.md#terminals). A command without keys is in the palette (Ctrl+P) or in the
+toolbar. A dialog shows its keys at the bottom. `python docs/keys.py` writes this page.
 """
 
 

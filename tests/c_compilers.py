@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 PROGRAMS = Path(__file__).parent / "c_programs"
+BUILT = Path(__file__).parent.parent / ".pytest_cache" / "c_programs"
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wsign-conversion", "-Wcast-qual", "-Werror"]
 SANITIZED = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 C = ["-xc", "-std=c99", *STRICT]
@@ -51,13 +53,33 @@ def sanitizers(compiler: str) -> tuple[str, ...]:
 
 
 def built(source: Path, program: Path, options: list[str], *more: str) -> Path:
-    """Compile one source, with the header beside the program; no warning is let pass."""
+    """Compile one source, with the header beside the program; no warning is let pass.
+
+    A program is compiled once: it is kept for the other workers and the next runs, under a hash of all that it is made of.
+    """
     compiler = compiler_for(options)
-    command = [compiler, *options, *more, f"-I{program.parent}", str(source), "-o", str(program)]
+    command = [compiler, *options, *more]
+    kept = BUILT / _hash([*command, str(Path(compiler).stat().st_mtime_ns)], [source, *sorted(program.parent.glob("*.h"))])
+    if not kept.exists():
+        _compile([*command, f"-I{program.parent}", str(source), "-o", str(program)])
+        BUILT.mkdir(parents=True, exist_ok=True)
+        beside = kept.with_suffix(f".{os.getpid()}")
+        shutil.copy2(program, beside)
+        os.replace(beside, kept)
+    else:
+        shutil.copy2(kept, program)
+    return program
+
+
+def _compile(command: list[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode or done.stderr:
         pytest.fail(f"{' '.join(command)}\n{done.stderr}", pytrace=False)
-    return program
+
+
+def _hash(words: list[str], files: list[Path]) -> str:
+    parts = [*(word.encode() for word in words), *(part for file in files for part in (file.name.encode(), file.read_bytes()))]
+    return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
 
 
 def ran(program: Path, *arguments: str | Path, cwd: Path | None = None) -> str:

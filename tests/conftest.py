@@ -1,11 +1,67 @@
-"""How property tests draw their examples: the same ones on every run, unless HYPOTHESIS_PROFILE=thorough asks for many new ones."""
+"""How many examples a property test draws, and which.
+
+Every day: a few, and the same ones on every run. With EXAMPLES=full, as `.ci/run` does: all of them, from a seed that is new on
+every run and stands at the top of its output. What fails then is printed, and kept in .hypothesis/, where the next full run tries
+it first; write it over the test as `@example(...)`, and every run tries it. EXAMPLES=thorough draws twenty times as many.
+"""
 
 from __future__ import annotations
 
 import os
+import random
+from pathlib import Path
+from typing import Any
 
+import hypothesis
+import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis.database import DirectoryBasedExampleDatabase
 
-settings.register_profile("ci", derandomize=True, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("thorough", deadline=None, max_examples=2000, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+ROOT = Path(__file__).parent.parent
+SIZES = {"few": 20, "full": 100, "thorough": 2000}
+SIZE = os.environ.get("EXAMPLES") or "few"
+# The workers of pytest-xdist are started with this environment: all of them draw from one seed.
+SEED = os.environ.setdefault("EXAMPLES_SEED", str(random.randrange(10**9)))
+OF_CHANCE = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
+"""Checks of how examples are drawn. They fail now and then for one seed or a few examples, though the code is right."""
+
+if SIZE not in SIZES:
+    raise pytest.UsageError(f"EXAMPLES={SIZE}: expected one of {', '.join(SIZES)}")
+settings.register_profile(
+    "few", derandomize=True, deadline=None, database=None, max_examples=SIZES["few"], suppress_health_check=OF_CHANCE
+)
+for name in ("full", "thorough"):
+    settings.register_profile(
+        name,
+        derandomize=False,
+        deadline=None,
+        database=DirectoryBasedExampleDatabase(ROOT / ".hypothesis" / "examples"),
+        max_examples=SIZES[name],
+        print_blob=True,
+        suppress_health_check=OF_CHANCE,
+    )
+settings.load_profile(SIZE)
+
+
+def _seed(config: pytest.Config) -> str:
+    return str(config.getoption("hypothesis_seed") or SEED)
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    """Which examples are drawn, and how to draw them again."""
+    if settings.default.derandomize:
+        return "examples: a few, the same ones on every run; EXAMPLES=full draws all of them, from a new seed"
+    seed = _seed(config)
+    return f"examples: {SIZE}, from seed {seed}; to draw them again: EXAMPLES={SIZE} python -m pytest --hypothesis-seed={seed}"
+
+
+def seed_test(test: Any, seed: str) -> None:
+    """Draw from a seed, as `hypothesis.seed` would; that one also stops failures from being kept."""
+    getattr(test, "_hypothesis_state_machine_class", test)._hypothesis_internal_use_seed = seed
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Seed each property test by its own name, so that what it draws does not depend on the tests before it."""
+    test = getattr(item, "function", None)
+    if hypothesis.is_hypothesis_test(test) and not settings.default.derandomize:
+        seed_test(test, f"{_seed(item.config)} {item.nodeid}")

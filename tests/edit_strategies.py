@@ -58,8 +58,10 @@ def edits_of(draw: st.DrawFn, table: Table) -> Edit:
     place = st.integers(1, len(names))
     if kind == "column" and free:
         declared = draw(st.none() | st.just({"type": "number", "min": 0.0}))
-        job = draw(st.sampled_from(["condition", "output"] if declared is None else ["condition"]))
-        return edits.insert_column(table, draw(place), draw(st.sampled_from(free)), job, declared, draw(st.sampled_from(["", "5"])))
+        name = draw(st.sampled_from(free))
+        can_be_output = declared is None and name not in table.schema.conditions  # a deleted column leaves its declaration
+        job = draw(st.sampled_from(["condition", "output"] if can_be_output else ["condition"]))
+        return edits.insert_column(table, draw(place), name, job, declared, draw(st.sampled_from(["", "5"])))
     if kind == "columns" and free:
         new = [edits.NewColumn(name, "condition", draw(st.none() | st.sampled_from(PARTS))) for name in free[:2]]
         return edits.insert_columns(table, draw(place), new)

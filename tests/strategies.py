@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, lru_cache
+from typing import TypeVar
 
 import numpy as np
 import oracles
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from contextdb.cells.conditions import Condition
@@ -19,6 +20,7 @@ from contextdb.cells.facts import cell
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.table import Table
 
+T = TypeVar("T")
 NAMES = ["CB", "FS", "Half Back", "Any", "not", "5", "-", 'say "no"', "A~2", "Move.Run", "a:b/c-d", "Größe", "1..2", "-x", "inf"]
 TAGS = ["InAir", "Move", "Move.Run", "Move.Run.Fast", "Moved", "Half Way"]
 CONDITIONS = ["speed", "Defender.Tags", "it's", 'a "b" c', "None"]
@@ -37,9 +39,21 @@ NOTHING = {"int": "5..3", "number": "5..3", "angle": "(5..5)", "tags": "+Move.Ru
 """Cells that no fact matches, though each part of them could."""
 
 
-def examples(times: float) -> settings:
-    """So many times the examples that the profile asks for: see conftest.py."""
-    return settings(max_examples=math.ceil(times * settings.default.max_examples))
+IS_FULL = not settings.default.derandomize
+"""Whether every state is tried, and not only a choice of them: see conftest.py."""
+
+
+def some(states: Iterable[T], n: int = 2) -> list[T]:
+    """Every n-th of the states, and all of them with EXAMPLES=full."""
+    return list(states)[:: 1 if IS_FULL else n]
+
+
+def examples(times: float, *unchecked: HealthCheck) -> settings:
+    """So many times the examples that the profile asks for (see conftest.py), without some more of hypothesis' own checks."""
+    profile = settings.default
+    return settings(
+        max_examples=math.ceil(times * profile.max_examples), suppress_health_check=[*profile.suppress_health_check, *unchecked]
+    )
 
 
 def one_of(*values: object) -> st.SearchStrategy:

@@ -299,7 +299,7 @@ def test_what_is_wrong_with_a_file_is_said(small: Path):
     small.write_bytes(whole[:-1])
     assert refusal(small).startswith("not a whole .safetensors file (")
     small.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
-    assert refusal(small) == "the file was altered: its contents do not give its digest."
+    assert refusal(small) == "the file was altered: its contents do not match its digest."
 
 
 @pytest.mark.parametrize("content", [b"Asset,x\na,1\n" * 20, b"\x89PNG\r\n\x1a\n" + bytes(200), b"{" * 5000, b"\xff" * 64])

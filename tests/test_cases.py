@@ -83,7 +83,7 @@ def test_a_fact_of_another_table_of_the_project_is_left_out_of_the_question():
 def test_two_cases_of_one_name_are_told():
     [found] = check_cases(table_of(), [Case("one", {}, "", 2), Case("two", {}, "", 3), Case("one", {}, "", 4)])
     assert (found.level, found.line) == ("warning", 4)
-    assert found.message == 'the case "one" stands in line 2 too: a name is for one case.'
+    assert found.message == 'the case "one" is also in line 2: each case needs its own name.'
 
 
 def test_an_asset_that_must_not_be_valid_and_is_none_of_the_table_is_told():

@@ -6,8 +6,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 import contextdb as cdb
 from contextdb.errors import ContextError
@@ -94,7 +95,7 @@ def moments(draw, max_actors=5, max_rows=5):
     return draw(st.lists(row, min_size=1, max_size=max_rows)), context, actors
 
 
-@settings(max_examples=150, deadline=None)
+@examples(1.5)
 @given(moments())
 def test_a_row_is_valid_when_some_casting_makes_its_rule_true(moment):
     rows, context, actors = moment
@@ -114,7 +115,7 @@ def test_a_row_is_valid_when_some_casting_makes_its_rule_true(moment):
             assert castings[0] == matches.casting(row)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(0.3)
 @given(moments(max_actors=8, max_rows=70))
 def test_many_and_live_contexts_cast_as_one_query_does(moment):
     rows, context, actors = moment
@@ -139,7 +140,7 @@ def cast_of(ask):
 CHANGES = st.sampled_from(["x", "kind", "other", "more", "fewer", "list", "number", "is_wet", "limit", "nothing"])
 
 
-@settings(max_examples=60, deadline=None)
+@examples(0.6)
 @given(moments(max_actors=5), st.lists(st.tuples(CHANGES, st.integers(0, 99)), max_size=10), st.booleans())
 def test_actors_that_a_live_context_keeps_count_as_they_are_when_it_is_asked(moment, changes, is_plain):
     rows, context, actors = moment

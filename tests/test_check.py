@@ -94,7 +94,7 @@ def test_mixed_line_ends_are_information_with_the_most_common_first(tmp_path: Pa
 
 
 def test_a_condition_that_is_not_declared_is_a_warning_with_the_nearest_that_is(tmp_path: Path):
-    message = 'the condition is not declared in contextdb.toml; its cells read as number. Did you mean "speed"?'
+    message = 'the condition is not declared in contextdb.toml; type inferred from its cells: number. Did you mean "speed"?'
     assert findings(tmp_path, "Asset,Speed\nrun,1..2\n") == [
         at(tmp_path, "undeclared-condition", "warning", message, column="Speed")
     ]
@@ -104,7 +104,7 @@ def test_where_nothing_is_declared_undeclared_conditions_are_information(tmp_pat
     (finding,) = findings(tmp_path, "Asset,ok\nrun,True\n", "")
     assert (finding.level, finding.message) == (
         "info",
-        "the condition is not declared in contextdb.toml; its cells read as bool.",
+        "the condition is not declared in contextdb.toml; type inferred from its cells: bool.",
     )
 
 
@@ -158,7 +158,7 @@ def test_a_soft_cell_that_accepts_nothing_always_costs(tmp_path: Path):
 
 @pytest.mark.parametrize("cell", ["13..20", "-5..-1", ">12", "<0", "12.5"])
 def test_a_cell_wholly_outside_the_domain_is_a_warning(tmp_path: Path, cell: str):
-    message = f'"{cell}" lies wholly outside the declared 0 to 12, so the row matches no expected value.'
+    message = f'"{cell}" is wholly outside the declared 0 to 12, so the row matches no expected value.'
     assert findings(tmp_path, f"Asset,speed\nrun,{cell}\n") == [
         at(tmp_path, "outside-domain", "warning", message, row=0, asset="run", line=2, column="speed")
     ]
@@ -179,7 +179,7 @@ def test_a_cell_inside_the_domain_or_with_an_end_left_open_is_as_it_should_be(tm
 
 def test_a_bound_that_stands_alone_is_named_in_full(tmp_path: Path):
     (finding,) = findings(tmp_path, "Asset,n\nrun,16777218\n")
-    assert finding.message == '"16777218" lies wholly outside the declared max 16777217, so the row matches no expected value.'
+    assert finding.message == '"16777218" is wholly outside the declared max 16777217, so the row matches no expected value.'
     (finding,) = findings(tmp_path, "Asset,n\nrun,-1..3\n", TYPES.replace("max = 16777217", "min = 0"))
     assert finding.message == '"-1..3" reaches beyond the declared min 0.'
 
@@ -195,7 +195,7 @@ def test_a_row_without_an_asset_is_an_error(tmp_path: Path, asset: str):
 
 
 def test_an_asset_that_stands_twice_is_a_warning_caused_by_the_first(tmp_path: Path):
-    message = 'the asset "run" stands in line 2 too.'
+    message = 'the asset "run" is also in line 2.'
     where = {"asset": "run", "column": "Asset", "by": (0,)}
     assert findings(tmp_path, "Asset,speed\nrun,1\njump,2\nrun,3\nrun,4\n") == [
         at(tmp_path, "duplicate-asset", "warning", message, row=2, line=4, **where),
@@ -290,7 +290,7 @@ def test_of_very_many_findings_of_a_kind_the_first_are_listed_and_the_others_cou
 def test_a_table_of_python_has_rows_and_no_lines():
     table = Table.from_columns({"Asset": ["a", "a"], "x": ["1", "1"]}, {"x": {"type": "number"}})
     assert [(f.rule, f.message, f.file, f.line, f.row) for f in check(table)] == [
-        ("duplicate-asset", 'the asset "a" stands in row 1 too.', None, None, 1),
+        ("duplicate-asset", 'the asset "a" is also in row 1.', None, None, 1),
         ("identical-rows", 'every condition is the same as in row 1 ("a").', None, None, 1),
     ]
 

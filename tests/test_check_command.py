@@ -132,7 +132,7 @@ def test_two_files_of_one_name_are_an_error(here: Path):
     result = run("check", "game", "--json")
     assert result.code == 1
     (finding,) = result.json["findings"]
-    assert finding["message"] == 'the table "jog" stands in "game/jog.csv" too. Accepted: one file for each table.'
+    assert finding["message"] == 'table "jog" is also defined in "game/jog.csv". Accepted: one file for each table.'
     assert finding["file"] == "game/jog.parquet"
 
 

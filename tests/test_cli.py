@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from running import ROOT, Result, run, run_process
+from strategies import some
 
 import contextdb
 from contextdb import cli
@@ -197,23 +198,24 @@ def test_what_the_system_refuses_is_told_without_a_traceback(monkeypatch: pytest
     assert run("check", "t.csv") == Result(2, "", "contextdb: secret/tables: Permission denied.\n")
 
 
-BUFFERING = pytest.mark.parametrize("unbuffered", ["", "1"], ids=["buffered", "unbuffered"])
+HOW = ("", "1")
+"""PYTHONUNBUFFERED."""
+UNWRITTEN = [["query", "t.csv", "ok=True"], ["check", "t.csv"], ["--version"], ["query", "--help"]]
 posix = pytest.mark.skipif(os.name == "nt", reason="pipes and devices as POSIX has them")
 
 
+STOPPED = [
+    (["query", "big.csv", "ok=True"], 0),
+    (["query", "big.csv", "ok=True", "--json"], 0),
+    (["query", "big.csv", "ok=False"], 1),
+    (["check", "bad.csv", "--all"], 1),
+    (["check", "bad.csv"], 1),
+    (["query", "--help"], 0),
+]
+
+
 @posix
-@BUFFERING
-@pytest.mark.parametrize(
-    ("arguments", "code"),
-    [
-        (["query", "big.csv", "ok=True"], 0),
-        (["query", "big.csv", "ok=True", "--json"], 0),
-        (["query", "big.csv", "ok=False"], 1),
-        (["check", "bad.csv", "--all"], 1),
-        (["check", "bad.csv"], 1),
-        (["query", "--help"], 0),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "code", "unbuffered"), some(((*one, how) for one in STOPPED for how in HOW), 3))
 def test_a_reader_who_stops_reading_changes_no_exit_code(here: Path, arguments: list[str], code: int, unbuffered: str):
     (here / "big.csv").write_text("Asset,ok\n" + "".join(f"{'a' * 50}{i},True\n" for i in range(5000)), encoding="utf-8")
     (here / "bad.csv").write_text("Asset,ok\n" + "".join(f"a{i},5..3\n,True\n,True\n" for i in range(500)), encoding="utf-8")
@@ -229,8 +231,7 @@ def test_a_reader_who_stops_reading_changes_no_exit_code(here: Path, arguments: 
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
-@BUFFERING
-@pytest.mark.parametrize("arguments", [["query", "t.csv", "ok=True"], ["check", "t.csv"], ["--version"], ["query", "--help"]])
+@pytest.mark.parametrize(("arguments", "unbuffered"), some(((one, how) for one in UNWRITTEN for how in HOW), 3))
 def test_output_that_cannot_be_written_is_an_error(arguments: list[str], unbuffered: str):
     command = [sys.executable, "-m", "contextdb", *arguments]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": unbuffered}

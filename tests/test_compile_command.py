@@ -143,7 +143,7 @@ def test_a_table_that_no_c_program_can_ask_is_left_out_of_the_header_and_told(he
 )
 def test_a_header_has_the_suffix_of_one(here: Path, name: str, mend: str):
     assert refused("game", "--c-header", name) == (
-        f"{name}: this is no name of a C header. Accepted: a name that ends in .h, .hpp, .hh or .hxx.{mend}"
+        f"{name}: this is not a valid name for a C header. Accepted: a name that ends in .h, .hpp, .hh or .hxx.{mend}"
     )
     assert artefacts(here) == []
 
@@ -161,7 +161,7 @@ def test_a_name_that_no_text_of_c_can_hold_is_told_before_anything_is_written(he
 )
 def test_types_go_into_a_python_file(here: Path, name: str, mend: str):
     assert refused("game", "--stubs", name) == (
-        f"{name}: this is no name of a Python file. Accepted: a name that ends in .py or .pyi.{mend}"
+        f"{name}: this is not a valid name for a Python file. Accepted: a name that ends in .py or .pyi.{mend}"
     )
     assert artefacts(here) == []
 
@@ -170,7 +170,8 @@ def test_types_go_into_a_python_file(here: Path, name: str, mend: str):
 def test_an_artefact_has_its_suffix(out: str):
     near = out.partition(".")[0] + ".safetensors"
     assert refused("game/run.csv", "-o", out) == (
-        f'{out}: this is no name of an artefact. Accepted: a name that ends in .safetensors, or a folder. Did you mean "{near}"?'
+        f"{out}: this is not a valid name for a compiled file. Accepted: a name that ends in .safetensors, or a folder. "
+        f'Did you mean "{near}"?'
     )
 
 
@@ -233,6 +234,6 @@ def test_an_altered_artefact_is_refused_by_a_query(here: Path):
     assert run("query", "r.safetensors", "speed=5") == Result(
         2,
         "",
-        "contextdb: r.safetensors: the file was altered: its contents do not give its digest. "
+        "contextdb: r.safetensors: the file was altered: its contents do not match its digest. "
         "Accepted: a file that this version of contextdb compiled. Try to compile the table again.\n",
     )

@@ -22,7 +22,7 @@ def test_it_never_writes_into_a_folder_that_is_there(tmp_path):
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     answer = run("demo", "--keep", str(tmp_path))
     assert (answer.code, answer.out) == (2, "")
-    assert "this is there already" in answer.err
+    assert "this already exists" in answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 

@@ -111,7 +111,7 @@ def test_a_changed_cell_is_told_with_its_asset_and_column(table):
 
 def test_a_cell_that_means_the_same_is_only_written_otherwise(table):
     found = diff(table, table.with_cell(3, "speed", "20.0000, 9.9900").with_cell(2, "speed", "-"))
-    assert found.summary == "2 cells written otherwise"
+    assert found.summary == "2 cells written differently"
     assert [c.is_meaning for c in found.cells] == [False, False]
 
 
@@ -123,7 +123,7 @@ def test_cells_that_cannot_be_read_mean_themselves(table):
 def test_jobs_are_read_as_what_they_are():
     before = table_of("A,On,P,W,out\na,True,1,,x\n", enabled="On", priority="P", weight="W", outputs=("out",))
     after = before.with_cells([(0, "On", "yes"), (0, "P", "1.0"), (0, "W", "1"), (0, "out", "x ")])
-    assert told(before, after) == "1 cell changed, 3 cells written otherwise"
+    assert told(before, after) == "1 cell changed, 3 cells written differently"
 
 
 def test_rows_are_known_by_their_asset_wherever_they_stand(table):

@@ -27,7 +27,8 @@ def test_a_difference_is_told_by_columns_rows_and_cells():
     result = run("diff", "a.csv", "b.csv", "--no-effects")
     assert (result.code, result.err) == (1, "")
     assert result.lines == [
-        "b.csv: 1 row added, 1 row renamed, 1 row moved, 1 column added, 1 column moved, 2 cells changed, 1 cell written otherwise",
+        "b.csv: 1 row added, 1 row renamed, 1 row moved, 1 column added, 1 column moved, 2 cells changed, "
+        "1 cell written differently",
         "",
         "columns",
         "  + new",
@@ -43,7 +44,7 @@ def test_a_difference_is_told_by_columns_rows_and_cells():
         "    hit    Any   →  True",
         "    speed  5..9  →  5..8",
         "",
-        "written otherwise",
+        "written differently",
         "  dive",
         "    speed  20, 9.99  →  20.00, 9.990",
     ]
@@ -164,4 +165,4 @@ def test_what_cannot_be_told_is_said_with_its_place(here):
     (here / "c.csv").write_text(BEFORE.replace("5..9", "fast"), encoding="utf-8")
     result = run("diff", "a.csv", "c.csv")
     assert result.code == 1
-    assert "That cannot be told: c.csv, line 3" in result.out
+    assert "That cannot be determined: c.csv, line 3" in result.out

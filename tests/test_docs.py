@@ -27,9 +27,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
+from strategies import IS_FULL
 
+from contextdb.cli import main
 from tui.app import EditorApp
 from tui.editor_settings import read_settings
 from tui.themes import LIGHT
@@ -70,6 +73,8 @@ class Session:
     """What runs the steps of one document, in one folder."""
 
     folder: Path
+    in_processes: bool = True
+    """Whether each command is started as a shell would."""
     names: dict[str, Any] = field(default_factory=lambda: {"__name__": "__main__"})
     exit_code: int = 0
 
@@ -97,6 +102,8 @@ class Session:
         start = {"contextdb": [sys.executable, "-m", "contextdb"], "python": [sys.executable]}
         if words[0] not in start:
             raise ValueError(f"a console block runs contextdb, python and echo $?, not {words[0]}: use a ```sh block")
+        if words[0] == "contextdb" and not self.in_processes:
+            return self._here(words[1:])
         done = subprocess.run(
             [*start[words[0]], *words[1:]],
             cwd=self.folder,
@@ -108,6 +115,18 @@ class Session:
         )
         self.exit_code = done.returncode
         return done.stdout.rstrip()
+
+    def _here(self, words: list[str]) -> str:
+        """What a command prints in this process, which starts no other."""
+        printed = io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True)
+        with contextlib.ExitStack() as stack:
+            stack.enter_context(contextlib.chdir(self.folder))
+            stack.enter_context(mock.patch.dict(os.environ, TERMINAL))
+            stack.enter_context(mock.patch("sys.stdin", stack.enter_context(open(os.devnull, encoding="utf-8"))))
+            stack.enter_context(contextlib.redirect_stdout(printed))
+            stack.enter_context(contextlib.redirect_stderr(printed))
+            self.exit_code = int(main(words))
+        return printed.buffer.getvalue().decode().rstrip()
 
 
 def blocks(lines: list[str]) -> Iterator[Block]:
@@ -146,11 +165,11 @@ def commands(lines: list[str], block: Block) -> Iterator[Step]:
 
 
 @contextlib.contextmanager
-def session() -> Iterator[Session]:
+def session(in_processes: bool = True) -> Iterator[Session]:
     """A session beside a fresh copy of tables/."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(ROOT / "tables", Path(folder) / "tables")
-        yield Session(Path(folder))
+        yield Session(Path(folder), in_processes)
 
 
 def shown(lines: list[str], step: Step) -> str:
@@ -176,7 +195,7 @@ def updated(lines: list[str]) -> list[str]:
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_a_document_shows_what_its_commands_print(document: Path):
     lines = document.read_text(encoding="utf-8").splitlines()
-    with session() as now:
+    with session(in_processes=IS_FULL) as now:
         for step in steps(lines):
             assert now.run(step) == shown(lines, step), f"{document.name}, line {step.first}: {step.source}"
 

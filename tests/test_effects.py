@@ -5,8 +5,9 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 from contextdb.cells.grammar import parse_cell
 from contextdb.checks.effects import effects, merge_effects
@@ -56,7 +57,7 @@ def without(some, others):
 ROWS = st.lists(st.tuples(st.sampled_from("abc"), *(st.sampled_from(texts) for texts in CELLS.values())), min_size=1, max_size=4)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(0.25)
 @given(ROWS, ROWS)
 def test_effects_are_those_that_trying_every_context_finds(old, new):
     before, after = table(*old), table(*new)

@@ -9,12 +9,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from pathlib import Path
 
 import polars as pl
 import pytest
 import strategies
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from running import ROOT, Result, run
 
@@ -235,7 +236,7 @@ def test_columns_whose_names_look_like_patterns_are_read(here: Path):
 
 
 @pytest.mark.parametrize("is_parquet", [False, True], ids=["csv", "parquet"])
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@strategies.examples(1, HealthCheck.function_scoped_fixture)
 @given(strategies.tables(least_conditions=1), st.data(), st.sampled_from(["any", "never"]))
 def test_each_context_of_a_file_is_answered_as_when_it_is_asked_alone(
     here: Path, is_parquet: bool, table: Table, data: st.DataObject, unknown: str
@@ -398,7 +399,7 @@ def test_several_assets_of_a_context_stand_in_one_cell_of_a_csv(here: Path):
     ("out", "message"),
     [
         ("answers.json", "answers.json: answers cannot be written to such a file. Accepted: a name that ends in .csv or .parquet."),
-        ("none/answers.csv", 'none/answers.csv: there is no folder "none". Accepted: a folder that is there.'),
+        ("none/answers.csv", 'none/answers.csv: there is no folder "none". Accepted: an existing folder.'),
         ("data/../data/a.csv", "data/../data/a.csv: the answers would be written over the contexts. Accepted: another file."),
     ],
 )
@@ -464,7 +465,7 @@ def test_the_place_of_a_fault_counts_what_was_read_before(here: Path, monkeypatc
 
 def test_a_scheduler_wants_the_engine_that_has_one(here: Path):
     assert refused("moves", "data/a.csv", "--scheduler", "tcp://x:1") == [
-        "--scheduler is the address of Dask's. Accepted: --engine dask beside it."
+        "--scheduler is the address of Dask's. Accepted: --engine dask with it."
     ]
 
 
@@ -496,8 +497,7 @@ sys.exit(cli.main(sys.argv[2:]))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="limits as POSIX has them")
-@pytest.mark.parametrize("n_bytes", [100, 6_000, 30_000])
-@pytest.mark.parametrize("name", ["answers.csv", "answers.parquet"])
+@pytest.mark.parametrize(("name", "n_bytes"), strategies.some(product(["answers.csv", "answers.parquet"], [100, 6_000, 30_000]), 5))
 def test_a_full_disk_is_told_of_the_file_that_was_asked_for(here: Path, name: str, n_bytes: int):
     rows = "".join(f"{i % 97 / 10},{i % 3 == 0}\n" for i in range(30_000))
     (here / "c.csv").write_text("speed,ok\n" + rows, encoding="utf-8")

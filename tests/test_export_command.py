@@ -49,7 +49,7 @@ def test_a_file_that_is_there_is_not_written_over_unless_forced():
     Path("out.csv").write_text("mine", encoding="utf-8")
     result = run("export", "game/jog.csv", "out.csv")
     assert (result.code, Path("out.csv").read_text(encoding="utf-8")) == (2, "mine")
-    assert "the file is there already" in result.err
+    assert "the file already exists" in result.err
     assert run("export", "game/jog.csv", "out.csv", "--force").code == 0
     assert Path("out.csv").read_bytes() == CSV
 
@@ -68,7 +68,7 @@ def test_what_is_lost_is_told():
         (("game/jog.csv", "out"), "the name has no suffix"),
         (("game/jog.csv", "-"), "standard output has no suffix"),
         (("game/jgo.csv", "out.csv"), 'Did you mean "game/jog.csv"?'),
-        (("game/jog.csv", "no/out.csv"), '/no". Accepted: a folder that is there.'),
+        (("game/jog.csv", "no/out.csv"), '/no". Accepted: an existing folder.'),
         (("game/jog.csv", "out.ods"), "is of no known format"),
         (("game/jog.csv", "out.csv", "--as", "exel"), "there is no"),
     ],

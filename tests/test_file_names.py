@@ -84,7 +84,7 @@ def test_two_files_of_one_name_in_two_forms_are_refused(tmp_path):
     if len(list(tmp_path.iterdir())) < 2:
         pytest.skip("this disk has one of them only")
     assert run("check", tmp_path).code == 1
-    assert "stands in" in run("coverage", tmp_path).err
+    assert "is also defined in" in run("coverage", tmp_path).err
 
 
 # ---- capitals
@@ -101,7 +101,7 @@ def test_two_tables_that_differ_in_capitals_alone_are_told(tmp_path, tells_capit
     for name in ("Walk", "walk"):
         put(tmp_path, name)
     (said,) = findings(tmp_path)
-    assert "are one file on disks that do not tell capitals" in said
+    assert "are one file on disks that ignore case" in said
     assert len(Project.load(tmp_path).tables) == 2
 
 
@@ -118,7 +118,7 @@ def test_a_table_declared_in_other_capitals_is_the_file_where_the_disk_says_so(t
     assert list(table_files(tmp_path, schema)) == [("moves", file)]
     assert settings_of(file, tmp_path, schema).name == "moves"
     assert load(file).settings.enabled == "on"
-    assert findings(tmp_path) == ['contextdb.toml calls it "Walk.csv": there is no such file on disks that tell capitals.']
+    assert findings(tmp_path) == ['contextdb.toml calls it "Walk.csv": there is no such file on disks that distinguish case.']
 
 
 def test_a_table_declared_in_other_capitals_is_another_one_where_the_disk_tells_them(tmp_path, tells_capitals):

@@ -135,7 +135,7 @@ def test_a_missing_file_in_the_working_folder_is_named(table: Path, monkeypatch:
 
 
 def test_a_file_taken_for_a_folder_is_named(table: Path):
-    assert f'"{table}" is no folder' in refused(lambda: read_bytes(table / "a.csv"))
+    assert f'"{table}" is not a folder' in refused(lambda: read_bytes(table / "a.csv"))
 
 
 def test_a_folder_taken_for_a_file_is_named_with_a_table_in_it(table: Path):
@@ -164,19 +164,19 @@ def test_other_refusals_give_the_systems_reason(table: Path, monkeypatch: pytest
 
 
 def test_a_path_with_a_nul_character_is_refused():
-    assert "this is no path" in refused(lambda: read_bytes("a\0b.csv"))
+    assert "this is not a valid path" in refused(lambda: read_bytes("a\0b.csv"))
 
 
 @needs_links
 def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path):
     os.mkfifo(tmp_path / "a.csv")
-    assert "this is no plain file" in refused(lambda: read_bytes(tmp_path / "a.csv"))
+    assert "this is not a regular file" in refused(lambda: read_bytes(tmp_path / "a.csv"))
 
 
 @needs_links
 def test_a_link_to_nothing_is_named(tmp_path: Path):
     (tmp_path / "a.csv").symlink_to("gone.csv")
-    assert 'this is a link to "gone.csv", which is not there' in refused(lambda: read_bytes(tmp_path / "a.csv"))
+    assert 'this is a link to "gone.csv", which does not exist' in refused(lambda: read_bytes(tmp_path / "a.csv"))
 
 
 # ---- writing
@@ -289,7 +289,7 @@ def test_a_file_marked_read_only_is_not_replaced(table: Path):
 def test_a_folder_that_is_missing_or_in_the_way_is_named(table: Path):
     missing = table.parent / "gone" / "a.csv"
     assert refused(lambda: write_atomic(missing, b"")) == (
-        f'{missing}: there is no folder "{missing.parent}". Accepted: a folder that is there.'
+        f'{missing}: there is no folder "{missing.parent}". Accepted: an existing folder.'
     )
     assert "this is a folder" in refused(lambda: write_atomic(table.parent, b""))
     assert "there is no folder" in refused(lambda: write_atomic(table / "a.csv", b""))

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from running import Result, run
+from strategies import examples
 
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
@@ -170,7 +171,7 @@ def test_a_parquet_file_whose_values_are_of_another_type_is_refused(here: Path):
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".safetensors"])
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@examples(0.6, HealthCheck.function_scoped_fixture)
 @given(raw=st.binary(max_size=200))
 def test_any_bytes_are_a_table_or_refused_by_every_command(here: Path, suffix: str, raw: bytes):
     (here / f"x{suffix}").write_bytes(raw)
@@ -187,7 +188,7 @@ def test_any_bytes_are_a_table_or_refused_by_every_command(here: Path, suffix: s
         assert "Traceback" not in result.err
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
+@examples(1, HealthCheck.function_scoped_fixture)
 @given(toml=st.binary(max_size=120) | st.text(max_size=120).map(lambda t: t.encode("utf-8", "surrogatepass")))
 def test_any_bytes_are_a_schema_or_refused(here: Path, toml: bytes):
     (here / "contextdb.toml").write_bytes(toml)
@@ -210,7 +211,7 @@ def test_any_bytes_are_a_schema_or_refused(here: Path, toml: bytes):
         ),
         ("[conditions.speed]\ntype = 3\n", "contextdb.toml, line 2: [conditions.speed] type = 3: this is a number, not text."),
         ('[conditions.speed]\ntype = "number"\nmni = 0\n', 'contextdb.toml, line 3: [conditions.speed] has no key "mni".'),
-        ('[condition.speed]\ntype = "number"\n', 'contextdb.toml, line 1: "condition" is no section.'),
+        ('[condition.speed]\ntype = "number"\n', 'contextdb.toml, line 1: "condition" is not a section.'),
         (
             '[conditions.speed]\ntype = "number"\nmin = 5\nmax = 1\n',
             "contextdb.toml, line 3: [conditions.speed] min = 5 is above max = 1.",
@@ -297,7 +298,7 @@ def test_a_nan_fact_is_a_missing_fact(table: Path):
     assert run("query", "t.csv", *facts[:1], "n=nan", *facts[2:], "--unknown", "never").code == 1
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(1, HealthCheck.function_scoped_fixture)
 @given(st.sampled_from(list(GOOD)), st.text(max_size=30))
 def test_any_text_as_a_fact_is_answered_or_refused(table: Path, name: str, text: str):
     result = run("query", "t.csv", "--unknown", "any", f"{name}={text}")

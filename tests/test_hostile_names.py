@@ -6,9 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from running import run
+from strategies import examples
 
 
 @pytest.fixture(autouse=True)
@@ -112,7 +113,7 @@ def test_a_hostile_argument_is_refused_by_every_command(here: Path, argument: st
 
 
 @pytest.mark.parametrize("arguments", [[], ["query"], ["query", "t.csv"], ["check"], ["compile", "t.csv"], ["evaluate", "t.csv"]])
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40)
+@examples(0.4, HealthCheck.function_scoped_fixture)
 @given(
     more=st.lists(
         st.text(max_size=12) | st.sampled_from(["--json", "--unknown", "any", "speed=1", "-o", "--", "-", "@t.csv"]), max_size=3

@@ -84,7 +84,7 @@ def test_columns_are_renamed_and_typed_as_asked():
 
 def test_a_table_that_is_there_is_not_written_over_unless_forced():
     Path("game/moves.csv").write_text("A,speed\nx,1\n", encoding="utf-8")
-    assert refused("moves.csv", "game/moves.csv").startswith("contextdb: game/moves.csv: the file is there already.")
+    assert refused("moves.csv", "game/moves.csv").startswith("contextdb: game/moves.csv: the file already exists.")
     assert Path("game/moves.csv").read_text(encoding="utf-8") == "A,speed\nx,1\n"
     assert run("import", "moves.csv", "game/moves.csv", "--force").code == 0
     assert Project.load("game")["moves"].assets == ["jog", "run"]
@@ -125,7 +125,7 @@ def test_our_own_csv_is_copied_byte_for_byte():
         (("moves.csv", "game/m.csv", "--type", "Speed=int"), 'contextdb.toml declares "Speed" already'),
         (("moves.csv", "game/m.csv", "--type", "po=int"), 'Did you mean "pos"?'),
         (("moves.csv", "game/m.csv", "--as", "xslx"), 'Did you mean "xlsx"?'),
-        (("moves.csv", "game/m.csv", "--as", "xlsx"), "this is no workbook"),
+        (("moves.csv", "game/m.csv", "--as", "xlsx"), "this is not a workbook"),
         (("moves.csv", "game/m.csv", "--encoding", "utf-9"), 'there is no encoding "utf-9"'),
         (("game", "game/m.csv"), "this is a folder."),
     ],

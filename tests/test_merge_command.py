@@ -29,7 +29,7 @@ THEIRS = BASE.replace("jump,Any,False", "jump,Any,True") + "land,,\r\n"
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setitem(cli.COMMANDS, "merge", "join what two sides made of one table")
+    monkeypatch.setitem(cli.COMMANDS, "merge", "merge two versions of a table")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -258,7 +258,7 @@ def test_two_databases_never_go_to_one_file_on_any_disk(here: Path):
     toml = TOML.replace("[databases.tired]", "[databases.JOG]")
     (here / "game" / "contextdb.toml").write_text(toml, encoding="utf-8")
     assert refused("game") == (
-        "game/JOG.motion.safetensors: two databases would be written to one file, on a disk that does not tell capitals. "
+        "game/JOG.motion.safetensors: two databases would be written to one file, on a disk that ignores case. "
         'Accepted: another name for "jog", "JOG".'
     )
 

@@ -221,7 +221,7 @@ def test_a_name_shows_the_best_frames_of_those_assets_though_they_may_not_play()
     assert [row[1] for row in rows_of(result)] == ["jog"] * 3
     assert all("asset not valid" in line for line in result.lines if " jog " in line)
     assert "2 of 5 rows valid in moves" in result.lines
-    assert motion("search", "game", "all", "--query", "walk@1", "--name", "fly").lines[-1] == 'no asset\'s name holds "fly"'
+    assert motion("search", "game", "all", "--query", "walk@1", "--name", "fly").lines[-1] == 'no asset\'s name contains "fly"'
 
 
 @pytest.mark.parametrize(
@@ -265,30 +265,30 @@ def test_every_view_fits_the_terminal(view: str):
             'there is no clip "wakl". Accepted: "idle", "jog", "walk", "walk_tired", or a .bvh file.',
         ),
         (["game", "all", "--query", "wakl@1"], 'Did you mean "walk@1"?'),
-        (["game", "all", "--query", "walk"], '"walk" is no moment of a clip. Accepted: CLIP@SECONDS, such as walk@1.5.'),
-        (["game", "all", "--query", "@1"], '"@1" is no moment of a clip.'),
-        (["game", "all", "--query", "walk@nan"], '"walk@nan" is no moment of a clip.'),
-        (["game", "all", "--query", "walk@-1"], '"walk@-1" is no moment of a clip.'),
+        (["game", "all", "--query", "walk"], '"walk" is not a moment of a clip. Accepted: CLIP@SECONDS, such as walk@1.5.'),
+        (["game", "all", "--query", "@1"], '"@1" is not a moment of a clip.'),
+        (["game", "all", "--query", "walk@nan"], '"walk@nan" is not a moment of a clip.'),
+        (["game", "all", "--query", "walk@-1"], '"walk@-1" is not a moment of a clip.'),
         (["game", "all", "--query", "walk@99"], 'there is no moment 99 s of "walk". Accepted: seconds from 0 to '),
         (["game", "all", "--query", "none.bvh@1"], "none.bvh: "),
         (["game", "all", "--query", "game/clips/jog.bvh@99"], "there is no moment 99 s of "),
-        (["game", "all", "--query", "walk@1", "--speed", "fast"], '"fast" is no speed. Accepted: 0 to 100 m/s, such as 1.3.'),
-        (["game", "all", "--query", "walk@1", "--speed", "-1"], '"-1" is no speed.'),
+        (["game", "all", "--query", "walk@1", "--speed", "fast"], '"fast" is not a speed. Accepted: 0 to 100 m/s, such as 1.3.'),
+        (["game", "all", "--query", "walk@1", "--speed", "-1"], '"-1" is not a speed.'),
         (["game", "all", "--query", "walk@1", "--turn", "9"], "--turn without --speed wishes for nothing."),
         (["game", "all", "--query", "walk@1", "--strafe", "9"], "--strafe without --speed wishes for nothing."),
-        (["game", "all", "--query", "walk@1", "--speed", "1", "--turn", "inf"], '"inf" is no angle.'),
-        (["game", "all", "--query", "walk@1", "--k", "0"], '"0" is no number of candidates. Accepted: 1 to 10000, such as 10.'),
-        (["game", "all", "--query", "walk@1", "--k", "ten"], '"ten" is no number of candidates.'),
+        (["game", "all", "--query", "walk@1", "--speed", "1", "--turn", "inf"], '"inf" is not an angle.'),
+        (["game", "all", "--query", "walk@1", "--k", "0"], '"0" is not a number of candidates. Accepted: 1 to 10000, such as 10.'),
+        (["game", "all", "--query", "walk@1", "--k", "ten"], '"ten" is not a number of candidates.'),
         (["game", "all", "--query", "walk@1", "--view", "sumary"], 'there is no "sumary".'),
         (["game", "all", "--query", "walk@1", "--view", "sumary"], 'Did you mean "summary"?'),
         (["game", "all", "--query", "walk@1", "--tags", "Mvoe"], 'there is no tag "Mvoe".'),
-        (["game", "all", "--query", "walk@1", "--tags", "Move~x"], '"Move~x" is no tag to filter by.'),
-        (["game", "all", "--query", "walk@1", "--tags", "+Move~2"], '"+Move~2" is no tag to filter by.'),
-        (["game", "all", "--query", "walk@1", "--tags", "+"], '"+" is no tag to filter by.'),
+        (["game", "all", "--query", "walk@1", "--tags", "Move~x"], '"Move~x" is not a tag to filter by.'),
+        (["game", "all", "--query", "walk@1", "--tags", "+Move~2"], '"+Move~2" is not a tag to filter by.'),
+        (["game", "all", "--query", "walk@1", "--tags", "+"], '"+" is not a tag to filter by.'),
         (["game", "all", "--query", "walk@1", "--qery", "x"], 'there is no option "--qery". Did you mean "--query"?'),
         (["game", "all", "gait=Wlak", *WALK[1:], "--query", "walk@1"], 'Did you mean "Walk"?'),
         (["game", "all", "gati=Walk", *WALK[1:], "--query", "walk@1"], 'there is no condition "gati".'),
-        (["game", "all", "Walk", "--query", "walk@1"], '"Walk" is no fact. Accepted: FACT=VALUE'),
+        (["game", "all", "Walk", "--query", "walk@1"], '"Walk" is not a fact. Accepted: FACT=VALUE'),
         (["game", "all", "gait=Walk", "--query", "walk@1"], 'the fact "speed" is missing (2 facts missing: "speed", "style").'),
         (["game", "all", "gait=Walk", "--query", "walk@1"], "--unknown any, or --unknown never"),
         (["game", "all", "gait=Walk", "--query", "walk@1", "--unknown", "nver"], 'there is no "nver".'),
@@ -435,9 +435,9 @@ def test_a_run_in_which_nothing_ever_plays_exits_with_1(here: Path):
         ("time_s,speed_mps\n0,1\n1e8,1\n", "lasts 1e+08 s. Accepted: at most 86400 s."),
         (
             "time_s,speed_mps\n0,fast\n",
-            'stick.csv, line 2, column "speed_mps": "fast" is no number that can be meant. Accepted: 0 to 100.',
+            'stick.csv, line 2, column "speed_mps": "fast" is not a valid number. Accepted: 0 to 100.',
         ),
-        ("time_s,speed_mps\nnan,1\n", 'line 2, column "time_s": "nan" is no number'),
+        ("time_s,speed_mps\nnan,1\n", 'line 2, column "time_s": "nan" is not a valid number'),
         ("time_s,speed_mps\n,1\n", 'line 2, column "time_s"'),
         ("time_s,speed_mps,gait,speed,style\n0,1,Wlak,1,tired\n", 'stick.csv, line 2, column "gait": '),
         ("time_s,speed_mps,gait,speed\n0,1,Walk,1\n", '"style" is missing'),
@@ -464,10 +464,10 @@ def test_a_stick_that_cannot_be_followed_is_refused_with_its_place(here: Path, t
         (["game", "player", "x.parquet", "--out", "x.parquet"], "the session would be written over the stick."),
         (
             ["game", "player", "stick.csv", "--out", "new.parquet", "--rate", "0"],
-            '"0" is no rate. Accepted: 1 to 1000 updates a second',
+            '"0" is not a rate. Accepted: 1 to 1000 updates a second',
         ),
-        (["game", "player", "stick.csv", "--out", "new.parquet", "--k", "-1"], '"-1" is no number of candidates.'),
-        (["game", "player", "stick.csv", "--out", "new.parquet", "--seed", "x"], '"x" is no seed.'),
+        (["game", "player", "stick.csv", "--out", "new.parquet", "--k", "-1"], '"-1" is not a number of candidates.'),
+        (["game", "player", "stick.csv", "--out", "new.parquet", "--seed", "x"], '"x" is not a seed.'),
     ],
 )
 def test_a_wrong_argument_of_a_run_is_told(arguments: list[str], message: str):
@@ -508,7 +508,7 @@ def test_a_replay_as_json_has_every_decision():
 
 def test_a_name_leaves_what_it_fits():
     assert len(motion("replay", "session.parquet", "--name", "jog").lines) < len(motion("replay", "session.parquet").lines)
-    assert motion("replay", "session.parquet", "--name", "swim").lines[-1].startswith('no asset\'s name holds "swim".')
+    assert motion("replay", "session.parquet", "--name", "swim").lines[-1].startswith('no asset\'s name contains "swim".')
     one = motion("replay", "session.parquet", "--at", "0", "--name", "tired")
     assert {row[1] for row in rows_of(one)} <= {"walk_tired"}
 
@@ -519,7 +519,7 @@ def test_a_name_leaves_what_it_fits():
         (["sesion.parquet"], 'sesion.parquet: there is no such file. Did you mean "session.parquet"?'),
         (
             ["stick.csv"],
-            "stick.csv: this is no Parquet file. Accepted: a session recorded by contextdb.motion.Trace. Try to record",
+            "stick.csv: this is not a Parquet file. Accepted: a session recorded by contextdb.motion.Trace. Try to record",
         ),
         (
             ["session.parquet", "--at", "151"],
@@ -551,7 +551,7 @@ def test_replay_works_the_costs_of_any_asset_out_again(here, monkeypatch):
     assert {row["asset"] for row in first["asked"]} == {asset for asset in first_assets("game") if "jog" in asset}
     assert all(row["cost"] is not None and row["rank"] >= 1 and row["channels"] for row in first["asked"])
     shown = run("motion", "replay", "s.parquet", "--at", "0", "--name", "jog").out
-    assert 'the best frames of assets whose name holds "jog" (summary)' in shown
+    assert 'the best frames of assets whose name contains "jog" (summary)' in shown
     unknown = run("motion", "replay", "s.parquet", "--at", "0", "--name", "jgo")
     assert (unknown.code, 'Did you mean "jog"?' in unknown.err) == (2, True)
     (here / "game").rename(here / "moved")

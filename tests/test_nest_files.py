@@ -164,7 +164,7 @@ def test_rules_that_only_together_are_too_long_are_told_as_such():
     schema, rule = {"speed": {"type": "number"}}, " or ".join(["speed > 1"] * 300)
     tables = {"inner": cdb.Table.from_columns({"Asset": ["a"], "When": [rule]}, schema, TableSettings("inner", when="When"))}
     outer = cdb.Table.from_columns({"Asset": ["@inner"], "When": [rule]}, schema, TableSettings("outer", when="When"))
-    with pytest.raises(cdb.TableError, match="rules of this row and of those that stand for its table, taken together"):
+    with pytest.raises(cdb.TableError, match="rules of this row and of those that refer to its table, combined"):
         outer.compile(tables)
 
 
@@ -249,8 +249,7 @@ def test_a_missing_table_is_named_with_its_place_and_the_nearest(tmp_path: Path)
         cdb.load(tmp_path / "tackle.csv")
     [fault] = caught.value.faults
     assert str(fault) == (
-        f'{tmp_path / "tackle.csv"}, line 2, column "Asset": there is no table "dvie" to stand here. '
-        'Accepted: "@dive". Did you mean "@dive"?'
+        f'{tmp_path / "tackle.csv"}, line 2, column "Asset": there is no table "dvie". Accepted: "@dive". Did you mean "@dive"?'
     )
     assert fault.rule == "no-such-table"
 
@@ -263,7 +262,7 @@ def test_a_mark_without_a_name_is_refused(tmp_path: Path):
 
 def test_a_table_that_stands_in_itself_is_refused_with_the_way_round(tmp_path: Path):
     write(tmp_path, dive="Asset,Weight,speed\n@low,1,Any\n", low="Asset,speed\n@tackle,Any\n")
-    with pytest.raises(cdb.TableError, match="the table stands in itself: tackle > dive > low > tackle"):
+    with pytest.raises(cdb.TableError, match="the table contains itself: tackle > dive > low > tackle"):
         cdb.load(tmp_path / "tackle.csv")
     with pytest.raises(cdb.TableError, match="low > tackle > dive > low"):
         cdb.Project.load(tmp_path)
@@ -324,7 +323,7 @@ def test_rows_that_multiply_without_end_are_refused_before_they_are_made():
 def test_a_table_that_knows_no_others_says_how_to_give_them():
     table = cdb.Table.from_columns({"Asset": ["@dive"]})
     with pytest.raises(
-        cdb.TableError, match=r'"@dive" stands for a table, and no other tables are known. Accepted: compile\(tables='
+        cdb.TableError, match=r'"@dive" refers to a table, but no other tables are given. Accepted: compile\(tables='
     ):
         table.compile()
 
@@ -361,7 +360,7 @@ def test_findings_of_an_inner_table_are_told_of_it_and_not_of_the_outer_one_too(
     )
     [first] = check_rows(outer)
     assert (first.level, first.asset, first.line, first.by) == ("warning", "tackle/dive/Left", 3, (2,))
-    assert f"The row stands in {tmp_path / 'dive.csv'}, line 2." in first.message
+    assert f"The row is in {tmp_path / 'dive.csv'}, line 2." in first.message
 
 
 def test_rows_of_an_inner_table_share_contexts_by_variety_where_every_policy_on_the_way_lets_several_play(tmp_path: Path):

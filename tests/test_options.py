@@ -13,9 +13,9 @@ from contextdb.cli import COMMANDS, Group
 SAID = re.compile(r"\(default(?:: (.+?))?\)|; default: (.+?)\)")
 """How a help says what holds when an option is not given; alone, that the option is what holds."""
 COMPUTED = {
-    "beside each table", "the sample tables", "those that came with contextdb", "tables/, or here", "told from its bytes",
-    "told from the file", "told from the cells", "OURS", "beside contextdb.toml", "the features' rate", "the clip's own path",
-    "contextdb, or the Python that runs now", "where they were", "whole, but in our own workbooks",
+    "next to each table", "the sample tables", "those that came with contextdb", "tables/, or here", "detected",
+    "detected from its cells", "OURS", "next to contextdb.toml", "the rate of the features", "the clip's own path",
+    "contextdb, or the Python that runs now", "as recorded", "whole, except in our own workbooks", "from the settings",
 }  # fmt: skip
 """What is worked out by the command: the parsed value is then None."""
 

@@ -131,8 +131,8 @@ def test_an_empty_name_and_a_text_that_is_too_long_are_refused():
     ("raw", "said"),
     [
         (b"", "the file is empty."),
-        (b"a,b\n1,2\n", "this is no Parquet file: it seems to be text. Accepted: a Parquet file. Did you mean the suffix .csv?"),
-        (b"PK\x03\x04 xl/", "it seems to be an Excel workbook (.xlsx)."),
+        (b"a,b\n1,2\n", "not a Parquet file: looks like text. Accepted: a Parquet file. Did you mean the suffix .csv?"),
+        (b"PK\x03\x04 xl/", "looks like an Excel workbook (.xlsx)."),
         (b"PAR1", "the file is cut off"),
     ],
 )
@@ -252,7 +252,7 @@ def test_any_list_of_names_comes_back_from_its_text(lists: list[list[str]], data
 def test_texts_and_names_that_no_parquet_file_can_hold_are_refused():
     for columns, said in [
         ([TextColumn.of("a", ["\ud800"])], "half a surrogate pair"),
-        ([TextColumn.of("a", ["x"]), TextColumn.of("a", ["y"])], "stands twice"),
+        ([TextColumn.of("a", ["x"]), TextColumn.of("a", ["y"])], "appears twice"),
         ([], "no columns"),
     ]:
         with pytest.raises(TableError, match=said):

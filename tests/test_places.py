@@ -117,7 +117,7 @@ def test_a_table_that_is_like_no_other_is_refused_without_a_guess(here: Path):
 def test_a_name_that_two_files_have_is_refused(here: Path):
     (here / "tables" / "walking.csv").write_text(CSV, encoding="utf-8")
     assert refused("walking", TableError) == (
-        'tables/walking.csv: the table "walking" stands in "tables/walk.csv" too. Accepted: one file for each table.'
+        'tables/walking.csv: table "walking" is also defined in "tables/walk.csv". Accepted: one file for each table.'
     )
     assert table_path("jog") == Path("tables/jog.csv")
 

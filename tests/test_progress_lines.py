@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -22,8 +23,12 @@ def test_a_log_gets_one_line_for_each_tenth(capsys: pytest.CaptureFixture[str]):
     assert lines == [f"contextdb: measuring t: {10 * tenth} % Counting contexts" for tenth in range(11)]
 
 
-def test_a_small_table_is_not_told_of():
-    assert log_of("measuring t", MANY_CELLS - 1) is None
+def test_of_a_small_table_only_the_preparing_is_told(capsys: pytest.CaptureFixture[str]):
+    log = log_of("measuring t", MANY_CELLS - 1)
+    assert log is not None
+    log(10, 1000, PREPARING)
+    log(10, 1000, "Counting contexts")
+    assert capsys.readouterr().err == f"contextdb: measuring t: 0 % {PREPARING}\n"
 
 
 @pytest.mark.parametrize("command", ["check", "coverage"])
@@ -53,3 +58,28 @@ def test_the_first_count_on_a_machine_says_that_it_is_prepared(monkeypatch: pyte
 def test_a_loop_that_was_compiled_is_prepared():
     count.prepare(count.SILENT)
     assert count.is_prepared()
+
+
+def test_a_log_is_told_of_the_pairs_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.setattr("contextdb.commands.coverage_telemetry.MANY_CELLS", 4)
+    (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
+    told = run("coverage", str(tmp_path / "t.csv")).err
+    assert "contextdb: comparing conditions of t: 0 % Comparing conditions\n" in told
+
+
+@pytest.mark.parametrize("form", ["text", "markdown", "html"])
+def test_pairs_of_too_many_conditions_are_left_out_and_that_is_said(form: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
+    said = "Pairs of conditions are not compared: the table has 2 conditions, and at most 1 are."
+    assert said not in run("coverage", str(tmp_path / "t.csv"), "--format", form).out
+    monkeypatch.setattr(import_module("contextdb.covering.pairs"), "MOST_CONDITIONS", 1)
+    monkeypatch.setattr("contextdb.report.coverage_results.MOST_CONDITIONS", 1)
+    assert said in " ".join(run("coverage", str(tmp_path / "t.csv"), "--format", form).out.split())
+
+
+@pytest.mark.parametrize("is_ready", [True, False])
+def test_a_check_says_once_that_its_loops_are_compiled(is_ready: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.setattr("contextdb.covering.judge.MANY", 2)
+    monkeypatch.setattr("contextdb.covering.judge.is_prepared", lambda: is_ready)
+    (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
+    assert run("check", str(tmp_path / "t.csv")).err.count(PREPARING) == (0 if is_ready else 1)

@@ -142,7 +142,7 @@ def test_a_declared_table_whose_file_is_missing_is_told_with_the_nearest_there_i
 def test_two_files_of_one_name_are_refused_and_neither_hides_the_other(folder: Path):
     pl.DataFrame({"Anim": ["p"], "Slot": ["L"], "speed": ["1"]}).write_parquet(folder / "jog.parquet")
     assert refused(folder, TableError) == [
-        f'{folder / "jog.parquet"}: the table "jog" stands in "{folder / "jog.csv"}" too. Accepted: one file for each table.'
+        f'{folder / "jog.parquet"}: table "jog" is also defined in "{folder / "jog.csv"}". Accepted: one file for each table.'
     ]
     assert len(twice_named(list(table_files(folder, EMPTY)))) == 1
 
@@ -150,7 +150,7 @@ def test_two_files_of_one_name_are_refused_and_neither_hides_the_other(folder: P
 def test_a_file_whose_name_is_that_of_another_table_is_refused(folder: Path):
     (folder / "crouch.csv").write_text(CSV, encoding="utf-8")
     assert refused(folder, TableError) == [
-        f'{folder / "crouch.csv"}: the table "crouch" stands in "{folder / "low" / "crouch.csv"}" too. '
+        f'{folder / "crouch.csv"}: table "crouch" is also defined in "{folder / "low" / "crouch.csv"}". '
         "Accepted: one file for each table."
     ]
 
@@ -174,7 +174,7 @@ def test_a_path_that_is_no_folder_is_refused_with_the_nearest(folder: Path):
         f'{wrong}: there is no such folder. Accepted: a folder of tables, or its contextdb.toml. Did you mean "{folder}"?'
     ]
     assert refused(folder / "jog.csv", FileError) == [
-        f"{folder / 'jog.csv'}: it is no folder. Accepted: a folder of tables, or its contextdb.toml."
+        f"{folder / 'jog.csv'}: not a folder. Accepted: a folder of tables, or its contextdb.toml."
     ]
     assert refused(folder / "no" / "such", FileError)[0].startswith(f"{folder / 'no' / 'such'}: there is no such folder.")
 

@@ -252,7 +252,7 @@ def test_missing_facts_are_named_with_what_to_write():
             'there is no condition "sped". Accepted: "state", "speed", "heading", "ok", "Defender.Tags". Did you mean "speed"?',
         ),
         ("Speed=1", 'Did you mean "speed"?'),
-        ("speed", '"speed" is no fact. Accepted: FACT=VALUE, without spaces round the =. Did you mean "speed=…"?'),
+        ("speed", '"speed" is not a fact. Accepted: FACT=VALUE, without spaces round the =. Did you mean "speed=…"?'),
         ("=1", 'there is no condition "".'),
         ("speed=fast", 'column "speed": cannot read "fast" as a number.'),
         ("speed=5..3", 'column "speed": '),
@@ -297,7 +297,7 @@ def test_a_misspelt_table_is_named_with_the_nearest():
 @pytest.mark.parametrize("most", ["-1", "x", "1.5", ""])
 def test_a_number_of_rows_is_a_whole_number_from_0_up(most: str):
     assert refused("moves", *FACTS, f"--most={most}") == [
-        f'contextdb query: argument --most: "{most}" is no number of rows, such as 10.',
+        f'contextdb query: argument --most: "{most}" is not a number of rows, such as 10.',
         'Try "contextdb query --help".',
     ]
 

@@ -194,7 +194,7 @@ def test_names_that_could_not_be_read_again_are_not_written():
         write_csv(columns, None, np.array([], np.int64))
     assert [f.found for f in caught.value.faults] == [
         "field 2 of 4 column names is empty.",
-        'the column name "a" stands twice, in fields 1 and 3.',
+        'the column name "a" appears twice, in fields 1 and 3.',
         r'the column name "x\x00" has a NUL character.',
     ]
 

@@ -77,7 +77,7 @@ def test_a_cell_that_both_changed_is_named_with_both_ways_out_and_the_file_stays
     a.save()
     raw = path.read_bytes()
     said = told(b)
-    assert 'in 1 place otherwise than here: walk, speed is "2" here and "1" in the file.' in said
+    assert 'in 1 place differently than here: walk, speed is "2" here and "1" in the file.' in said
     assert "to load it again and repeat the edits, or save(overwrite=True)" in said
     assert path.read_bytes() == raw
     assert list(path.parent.glob(".contextdb-*")) == []

@@ -196,13 +196,13 @@ def test_a_wrong_value_in_a_number_condition_is_said(line: str, message: str):
     [
         ("values = 'A B'", f'values = "A B": this is text, not a list. Accepted: {NAMES_SAID}. Did you mean values = ["A", "B"]?'),
         ("values = []", f"values = []: the list is empty. Accepted: {NAMES_SAID}."),
-        ("values = ['A', 'B', 'A']", f'values = ["A", "B", "A"]: "A" stands twice. Accepted: {NAMES_SAID}. '
+        ("values = ['A', 'B', 'A']", f'values = ["A", "B", "A"]: "A" appears twice. Accepted: {NAMES_SAID}. '
                                      'Did you mean values = ["A", "B"]?'),
         ("values = ['A', 2]", 'values = ["A", 2]: entry 2 cannot be used: this is a number, not text. '
                               f'Accepted: {NAMES_SAID}. Did you mean values = ["A", "2"]?'),
         ("values = ['A', '']", 'values = ["A", ""]: entry 2 cannot be used: this is empty. '
                                f'Accepted: {NAMES_SAID}. Did you mean values = ["A"]?'),
-        ("values = ['A ']", 'values = ["A "]: entry 1 cannot be used: a space stands before or after it. '
+        ("values = ['A ']", 'values = ["A "]: entry 1 cannot be used: a space is before or after it. '
                             f'Accepted: {NAMES_SAID}. Did you mean values = ["A"]?'),
         ("values = [['A']]", f"values = [[…]]: entry 1 cannot be used: this is a list, not text. Accepted: {NAMES_SAID}."),
     ],
@@ -243,7 +243,7 @@ def test_a_type_of_another_language_is_mended(found: str, mend: str):
         ),
         (
             "type = 'angle'\nmin = -180",
-            "line 3: [conditions.x] min = -180 has no place here: an angle goes round, so it has no ends and no list. "
+            "line 3: [conditions.x] min = -180 has no place here: an angle wraps around, so it has no ends and no list. "
             "Accepted: min in a condition of type int or number. Try to leave it out.",
         ),
         (
@@ -330,12 +330,12 @@ SECTIONS_SAID = (
     [
         (
             "[condition.x]\ntype = 'bool'",
-            f'line 1: "condition" is no section. Accepted: {SECTIONS_SAID}. Did you mean [conditions.x]?',
+            f'line 1: "condition" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [conditions.x]?',
         ),
-        ("[tabels.x]", f'line 1: "tabels" is no section. Accepted: {SECTIONS_SAID}. Did you mean [tables.x]?'),
-        ("[Project]\nname = ''", f'line 1: "Project" is no section. Accepted: {SECTIONS_SAID}. Did you mean [project]?'),
-        ("[qqq]", f'line 1: "qqq" is no section. Accepted: {SECTIONS_SAID}.'),
-        ("\nname = 'x'", f'line 2: "name" is no section. Accepted: {SECTIONS_SAID}.'),
+        ("[tabels.x]", f'line 1: "tabels" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [tables.x]?'),
+        ("[Project]\nname = ''", f'line 1: "Project" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [project]?'),
+        ("[qqq]", f'line 1: "qqq" is not a section. Accepted: {SECTIONS_SAID}.'),
+        ("\nname = 'x'", f'line 2: "name" is not a section. Accepted: {SECTIONS_SAID}.'),
         ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name". Did you mean "name"?'),
         ("conditions = 5", "line 1: conditions = 5: this is a number, not a section. Accepted: [conditions.NAME]."),
         ("project = 'x'", 'line 1: project = "x": this is text, not a section. Accepted: [project].'),
@@ -354,7 +354,7 @@ SECTIONS_SAID = (
         ),
         (
             "[conditions.' x']\ntype = 'bool'",
-            'line 1: [conditions." x"]: the name cannot be used: a space stands before or after it. '
+            'line 1: [conditions." x"]: the name cannot be used: a space is before or after it. '
             "Accepted: a name without spaces around it. Did you mean [conditions.x]?",
         ),
         (
@@ -368,16 +368,16 @@ SECTIONS_SAID = (
         ),
         (
             "[tables.a]\nfile = 'x/A.csv'\n[tables.b]\nfile = './x/a.csv'",
-            'line 4: [tables.b] stands in "x/a.csv", as [tables.a] does. Accepted: one file for each table.',
+            'line 4: [tables.b] uses the file "x/a.csv", as [tables.a] does. Accepted: one file for each table.',
         ),
         (
             "[tables.a]\n[tables.b]\nfile = 'a.csv'",
-            'line 3: [tables.b] stands in "a.csv", as [tables.a] does. Accepted: one file for each table.',
+            'line 3: [tables.b] uses the file "a.csv", as [tables.a] does. Accepted: one file for each table.',
         ),
         (
             "[conditions.speed]\ntype = 'number'\n[tables.a]\noutputs = ['speed']",
-            'line 4: [tables.a] outputs names "speed", which is declared as a condition. Accepted: a column that is no condition. '
-            "Try to leave out [conditions.speed].",
+            'line 4: [tables.a] outputs names "speed", which is declared as a condition. Accepted: a column that is not a '
+            "condition. Try to leave out [conditions.speed].",
         ),
         (
             "[conditions.speed]\ntype = 'number'\n[blueprints.b]\nconditions = ['sped']",
@@ -414,8 +414,8 @@ TOML_SAID = 'Accepted: [section.name], key = "text", key = 1.5, key = ["A", "B"]
             f'line 2: cannot read "outputs = [A, B]" as TOML: invalid value, at character 12. {TOML_SAID} '
             'Did you mean outputs = ["A", "B"]?',
         ),
-        ("[a]\nx = 1\n[a]", 'line 3: "[a]" stands twice. Accepted: each section once, and each key once in it.'),
-        ("a = 1\na = 2", 'line 2: "a = 2" stands twice. Accepted: each section once, and each key once in it.'),
+        ("[a]\nx = 1\n[a]", 'line 3: "[a]" appears twice. Accepted: each section once, and each key once in it.'),
+        ("a = 1\na = 2", 'line 2: "a = 2" appears twice. Accepted: each section once, and each key once in it.'),
         ("x = [\n'a',\n\n", f"line 2: cannot read \"'a',\" as TOML: invalid value, the file ends here. {TOML_SAID}"),
     ],
 )  # fmt: skip
@@ -424,7 +424,7 @@ def test_a_line_that_is_no_toml_is_said_with_its_line(text: str, message: str):
 
 
 def test_hostile_sizes_are_refused_without_a_traceback():
-    assert fault("a = " + "[" * 5000) == ("contextdb.toml: lists stand in lists too deep to be read. Accepted: lists of names.")
+    assert fault("a = " + "[" * 5000) == ("contextdb.toml: lists are nested too deeply to be read. Accepted: lists of names.")
     assert fault("a = " + "9" * 5000) == (
         "contextdb.toml: a whole number has too many digits to be read. Accepted: a number, such as -1.5."
     )
@@ -622,10 +622,10 @@ WRONG_MIRRORS = [
      'mirror = "negate" has no place here: a derived fact is computed from mirrored facts.'
      ' Accepted: mirror in the conditions that it is computed from. Try to leave it out.'),
     ("tags", 'values = ["Left.Hand", "Right.Hand", "Left.Foot"]', '{ Left = "Right" }',
-     'mirror = { Left = "Right" }: "Left.Foot" changes places with "Right.Foot", which is no declared value.'
+     'mirror = { Left = "Right" }: "Left.Foot" is exchanged with "Right.Foot", which is not a declared value.'
      ' Accepted: values that hold both. Try to add "Right.Foot" to the values.'),
     ("tags", "", '{ A = "B", "A.x" = "C" }',
-     'mirror = { A = "B", "A.x" = "C" }: "A.x": it stands under "A", with which it changes places anyway.'
+     'mirror = { A = "B", "A.x" = "C" }: "A.x": it is below "A", with which it is exchanged anyway.'
      ' Accepted: each name in one pair, such as { Left = "Right" }.'),
 ]  # fmt: skip
 MIRRORS_ACCEPTED = 'Accepted: "negate" (the other sign), "none", or names that change places, such as { Left = "Right" }.'

@@ -182,12 +182,12 @@ def archive() -> bytes:
     ],
 )
 def test_a_binary_file_named_csv_is_told_by_its_first_bytes(raw: bytes, kind: str):
-    assert f"t.csv: this is no text: it seems to be {kind}" in fault_of(raw)
+    assert f"t.csv: not a text file: looks like {kind}" in fault_of(raw)
 
 
 def test_other_binary_data_is_refused_with_the_line_of_its_first_nul_byte():
     assert fault_of(b"a,b\n1,\0\n\0,2\n") == (
-        "t.csv, line 2: this is no text: it holds 2 NUL bytes, the first on this line. Accepted: CSV text in UTF-8."
+        "t.csv, line 2: not a text file: it contains 2 NUL bytes, the first on this line. Accepted: CSV text in UTF-8."
     )
 
 
@@ -257,7 +257,7 @@ def test_a_cell_that_quotes_a_conflict_is_text():
     ],
 )
 def test_json_and_html_are_named_before_their_faults(text: str, kind: str):
-    assert faults_of(text)[0] == f"t.csv: this is no CSV: it seems to be {kind}. Accepted: CSV text in UTF-8."
+    assert faults_of(text)[0] == f"t.csv: not a CSV file: looks like {kind}. Accepted: CSV text in UTF-8."
 
 
 # ---- headers
@@ -265,7 +265,7 @@ def test_json_and_html_are_named_before_their_faults(text: str, kind: str):
 
 def test_a_name_that_stands_twice_is_refused_with_both_places():
     assert fault_of("a,b,c,b\n1,2,3,4\n") == (
-        't.csv, line 1: the column name "b" stands twice, in fields 2 and 4. Accepted: each name once.'
+        't.csv, line 1: the column name "b" appears twice, in fields 2 and 4. Accepted: each name once.'
     )
 
 
@@ -322,7 +322,7 @@ def test_an_unclosed_quote_before_quoted_cells_is_named_where_it_opens_and_hides
 
 def test_a_quote_inside_a_field_must_be_doubled():
     assert fault_of('a,b\n1,5" tall\n') == (
-        "t.csv, line 2: a quote stands inside the field '5\" tall'. "
+        "t.csv, line 2: a quote is inside the field '5\" tall'. "
         'Accepted: a field in double quotes from its start to its end, each quote in it doubled. Did you mean "5"" tall"?'
     )
     assert 'Did you mean "say ""hi"" now"?' in fault_of('a,b\n1,"say "hi" now"\n')

@@ -242,7 +242,7 @@ def test_a_priority_is_a_whole_number_that_can_be_kept(text):
         ),
         (
             lambda: Table.build("t", [TextColumn.of("Asset", "a"), TextColumn.of("Asset", "b")]),
-            'the column name "Asset" stands twice. Accepted: each name once.',
+            'the column name "Asset" appears twice. Accepted: each name once.',
         ),
     ],
 )

@@ -117,7 +117,7 @@ def _without_empty(said: dict[str, object]) -> dict[str, object]:
 
 
 def test_the_command_merges_a_contextdb_toml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(cli.COMMANDS, "merge", "join what two sides made of one table")
+    monkeypatch.setitem(cli.COMMANDS, "merge", "merge two versions of a table")
     monkeypatch.chdir(tmp_path)
     for name, text in (("base", BASE), ("ours", BASE + HIT), ("theirs", BASE + TAGS)):
         Path(name).write_text(text, encoding="utf-8")

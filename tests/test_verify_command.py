@@ -8,9 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from running import ROOT, run
+from strategies import examples
 
 import contextdb as cdb
 from contextdb import motion
@@ -76,7 +77,7 @@ def test_a_file_as_it_was_written_is_whole(name: str, made: Path):
 
 @pytest.mark.parametrize("name", MAKERS)
 @given(data=st.data())
-@settings(max_examples=40)
+@examples(0.4)
 def test_no_flipped_bit_passes_as_whole_unless_it_changes_nothing(name: str, data: st.DataObject, made: Path, tmp_path_factory):
     raw = bytearray((made / name).read_bytes())
     bit = data.draw(st.integers(0, 8 * len(raw) - 1))
@@ -111,7 +112,12 @@ def test_tables_in_csv_are_readable_and_hold_no_digest():
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("README.md", "not a file of contextdb"), ("nowhere.json", "no such file"), (".ci", "holds no file of contextdb")],
+    [
+        ("README.md", "not a file of contextdb"),
+        ("nowhere.json", "no such file"),
+        ("nowhere", "no such file"),
+        (".ci", "holds no file of contextdb"),
+    ],
 )
 def test_what_is_no_file_of_ours_exits_with_2(name: str, said: str):
     result = run("verify", str(ROOT / name))

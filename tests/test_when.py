@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from running import run
+from strategies import examples
 
 import contextdb as cdb
 from contextdb.checks.cases import Case, judge
@@ -311,7 +312,7 @@ BOXED = [
 ]
 
 
-@settings(max_examples=60, deadline=None)
+@examples(0.6)
 @given(
     st.lists(
         st.tuples(st.sampled_from(BOXED), st.sampled_from(["Any", "Run", "Walk"]), st.sampled_from(["Any", "1..3"])),

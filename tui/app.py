@@ -148,7 +148,7 @@ class EditorApp(Editor):
         self._show_table(name, session)
 
     def go_into(self, name: str, outer: str, facts: Mapping[str, str]) -> None:
-        """Show the table that a row of another stands for, at its first row that is valid for these facts."""
+        """Show the table that a row of another refers to, at its first row that is valid for these facts."""
         try:
             sheet = self.workspace.session(name).sheet
         except ContextDBError as error:
@@ -216,7 +216,7 @@ class EditorApp(Editor):
         self.call_later(self.main.run_command, name)
 
     async def action_quit(self) -> None:
-        """Leave; unsaved edits are asked about."""
+        """Quit; asks about unsaved edits."""
         unsaved = self.workspace.unsaved
         if unsaved:
             self.push_screen(LeavingDialog(unsaved), self._left)

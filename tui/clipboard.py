@@ -26,7 +26,7 @@ class Clipboard:
     def copy(self, text: str) -> str:
         """Keep a text, and hand it to the system; gives what a person should know of it, or nothing."""
         self.text = text
-        raw = text.encode(errors="replace")  # half of a surrogate pair is no text for other programs
+        raw = text.encode(errors="replace")  # half of a surrogate pair is not text for other programs
         in_system = _to_system(raw.decode())
         self._of_system = _from_system()
         in_tmux = "TMUX" in os.environ and _to_tmux(raw)

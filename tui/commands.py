@@ -39,7 +39,7 @@ class Command:
     scope: Scope = "grid"
     in_footer: bool = False
     is_listed: bool = True
-    """False: too small for the palette; it stands in the help with its neighbours."""
+    """False: too small for the palette; it is in the help with its neighbours."""
 
     def binding(self) -> Binding | None:
         """The command as a Textual binding; None without keys. The screen has those of the assets' pane, for every tab."""
@@ -99,11 +99,9 @@ GRID: tuple[Command, ...] = (
     Command("select-rows", "alt+r,shift+space", "Select rows", "Select the whole rows of the selection.", "Select", "select_rows"),
     Command("select-columns", "ctrl+@,alt+k,ctrl+space", "Select columns", "Select the whole columns.", "Select", "select_columns"),
     Command("select-all", "ctrl+a", "Select all", "Select every cell.", "Select", "select_all"),
-    Command("edit", "f2,enter", "Edit", "Change the cell; Enter takes it, Esc does not.", "Edit", "edit", in_footer=True),
-    Command("choose", "f4,alt+down", "Choose", "Open the list of what the cell may be.", "Edit", "choose"),
-    Command(
-        "edit-empty", "backspace", "Edit empty", "Empty the one cell and change it; Esc leaves it as it was.", "Edit", "edit_empty"
-    ),
+    Command("edit", "f2,enter", "Edit", "Edit the cell; Enter accepts, Esc cancels.", "Edit", "edit", in_footer=True),
+    Command("choose", "f4,alt+down", "Choose", "Open the list of accepted values.", "Edit", "choose"),
+    Command("edit-empty", "backspace", "Edit empty", "Edit the cell from empty; Esc leaves it as it was.", "Edit", "edit_empty"),
     Command("clear", "delete", "Clear", "Empty the selected cells; an empty condition is Any.", "Edit", "clear"),
     Command("copy", "ctrl+c", "Copy", "Copy the selected cells, also for Excel.", "Edit", "copy"),
     Command("cut", "ctrl+x", "Cut", "Copy the selected cells and empty them.", "Edit", "cut"),
@@ -119,11 +117,13 @@ GRID: tuple[Command, ...] = (
         "Edit",
         verb=lambda s: s.fill_right(),
     ),
-    Command("undo", "ctrl+z", "Undo", "Take back the last step; in the test row the last fact.", "Edit", "undo(False)"),
-    Command("redo", "ctrl+y,ctrl+shift+z", "Redo", "Make the step again that was taken back.", "Edit", "undo(True)"),
+    Command("undo", "ctrl+z", "Undo", "Undo the last step; in the test row the last fact.", "Edit", "undo(False)"),
+    Command("redo", "ctrl+y,ctrl+shift+z", "Redo", "Redo the step that was undone.", "Edit", "undo(True)"),
     Command("insert-row", "insert,alt+a", "Insert row", "Insert as many rows above as are selected.", "Rows", "insert_rows(False)"),
     Command("insert-below", "ctrl+n", "Insert below", "Insert as many rows below as are selected.", "Rows", "insert_rows(True)"),
-    Command("duplicate", "ctrl+b", "Duplicate", "Copy the selected rows to below them.", "Rows", verb=lambda s: s.duplicate_rows()),
+    Command(
+        "duplicate", "ctrl+b", "Duplicate", "Copy the selected rows below themselves.", "Rows", verb=lambda s: s.duplicate_rows()
+    ),
     Command(
         "delete-rows", "ctrl+k,ctrl+delete", "Delete rows", "Delete the selected rows.", "Rows", verb=lambda s: s.delete_rows()
     ),
@@ -148,22 +148,22 @@ GRID: tuple[Command, ...] = (
     ),
     Command("sort", "alt+s", "Sort", "Show the rows sorted by this column: up, down, as in the file.", "View", "sort"),
     Command("test-row", "f6", "Test row", "Go to the test row, or back to the table.", "Test row", "test_row", in_footer=True),
-    Command("open-row", "alt+o", "Open the row", "Go into the table that the row stands for.", "Move", "open_row"),
+    Command("open-row", "alt+o", "Open the row", "Open the table that the row refers to.", "Move", "open_row"),
     Command("leave", "escape", "Back", "Leave the test row; end a selection.", "Move", "leave", is_listed=False),
 )
 
 _OF_ASSETS = (
     Command("find", "ctrl+f", "Find", "Find texts, and replace them.", "Edit", "find", in_footer=True),
-    Command("find-next", "f3", "Find next", "Go to the next cell found.", "Edit", "find_next(False)"),
-    Command("find-previous", "shift+f3", "Find previous", "Go to the cell found before.", "Edit", "find_next(True)"),
+    Command("find-next", "f3", "Find next", "Go to the next hit.", "Edit", "find_next(False)"),
+    Command("find-previous", "shift+f3", "Find previous", "Go to the previous hit.", "Edit", "find_next(True)"),
     Command("go-to", "ctrl+g", "Go to", "Go to a row by its number or its asset.", "Move", "go_to"),
-    Command("filter", "ctrl+l", "Filter", "Show only some rows.", "View", "filter"),
+    Command("filter", "ctrl+l", "Filter", "Show only some of the rows.", "View", "filter"),
     Command("filter-same", "alt+e,alt+f", "Filter same", "Show only rows with the text of this cell.", "View", "filter_same"),
-    Command("show-all", "alt+g", "Show all rows", "Take the filter off.", "View", "show_all"),
-    Command("sort-file", "", "Sort the file", "Put the rows of the file itself in the order shown.", "Rows", "sort_file"),
+    Command("show-all", "alt+g", "Show all rows", "Remove the filter.", "View", "show_all"),
+    Command("sort-file", "", "Sort the file", "Sort the rows of the file itself as shown.", "Rows", "sort_file"),
     Command("autofit", "alt+w", "Autofit", "Make each column as wide as its texts.", "View", "autofit"),
     Command("rename-column", "", "Rename column", "Give the column another name.", "Columns", "rename_column"),
-    Command("clear-context", "alt+x", "Clear test row", "Ask for nothing.", "Test row", "clear_context"),
+    Command("clear-context", "alt+x", "Clear test row", "Empty the test row.", "Test row", "clear_context"),
 )
 
 _OF_SCREEN = (
@@ -179,29 +179,31 @@ _OF_SCREEN = (
         in_footer=True,
     ),
     Command("save", "ctrl+s", "Save", "Write the table to its file.", "File", "save", in_footer=True),
-    Command("save-as", "", "Save as", "Write the table to another file, and go on with that.", "File", "save_as"),
+    Command("save-as", "", "Save as", "Write the table to another file, and continue with it.", "File", "save_as"),
     Command("open", "ctrl+o", "Tables", "Go to another table of the folder.", "File", "tables"),
-    Command("back", "alt+q,alt+up,alt+b", "Back", "Leave a table that a row stands for, and go back to that row.", "File", "back"),
+    Command(
+        "back", "alt+q,alt+up,alt+b", "Back", "Leave an inner table, and go back to the row that refers to it.", "File", "back"
+    ),
     Command("new-table", "", "New table", "Make a table, with the columns of a blueprint.", "File", "new_table"),
-    Command("refresh", "f5", "Refresh", "Take in what changed on the disk, sort and filter anew.", "File", "refresh"),
-    Command("import", "", "Import", "Bring rows in from Excel, CSV, Parquet or JSON.", "File", "import"),
+    Command("refresh", "f5", "Refresh", "Read changes from disk; sort and filter again.", "File", "refresh"),
+    Command("import", "", "Import", "Read rows from Excel, CSV, Parquet or JSON.", "File", "import"),
     Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
     Command("history", "alt+z", "Undo history", "Every step; go back to any of them.", "Edit", "history"),
     Command("add-column", "alt+c", "Add column", "Add a condition or another column.", "Columns", "add_column"),
-    Command("blueprints", "", "Blueprints", "Sets of columns that are used again.", "Columns", "blueprints"),
+    Command("blueprints", "", "Blueprints", "Sets of columns to reuse.", "Columns", "blueprints"),
     Command("contexts", "f9", "Contexts", "Load a saved or recorded context.", "Test row", "contexts", in_footer=True),
     Command("next-context", "f8", "Next context", "Load the next context of the file.", "Test row", "step(1)"),
-    Command("previous-context", "f7", "Previous context", "Load the context before.", "Test row", "step(-1)"),
-    Command("actors", "alt+p", "Actors", "Who may play each role, for the test row.", "Test row", "actors"),
+    Command("previous-context", "f7", "Previous context", "Load the previous context.", "Test row", "step(-1)"),
+    Command("actors", "alt+p", "Actors", "Who may fill each role, for the test row.", "Test row", "actors"),
     Command("why", "f12", "Why", "Why this row is not valid, and which are nearest.", "Test row", "why", in_footer=True),
     Command("next-tab", "ctrl+pagedown,alt+right", "Next tab", "Go to the next tab.", "Tabs", "next_tab(1)"),
-    Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the tab before.", "Tabs", "next_tab(-1)"),
+    Command("previous-tab", "ctrl+pageup,alt+left", "Previous tab", "Go to the previous tab.", "Tabs", "next_tab(-1)"),
     Command("assets", "alt+1", "Assets", "The table.", "Tabs", "tab('assets')"),
     Command("options", "alt+2", "Options", "The settings of the table.", "Tabs", "tab('options')"),
     Command("priorities", "alt+3", "Priorities", "Which database comes first.", "Tabs", "tab('priorities')"),
     Command("coverage", "alt+4", "Coverage", "Which contexts have no asset.", "Tabs", "tab('coverage')"),
     Command("problems", "alt+5", "Problems", "What is wrong with the table.", "Tabs", "tab('problems')"),
-    Command("quit", "ctrl+q", "Quit", "Leave; unsaved edits are asked about.", "File", "quit"),
+    Command("quit", "ctrl+q", "Quit", "Quit; asks about unsaved edits.", "File", "quit"),
 )
 
 SCREEN: tuple[Command, ...] = tuple(replace(command, scope="screen") for command in _OF_SCREEN)

@@ -80,7 +80,7 @@ def _faults(said: Mapping[str, object], themes: Collection[str]) -> Iterator[Fau
         near = nearest(str(theme), themes)
         yield Fault(f"there is no theme {in_quotes(str(theme))}.", ", ".join(sorted(themes)), in_quotes(near) if near else "")
     if not isinstance(keys, dict):
-        yield Fault("[keys] is no table.", 'lines such as duplicate = "ctrl+u"')
+        yield Fault("[keys] is not a table.", 'lines such as duplicate = "ctrl+u"')
         return
     for name, text in keys.items():
         yield from _key_faults(name, text)
@@ -92,7 +92,7 @@ def _key_faults(name: str, text: object) -> Iterator[Fault]:
         near = nearest(name, BY_ID)
         yield Fault(f"there is no command {in_quotes(name)}.", "those of docs/keys.md", in_quotes(near) if near else "")
     if not isinstance(text, str) or not text.strip():
-        yield Fault(f"the keys of {in_quotes(name)} are no text.", '"ctrl+u", or several with commas between')
+        yield Fault(f"the keys of {in_quotes(name)} are not text.", '"ctrl+u", or several with commas between')
         return
     for key in text.split(","):
         *modifiers, last = key.strip().split("+")

@@ -138,7 +138,7 @@ class KeyParser(XTermParser):
             self._close()
 
     def _close(self) -> None:
-        """Have Textual begin anew: it still waits for the end of what it does not know."""
+        """Have Textual begin again: it still waits for the end of what it does not know."""
         if self._awaiting.timeout is not None:
             self._gen = self.parse(self._tokens.append)
             self._awaiting, self._timeout_time = next(self._gen), None

@@ -1,4 +1,4 @@
-"""What panes and widgets tell the screen they stand on."""
+"""What panes and widgets tell the screen they are on."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class SetContext(Message):
     facts: Mapping[str, str]
     """Condition to fact, as written in `contextdb query`; a condition that is not named is left out of the question."""
     name: str = ""
-    """Where the context comes from: shown beside the test row."""
+    """Where the context comes from: shown next to the test row."""
 
 
 @dataclass
 class Edited(Message):
-    """The sheet was edited: show it anew and say what was done."""
+    """The sheet was edited: show it again and say what was done."""
 
     done: Done
 

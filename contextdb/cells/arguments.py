@@ -85,7 +85,7 @@ def require_mapping(value: object, what: str, accepted: str) -> Mapping[Any, Any
 
 
 def require_many(value: object, what: str, accepted: str) -> Iterable[Any]:
-    """Something to go through that is no text."""
+    """Something to go through that is not text."""
     if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
         raise _wrong(value, what, accepted)
     return value

@@ -8,7 +8,7 @@ A domain is a kind and, where they are declared, its values or its bounds:
     angle    degrees on the circle, [-180, 180)
     enum     one of `values`
     text     any text: an enum whose values are not declared
-    tags     a set of tags out of `values`; a tag covers what stands under it: Move covers Move.Run
+    tags     a set of tags out of `values`; a tag covers what is under it: Move covers Move.Run
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ class FactSet:
 
 
 def cell(text: str) -> FactSet:
-    """A fact that may be any of a set of values, written as a cell: `query({"heading": cell("0 ± 90")})`."""
+    """A fact that may be any of a set of values, written like a cell: `query({"heading": cell("0 ± 90")})`."""
     return FactSet(require_text(text, "text"))
 
 

@@ -96,7 +96,7 @@ class TagSet:
 
     @property
     def is_contradiction(self) -> bool:
-        """Whether a needed tag stands under a banned one, so that no set of tags can have all `needs` and no `bans`."""
+        """Whether a needed tag is under a banned one, so that no set of tags can have all `needs` and no `bans`."""
         return not self.bans.isdisjoint(covered_by(self.needs))
 
     @property
@@ -276,7 +276,7 @@ def _read_spans(part: str, text: str, domain: Domain) -> Spans:
         if low is None and high is None:
             raise _unreadable(text, domain, '".." needs a number before or after it')
         if (left and left not in "[(") or (low is None and left == "[") or (high is None and right == "]"):
-            raise _unreadable(text, domain, "a bracket stands at an end that is left away")
+            raise _unreadable(text, domain, "a bracket is at a missing end")
         return _between(_end(low, text, domain), _end(high, text, domain), left == "(", right == ")", text, domain)
     if found := _COMPARE.fullmatch(part):
         return _compared(found[1] or "=", _number(found[2], text, domain), text, domain)
@@ -318,7 +318,7 @@ def _angles_between(
 ) -> Spans:
     given = high if low is None else low if high is None else None
     if given is not None and not -180.0 <= given <= 180.0:
-        raise _unreadable(text, domain, f"an end left away stands for -180 or 180, and {given:g} lies outside; write both ends")
+        raise _unreadable(text, domain, f"a missing end means -180 or 180, and {given:g} is outside; write both ends")
     is_low_open, is_high_open = is_low_open and low is not None, is_high_open and high is not None
     return intervals.arc(-180.0 if low is None else low, 180.0 if high is None else high, is_low_open, is_high_open)
 
@@ -337,7 +337,7 @@ def _tokens(text: str, domain: Domain) -> Iterator[tuple[str, str]]:
     while at < len(text):
         token = _TOKEN.match(text, at)
         if not token:
-            raise _unreadable(text, domain, "a double quote stands alone; inside quotes it is doubled")
+            raise _unreadable(text, domain, "a double quote is unpaired; inside quotes it is doubled")
         sign, in_quotes, bare = token.groups()
         if in_quotes is not None:
             yield sign, in_quotes.replace('""', '"')
@@ -360,7 +360,7 @@ def _read_names(text: str, domain: Domain) -> ValueSet:
     plain = None if '"' in text else (("", _bare(word, text, domain)) for word in text.split())
     for sign, name in plain or _tokens(text, domain):
         if sign:
-            raise _unreadable(text, domain, f'"{sign}" stands before a quoted value')
+            raise _unreadable(text, domain, f'"{sign}" comes before a quoted value')
         if domain.values is not None and name not in domain.known:
             raise _unknown_value(name, text, domain, domain.values)
         names.append(name)
@@ -441,7 +441,7 @@ def _format_spans(spans: Spans, domain: Domain) -> str:
 
 
 def _shown_end(degrees: float) -> float:
-    """Half a turn is told as 180, not as the -180 that it is kept as."""
+    """Half a turn is shown as 180, not as the -180 that is stored."""
     return 180.0 if degrees == -180.0 else degrees
 
 

@@ -102,7 +102,7 @@ def swap_faults(swaps: Mapping[str, str], kind: str) -> Iterator[tuple[str, str]
     for name in partners if kind == "tags" else ():
         for above in partners:
             if name.startswith(above + "."):
-                yield name, f"it stands under {in_quotes(above)}, with which it changes places anyway"
+                yield name, f"it is below {in_quotes(above)}, with which it is exchanged anyway"
 
 
 def sided_pairs(names: Iterable[str]) -> dict[str, str]:

@@ -25,7 +25,7 @@ SAVED = 4
 def plain(accepts: Accepted, cuts: Sequence[float], keeps_all: bool = False) -> Accepted:
     """The set with plain ends; what is no set of numbers stays.
 
-    `cuts` are the first numbers of the classes that the column's cells tell apart, ascending, and those of the set are among them.
+    `cuts` are the first numbers of the classes that the column's cells distinguish, ascending, and those of the set are among them.
     With `keeps_all` no number is lost: ends move outwards only, so that a row that gets the cell leaves nothing of the set open.
     """
     if not isinstance(accepts, NumberSet) or not any(_length(end) > DIGITS for end in cuts_of(accepts)):

@@ -21,7 +21,7 @@ _TRUTH = {"true": True, "t": True, "yes": True, "1": True, "false": False, "f": 
 
 @lru_cache(maxsize=1 << 12)  # the cells of a column repeat its words
 def is_name(text: str) -> bool:
-    """Whether a value can stand in a cell without quotes."""
+    """Whether a value can be in a cell without quotes."""
     return bool(_NAME.fullmatch(text)) and not is_reserved(text)
 
 

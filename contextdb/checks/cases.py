@@ -49,7 +49,7 @@ class Case:
     facts: Mapping[str, str]
     expected: str = ""
     line: int | None = None
-    """Where it stands in its file, from 1."""
+    """Where it is in its file, from 1."""
     note: str = ""
 
 
@@ -129,7 +129,7 @@ def keep_case(path: Path, case: Case) -> None:
         The file cannot be read or written, or a condition has a name that such a file uses itself.
     """
     if taken := [name for name in CASE_COLUMNS if name in case.facts]:
-        found = f"a condition of the name {in_quotes(taken[0])} cannot be kept: a file of cases has such a column itself."
+        found = f"a condition named {in_quotes(taken[0])} cannot be saved: a file of cases has such a column itself."
         raise TableError(Fault(found, "another name of the condition", place=Place(str(path))))
     empty = [TextColumn.of(NAME, ()), TextColumn.of(EXPECTED, ())]
     said = {NAME: case.name, EXPECTED: case.expected, **case.facts} | ({NOTE: case.note} if case.note else {})
@@ -208,7 +208,7 @@ def _names(columns: Sequence[TextColumn]) -> list[str]:
 
 
 def _row_of(case: Case, source: AnySource | None, columns: Sequence[TextColumn]) -> int | None:
-    """Where a case stands: on its line, where the file still has it there, else where its name first stands."""
+    """Where a case is: on its line, where the file still has it there, else where its name first stands."""
     rows = [row for row, name in enumerate(_names(columns)) if name == case.name]
     at_line = [row for row in rows if source is not None and source.line(row) == case.line]
     return next(iter(at_line + rows), None)
@@ -235,7 +235,7 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
         return []
     try:
         flat, compiled = table.flat(), table.compile()
-    except TableError:  # a table inside it cannot be used: said of the row that stands for it
+    except TableError:  # a table inside it cannot be used: said of the row that refers to it
         return []
     found = list(_doubtful(flat, cases, file))
     known = _asked(flat)
@@ -244,7 +244,7 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
             continue
         verdict = judge(compiled, case)
         for fault in verdict.faults:
-            message = f"the case {in_quotes(case.name)} cannot be asked: {fault.message}"
+            message = f"the case {in_quotes(case.name)} cannot be evaluated: {fault.message}"
             found.append(Finding("unreadable-case", "error", message, flat.name, file, line=case.line, column=fault.place.column))
         if not verdict.faults and verdict.holds is False:
             message = f"the case {in_quotes(case.name)} fails: {told(verdict, compiled.assets)}."
@@ -315,7 +315,7 @@ def read_expected(text: str) -> Expected:
             return Expected(needs, bans)
         case ValueSet(values, False) if not cell.is_soft:
             return Expected(frozenset(map(str, values)), is_exact=True)
-    found = f"{in_quotes(body)} says nothing that can be expected."
+    found = f"{in_quotes(body)} is not a valid expectation."
     raise ContextError(Fault(found, f'assets with spaces between, "+walk -run", "{NONE}"', place=Place(column=EXPECTED)))
 
 
@@ -333,14 +333,14 @@ def _doubtful(table: TableData, cases: Sequence[Case], file: str | None) -> Iter
         about = f"the case {in_quotes(case.name)}"
         for name in [name for name in case.facts if name not in asked]:
             [fault] = no_condition(name, [c.condition.name for c in table.conditions]).faults
-            yield replace(place, message=f"{about} cannot be asked: {fault.message}", column=name)
+            yield replace(place, message=f"{about} cannot be evaluated: {fault.message}", column=name)
             asked.add(name)
         if first := first_of.get(case.name):
             where = f"in line {first.line}" if first.line else "before it"
-            yield replace(place, level="warning", message=f"{about} stands {where} too: a name is for one case.", column=NAME)
+            yield replace(place, level="warning", message=f"{about} is also {where}: each case needs its own name.", column=NAME)
         first_of.setdefault(case.name, case)
         for asset in _banned(case).difference(assets):
-            message = f"{about} holds whatever the table says: {_no_asset(asset, assets)}"
+            message = f"{about} always holds: {_no_asset(asset, assets)}"
             yield replace(place, level="warning", message=message, column=EXPECTED)
 
 

@@ -1,4 +1,4 @@
-"""What a change of a table does: which contexts gain or lose assets, gaps that open and close, rows that can play no more.
+"""What a change of a table does: which contexts gain or lose assets, gaps that open and close, rows that can no longer be chosen.
 
 Both tables are read under one set of conditions, so that their contexts can be compared; a column that one of them does not have
 says Any there. What an asset gains is what its rows hold now and held not before. A gap that opens lies where some asset lost
@@ -201,7 +201,7 @@ class MergeEffects:
     opened: tuple[Box, ...]
     """Contexts without a valid row that had one in both sides."""
     findings: tuple[Finding, ...]
-    """Overlaps under a policy "unique", and rows that can play no more; rows are those of the merge."""
+    """Overlaps under a policy "unique", and rows that can no longer be chosen; rows are those of the merge."""
 
     def __bool__(self) -> bool:
         return bool(self.opened or self.findings)
@@ -231,7 +231,7 @@ def _flat(table: EitherTable) -> EitherTable:
         return table
     plain = as_plain(flat)
     if plain is None:
-        found = f"tags of {in_quotes(table.name)} and of a table inside it are asked for as no single cell can say."
+        found = f"tags of {in_quotes(table.name)} and of a table inside it have requirements that no single cell can describe."
         raise TableError(Fault(found, place=Place(str(table.path) if table.path else None)))
     return plain
 

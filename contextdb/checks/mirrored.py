@@ -54,7 +54,7 @@ def _asked(table: Table) -> dict[str, Condition]:
 
 
 def _mirroring_databases(table: Table) -> list[str]:
-    """The databases that play assets of the table mirrored: its own, and those of tables that it stands in."""
+    """The databases that play assets of the table mirrored: its own, and those of tables that it is in."""
     around = table.around or {}
     found = []
     for name, part in table.schema.databases.items():
@@ -90,7 +90,7 @@ def _is_uneven(condition: Condition) -> bool:
 def _uneven(condition: Condition) -> str:
     bounds = {"min": condition.domain.minimum, "max": condition.domain.maximum}
     low, high = (f"{key} {format_number(b)}" if math.isfinite(b) else f"no {key}" for key, b in bounds.items())
-    return f'mirror = "negate", with {low} and {high}: the mirrored facts lie outside.'
+    return f'mirror = "negate", with {low} and {high}: the mirrored facts are outside the bounds.'
 
 
 def _file(table: Table) -> str | None:

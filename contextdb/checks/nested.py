@@ -1,4 +1,4 @@
-"""What a check finds wrong with rows that stand for another table, and what it tells of a flat table's rows.
+"""What a check finds wrong with rows that refer to another table, and what it says of a flat table's rows.
 
 A finding of a table is about that table's own rows: what concerns rows of an inner table alone is told of that table, once.
 """
@@ -20,7 +20,7 @@ from contextdb.tables.table import Table
 
 
 def check_nesting(table: Table) -> Iterator[Finding]:
-    """What is wrong with the rows of a readable table that stand for others; nothing where no others are known."""
+    """What is wrong with the rows of a readable table that refer to others; nothing where no others are known."""
     if not is_nested(table) or table.around is None or table.faults:
         return
     unusable = list(_unusable(table))
@@ -45,7 +45,7 @@ def _unusable(table: Table) -> Iterator[Finding]:
         except ContextDBError as error:
             first = error.faults[0]
             n_faults = plural(len(error.faults), "fault")
-            message = f"the table {in_quotes(name)} cannot stand here: it has {n_faults}, the first in {first.place}."
+            message = f"the table {in_quotes(name)} cannot be used here: it has {n_faults}, the first in {first.place}."
             yield finding_at(table, rows[0], "unusable-table", "error", message, table.asset_column)
 
 
@@ -72,12 +72,12 @@ def own_findings(flat: FlatTable, findings: Iterable[Finding]) -> Iterator[Findi
 
 
 def outer_findings(flat: FlatTable, findings: Iterable[Finding]) -> Iterator[Finding]:
-    """The findings about rows of a flat table, without those that the check of an inner table tells of."""
+    """The findings about rows of a flat table, without those that the check of an inner table reports."""
     return (f for f in findings if f.row is None or not _is_of_inner(flat, (f.row, *f.by)))
 
 
 def _is_of_inner(flat: FlatTable, rows: Sequence[int]) -> bool:
-    """Whether several rows all stand in one place of one inner table, whose own check tells of them."""
+    """Whether several rows all are in one place of one inner table, whose own check reports them."""
     way = flat.expansion.rows
     return len(rows) > 1 and all(way[0, row] == way[0, rows[0]] and flat.leaves[row] != flat.assets[row] for row in rows)
 
@@ -86,7 +86,7 @@ def _own(flat: FlatTable, finding: Finding, row: int) -> Finding:
     outer = flat.expansion.rows[0]
     own, places = int(outer[row]), flat.places(row)
     by = tuple(dict.fromkeys(int(outer[other]) for other in finding.by if outer[other] != own))
-    where = f" The row stands in {places[-1]}." if len(places) > 1 else ""
+    where = f" The row is in {places[-1]}." if len(places) > 1 else ""
     place = places[0]
     return replace(
         finding, message=finding.message + where, row=own, by=by, file=place.file, line=place.line, column=finding.column

@@ -55,7 +55,7 @@ def _judged(table: EitherTable, work: int, progress: Progress) -> list[Finding]:
     if table.n_rows == 0:
         return []
     try:
-        ready = opened(table)
+        ready = opened(table, is_cut=True)
     except ContextDBError:  # such as a domain without a value: said of the cells already
         return []
     judging = progress.within("Comparing rows", 0.0, 1.0)
@@ -73,8 +73,8 @@ def _judged(table: EitherTable, work: int, progress: Progress) -> list[Finding]:
 def _undecided(table: EitherTable, n_undecided: int, n_rows: int) -> Finding:
     file = str(table.path) if table.path else None
     message = (
-        f"{n_undecided:,} of {plural(n_rows, 'row')} could not be decided within the work of a check, so others may make them "
-        "needless. To decide more: contextdb coverage, and its --work."
+        f"{n_undecided:,} of {plural(n_rows, 'row')} could not be decided within the work limit of a check, so other rows may "
+        "make them redundant. To decide more, use contextdb coverage with --work."
     )
     return Finding("undecided-rows", "info", message, table.name, file)
 

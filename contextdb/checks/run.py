@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import cast
@@ -61,18 +61,19 @@ def _whole_table(table: Table) -> Iterator[Finding]:
         ends = ", ".join(f"{n:,} in {LINE_ENDS[end]}" for end, n in table.source.line_ends.items())
         message = f"the lines end in different ways: {ends}; they are kept as they are."
         yield Finding("mixed-line-ends", "info", message, table.name, file)
+    present = {c.name for c in table.columns}
+    absent = [name for name in table.schema.conditions if name not in present]
     for column in table.conditions:
         if not column.condition.is_declared:
-            yield _undeclared(table, column, file)
+            yield _undeclared(table, column, file, absent)
 
 
-def _undeclared(table: Table, column: ConditionColumn, file: str | None) -> Finding:
+def _undeclared(table: Table, column: ConditionColumn, file: str | None, absent: Sequence[str]) -> Finding:
     name, kind = column.condition.name, column.condition.domain.kind
-    present = {c.name for c in table.columns}
-    near = nearest(name, [c for c in table.schema.conditions if c not in present])
+    near = nearest(name, absent)
     hint = f" Did you mean {in_quotes(near)}?" if near else ""
     level: Level = "warning" if table.schema.conditions else "info"
-    message = f"the condition is not declared in contextdb.toml; its cells read as {kind}.{hint}"
+    message = f"the condition is not declared in contextdb.toml; type inferred from its cells: {kind}.{hint}"
     return Finding("undeclared-condition", level, message, table.name, file, column=name)
 
 
@@ -106,7 +107,7 @@ def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
     spans = cell.accepts.spans
     bounds = _declared(low, high)
     if spans[-1][1] < low or spans[0][0] > high:
-        return "outside-domain", "warning", f"lies wholly outside {bounds}, so the row matches no expected value."
+        return "outside-domain", "warning", f"is wholly outside {bounds}, so the row matches no expected value."
     ends = [e for span in spans for e in span if np.isfinite(e)]
     if ends and (min(ends) < low or max(ends) > high):
         return "beyond-domain", "info", f"reaches beyond {bounds}."
@@ -147,7 +148,7 @@ def _assets(table: Table) -> Iterator[Finding]:
                 yield finding_at(table, row, "no-asset", "error", "the row names no asset.", table.asset_column)
         elif len(rows) > 1 and inner_name(asset) is None:
             for row in rows[1:]:
-                message = f"the asset {in_quotes(asset)} stands in {where(table, rows[0], row)} too."
+                message = f"the asset {in_quotes(asset)} is also in {where(table, rows[0], row)}."
                 yield finding_at(table, row, "duplicate-asset", "warning", message, table.asset_column, (rows[0],))
 
 

@@ -43,13 +43,13 @@ def verified(path: Path) -> Verdict:
     FileError
         There is no such file, the disk refuses, or the file is of no kind that contextdb writes.
     """
+    if not os.path.isfile(path):
+        read_bytes(path)  # raises, with the reason
     check = CHECKS.get(path.suffix.lower())
     if check is None:
         accepted = f"a file that contextdb writes: {', '.join(CHECKS)}"
         found = f"{in_quotes(path.name)} is not a file of contextdb."
         raise FileError(Fault(found, accepted, place=Place(str(path))))
-    if not os.path.isfile(path):
-        read_bytes(path)  # raises, with the reason
     kind = "file"
     try:
         for kind, message in check(path):
@@ -63,7 +63,7 @@ def verified(path: Path) -> Verdict:
 
 
 def files_under(folder: Path) -> list[Path]:
-    """The files below a folder that contextdb may have written, in order; what stands in hidden folders counts too."""
+    """The files below a folder that contextdb may have written, in order; what is in hidden folders counts too."""
     return sorted(path for path in folder.rglob("*") if path.suffix.lower() in CHECKS and path.is_file())
 
 
@@ -83,7 +83,7 @@ def _safetensors(path: Path) -> Told:
         yield "motion database", None
         open_database(path, verify=True)
     elif CLIP_FEATURES.key in keys:
-        yield "features of a clip", "kept by a build; the next build checks them and computes them again where they are altered"
+        yield "features of a clip", "cached by a build; the next build checks them and computes altered ones again"
     else:
         yield "compiled table", None
         open_artefact(path, CompiledData)
@@ -133,7 +133,7 @@ def _json(path: Path) -> Told:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ArtefactError(Fault(f"the file is no JSON: {error}.", ACCEPTED)) from None
+        raise ArtefactError(Fault(f"the file is not JSON: {error}.", ACCEPTED)) from None
     if not isinstance(document, dict) or not {"format", "tables"} <= document.keys():
         yield "JSON", "a document of another program, or of another command; nothing to compare"
         return

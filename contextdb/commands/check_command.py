@@ -1,6 +1,6 @@
-"""What is wrong with the tables: cells that cannot be read, empty cells, rows that others make needless, saved contexts that fail.
+"""Find what is wrong with the tables: unreadable cells, cells that accept nothing, redundant rows, saved contexts that fail.
 
-Exits with 1 when there are findings at the level of --fail-on, with 2 when there is no such path.
+Exits with 1 if there are findings at the level of --fail-on, with 2 if the path does not exist.
 
   contextdb check tables/
   contextdb check tables/ --format github --fail-on warning
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     same = "the same as --format json"
     parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
     parser.add_argument(
-        "--fail-on", choices=("error", "warning", "none"), default="error", help="the level that fails (default: error)"
+        "--fail-on", choices=("error", "warning", "none"), default="error", help="the lowest level that fails (default: error)"
     )
     parser.add_argument("--all", action="store_true", help="print every finding, not the first few of each kind")
 
@@ -105,9 +105,9 @@ def _unportable(files: Sequence[tuple[str, Path]], schema: Schema) -> Iterator[F
         declared = next((one for one in wanted if alike(one) == alike(path.name)), path.name)
         told = [f"{why}." for why in [why_unportable(path.name)] if why]
         if other := others.get(str(path)):
-            told.append(f"this and {path_in_quotes(other)} are one file on disks that do not tell capitals.")
+            told.append(f"this and {path_in_quotes(other)} are one file on disks that ignore case.")
         if composed(declared) != composed(path.name):
-            told.append(f"{SCHEMA_FILE} calls it {in_quotes(declared)}: there is no such file on disks that tell capitals.")
+            told.append(f"{SCHEMA_FILE} calls it {in_quotes(declared)}: there is no such file on disks that distinguish case.")
         yield from (Finding("unportable-name", "warning", message, name, str(path)) for message in told)
 
 
@@ -149,7 +149,7 @@ def _check_cases(table: Table, path: Path) -> list[Finding]:
 
 
 def _strays(folder: Path, tables: Sequence[Path]) -> Iterator[Finding]:
-    """A finding for every file of cases beside the tables that is none of theirs."""
+    """A finding for every file of cases next to the tables that is none of theirs."""
     taken = {os.path.abspath(cases_path(table)) for table in tables}
     for beside in sorted({folder, *(table.parent for table in tables if table.parent.is_dir())}):
         for path in sorted(beside.iterdir()):
@@ -164,7 +164,7 @@ def _stray(path: Path) -> Finding:
     near = nearest(stem, stems)
     mend = f" Did you mean {in_quotes(near + CASES_SUFFIX)}?" if near else ""
     accepted = " or ".join(in_quotes(stem + suffix) for suffix in TABLE_SUFFIXES)
-    message = f"its cases cannot be asked: there is no table beside it. Accepted: {accepted}.{mend}"
+    message = f"its cases cannot be evaluated: there is no table next to it. Accepted: {accepted}.{mend}"
     return Finding("unreadable-case", "error", message, file=str(path))
 
 

@@ -1,9 +1,9 @@
-"""Write the binary artefact for the game: .safetensors, opened there by memory map.
+"""Write the compiled file for the game: a .safetensors file, which the game maps into memory.
 
-Prints the path of each file that was written. --stubs also writes the facts of all these tables as Python types, for completion
-in editors and for type checkers; --c-header one header for games in C or C++, which opens the artefacts and asks them.
+Prints the path of each written file. --stubs also writes the facts of these tables as Python types, for completion in editors and
+for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files.
 
-  contextdb compile tables/                  one artefact beside each table
+  contextdb compile tables/                  one compiled file next to each table
   contextdb compile tables/ -o build/        all of them into a folder
   contextdb compile tables/hit_mid_air.csv -o hit_mid_air.safetensors
   contextdb compile tables/ -o build/ --stubs game/facts.py
@@ -35,10 +35,12 @@ HEADERS = (".h", ".hpp", ".hh", ".hxx")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or one table")
-    parser.add_argument("-o", "--out", metavar="FILE", help="the artefact, or a folder for several (default: beside each table)")
+    parser.add_argument(
+        "-o", "--out", metavar="FILE", help="the compiled file, or a folder for several (default: next to each table)"
+    )
     parser.add_argument("--stubs", metavar="FILE", help="also write the facts of the tables as Python types: a .py or .pyi file")
     parser.add_argument(
-        "--c-header", metavar="FILE", help="also write one C99 header that opens the artefacts and asks them: a .h file"
+        "--c-header", metavar="FILE", help="also write one C99 header that opens and queries the compiled files: a .h file"
     )
 
 
@@ -66,7 +68,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _header_text(tables: list[Table], path: Path) -> str:
-    """The header, before anything is written; tables that it leaves out are told."""
+    """The header, before anything is written; tables that it leaves out are reported."""
     text, held_back = c_header_of({table.name: table.compile() for table in tables}, f"CDB_{path.stem}_H")
     for table in held_back:
         print(
@@ -93,7 +95,7 @@ def _written_as(text: str, suffixes: tuple[str, ...], what: str) -> Path:
         return path
     mend = "" if os.path.isdir(text) or text.endswith(SEPARATORS) else path_in_quotes(path.with_suffix(suffixes[0]))
     accepted = f"a name that ends in {', '.join(suffixes[:-1])} or {suffixes[-1]}"
-    raise FileError(Fault(f"this is no name of {what}.", accepted, mend, Place(text)))
+    raise FileError(Fault(f"this is not a valid name for {what}.", accepted, mend, Place(text)))
 
 
 def _tables(text: str) -> list[Table]:
@@ -118,7 +120,9 @@ def _target(table: Table, out: str | None, n_tables: int) -> Path:
         is_file_name = PurePath(table.name).name == table.name and not any(c in table.name for c in SEPARATORS)
         return Path(out) / f"{table.name if is_file_name else table.path.stem}{SUFFIX}"
     mend = path_in_quotes(Path(out).with_suffix(SUFFIX))
-    raise FileError(Fault("this is no name of an artefact.", f"a name that ends in {SUFFIX}, or a folder", mend, Place(out)))
+    raise FileError(
+        Fault("this is not a valid name for a compiled file.", f"a name that ends in {SUFFIX}, or a folder", mend, Place(out))
+    )
 
 
 def _require_different(targets: list[Path]) -> None:

@@ -1,8 +1,8 @@
-"""Which contexts have a valid row, which have none, and whether that is enough.
+"""Measure which contexts have a valid row, and which have none.
 
-Exits with 1 when a bar is missed: --fail-under, --fail-under-telemetry, --max-drop (0 unless given, when there is a --baseline),
-or when a table of the baseline is gone or has lost all its rows, unless --gone names it.
-Bars are held against the lower bound of the covered share, so that no lucky sample passes.
+Exits with 1 if a threshold is missed: --fail-under, --fail-under-telemetry, or --max-drop (by default 0 with a --baseline);
+or if a table of the baseline is missing or has lost all its rows, unless --gone names it.
+Thresholds are compared with the lower bound of the covered share, so that a lucky sample does not pass.
 
   contextdb coverage tables/
   contextdb coverage locomotion --gap 1
@@ -25,6 +25,8 @@ from contextdb.commands import coverage_telemetry
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import Earlier
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
+from contextdb.covering.pairs import PairTable
+from contextdb.covering.progress import Tell
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
 from contextdb.report import coverage_formats
@@ -45,18 +47,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     same = "the same as --format json"
     parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
-    parser.add_argument("--fail-under", type=_percent, metavar="PCT", help="fail when less is covered in any table")
+    parser.add_argument("--fail-under", type=_percent, metavar="PCT", help="fail if the covered percentage of any table is lower")
     parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run")
     parser.add_argument("--max-drop", type=_percent, metavar="PCT", help="how many points a table may fall below the baseline")
     parser.add_argument(
-        "--gone", action="append", default=[], metavar="TABLE", help="a table of the baseline that is meant to be gone, or empty"
+        "--gone", action="append", default=[], metavar="TABLE", help="a table of the baseline that is missing or empty on purpose"
     )
-    parser.add_argument("--gap", metavar="N", help="tell all of one gap, by its number or id")
-    parser.add_argument("--explain", metavar="ROW", help="tell all of one row, by its number (from 1) or asset")
+    parser.add_argument("--gap", metavar="N", help="show all details of one gap, by its number or id")
+    parser.add_argument("--explain", metavar="ROW", help="show all details of one row, by its number (from 1) or asset")
     parser.add_argument("--all", action="store_true", help="list every gap and finding")
-    parser.add_argument("--seed", type=_count, default=0, metavar="N", help="where samples start (default: 0)")
+    parser.add_argument("--seed", type=_count, default=0, metavar="N", help="the seed of the samples (default: 0)")
     parser.add_argument("--work", type=_count, default=WORK, metavar="N", help=f"steps of the exact count (default: {WORK:,})")
-    parser.add_argument("--samples", type=_count, default=SAMPLES, metavar="N", help=f"contexts to try (default: {SAMPLES:,})")
+    parser.add_argument("--samples", type=_count, default=SAMPLES, metavar="N", help=f"contexts to sample (default: {SAMPLES:,})")
     coverage_telemetry.add_arguments(parser, _percent)
 
 
@@ -88,8 +90,8 @@ def _code(results: CoverageResults) -> ExitCode:
 
 
 def tables_at(text: str) -> list[Table]:
-    """The tables under a path: a folder of them, one file, or a table by its name. Of a folder those that stand in no other: the
-    others are measured where they stand.
+    """The tables under a path: a folder of them, one file, or a table by its name. Of a folder those that are in no other: the
+    others are measured where they are.
 
     Raises
     ------
@@ -108,9 +110,9 @@ def tables_at(text: str) -> list[Table]:
 
 def _require_sense(arguments: argparse.Namespace) -> None:
     if arguments.max_drop is not None and not arguments.baseline:
-        raise ContextError(Fault("--max-drop compares with a baseline.", "--baseline FILE beside it"))
+        raise ContextError(Fault("--max-drop compares with a baseline.", "--baseline FILE with it"))
     if arguments.gone and not arguments.baseline:
-        raise ContextError(Fault("--gone names tables of a baseline.", "--baseline FILE beside it"))
+        raise ContextError(Fault("--gone names tables of a baseline.", "--baseline FILE with it"))
     coverage_telemetry.require_telemetry(arguments)
     is_detail = arguments.gap is not None or arguments.explain is not None
     names = ("fail_under", "fail_under_telemetry", "max_drop", "baseline")
@@ -158,8 +160,7 @@ def _measured(arguments: argparse.Namespace, table: EitherTable, baseline: dict[
 
 def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     """The coverage of one table and of its pairs of conditions, by the budgets of the arguments."""
-    from contextdb.covering import coverage, pairs
-    from contextdb.covering.pairs import SAMPLES as PAIR_SAMPLES
+    from contextdb.covering import coverage
     from contextdb.report.coverage_results import Measured
 
     with _placed(table):
@@ -171,17 +172,34 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
                 work=arguments.work,
                 samples=arguments.samples,
                 max_gaps=MOST_GAPS,
-                progress=None if told is None else lambda part, share: told(int(1000 * share), 1000, part),
+                progress=_tell(told),
             )
         seen = coverage_telemetry.observed(arguments, table, report.gaps)
-        compared = pairs(table, seed=arguments.seed, samples=min(arguments.samples, PAIR_SAMPLES))
+        compared = _pairs(arguments, table)
     lines = tuple(table.place(row).line for row in range(table.n_rows))
     file = str(table.path) if table.path else None
     return Measured(report, file, tuple(table.assets), lines, compared, telemetry=seen, inside=_inside(table))
 
 
+def _pairs(arguments: argparse.Namespace, table: EitherTable) -> PairTable | None:
+    """The coverage of pairs of conditions; None where the conditions are too many."""
+    from contextdb.covering import pairs
+    from contextdb.covering.pairs import MOST_CONDITIONS, SAMPLES
+
+    if len(table.conditions) > MOST_CONDITIONS:
+        return None
+    n_cells = table.n_rows * len(table.conditions)
+    with coverage_telemetry.bar(f"comparing conditions of {printable(table.name)}", n_cells) as told:
+        return pairs(table, seed=arguments.seed, samples=min(arguments.samples, SAMPLES), progress=_tell(told))
+
+
+def _tell(told: coverage_telemetry.Bar | None) -> Tell | None:
+    """What tells a bar of a computation."""
+    return None if told is None else lambda part, share: told(int(1000 * share), 1000, part)
+
+
 def _inside(table: EitherTable) -> dict[int, str]:
-    """For the rows that stand in other files than the table their files, from the table's folder."""
+    """For the rows that are in other files than the table their files, from the table's folder."""
     if table.path is None or not isinstance(table, FlatTable):
         return {}
     files = {row: table.place(row).file for row in range(table.n_rows)}
@@ -217,7 +235,7 @@ def _details(arguments: argparse.Namespace, table: EitherTable) -> str:
 
 
 def _row(text: str, table: EitherTable) -> int:
-    """The row that --explain means: a number from 1, else an asset that stands in one row."""
+    """The row that --explain means: a number from 1, else an asset that is in one row."""
     rows = [row for row, asset in enumerate(table.assets) if asset == text]
     if len(rows) == 1:
         return rows[0]
@@ -225,7 +243,7 @@ def _row(text: str, table: EitherTable) -> int:
         return int(text) - 1
     if rows:
         numbers = ", ".join(str(row + 1) for row in rows[:6])
-        found = f"the asset {in_quotes(text)} stands in {plural(len(rows), 'row')}."
+        found = f"the asset {in_quotes(text)} is in {plural(len(rows), 'row')}."
         raise ContextError(Fault(found, f"one of the rows {numbers}"))
     near = nearest(text, table.assets)
     accepted = f"a row from 1 to {table.n_rows:,}, or an asset" if table.n_rows else "none: the table has no rows"
@@ -245,7 +263,7 @@ def _read_baseline(file: str) -> dict[str, Earlier]:
     try:
         text = read_bytes(Path(file)).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ContextError(Fault("the baseline is no text.", ACCEPTED, place=Place(file))) from None
+        raise ContextError(Fault("the baseline is not text.", ACCEPTED, place=Place(file))) from None
     return read_baseline(text, file)
 
 
@@ -256,7 +274,7 @@ def _percent(text: str) -> float:
     except ValueError:
         percent = -1.0
     if not 0.0 <= percent <= 100.0:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no percentage. Accepted: a number from 0 to 100.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a percentage. Accepted: a number from 0 to 100.")
     return percent / 100.0
 
 
@@ -264,5 +282,5 @@ def _count(text: str) -> int:
     """A whole number from 0 up."""
     plain = text.replace("_", "").replace(",", "")
     if not (plain.isascii() and plain.isdecimal()) or len(plain) > 15:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no whole number from 0 up.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a whole number from 0 up.")
     return int(plain)

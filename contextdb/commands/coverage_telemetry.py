@@ -1,4 +1,4 @@
-"""The part of `contextdb coverage` that holds recorded contexts against the tables."""
+"""The part of `contextdb coverage` that evaluates recorded contexts."""
 
 from __future__ import annotations
 
@@ -33,15 +33,17 @@ def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], floa
     """The arguments about telemetry."""
     told = parser.add_argument_group("recorded contexts")
     told.add_argument(
-        "--telemetry", action="append", metavar="GLOB", help="CSV or Parquet files with a column for each fact; may be given again"
+        "--telemetry", action="append", metavar="GLOB", help="CSV or Parquet files with a column for each fact; may be repeated"
     )
     told.add_argument(
-        "--fail-under-telemetry", type=percent, metavar="PCT", help="fail when fewer of the recorded moments have a valid row"
+        "--fail-under-telemetry", type=percent, metavar="PCT", help="fail if the covered percentage of recorded moments is lower"
     )
-    told.add_argument("--count", metavar="COLUMN", help="the column that says how often each row's moment was seen")
+    told.add_argument("--count", metavar="COLUMN", help="the column that says how often each moment was seen")
     told.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
     told.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
-    told.add_argument("--resume", metavar="FOLDER", help="keep the sums of finished files, and go on there after an interruption")
+    told.add_argument(
+        "--resume", metavar="FOLDER", help="keep the sums of finished files, and continue from them after an interruption"
+    )
 
 
 def require_telemetry(arguments: argparse.Namespace) -> None:
@@ -54,7 +56,7 @@ def require_telemetry(arguments: argparse.Namespace) -> None:
     """
     if arguments.telemetry:
         if arguments.scheduler is not None and arguments.engine != "dask":
-            raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask beside it"))
+            raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask with it"))
         return
     given = {
         "--fail-under-telemetry": arguments.fail_under_telemetry is not None,
@@ -65,11 +67,11 @@ def require_telemetry(arguments: argparse.Namespace) -> None:
     }
     for option, is_given in given.items():
         if is_given:
-            raise ContextError(Fault(f"{option} is about recorded contexts.", "--telemetry GLOB beside it"))
+            raise ContextError(Fault(f"{option} is about recorded contexts.", "--telemetry GLOB with it"))
 
 
 def observed(arguments: argparse.Namespace, table: EitherTable, known: Sequence[Gap]) -> Observed | None:
-    """What the recorded contexts say of a table and its gaps; None where no files were named. Files not read are told."""
+    """What the recorded contexts say of a table and its gaps; None where no files were named. Files not read are reported."""
     if not arguments.telemetry:
         return None
     from contextdb.telemetry import observe
@@ -119,16 +121,16 @@ def bar(label: str, n_cells: int = 0) -> Iterator[Bar | None]:
 
 
 def log_of(label: str, n_cells: int) -> Bar | None:
-    """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal, and where cells are
-    not very many."""
-    if sys.stderr.isatty() or n_cells < MANY_CELLS:
+    """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal. Where cells are not
+    very many it tells only that loops are compiled."""
+    if sys.stderr.isatty():
         return None
     told: set[object] = set()
 
     def tell(done: float, total: int, part: str = "") -> None:
         tenth = int(10 * done / total) if total else 0
         mark = part if part == PREPARING else tenth
-        if mark not in told:
+        if mark not in told and (mark == PREPARING or n_cells >= MANY_CELLS):
             told.add(mark)
             print(f"contextdb: {label}: {10 * tenth} % {part}".rstrip(), file=sys.stderr, flush=True)
 

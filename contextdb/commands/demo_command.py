@@ -1,7 +1,7 @@
-"""The whole way on the sample tables: a context, the valid assets, why the others are not, a player of two teams cast for a role,
+"""A tour of the sample tables: a context, its valid assets, why the others are not valid, a player from two teams cast for a role,
 and a search of the valid clips' frames.
 
-The clips are made by formulas, not captured; they are written as BVH files and read back like any others.
+Formulas make the clips, not motion capture. They are written as BVH files and read back like any others.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ N_NEAREST = 2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("--tables", metavar="FOLDER", help="the sample tables (default: those that came with contextdb)")
-    parser.add_argument("--keep", metavar="FOLDER", help="a new folder for the tables and the made clips, to try things on")
+    parser.add_argument("--keep", metavar="FOLDER", help="a new folder for the tables and the synthetic clips, to experiment with")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -84,7 +84,7 @@ def make_sample(source: Path, folder: Path) -> None:
     """
     Project.load(source)  # says what is wrong with it
     if folder.exists():
-        found = Fault("this is there already.", "the name of a folder that is not there yet", place=Place(str(folder)))
+        found = Fault("this already exists.", "the name of a folder that does not exist yet", place=Place(str(folder)))
         raise FileError(found)
     make_folder(folder.parent)
     with refused_writing(folder, ()), temporary_folder(folder.parent.resolve()) as temporary:
@@ -96,7 +96,7 @@ def make_sample(source: Path, folder: Path) -> None:
 
 
 def sample_folder() -> Path:
-    """Where the sample tables are: inside an installed package, or in the checkout beside it.
+    """Where the sample tables are: inside an installed package, or in the checkout next to it.
 
     Raises
     ------
@@ -107,9 +107,7 @@ def sample_folder() -> Path:
     for folder in (package / "_tables", package.parent / "tables"):
         if (folder / SCHEMA_FILE).is_file():
             return folder
-    raise FileError(
-        Fault("the sample tables are not there.", "tables/ of the checkout: --tables FOLDER", place=Place(str(package)))
-    )
+    raise FileError(Fault("the sample tables are missing.", "tables/ of the checkout: --tables FOLDER", place=Place(str(package))))
 
 
 def _steps(folder: Path) -> Iterator[str]:

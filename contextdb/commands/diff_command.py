@@ -1,6 +1,6 @@
-"""What changed between two versions of a table: rows by asset, columns, and cells, those of meaning apart from those of writing.
+"""Show what changed between two versions of a table: rows by asset, columns, and cells, with changes of mere text apart.
 
-Exits with 0 when nothing did, with 1 when something did, with 2 when a table cannot be read.
+Exits with 0 if nothing changed, with 1 if something did, with 2 if a table cannot be read.
 
   contextdb diff old/hit_mid_air.csv tables/hit_mid_air.csv
   contextdb diff a.csv b.csv --format markdown
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=FORMATS, default="text", metavar="FORMAT", help=f"{', '.join(FORMATS)} (default: text)")
     same = "the same as --format json"
     parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
-    parser.add_argument("--no-effects", action="store_false", dest="effects", help="leave out what the change does")
+    parser.add_argument("--no-effects", action="store_false", dest="effects", help="leave out the effects of the change")
     parser.add_argument("--all", action="store_true", help="print every difference, not the first of each kind")
 
 
@@ -48,14 +48,14 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _may_matter(found: Diff) -> bool:
-    """Whether more changed than how things are written and where they stand."""
+    """Whether more changed than how things are written and where they are."""
     is_other_rows = found.rows_added or found.rows_removed or found.columns_added or found.columns_removed or found.columns_renamed
     names_tables = any(inner_name(text) is not None for row in found.rows_renamed for text in (row.before, row.after))
     return bool(is_other_rows or found.n_changed or names_tables)
 
 
 def _effects(found: Diff) -> Effects | Fault:
-    """What the change does, or why that cannot be told."""
+    """What the change does, or why that cannot be reported."""
     from contextdb.checks.effects import effects
 
     try:

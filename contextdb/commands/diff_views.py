@@ -97,7 +97,7 @@ def _cell_lines(found: Diff, colour: bool, shows_all: bool) -> Iterator[str]:
     changes = list(found.cells)
     for title, part in (
         ("cells", [c for c in changes if c.is_meaning]),
-        ("written otherwise", [c for c in changes if not c.is_meaning]),
+        ("written differently", [c for c in changes if not c.is_meaning]),
     ):
         if not part:
             continue

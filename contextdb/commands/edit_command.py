@@ -1,6 +1,6 @@
 """Edit tables in the terminal: cells, a test context, coverage, priorities.
 
-It needs a terminal; without one it exits with 2.
+Exits with 2 without a terminal.
 
   contextdb edit tables/
   contextdb edit tables/hit_mid_air.csv --theme contextdb-light
@@ -23,7 +23,7 @@ class TerminalError(ContextDBError):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", nargs="?", help="a table, or a folder of tables (default: tables/, or here)")
-    parser.add_argument("--theme", metavar="NAME", help="the colours; without it those of the settings")
+    parser.add_argument("--theme", metavar="NAME", help="the colours (default: from the settings)")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 def _require_terminal() -> None:
     term = os.environ.get("TERM", "" if os.name != "nt" else "windows")
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        found = "standard input and output are no terminal."
+        found = "standard input and output are not a terminal."
         raise TerminalError(Fault(found, "a terminal", 'to use "contextdb query" and "contextdb check" in scripts'))
     if term in ("", "dumb", "unknown"):
         found = f"the terminal cannot move its cursor (TERM is {term or 'not set'})."

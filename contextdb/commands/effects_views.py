@@ -52,7 +52,7 @@ def effects_markdown(effect: Effects | Fault | None, shows_all: bool = False) ->
 
 def _told(effect: Effects | Fault, shows_all: bool) -> Iterator[Told]:
     if isinstance(effect, Fault):
-        yield f"That cannot be told: {effect}", []
+        yield f"That cannot be determined: {effect}", []
         return
     most = sys.maxsize if shows_all else MOST
     if effect.before is not None and effect.after is not None:
@@ -66,7 +66,7 @@ def _told(effect: Effects | Fault, shows_all: bool) -> Iterator[Told]:
         yield f"{plural(effect.n_left_out, 'more changed asset')} not looked at", []
     yield from _boxes("gaps opened", effect.opened, most)
     yield from _boxes("gaps closed", effect.closed, most)
-    yield from _findings("rows that can play no more", effect.dead, most)
+    yield from _findings("rows that can no longer be chosen", effect.dead, most)
     yield from _findings("rows that may not be valid together", effect.overlaps, most)
     if not effect:
         yield "no context gains or loses an asset", []

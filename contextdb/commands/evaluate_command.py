@@ -1,4 +1,4 @@
-"""Every context of a CSV or Parquet file, or of all files of a glob: in how many each asset is valid, and how many have none.
+"""Evaluate every context of a CSV or Parquet file, or of all files of a glob: how often each asset is valid, how often none.
 
 A file of contexts has a column for each fact and a row for each moment.
 
@@ -6,8 +6,8 @@ A file of contexts has a column for each fact and a row for each moment.
   contextdb evaluate hit_mid_air "telemetry/*.parquet" --unknown any --out answers.parquet
   contextdb evaluate hit_mid_air "telemetry/*.parquet" --engine dask --scheduler tcp://10.0.0.5:8786
 
-Files are streamed. The answers stand in FILE when all of them do: a run that fails or is interrupted leaves FILE as it was. With
---engine dask the workers read the files, and write beside FILE, by the names that they have here.
+Files are streamed. FILE is written when all answers are complete: a run that fails or is interrupted leaves FILE as it was. With
+--engine dask the workers read the files, and write next to FILE, under the same paths as here.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE", help="write each context's valid rows: .csv, .parquet, or a pipe that reads CSV")
     parser.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
-    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="what a missing fact does (default: error)")
+    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Evaluate the files; only sums are kept, and with --out the answers, in a folder beside it until all are there."""
+    """Evaluate the files; only sums are kept, and with --out the answers, in a folder next to it until all are there."""
     if arguments.scheduler is not None and arguments.engine != "dask":
-        raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask beside it"))
+        raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask with it"))
     compiled = open_compiled(arguments.table)
     files = context_files(arguments.contexts)
     out = None if arguments.out is None else _out_file(Path(arguments.out), files)
@@ -85,7 +85,7 @@ def _answered(
     Raises
     ------
     ContextDBError
-        A file cannot be read, holds facts that the table cannot be asked with, or was not finished; then nothing is told.
+        A file cannot be read, holds facts that the table cannot use, or was not finished; then nothing is reported.
     """
     from contextdb.telemetry.engines import with_dask
     from contextdb.telemetry.evaluate_file import Question, evaluate_file
@@ -120,7 +120,7 @@ def _by_option(faults: Sequence[Fault]) -> ContextError:
 
 @contextmanager
 def _folder_beside(out: Path | None) -> Iterator[Path | None]:
-    """A folder for what is not finished, beside the file that it becomes; it goes, whatever happens."""
+    """A folder for what is not finished, next to the file that it becomes; it goes, whatever happens."""
     if out is None:
         yield None
         return
@@ -150,7 +150,7 @@ def _out_file(out: Path, files: Sequence[Path]) -> Path:
         )
     if not os.path.isdir(out.parent):
         raise FileError(
-            Fault(f"there is no folder {path_in_quotes(out.parent)}.", "a folder that is there", place=place, rule="no-such-path")
+            Fault(f"there is no folder {path_in_quotes(out.parent)}.", "an existing folder", place=place, rule="no-such-path")
         )
     if out.resolve() in [path.resolve() for path in files]:
         raise FileError(Fault("the answers would be written over the contexts.", "another file", place=place))

@@ -1,6 +1,6 @@
-"""Export a table for other programs: CSV, TSV, Excel, Parquet, JSON, DMN, Unreal. The suffix of DST says which, or --as.
+"""Export a table for other programs: CSV, TSV, Excel, Parquet, JSON, DMN, Unreal. The suffix of DST or --as selects the format.
 
-What the format cannot hold is told with its place. A workbook keeps what contextdb.toml says of the table, so that importing it
+Reports, with its place, what the format cannot hold. A workbook keeps the settings in contextdb.toml of the table, so importing it
 again loses nothing.
 
   contextdb export tables/hit_mid_air.csv moves.xlsx
@@ -29,21 +29,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", metavar="DST", help="the file to write; - for standard output")
     names = [name for name, one in FORMATS.items() if one.is_written]
     parser.add_argument("--as", dest="format", metavar="FORMAT", choices=names, help=f"the format of DST: {', '.join(names)}")
-    told = "cells of CSV and TSV that a spreadsheet may run as formulas: named, kept, or with ' before each (default: tell)"
+    told = (
+        "cells of CSV and TSV that a spreadsheet may run as formulas: report them, keep them, or put ' before each (default: tell)"
+    )
     parser.add_argument("--formulas", choices=("tell", "keep", "quote"), default="tell", help=told)
-    parser.add_argument("--force", action="store_true", help="write over a file that is there")
+    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Write one table; what could not be kept is told on standard error."""
+    """Write one table; what could not be kept is reported on standard error."""
     is_standard = arguments.target == "-"
     if is_standard and arguments.format is None:
-        raise FileError(Fault("standard output has no suffix that tells a format.", "--as with a format", "--as tsv"))
+        raise FileError(Fault("standard output has no suffix that gives a format.", "--as with a format", "--as tsv"))
     kind = format_of(arguments.target, arguments.format, for_writing=True)
     if not is_standard and os.path.exists(arguments.target) and not (arguments.force or is_stream(Path(arguments.target))):
-        raise FileError(
-            Fault("the file is there already.", "a new name, or --force to write over it", place=Place(arguments.target))
-        )
+        raise FileError(Fault("the file already exists.", "a new name, or --force to write over it", place=Place(arguments.target)))
     table = load_table(table_path(arguments.source), strict=False)
     raw, remarks = write(table, kind, arguments.formulas)
     for remark in remarks:

@@ -1,6 +1,6 @@
-"""Let git merge and show tables cell by cell: writes lines of .gitattributes and git's configuration.
+"""Let git merge and show tables cell by cell: write lines to .gitattributes and git's configuration.
 
-What stands there already stays; run again, it changes nothing. Commit .gitattributes; every clone runs this once.
+Existing lines stay, and running it again changes nothing. Commit .gitattributes; run this once in every clone.
 
   contextdb git install
   contextdb git install tables/ --global

@@ -24,7 +24,7 @@ LINES = (
 )
 NAME = "contextdb: tables by asset and cell"
 BY_LINES = "{ test $? = 1 || git merge-file --diff3 -L ours -L base -L theirs %A %O %B; exit 1; }"
-"""What git does where the driver cannot be run or fails: else ours alone would stand in the file, without a mark."""
+"""What git does where the driver cannot be run or fails: else ours alone would are in the file, without a mark."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Setup:
         return [line.strip() for line in self.raw().splitlines()]
 
     def raw(self) -> bytes:
-        """What .gitattributes holds; nothing where it is not there."""
+        """What .gitattributes holds; nothing where it is missing."""
         return read_bytes(self.attributes) if self.attributes.is_file() else b""
 
     def value(self, key: str) -> str | None:
@@ -101,7 +101,7 @@ class Setup:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments that say where."""
-    parser.add_argument("path", metavar="PATH", nargs="?", default=".", help=f"the folder whose {ATTRIBUTES} is meant (default: .)")
+    parser.add_argument("path", metavar="PATH", nargs="?", default=".", help=f"the folder that contains {ATTRIBUTES} (default: .)")
     scope = parser.add_mutually_exclusive_group()
     scope.add_argument("--local", action="store_false", dest="is_global", default=False, help="configure this clone (default)")
     scope.add_argument("--global", action="store_true", dest="is_global", help="configure all repositories of this user")

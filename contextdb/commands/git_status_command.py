@@ -1,4 +1,4 @@
-"""What git has been told of tables. Exits with 1 when something is missing.
+"""Show how git is set up for tables. Exits with 1 if something is missing.
 
 contextdb git status tables/
 """

@@ -1,6 +1,6 @@
-"""A table as lines: each asset, and below it its cells that are not empty. Git compares these lines in `git diff` and `git log -p`.
+"""Print a table as lines: each asset, then its cells that are not empty. Git compares these lines in `git diff` and `git log -p`.
 
-A file that is no table is printed as it is.
+A file that is not a table is printed as it is.
 
   contextdb git text tables/hit_mid_air.csv
 """
@@ -20,7 +20,7 @@ from contextdb.tables.table import Table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
-    parser.add_argument("file", metavar="FILE", help="a .csv or .parquet file, under whatever name git gives it")
+    parser.add_argument("file", metavar="FILE", help="a .csv or .parquet file, under any name that git gives it")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:

@@ -1,4 +1,4 @@
-"""Take back what `contextdb git install` wrote: its lines of .gitattributes and its sections of git's configuration.
+"""Remove what `contextdb git install` wrote: its lines of .gitattributes and its sections of git's configuration.
 
 contextdb git uninstall tables/
 """

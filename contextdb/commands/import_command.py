@@ -1,7 +1,7 @@
 """Import a table from another program into a folder of tables: CSV in any dialect, TSV, Excel, Parquet, JSON, DMN, Unreal.
 
-Columns are matched with the conditions that contextdb.toml declares; for others a type is proposed from their cells, and declared
-there with the new table. What was decided, and why, is printed; --dry-run prints it alone.
+Columns are matched with the conditions that contextdb.toml declares. For others the command infers a type from their cells, and
+declares it there with the new table. It prints its decisions and their reasons; --dry-run writes nothing else.
 
   contextdb import moves.xlsx tables/moves.csv --dry-run
   contextdb import moves.xlsx tables/moves.csv --sheet Moves --map Sped=speed --map Notes=
@@ -22,12 +22,20 @@ from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural, row_name
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
-from contextdb.exchange.importing import Plan, declared_differently, plan_import, project_of
+from contextdb.exchange.importing import (
+    NAMES,
+    Plan,
+    declared_differently,
+    has_whole_names,
+    plan_import,
+    project_of,
+    whole_names_told,
+)
 from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
 from contextdb.exchange.reading import Reading, listed
 from contextdb.files.file_names import why_unportable
 from contextdb.schema.shapes import KIND_SYNONYMS
-from contextdb.tables.project import SCHEMA_FILE, schema_for
+from contextdb.tables.project import SCHEMA_FILE
 
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|"}
 LARGE_BYTES, LARGE_CELLS, LARGE_COLUMNS = 10_000_000, 1_000_000, 2_000
@@ -44,19 +52,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sheet", metavar="NAME", help="a sheet of a workbook, or cells of it (Moves!A1:F20); a decision of a DMN file"
     )
     parser.add_argument(
-        "--map", metavar="COLUMN=NAME", action="append", default=[], help="what a column is called here; COLUMN= leaves it out"
+        "--map", metavar="COLUMN=NAME", action="append", default=[], help="the name of a column in the table; COLUMN= leaves it out"
     )
     parser.add_argument(
         "--type", metavar="NAME=TYPE", action="append", default=[], help="the type of a new condition, or output, priority, …"
     )
-    parser.add_argument("--encoding", help="the encoding of a text file (default: told from its bytes)")
-    between = f"what stands between fields: {', '.join(DELIMITERS)} (default: told from the file)"
+    parser.add_argument("--encoding", help="the encoding of a text file (default: detected)")
+    between = f"the delimiter between fields: {', '.join(DELIMITERS)} (default: detected)"
     parser.add_argument("--delimiter", metavar="NAME", choices=DELIMITERS, help=between)
-    parser.add_argument("--decimal", choices=("comma", "point"), help="what stands in 3,5 (default: told from the cells)")
-    whole = "whether Mid Air is one name (whole) or two (words), in columns that are new (default: whole, but in our own workbooks)"
-    parser.add_argument("--names", choices=("whole", "words"), help=whole)
+    parser.add_argument(
+        "--decimal", choices=("comma", "point"), help="the decimal sign of the file (default: detected from its cells)"
+    )
+    whole = "whether Mid Air is one name (whole) or two (words), in new columns (default: whole, except in our own workbooks)"
+    parser.add_argument("--names", choices=NAMES, help=whole)
     parser.add_argument("--dry-run", action="store_true", help="write nothing")
-    parser.add_argument("--force", action="store_true", help="write over a table that is there")
+    parser.add_argument("--force", action="store_true", help="overwrite an existing table")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -73,7 +83,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     for remark in reading.remarks:
         print(printable(f"{name}: {remark}"), file=sys.stderr)
     plan = _plan(reading, target, arguments)
-    if arguments.names is None and (told := _whole_names(plan, reading)):
+    if arguments.names is None and (told := whole_names_told(plan.columns, reading, "--names words")):
         print(printable(f"{name}: {told}"), file=sys.stderr)
     if not arguments.dry_run:
         if is_large:
@@ -96,12 +106,12 @@ def _target(text: str, may_overwrite: bool) -> Path:
         mend = path_in_quotes(target.with_suffix(".csv")) if target.name else ""
         raise FileError(Fault("a table file does not end so.", f"a name that ends in {' or '.join(TABLE_SUFFIXES)}", mend, place))
     if why := why_unportable(target.name):
-        raise FileError(Fault(f"this is no name for a table: {why}.", "a name that every system can have", place=place))
+        raise FileError(Fault(f"this is not a valid table name: {why}.", "a name that every system can have", place=place))
     if not os.path.isdir(target.parent):
         folder = path_in_quotes(target.parent)
         raise FileError(Fault(f"there is no folder {folder}.", "a folder of tables", place=place, rule="no-such-path"))
     if os.path.exists(target) and not may_overwrite:
-        raise FileError(Fault("the file is there already.", "a new name, or --force to write over it", place=place))
+        raise FileError(Fault("the file already exists.", "a new name, or --force to write over it", place=place))
     return target
 
 
@@ -112,28 +122,15 @@ def _bytes(source: str) -> tuple[bytes, str]:
 def _options(arguments: argparse.Namespace) -> ReadOptions:
     is_comma = None if arguments.decimal is None else arguments.decimal == "comma"
     delimiter = None if arguments.delimiter is None else DELIMITERS[arguments.delimiter]
-    is_whole = arguments.names == "whole" if arguments.names else False if _is_of_a_project(arguments.source) else None
+    is_whole = has_whole_names(arguments.names, None if arguments.source == "-" else Path(arguments.source))
     return ReadOptions(arguments.format, arguments.sheet, arguments.encoding, delimiter, is_comma, is_whole)
-
-
-def _is_of_a_project(source: str) -> bool:
-    """Whether a contextdb.toml declares a file as a table, so that its cells are cells of ours."""
-    path = Path(source)
-    if path.suffix.lower() not in TABLE_SUFFIXES or not path.is_file():
-        return False
-    try:
-        folder, schema = schema_for(path)
-    except ContextDBError:  # it is no concern of this import
-        return False
-    said = (path.parent.resolve() / path.name).relative_to(folder.resolve()).as_posix()
-    return any(said in settings.files for settings in schema.tables.values())
 
 
 def _plan(reading: Reading, target: Path, arguments: argparse.Namespace) -> Plan:
     schema, settings = project_of(target)
     mapped = propose(reading, schema, settings, _pairs(arguments.map, "--map", "COLUMN=NAME"))
     for name in declared_differently(reading, schema):
-        told = f"the file declares {in_quotes(name)} otherwise than contextdb.toml, which holds."
+        told = f"the file declares {in_quotes(name)} differently from contextdb.toml, which takes precedence."
         print(printable(told), file=sys.stderr)
     return plan_import(reading, target, mapped=_typed(mapped, reading, _pairs(arguments.type, "--type", "NAME=TYPE")))
 
@@ -175,18 +172,6 @@ def _typed(mapped: Sequence[Mapped], reading: Reading, types: dict[str, str]) ->
 
 
 # ---- what is said
-
-
-def _whole_names(plan: Plan, reading: Reading) -> str:
-    """Which columns have texts that became one name each though blanks part names in a cell, with the first such text."""
-    changed = [(column, reading.column(column.source)) for column in plan.columns if column.cells is not None]
-    names = [column.source for column, _ in changed]
-    texts = (text for _, column in changed for text in column.texts if " " in text.strip())
-    example = next(texts, None)
-    if example is None:
-        return ""
-    where = "column" if len(names) == 1 else "columns"
-    return f"{where} {listed(names)}: each text is one name, such as {in_quotes(example)}; --names words reads each word as a name."
 
 
 def _lines(plan: Plan, reading: Reading, name: str, is_dry: bool) -> list[str]:

@@ -1,20 +1,20 @@
-"""Join what two sides made of one table, cell by cell, with rows and columns that came, went and moved. A git merge driver.
+"""Merge two versions of a table, cell by cell, with rows and columns that were added, removed and moved. A git merge driver.
 
-A contextdb.toml is merged key by key. The result is written over OURS, or into FILE. What the sides disagree about stands in it
-between git's marks, row by row, for a person or the editor to decide; a Parquet file then stays as it was. Where one of the three
-files is no table, lines are merged as git does it.
+A contextdb.toml is merged key by key. The result is written to OURS, or to FILE. Conflicts are written between git's marks, row by
+row, for a person or the editor to decide; a Parquet file then stays as it was. If one of the three files is not a table, its lines
+are merged as git does.
 
-Exits with 0 when all went together, with 1 when something is to be decided or lines were merged, with 2 when a file is not there or
+Exits with 0 if everything merged, with 1 if something is left to decide or lines were merged, with 2 if a file is missing or
 cannot be written.
 
-After a clean merge the meaning is looked at again: gaps, overlaps under the policy "unique" and rows that can play no more that
-neither side had are told on standard error; with --strict they give 1 too.
+After a clean merge the meaning is checked: gaps, overlaps under the policy "unique" and rows that can no longer be chosen, if
+neither side had them, are reported on standard error; with --strict the command then exits with 1.
 
   contextdb merge base.csv ours.csv theirs.csv --out merged.csv
   contextdb merge base.csv ours.csv theirs.csv --take theirs
 
 As a merge driver of git, with the lines "*.csv merge=contextdb" and "contextdb.toml merge=contextdb" in .gitattributes (what
-`git install` sets merges lines where the driver itself cannot be run):
+`git install` sets merges lines if the driver itself cannot run):
 
   git config merge.contextdb.driver "contextdb merge %O %A %B --path=%P"
 """
@@ -52,13 +52,15 @@ Merged = tuple[bytes | None, Callable[[], ExitCode]]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
-    parser.add_argument("base", metavar="BASE", help="the table before both changed it")
+    parser.add_argument("base", metavar="BASE", help="the table before both sides changed it")
     parser.add_argument("ours", metavar="OURS", help="our version; the result is written over it")
     parser.add_argument("theirs", metavar="THEIRS", help="the other version")
     parser.add_argument("-o", "--out", metavar="FILE", help="write the result here, and leave OURS as it is")
-    parser.add_argument("--path", metavar="PATH", help="the table's file, whose contextdb.toml holds (git: %%P; default: OURS)")
-    parser.add_argument("--take", choices=("ours", "theirs"), help="decide all conflicts for one side")
-    parser.add_argument("--strict", action="store_true", help="exit with 1 when the merge brings a gap that neither side had")
+    parser.add_argument(
+        "--path", metavar="PATH", help="the table's file, which decides the contextdb.toml to use (git: %%P; default: OURS)"
+    )
+    parser.add_argument("--take", choices=("ours", "theirs"), help="resolve all conflicts in favour of one side")
+    parser.add_argument("--strict", action="store_true", help="exit with 1 when the merge creates a gap that neither side had")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -153,7 +155,7 @@ def _merge_lines(path: Path, raws: Raws, arguments: argparse.Namespace, error: E
         raw, n_conflicts = merged_lines(*raws)
         write_atomic(Path(arguments.out or arguments.ours), raw)
         said = f"lines were merged instead of cells, with {plural(n_conflicts, 'place')} between marks."
-        mend = "to look at the file, and to mend what cannot be read"
+        mend = "to look at the file, and to correct what cannot be read"
     print(printable(f"contextdb: {Fault(said, mend=mend, place=place)}"), file=sys.stderr)
     return ExitCode.FOUND
 

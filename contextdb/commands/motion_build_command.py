@@ -1,14 +1,14 @@
 """Build the motion databases that contextdb.toml declares from their clips, and save them.
 
-Each becomes a file NAME.motion.safetensors, opened by memory map. What is computed of a clip is kept in .contextdb-cache, so that
-the next build computes only the clips that changed.
+Each becomes a memory-mapped file NAME.motion.safetensors. The features of each clip are cached in .contextdb-cache, so the next
+build computes only changed clips.
 
-  contextdb motion build tables/                       all databases, beside contextdb.toml
+  contextdb motion build tables/                       all databases, next to contextdb.toml
   contextdb motion build tables/ --out build/ --database jog
-  contextdb motion build tables/ --keep-going            without the clips and databases of which something is wrong
+  contextdb motion build tables/ --keep-going            without faulty clips and databases
 
-Nothing is saved while a clip cannot be read: all faults are told, and the exit code is 2. With --keep-going such clips are left
-out and told, and the exit code is 1. Clips that are only doubtful, such as a body of 170 m, are told as warnings.
+If a clip cannot be read, nothing is saved, all faults are reported, and the exit code is 2. With --keep-going such clips are left
+out and reported, and the exit code is 1. Clips that only look wrong, such as a body of 170 m, give warnings.
 """
 
 from __future__ import annotations
@@ -40,10 +40,12 @@ HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed",
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
-    parser.add_argument("--out", metavar="FOLDER", help=f"where the databases are saved (default: beside {SCHEMA_FILE})")
-    parser.add_argument("--database", metavar="NAME", action="append", help="only this one; may be given several times")
-    parser.add_argument("--keep-going", action="store_true", help="leave out what is wrong, build the rest, and exit with 1")
-    parser.add_argument("--no-cache", action="store_true", help="compute every clip, and keep nothing")
+    parser.add_argument("--out", metavar="FOLDER", help=f"where the databases are saved (default: next to {SCHEMA_FILE})")
+    parser.add_argument("--database", metavar="NAME", action="append", help="only this database; may be repeated")
+    parser.add_argument(
+        "--keep-going", action="store_true", help="leave out faulty clips and databases, build the rest, and exit with 1"
+    )
+    parser.add_argument("--no-cache", action="store_true", help="compute every clip, and cache nothing")
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of a table")
 
 
@@ -86,7 +88,7 @@ def warn(sentences: Iterable[str]) -> None:
 
 @dataclass
 class LeftOut:
-    """What a build goes on without: for each database what is wrong with it, or with some of its clips."""
+    """What a build continues without: for each database what is wrong with it, or with some of its clips."""
 
     errors: dict[str, list[ContextDBError]] = field(default_factory=dict)
 
@@ -104,7 +106,7 @@ class LeftOut:
         """Each fault, then what was left out."""
         yield from (f"left out: {message}" for message in self.messages)
         for name, errors in self.errors.items():
-            yield f"[databases.{name}] is left out, or lacks what is told above ({plural(len(errors), 'error')})."
+            yield f"[databases.{name}] is left out, or lacks what is reported above ({plural(len(errors), 'error')})."
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,7 @@ class MotionProject:
         for name, path in targets.items():
             other = taken.setdefault(path.name.casefold(), name)
             if other != name:
-                found = "two databases would be written to one file, on a disk that does not tell capitals."
+                found = "two databases would be written to one file, on a disk that ignores case."
                 raise FileError(Fault(found, f"another name for {some([other, name])}", place=Place(str(path))))
         return targets
 

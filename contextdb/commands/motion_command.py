@@ -5,7 +5,7 @@
   contextdb motion run game/ player stick.csv --out session.parquet
   contextdb motion replay session.parquet --at 2.5s
 
-The project that `demo --keep game` makes is one to try them on.
+The command `demo --keep game` makes a project to try them on.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""What was decided in a recorded session: what changed, when, and why; with --at, one decision in full.
+"""Show the decisions of a recorded session: what changed, when, and why; with --at, one decision in full.
 
-Without --at a row stands for each change, with what playing on would have cost and how long it then went on. --at takes an update's
-tick, as the first column tells it, or a time such as 2.5s.
+Without --at each change has a row, with the cost of playing on and how long the new animation played. --at accepts the tick of an
+update, shown in the first column, or a time such as 2.5s.
 
-A session keeps the best candidates of each search. With --at and --name the costs of all assets of that name are worked out again
+A session keeps the best candidates of each search. With --at and --name the costs of all assets with that name are computed again
 from the databases: those of the project that the session was recorded with, or of --project.
 
   contextdb motion replay session.parquet
@@ -42,17 +42,17 @@ from contextdb.tables.project import SCHEMA_FILE, folder_of
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("file", metavar="FILE", help="a recorded session, a .parquet file")
-    parser.add_argument("--at", metavar="N|TIME", help="one decision in full: its tick, or a time such as 2.5s")
+    parser.add_argument("--at", metavar="N|TIME", help="show one decision in full: its tick, or a time such as 2.5s")
     add_view(parser, "with --at: which costs are shown")
-    parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name holds this")
-    parser.add_argument("--project", metavar="FOLDER", help="with --name: where the databases are (default: where they were)")
+    parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name contains this")
+    parser.add_argument("--project", metavar="FOLDER", help="with --name: the project with the databases (default: as recorded)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Print a session, or one decision of it."""
     if arguments.view and arguments.at is None:
-        raise QueryError(Fault("--view shows the costs of one decision.", "--at N|TIME beside it, such as --at 2.5s"))
+        raise QueryError(Fault("--view shows the costs of one decision.", "--at N|TIME with it, such as --at 2.5s"))
     trace = Trace.load(arguments.file)
     place = None if arguments.at is None else place_of(arguments.at, trace, arguments.file)
     with output():
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def place_of(text: str, trace: Trace, file: str) -> int:
-    """Where the decision stands that --at means: of that tick, or the last one at or before that time.
+    """Where the decision is that --at means: of that tick, or the last one at or before that time.
 
     Raises
     ------
@@ -109,12 +109,12 @@ def _never_played(trace: Trace, asked: argparse.Namespace) -> str:
     """What to say of a name that no playing asset holds, and of one that no asset of the databases holds."""
     databases, why = databases_of(trace, asked.project, asked.file)
     if why:
-        return f"nothing whose name holds {in_quotes(asked.name)} plays; {why}"
+        return f"nothing whose name contains {in_quotes(asked.name)} plays; {why}"
     try:
         require_known(asked.name, databases, asked.file)
     except MotionError as error:
         return error.faults[0].message
-    return f"nothing whose name holds {in_quotes(asked.name)} plays; --at N|TIME beside --name tells what it would have cost"
+    return f"nothing whose name contains {in_quotes(asked.name)} plays; --at N|TIME with --name shows what it would have cost"
 
 
 def _is_named(playing: Playing | None, name: str) -> bool:
@@ -159,10 +159,10 @@ def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str
     """
     said = {str(about["project"]) for about in trace.about.values() if "project" in about}
     if project is None and not said:
-        return {}, "the session does not say which project it was recorded with: --project FOLDER says it."
+        return {}, "the session does not say which project it was recorded with; give it with --project FOLDER."
     folder = os.path.normpath(os.path.join(os.path.dirname(file), said.pop())) if project is None else project
     if project is None and not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
-        return {}, f"its project is no longer at {path_in_quotes(folder)}: --project FOLDER says where."
+        return {}, f"its project is no longer at {path_in_quotes(folder)}; give it with --project FOLDER."
     opened = {name: _saved(saved_path(folder_of(Path(folder)), name), about) for name, about in trace.about.items()}
     if all(opened.values()):
         return {name: database for name, database in opened.items() if database is not None}, ""

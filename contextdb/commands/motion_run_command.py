@@ -1,9 +1,9 @@
 """Steer a character along a recorded stick, and record every decision: the same files give the same session.
 
-STICK is a CSV or Parquet file with a row for each moment, which lasts until the next: time_s; speed_mps, turn_dps and strafe_deg
-as for `motion search`, or x_mps and z_mps, a velocity over the ground, and facing_deg. All other columns are facts.
+STICK is a CSV or Parquet file with a row for each moment, which lasts until the next. Its columns are time_s; speed_mps, turn_dps
+and strafe_deg as for `motion search`, or x_mps and z_mps, a velocity over the ground, and facing_deg. All other columns are facts.
 
-Exits with 1 when nothing ever plays.
+Exits with 1 if nothing ever plays.
 
   contextdb motion run game/ player stick.csv --out session.parquet
   contextdb motion replay session.parquet
@@ -41,12 +41,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, or its contextdb.toml")
     parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
-    parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what is asked for, moment by moment")
+    parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what the player requests, moment by moment")
     parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
-    parser.add_argument("--rate", metavar="HZ", type=_rate, help="updates a second (default: the features' rate)")
+    parser.add_argument("--rate", metavar="HZ", type=_rate, help="updates per second (default: the rate of the features)")
     parser.add_argument("--k", metavar="N", type=_count, default=12, help="candidates of each search to keep (default: 12)")
-    parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="of the variation that the controller has (default: 0)")
-    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="what a missing fact does (default: error)")
+    parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="seed of the controller's variation (default: 0)")
+    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
@@ -144,7 +144,7 @@ def _out_file(out: Path, stick: Path) -> Path:
         raise FileError(Fault("a session cannot be written to such a file.", f"a name that ends in {SUFFIX}", place=place))
     if not os.path.isdir(out.parent):
         found = f"there is no folder {path_in_quotes(out.parent)}."
-        raise FileError(Fault(found, "a folder that is there", place=place, rule="no-such-path"))
+        raise FileError(Fault(found, "an existing folder", place=place, rule="no-such-path"))
     if out.resolve() == stick.resolve():
         raise FileError(Fault("the session would be written over the stick.", "another file", place=place))
     return out
@@ -156,17 +156,17 @@ def _rate(text: str) -> float:
     except ValueError:
         rate = math.nan
     if not 1.0 <= rate <= 1000.0:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no rate. Accepted: 1 to 1000 updates a second, such as 30.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a rate. Accepted: 1 to 1000 updates a second, such as 30.")
     return rate
 
 
 def _count(text: str) -> int:
     if not text.isdecimal() or int(text) > 1000:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no number of candidates. Accepted: 0 to 1000, such as 12.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of candidates. Accepted: 0 to 1000, such as 12.")
     return int(text)
 
 
 def _seed(text: str) -> int:
     if not text.isdecimal() or len(text) > 18:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no seed. Accepted: a whole number, such as 7.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a seed. Accepted: a whole number, such as 7.")
     return int(text)

@@ -1,6 +1,6 @@
-"""The best frames of one database for a pose and a wished path, with what each channel and bias adds to their cost.
+"""Show the best frames of one database for a pose and a desired path, with what each channel and bias adds to their cost.
 
-With facts, only the assets that the database's table says are valid may play. Exits with 1 when nothing may.
+With facts, only the assets that the database's table says are valid may play. Exits with 1 if nothing may.
 
   contextdb motion search game/ loco --query walk@1.5 --speed 1.3 --turn 30
   contextdb motion search game/ loco gait=Walk speed=1.3 direction=0 style=tired --query walk@1.5 --view pose
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("database", metavar="DATABASE", help="the name of a [databases.NAME]")
     add_asked(parser)
     add_view(parser, "which costs are shown", View.SUMMARY)
-    parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name holds this, chosen or not")
+    parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name contains this, chosen or not")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
 
 def _candidates(database: MotionDatabase, query: Features, valid: Matches | None, asked: argparse.Namespace) -> Candidates:
-    """The best frames; of assets whose name holds --name, those that may not be chosen too."""
+    """The best frames; of assets whose name contains --name, those that may not be chosen too."""
     if not asked.name:
         return database.candidates(query, asked.k, valid, left_out=asked.left_out, tags=asked.tags)
     counts = database.candidates(query, 0, valid, tags=asked.tags).counts
@@ -92,6 +92,6 @@ def _lines(
     if rows:
         yield from candidate_lines(rows, View(asked.view), _events(stage, name, found), terminal_width())
     elif asked.name:
-        yield f"no asset's name holds {in_quotes(asked.name)}"
+        yield f"no asset's name contains {in_quotes(asked.name)}"
     else:
         yield "nothing may play"

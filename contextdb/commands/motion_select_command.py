@@ -1,6 +1,6 @@
-"""Which database of a selector wins for a pose and a wished path, with which frame, and why.
+"""Show which database of a selector wins for a pose and a desired path, with which frame, and why.
 
-With facts, only the assets that the databases' tables say are valid may play. Exits with 1 when nothing may.
+With facts, only the assets that the databases' tables say are valid may play. Exits with 1 if nothing may.
 
   contextdb motion select game/ locomotion --query walk@2 --speed 1.3
   contextdb motion select game/ locomotion gait=Walk speed=1.3 direction=0 style=tired --query walk@2 --speed 1.3 --view all
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("selector", metavar="SELECTOR", help="the name of a [selectors.NAME]")
     add_asked(parser)
     add_view(parser, "which costs are shown", View.SUMMARY)
-    parser.add_argument("--name", metavar="TEXT", default="", help="only candidates whose name holds this")
+    parser.add_argument("--name", metavar="TEXT", default="", help="only candidates whose name contains this")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:

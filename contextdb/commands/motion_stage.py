@@ -53,7 +53,7 @@ class Stage:
         """Read a project, open some of its databases where they are saved and up to date, and build the others.
 
         `names_of` says which are needed. Those of the same features are taken too, as they share a normalisation; what is wrong
-        with one of these is told, and it is left out.
+        with one of these is reported, and it is left out.
         """
         motion, project = MotionProject.load(path), Project.load(path)
         needed = names_of(motion.config)
@@ -152,16 +152,18 @@ def add_asked(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("facts", metavar="FACT=VALUE", nargs="*", default=[], help="facts: only assets that are valid may play")
     parser.add_argument("--query", metavar=CLIP_AT, required=True, help="the pose: a moment of a clip, such as walk@1.5")
     parser.add_argument(
-        "--speed", metavar="M/S", type=_speed, help="the wished path: metres a second (default: the clip's own path)"
+        "--speed", metavar="M/S", type=_speed, help="the desired path: metres per second (default: the clip's own path)"
     )
-    parser.add_argument("--turn", metavar="DEG/S", type=_degrees, help="with --speed: degrees a second, positive to the left")
-    parser.add_argument("--strafe", metavar="DEG", type=_degrees, help="with --speed: where it goes against where it faces")
+    parser.add_argument("--turn", metavar="DEG/S", type=_degrees, help="with --speed: degrees per second, positive to the left")
     parser.add_argument(
-        "--tags", metavar="TAGS", type=read_tags, help='"Move": has it; "-Stun": has not; "Move~2": costs 2 without'
+        "--strafe", metavar="DEG", type=_degrees, help="with --speed: the direction of movement relative to the facing"
     )
-    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="what a missing fact does (default: error)")
-    parser.add_argument("--k", metavar="N", type=_count, default=10, help="so many candidates (default: 10)")
-    parser.add_argument("--left-out", action="store_true", help="also frames that may not be chosen, each with the reason")
+    parser.add_argument(
+        "--tags", metavar="TAGS", type=read_tags, help='"Move": must have it; "-Stun": must not; "Move~2": costs 2 without it'
+    )
+    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
+    parser.add_argument("--k", metavar="N", type=_count, default=10, help="the number of candidates (default: 10)")
+    parser.add_argument("--left-out", action="store_true", help="also list frames that may not be chosen, with the reasons")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
@@ -174,7 +176,7 @@ def add_view(parser: argparse.ArgumentParser, what: str, default: View | None = 
 
 
 def facts_of(given: Sequence[str], tables: Mapping[str, CompiledTable]) -> dict[str, dict[str, Fact]]:
-    """FACT=VALUE arguments for each table that has the condition; one that none has is told as the first table's fault."""
+    """FACT=VALUE arguments for each table that has the condition; one that none has is reported as the first table's fault."""
     of_table = {name: [text for text in given if _is_fact_of(text, table)] for name, table in tables.items()}
     known = {text for texts in of_table.values() for text in texts}
     first = next(iter(of_table))
@@ -192,7 +194,7 @@ def clip_at(text: str) -> tuple[str, float]:
     at_s = _number(seconds.removesuffix("s").strip())
     if not clip or at_s is None or not 0.0 <= at_s <= MOST_SECONDS:
         mend = "" if clip or not text else in_quotes(f"{text}@0")
-        raise QueryError(Fault(f"{in_quotes(text)} is no moment of a clip.", f"{CLIP_AT}, such as walk@1.5", mend))
+        raise QueryError(Fault(f"{in_quotes(text)} is not a moment of a clip.", f"{CLIP_AT}, such as walk@1.5", mend))
     return clip, at_s
 
 
@@ -232,7 +234,7 @@ def read_tags(text: str) -> TagFilter:
         cost = _number(cost_text)
         if not name or (tilde and (cost is None or not 0.0 <= cost <= MOST_COST or sign == "+")):
             accepted = 'Move, +Move, -Move, "Move~2.5" or "-Move~2.5"'
-            raise argparse.ArgumentTypeError(Fault(f"{in_quotes(word)} is no tag to filter by.", accepted).message)
+            raise argparse.ArgumentTypeError(Fault(f"{in_quotes(word)} is not a tag to filter by.", accepted).message)
         if tilde and cost is not None:
             soft[sign][name] = cost
         else:
@@ -253,20 +255,20 @@ def _number(text: str) -> float | None:
 def _speed(text: str) -> float:
     number = _number(text)
     if number is None or not 0.0 <= number <= MOST_SPEED_MPS:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no speed. Accepted: 0 to {MOST_SPEED_MPS:g} m/s, such as 1.3.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a speed. Accepted: 0 to {MOST_SPEED_MPS:g} m/s, such as 1.3.")
     return number
 
 
 def _degrees(text: str) -> float:
     number = _number(text)
     if number is None or abs(number) > 3600.0:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no angle. Accepted: -3600 to 3600 degrees, such as 45.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not an angle. Accepted: -3600 to 3600 degrees, such as 45.")
     return number
 
 
 def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 10_000:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no number of candidates. Accepted: 1 to 10000, such as 10.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of candidates. Accepted: 1 to 10000, such as 10.")
     return int(text)
 
 

@@ -83,7 +83,7 @@ class Stick:
         Raises
         ------
         TableError, FileError
-            The file cannot be read; with every column that is neither the stick's nor a fact, and every value that is no number.
+            The file cannot be read; with every column that is neither the stick's nor a fact, and every value that is not a number.
         """
         source, columns = read_texts(path)
         faults = [_unknown(path, column.name, conditions) for column in columns if column.name not in (*STICK, *conditions)]
@@ -112,7 +112,7 @@ class Moments:
         Raises
         ------
         ContextDBError
-            Facts that a table cannot be asked with; with file, line and fact.
+            Facts that a query cannot use; with file, line and fact.
         """
         read = {name: read_contexts(path, table) for name, table in tables.items()}
         known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}
@@ -183,7 +183,7 @@ def _numbers(path: Path, source: AnySource, column: TextColumn, faults: list[Fau
         elif text.strip() or column.name == "time_s":
             row = int((column.codes == code).argmax())
             place = Place(str(path), source.line(row), column.name, row)
-            faults.append(Fault(f"{in_quotes(text)} is no number that can be meant.", f"{least:g} to {most:g}", place=place))
+            faults.append(Fault(f"{in_quotes(text)} is not a valid number.", f"{least:g} to {most:g}", place=place))
     return np.asarray(values[column.codes])
 
 

@@ -1,6 +1,6 @@
-"""Which assets are valid for one context.
+"""Show which assets are valid for one context.
 
-Exits with 1 when none is.
+Exits with 1 if none is.
 
   contextdb query locomotion gait=Walk speed=1.3 direction=0 style=normal
   contextdb query tables/locomotion.csv --unknown any "direction=0 ± 90" --explain
@@ -38,11 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("table", metavar="TABLE", help="a .csv, .parquet or .safetensors file, or the name of a table")
     parser.add_argument(
-        "facts", metavar="FACT=VALUE", nargs="*", default=[], help="a value, or a set of values written as a cell: speed=3..5"
+        "facts", metavar="FACT=VALUE", nargs="*", default=[], help="a value, or a set of values written like a cell: speed=3..5"
     )
-    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="what a missing fact does (default: error)")
+    parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
     parser.add_argument(
-        "--explain", action="store_true", help="for the rows nearest to valid, the cells that fail and what to change"
+        "--explain", action="store_true", help="show the nearest rows that are not valid, their failing cells, and what to change"
     )
     told = f"explain so many rows (default: {N_EXPLAINED})"
     parser.add_argument("--most", type=_count, default=N_EXPLAINED, metavar="N", help=told)
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     compiled = open_compiled(arguments.table)
     plain, actors = read_actors(arguments.facts, compiled)
     if arguments.prefer is not None and actors is None:
-        raise ContextError(Fault("there are no actors to prefer one of.", 'facts of actors, such as "Defender[0].distance=2"'))
+        raise ContextError(Fault("there are no actors to choose from.", 'facts of actors, such as "Defender[0].distance=2"'))
     context = read_facts(plain, compiled)
     with missing_facts_by_option():
         explanation = compiled.explain(context, arguments.unknown, actors, arguments.prefer)
@@ -75,7 +75,7 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
     Raises
     ------
     ContextError
-        For every argument that is no fact of the table, together.
+        For every argument that is not a fact of the table, together.
     """
     facts: dict[str, Fact] = {}
     faults: list[Fault] = []
@@ -93,7 +93,7 @@ def read_facts(given: list[str], compiled: CompiledTable) -> dict[str, Fact]:
 
 
 def read_actors(given: list[str], compiled: CompiledTable) -> tuple[list[str], dict[str, list[dict[str, object]]] | None]:
-    """The arguments that are no facts of actors, and the actors of those that are, in the order of their numbers; None without.
+    """The arguments that are not facts of actors, and the actors of those that are, in the order of their numbers; None without.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def read_actors(given: list[str], compiled: CompiledTable) -> tuple[list[str], d
 
 
 def _free_value(text: str) -> object:
-    """A fact of an actor that is no condition, such as an id or a distance: a number where it reads as one."""
+    """A fact of an actor that is not a condition, such as an id or a distance: a number where it reads as one."""
     try:
         return float(text)
     except ValueError:
@@ -140,13 +140,13 @@ def _split(text: str, compiled: CompiledTable) -> tuple[str, str]:
         compiled.derivation.refuse(text[:at] for at in ends)
     if ends:
         raise no_condition(text[: ends[0]], compiled.asked)
-    raise ContextError(Fault(f"{in_quotes(text)} is no fact.", "FACT=VALUE, without spaces round the =", in_quotes(f"{text}=…")))
+    raise ContextError(Fault(f"{in_quotes(text)} is not a fact.", "FACT=VALUE, without spaces round the =", in_quotes(f"{text}=…")))
 
 
 def _count(text: str) -> int:
     """A number of rows."""
     if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is no number of rows, such as 10.")
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of rows, such as 10.")
     return int(text)
 
 

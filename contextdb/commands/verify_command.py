@@ -1,10 +1,10 @@
-"""Whether files are as they were written.
+"""Check that files are as they were written.
 
-Compiled tables, motion databases, recorded sessions, Parquet tables, coverage reports and the editor's journals hold a digest or
-check sums of their contents, and a single altered bit is found. Of a folder every such file below it is looked at. Tables in CSV
-and contextdb.toml hold no digest: they are read, and reported as readable.
+Compiled tables, motion databases, recorded sessions, Parquet tables, coverage reports and the editor's journals contain a digest
+or checksums of their contents, which detect a single altered bit. In a folder every such file below it is checked. Tables in CSV
+and contextdb.toml have no digest: they are read, and reported as readable.
 
-Exits with 1 when a file is damaged.
+Exits with 1 if a file is damaged.
 
   contextdb verify hit_mid_air.safetensors
   contextdb verify coverage.json recorded/session.parquet

@@ -27,7 +27,7 @@ and for a table with tables inside, D the depth, T the number of tables (`contex
 
 The metadata hold `contextdb` (the version of this layout), `about` (JSON: name, policy, fallback, conditions and the kind of each
 column; where facts are derived also the conditions that they are computed from; where rows have rules also their column and the
-conditions that they name and that are no columns) and `digest`, BLAKE2b-128 of `about` and of all
+conditions that they name and that are not columns) and `digest`, BLAKE2b-128 of `about` and of all
 tensors in the order of their names. Opening checks all of it. A table with rules has layout 2, so that what knows only masks does
 not answer without them, and so has one with tables inside and soft cells; any other has layout 1.
 """
@@ -130,7 +130,7 @@ def open_artefact(path: Path, kind: type[Compiled]) -> Compiled:
     with COMPILED.reading(path):
         about = metadata["about"]
         if digest_of(tensors, about) != metadata.get("digest"):
-            raise COMPILED.refused(path, "the file was altered: its contents do not give its digest.")
+            raise COMPILED.refused(path, "the file was altered: its contents do not match its digest.")
         return _table(json.loads(about), tensors, kind)
 
 
@@ -195,7 +195,7 @@ def _derivation(about: dict[str, Any], conditions: tuple[Condition, ...]) -> Der
 
 
 def _computed_from(compiled: CompiledData) -> list[Condition]:
-    """The conditions that derived facts are computed from and that are no columns of the table."""
+    """The conditions that derived facts are computed from and that are not columns of the table."""
     computed = compiled.derivation.conditions if compiled.derivation else ()
     return [condition for condition in computed if condition.name not in compiled.places]
 

@@ -59,7 +59,7 @@ THREAD_CONTEXTS = 8192
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """The number columns, to be encoded by bisection: column j stands in `facts[j]` and fills slot `slots[j]`.
+    """The number columns, to be encoded by bisection: column j is in `facts[j]` and fills slot `slots[j]`.
 
     facts float64 [columns, N]; column j bisects bounds[edges[j]:edges[j + 1]]; class k has code firsts[j] + k, NaN missing[j].
     """
@@ -91,7 +91,7 @@ class KeptFacts:
 
 @dataclass(frozen=True, eq=False)
 class Values:
-    """The facts that are no numbers, as classes int32 [value slots, N], -1 where missing.
+    """The facts that are not numbers, as classes int32 [value slots, N], -1 where missing.
 
     Slot j of these fills slot `slots[j]` of the codes; its class v is mask starts[j] + v, and a missing fact mask absent[j].
     """
@@ -126,7 +126,7 @@ class Answers(Sequence[Answer]):
 
 @dataclass(frozen=True, eq=False)
 class ManyMatches(Unchanging, Answers[Matches]):
-    """The valid rows of many contexts: a sequence of `Matches`. What is asked for is worked out then, and kept; arrays are
+    """The valid rows of many contexts: a sequence of `Matches`. Results are computed on first use and kept; arrays are
     read-only."""
 
     compiled: CompiledData
@@ -140,7 +140,7 @@ class ManyMatches(Unchanging, Answers[Matches]):
 
     @property
     def mirrored(self) -> ManyMatches:
-        """The valid rows of the same contexts as a mirror shows them; see `Matches.mirrored`. The same object where no fact of the
+        """The valid rows of the same contexts with mirrored facts; see `Matches.mirrored`. The same object where no fact of the
         table changes in a mirror."""
         return self._mirrored if self.compiled.mirroring else self
 
@@ -405,7 +405,7 @@ class _Encoder:
     def _read_values(self, at: int, masks: ValueMasks | TagMasks, given: Any) -> Codes:
         """Codes int32 [slots, N] read fact by fact, -1 where missing."""
         n_slots = self.compiled.stack.n_slots[at]
-        absent = tuple(3 * i - 1 for i in range(n_slots))  # -1 once the slot's start is taken off
+        absent = tuple(3 * i - 1 for i in range(n_slots))  # -1 once the slot's start is removed
         facts = [None] * self.n_contexts if given is None else self._read_each(at, given)
         if self.unknown == "error":
             self._refuse_missing(self.compiled.conditions[at].name, np.flatnonzero([f is None for f in facts]))
@@ -426,7 +426,7 @@ class _Encoder:
                 raise _in_context(error, row, condition.name, value) from None
             if isinstance(known[key], Cell):
                 place = Place(row=row, column=condition.name)
-                mend = "to ask for these contexts one by one: query(facts)"
+                mend = "to query these contexts one by one: query(facts)"
                 raise ContextError(Fault("a set of values is for one query at a time.", "one value in each context", mend, place))
             facts.append(known[key])
         return facts
@@ -448,7 +448,7 @@ def _in_context(error: Exception, row: int, name: str, value: object) -> Context
     place = Place(row=row, column=name)
     if isinstance(error, ContextError):
         return ContextError(*(f.at(place) for f in error.faults))
-    return ContextError(Fault(f"{type(value).__name__} is no fact.", "one value in each context", place=place))
+    return ContextError(Fault(f"{type(value).__name__} is not a fact.", "one value in each context", place=place))
 
 
 def _encode_with_numpy(numbers: Numbers, out: Codes) -> None:

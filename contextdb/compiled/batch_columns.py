@@ -26,13 +26,13 @@ def facts_of(contexts: object) -> dict[str, Any]:
         return {name: contexts[name] for name in contexts.columns}
     if not isinstance(contexts, Mapping):
         accepted = "a polars DataFrame, or a mapping of names to equally long columns"
-        raise ContextError(Fault(f"{type(contexts).__name__} is no columns of facts.", accepted))
+        raise ContextError(Fault(f"{type(contexts).__name__} is not columns of facts.", accepted))
     for name, column in contexts.items():
         is_flat = column.ndim == 1 if isinstance(column, np.ndarray) else isinstance(column, (list, tuple, range, pl.Series))
         if not is_flat:
             place = Place(column=str(name))
             raise ContextError(
-                Fault(f"{type(column).__name__} is no column of facts.", "a list, a flat array or a series", place=place)
+                Fault(f"{type(column).__name__} is not a column of facts.", "a list, a flat array or a series", place=place)
             )
     return dict(contexts)
 

@@ -1,6 +1,6 @@
-"""Cut a condition's domain into the classes that its column tells apart, and keep one mask of rows for each.
+"""Cut a condition's domain into the classes that its column distinguishes, and keep one mask of rows for each.
 
-A class is a set of values that no cell of the column tells apart, so a fact matters only through its class. The columns here are
+A class is a set of values that no cell of the column distinguishes, so a fact matters only through its class. The columns here are
 the compiled form of one condition each:
 
     ValueMasks    bool, enum, text    a class for each value; text has one more, for every value that no cell names

@@ -1,6 +1,6 @@
 """Compile a table into bitmasks, and look contexts up in them.
 
-Each condition's domain is cut into the fewest classes its column tells apart; each class keeps one bit a row. A query finds the
+Each condition's domain is cut into the fewest classes its column distinguishes; each class keeps one bit a row. A query finds the
 class of every fact and ANDs the masks, so its cost grows with conditions x rows / 64 and not with how the cells are written.
 
 W = ceil(n_rows / 64). Bit r % 64 of word r // 64 is row r; bits past the last row are 0, always. A compiled table is never
@@ -54,7 +54,7 @@ SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 class CompiledData(Unchanging):
     """A table as masks: what every way to ask it needs. `CompiledTable` has the ways.
 
-    It can be pickled at any time. What was pickled answers the same; only which assets were picked last (`pick`) is not pickled.
+    It can be pickled at any time. The copy gives the same answers; only the memory of `pick` is not pickled.
     """
 
     name: str
@@ -81,7 +81,7 @@ class CompiledData(Unchanging):
     ways: Ways | None = None
     """The way of each row through tables inside tables; None for a table without."""
     declared: frozenset[str] = frozenset()
-    """Conditions that the project declares: facts of these names are of other tables, and no slips."""
+    """Conditions the project declares. A fact with one of these names belongs to another table; it is not a typo."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -91,7 +91,7 @@ class CompiledData(Unchanging):
 
     @property
     def n_rows(self) -> int:
-        """How many rows the table has."""
+        """The number of rows."""
         return len(self.assets)
 
     @property
@@ -116,7 +116,7 @@ class CompiledData(Unchanging):
 
     @cached_property
     def ruled(self) -> tuple[Condition, ...]:
-        """The conditions that rules name and that are no columns of the table."""
+        """The conditions that rules name and that are not columns of the table."""
         return tuple(c for c in self.when.conditions if c.name not in self.places) if self.when else ()
 
     @cached_property
@@ -154,7 +154,7 @@ class CompiledData(Unchanging):
 
     @property
     def policies(self) -> frozenset[str]:
-        """The policies of the table and of those that stand in it."""
+        """The policies of the table and of those that are in it."""
         return frozenset((self.policy,) if self.ways is None else (table.policy for table in self.ways.tables))
 
     def penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:
@@ -296,7 +296,7 @@ class CompiledData(Unchanging):
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Where each condition stands among `conditions`."""
+        """Where each condition is among `conditions`."""
         return {c.name: at for at, c in enumerate(self.conditions)}
 
     @cached_property
@@ -333,7 +333,7 @@ class CompiledData(Unchanging):
 
     @property
     def version(self) -> str:
-        """A digest of what the table says: the same for two that say the same, wherever they were compiled."""
+        """A digest of the table's contents: the same for two tables with the same contents, wherever they were compiled."""
         return self.answering.version
 
     @cached_property

@@ -1,6 +1,6 @@
 """Why a row is valid for a context, or is not: which of its cells fail, with which fact, and what to change.
 
-Winner first: valid rows stand before all others, then the rows nearest to valid, with the fewest failing cells. The details of a
+Winner first: valid rows are before all others, then the rows nearest to valid, with the fewest failing cells. The details of a
 row are worked out when they are asked for.
 """
 
@@ -57,7 +57,7 @@ ONE_BOUND = 1e-12
 class Failure:
     """One cell that does not accept its fact, or a rule that does not hold.
 
-    Of a rule `condition` is the column of rules, `fact` tells the facts that it names, and the mend is to have none.
+    For a rule, `condition` is the column of rules, `fact` gives the facts that it names, and `mend` is to have no rule.
     """
 
     condition: str
@@ -67,7 +67,7 @@ class Failure:
     mend: str
     """The cell with which the row would match, as near to the present one as can be."""
     step: Step | None = None
-    """Where tables stand in tables: the row of the table whose cell it is."""
+    """Where tables are in tables: the row of the table whose cell it is."""
 
     def __str__(self) -> str:
         where = "" if self.step is None else f" ({self.step})"
@@ -116,7 +116,7 @@ class Explanation:
         return self.row(int(self.order[require_place(place, len(self), "place")]))
 
     def row(self, row: int) -> RowExplanation:
-        """Why this row is valid or not; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        """Why this row is valid or not; raises NoSuchPlace, also an IndexError, for a row that the table does not have."""
         row = require_row(row, len(self))
         at = np.flatnonzero(self._fails[:, row]).tolist()
         failures = [failure for i in at for failure in self._failures(i, row)]
@@ -125,7 +125,7 @@ class Explanation:
         return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
 
     def asset(self, asset: str) -> list[RowExplanation]:
-        """Why the rows of this asset, told with its path or without, are valid or not; ContextError names the nearest asset when no
+        """Why the rows of this asset, with or without its path, are valid or not; ContextError names the nearest asset when no
         row has it."""
         require_text(asset, "asset")
         names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
@@ -138,7 +138,7 @@ class Explanation:
         return found
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
-        """The rows that are not valid but nearest to it: fewest failing cells, then least far off."""
+        """The nearest rows that are not valid: those with the fewest failing cells first, then the smallest distance."""
         most = require_whole(most, "most")
         rows = np.flatnonzero(self.n_failures)
         if most <= 0:
@@ -249,7 +249,7 @@ def explain(compiled: CompiledData, context: Context, unknown: Unknown = "error"
 
 @dataclass(frozen=True, slots=True)
 class RulePart:
-    """A row's own rule; where tables stand in tables, that of one row of the way."""
+    """A row's own rule; where tables are in tables, that of one row of the way."""
 
     column: str
     text: str
@@ -288,7 +288,7 @@ def _rule_parts(compiled: CompiledData, row: int) -> list[RulePart]:
 
 
 def cell_failures(compiled: CompiledData, at: int, row: int, fact: Fact, told: str) -> Iterator[Failure]:
-    """The cell of a row that does not accept a fact; where tables stand in tables, each cell that does not."""
+    """The cell of a row that does not accept a fact; where tables are in tables, each cell that does not."""
     condition = compiled.conditions[at]
     layers = None if compiled.ways is None else compiled.ways.layers[at]
     if compiled.ways is None or layers is None:

@@ -130,7 +130,7 @@ def _encode_groups(values, start, count, members, edges, firsts, strides, codes)
 def batch(values, starts, absent, groups, numbers, slots, bounds, masks, wide, enabled, start, stop, counts, hits):  # type: ignore[no-untyped-def]
     """Counts int64 [N] and hits int64 [rows] of the contexts start … stop - 1, encoded on the way.
 
-    values int32 [value slots, N] are classes, -1 where missing: then mask absent[slot] stands in; class v is mask starts[slot] + v.
+    values int32 [value slots, N] are classes, -1 where missing: then mask absent[slot] is in; class v is mask starts[slot] + v.
     groups are the arrays of `stack.Groups`; numbers, slots and bounds (bounds, edges, firsts, missing) as in `_encode_numbers`.
     """
     members, edges, group_firsts, strides = groups

@@ -1,7 +1,7 @@
 """A context that the game keeps: set what changed, then ask. The cheap way to query every frame.
 
 Most facts stay as they are from one frame to the next. The masks of those are intersected once, and a question costs one `&` for
-each fact that has been moving; a fact that starts to move joins those, and the rest is intersected anew.
+each fact that has been moving; a fact that starts to move joins those, and the rest is intersected again.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ _SHARED = frozenset(("_lookups", "_others"))
 """What a context never changes, and shares with its copies."""
 
 CAST = ""
-"""What stands among the unusual facts while actors are offered, so that a question without actors has nothing to check."""
+"""What is among the unusual facts while actors are offered, so that a question without actors has nothing to check."""
 
 
 class LiveContext(MutableMapping[str, object]):
-    """Facts kept between questions. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` asks.
+    """Facts kept between queries. `live["speed"] = 3.2` sets one, `del live["speed"]` makes it missing, `live.matches()` answers.
 
-    A mapping of the facts that are set; a name that is not among them raises NoSuchFact, which is a KeyError too. `copy()` gives a
-    context that goes its own way. Two are equal when they are one.
+    A mapping of the facts that are set; a name that is not among them raises NoSuchFact, which is also a KeyError. `copy()` gives a
+    context of its own. A live context is equal only to itself.
     """
 
     __slots__ = (
@@ -136,13 +136,13 @@ class LiveContext(MutableMapping[str, object]):
         return self._facts[name]
 
     def update(self, facts: Mapping[str, object] | Iterable[tuple[str, object]]) -> None:  # type: ignore[override]
-        """Set several facts; those that no condition of the table asks for are passed over, as in `query`.
+        """Set several facts; facts that the table does not use are ignored, as in `query`.
 
         Raises
         ------
         ContextError
-            A name is very likely that of a condition misspelt, whose fact is not given beside it: then none is set. Names that the
-            project declares are of other tables, and no slips. Or a value is wrong, which names the fact.
+            A name looks like the misspelt name of a condition whose fact is not given: then none is set. Names that the
+            project declares belong to other tables and are not misspelt. Or a value is wrong; the message names the fact.
         """
         if type(facts) is not dict:
             facts = as_context(facts)
@@ -167,11 +167,11 @@ class LiveContext(MutableMapping[str, object]):
             self._passed.add(name)
         for near in self._alike[name]:
             if near not in facts:
-                found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is not given beside it."
+                found = f"there is no condition {in_quotes(name)}, and {in_quotes(near)} is not given."
                 raise NoSuchFact(Fault(found, NAMES, in_quotes(near), rule="unknown-fact"))
 
     def copy(self) -> Self:
-        """A context of its own with the same facts and actors, which shares the compiled table. The actors' mappings are shared."""
+        """An independent context with the same facts and actors, which shares the compiled table and the actors' mappings."""
         new: Self = object.__new__(type(self))
         for name, value in self._state().items():
             setattr(new, name, copy(value) if type(value) in (dict, set) and name not in _SHARED else value)
@@ -199,9 +199,9 @@ class LiveContext(MutableMapping[str, object]):
         return _live_again, (self._compiled, self._unknown, self.facts, cast)
 
     def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
-        """Offer actors for roles from now on, as `query` takes them; None takes them back. They are read when next asked.
+        """Offer actors for roles from now on, as `query` accepts them; None withdraws them. They are read at the next query.
 
-        The mappings are kept, not copied: what the game changes in them counts in the next question. While they say the same, they
+        The mappings are kept, not copied: what the game changes in them counts in the next query. While they do not change, they
         are not read again.
         """
         self._cast = None
@@ -305,9 +305,9 @@ class SoftLiveContext(LiveContext):
 
 
 class AskingLiveContext(LiveContext):
-    """The same for a table with derived facts or rules, which asks for facts that are no columns.
+    """The same for a table with derived facts or rules, which asks for facts that are not columns.
 
-    Derived facts are computed anew when one that they need was set since the last question.
+    Derived facts are computed again when one that they need was set since the last question.
     """
 
     __slots__ = ("_computed", "_given", "_is_stale", "_others")
@@ -382,7 +382,7 @@ class AskingLiveContext(LiveContext):
 
 
 class RuledLiveContext(AskingLiveContext):
-    """The same for a table with rules: one is asked anew when a fact that it names has changed."""
+    """The same for a table with rules: one is asked again when a fact that it names has changed."""
 
     __slots__ = ("_is_set", "_left", "_named", "_truths", "_values", "_when")
 

@@ -92,7 +92,7 @@ def _value_terms(columns: Sequence[tuple[Condition, ValueMasks]], n_rows: int, n
 
 
 def _group_term(i: int, keys: Sequence[str], members: Sequence[ValueMasks], names: dict[str, Any], leaves: Sequence[Any]) -> str:
-    """The term that finds a group's leaf by its facts; leaves stand in the order of the joint classes, the last column fastest."""
+    """The term that looks up a group's leaf by its facts; leaves are in the order of the joint classes, the last column fastest."""
     if len(members) > 2 and not any(m.has_others for m in members):
         names[f"g{i}"] = dict(zip(product(*(m.values for m in members)), leaves, strict=True))
         names[f"k{i}"] = itemgetter(*keys)

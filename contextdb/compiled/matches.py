@@ -79,7 +79,7 @@ class Answering:
 
 
 _OWN_ANSWER = "an answer of this compiled table"
-_ASK_AGAIN = "to ask this table again: query(facts)"
+_ASK_AGAIN = "to query this table again: query(facts)"
 
 
 class Matches:
@@ -93,11 +93,11 @@ class Matches:
     assets : list of str
         The assets of those rows; of a row in a table inside the table with its path, "hit_mid_air/dive/MidAir_Dive".
     leaves : list of str
-        The assets without paths, as a motion database names them.
+        The assets without paths, as motion databases name them.
     mask : uint64 array, shape (W,)
         Bit r % 64 of word r // 64 is row r.
     always : uint64 array, shape (W,)
-        The rows that hold *all* values of the facts that were given as sets; the same as `mask` when none was.
+        The rows that accept *all* values of facts given as sets; the same as `mask` without such facts.
     """
 
     __slots__ = ("_mirrored", "_penalties", "_rows", "_table", "bits")
@@ -115,7 +115,7 @@ class Matches:
 
     @property
     def n_rows(self) -> int:
-        """How many rows the table has, valid or not."""
+        """The number of rows of the table, valid or not."""
         return len(self._table.row_numbers)
 
     @property
@@ -176,9 +176,9 @@ class Matches:
 
     @property
     def mirrored(self) -> Matches:
-        """The answer to the same question with the facts as a mirror shows them: the rows whose assets may be played mirrored.
+        """The answer to the same query with mirrored facts: the rows whose assets may be played mirrored.
 
-        Asked when it is first wanted, with the facts as they were. The same object where no fact of the table changes in a mirror.
+        Computed on first use, with the facts as they were. The same object where no fact of the table changes in a mirror.
 
         Raises
         ------
@@ -189,7 +189,7 @@ class Matches:
             return self
         known = getattr(self, "_mirrored", None)
         if known is None:
-            found = "this answer was not asked with facts, so there are none to mirror."
+            found = "this answer was computed without facts, so there are none to mirror."
             raise ContextError(Fault(found, "an answer of query, query_many or live"))
         if isinstance(known, dict):
             assert self._table.ask_mirrored is not None, "what was pickled has its answer"
@@ -208,8 +208,8 @@ class Matches:
         return Matches(self.bits, self._table)
 
     def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
-        """Who plays which role in a valid row, as {role: actor}; for an answer to a query with actors."""
-        raise ContextError(Fault("this question was asked without actors, so nobody is cast.", "query(facts, actors={...})"))
+        """Who fills which role in a valid row, as {role: actor}; for an answer to a query with actors."""
+        raise ContextError(Fault("this query had no actors, so nobody is cast.", "query(facts, actors={...})"))
 
     def castings(self, row: int) -> Sequence[Mapping[str, Mapping[str, Any]]]:
         """All castings of a valid row, best first; for an answer to a query with actors."""

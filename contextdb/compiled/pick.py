@@ -4,9 +4,10 @@
     unique              the only valid row; two at once break the table's promise and raise PolicyError
     collect, priority   of the rows with the highest priority one at random, by row weight, and not the asset picked last
 
-Rows of weight 0 are never picked at random, and hold no others back. When no row is left, the table's fallback is the answer.
+Rows of weight 0 are never picked, and never prevent another row from being picked. When no row is left, the answer is the table's
+fallback.
 
-A row that stands for a table is one candidate, with its own priority and weight, as long as that table has a row to give; which of
+A row that refers to a table is one candidate, with its own priority and weight, as long as that table has a row to give; which of
 its rows is played is then picked by that table's own policy, priorities and weights. Its fallback is not asked for.
 """
 
@@ -56,10 +57,10 @@ def pick(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None,
 
     Notes
     -----
-    What a generator picked last is remembered beside this table, by the identity of the generator, and goes over to the next
+    What a generator picked last is remembered next to this table, by the identity of the generator, and goes over to the next
     version of a watched table. It is neither in the generator's state nor in a pickle: a generator that was copied or came out of a
     pickle has picked nothing yet, and one that was set back (`setstate`) still knows its later pick. Where a replay or a rollback
-    must pick the same again, keep the asset beside the state of the generator and give it as `last`: the pick then depends on the
+    must pick the same again, keep the asset next to the state of the generator and give it as `last`: the pick then depends on the
     answer, that state and `last` alone.
     """
     row = pick_row(compiled, matches, rng, last)
@@ -85,7 +86,7 @@ def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = N
 
 
 def _through_tables(compiled: CompiledData, ways: Ways, rows: Rows, source: Rng, last: str | None) -> int | None:
-    """The row that is picked where tables stand in tables."""
+    """The row that is picked where tables are in tables."""
     possible = _possible(ways, rows[ways.pickable[rows]], 0)
     if not len(possible):
         return None
@@ -257,7 +258,7 @@ def _shares(weights: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _why_not_through(ways: Ways, valid: Rows, row: int) -> str:
-    """Why a valid row is not picked where tables stand in tables: who outranks it where the ways part."""
+    """Why a valid row is not picked where tables are in tables: who outranks it where the ways part."""
     steps = ways.steps(row)
     if not ways.pickable[row]:
         tables = [ways.table_at(row, depth) for depth in range(len(steps))]

@@ -1,7 +1,7 @@
 """All masks of a compiled table in one array, addressed by codes, as the kernels want it.
 
 A code is the number of a mask in the stack: one for each condition (for tags one for each slot), in the order of the conditions.
-A wide column's code is the fact's class instead, and stands behind all others; the kernels put its two digits together.
+A wide column's code is the fact's class instead, and is behind all others; the kernels put its two digits together.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Data that never changes: a copy is the thing itself, and a pickle holds what it was made of.
 
-What was worked out from it meanwhile (look-ups, masks as integers, generated functions) is not pickled, but worked out anew where
+What was worked out from it meanwhile (look-ups, masks as integers, generated functions) is not pickled, but worked out again where
 it is needed. So a thing can be pickled at any time, before and after it was asked, and its pickle is the same.
 """
 

@@ -1,6 +1,6 @@
-"""The way of each row of a flat table through the tables that stand in each other, as a compiled table keeps it.
+"""The way of each row of a flat table through the tables that are in each other, as a compiled table keeps it.
 
-D = depth, n = flat rows. A way tells the path of a row's name, where its rows stand in their files, and which of two rows a
+D = depth, n = flat rows. A way tells the path of a row's name, where its rows are in their files, and which of two rows a
 policy prefers: that of the table where their ways part.
 """
 
@@ -25,7 +25,7 @@ Rows = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One row of a way: a row of a table, what its asset cell says, and where it stands."""
+    """One row of a way: a row of a table, what its asset cell says, and where it is."""
 
     table: str
     row: int
@@ -63,7 +63,7 @@ class WayTable:
     """Its column of rules."""
 
     def place(self, row: int) -> Place:
-        """Where a row stands."""
+        """Where a row is."""
         if self.table is not None:
             return self.table.place(row)
         line = -1 if self.lines is None else int(self.lines[row])

@@ -15,7 +15,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.ruled import RuledTable, without_rules
-from contextdb.covering.space import CellBox, Space, WeightsOf, used_factors
+from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_measurable, used_factors
 from contextdb.expressions import Assumptions, Derivation, Expression
 from contextdb.expressions.assume import WANTS, read_assumptions
 from contextdb.expressions.expression import read_expression
@@ -48,20 +48,24 @@ def opened(
     weights: WeightsOf | None = None,
     assume: bool = True,
     progress: Progress = SILENT,
+    is_cut: bool = False,
 ) -> Opened:
-    """A table with its space; see `contextdb.covering.coverage` for the arguments and what is raised."""
+    """A table with its space; see `contextdb.covering.coverage` for the arguments and what is raised.
+
+    A table that is too large is refused, or where `is_cut` cut to so many rows as can be compared.
+    """
     require_kind(table, (Table, FlatTable, CompiledTable), "table", "a Table, or a CompiledTable")
     if isinstance(table, CompiledTable):
         table.refuse_rules("what they leave is worked out from the table itself")
-        return Opened(table, None, Space.of(table, impossible, weights, progress), None)
+        return Opened(table, None, _space(table, impossible, weights, progress, is_cut), None)
     ruled = without_rules(table.flat())
     table = ruled.table
     compiled = table.compile()
     impossible = list(require_many(impossible, "impossible", "a list of mappings of conditions to cells"))
     if not assume and not ruled.rules:
-        return Opened(compiled, table, Space.of(compiled, impossible, weights, progress), None, ruled=ruled)
+        return Opened(compiled, table, _space(compiled, impossible, weights, progress, is_cut), None, ruled=ruled)
     assumed = assumptions_of(table if assume else replace(table, settings=replace(table.settings, assume=())))
-    space = Space.of(compiled, [*impossible, *assumed.boxes], weights, progress)
+    space = _space(compiled, [*impossible, *assumed.boxes], weights, progress, is_cut)
     texts = tuple(expression.text for expression in assumed.expressions)
     restricted = _restricted(space)
     drawn = [c for c in _drawn(table, assumed) if c.name in restricted]
@@ -75,6 +79,14 @@ def opened(
     return Opened(compiled, table, space, Drawer(space, derivation, unboxed), texts, sampled, ruled)
 
 
+def _space(
+    compiled: CompiledTable, impossible: Sequence[CellBox], weights: WeightsOf | None, progress: Progress, is_cut: bool
+) -> Space:
+    if not is_cut:
+        require_measurable(compiled)
+    return Space.of(compiled, impossible, weights, progress, comparable_rows(compiled) if is_cut else None)
+
+
 def _restricted(space: Space) -> set[str]:
     """The conditions that some row, or some context that cannot happen, restricts."""
     used = set(used_factors(space.boxes + space.impossible, space.full))
@@ -82,7 +94,7 @@ def _restricted(space: Space) -> set[str]:
 
 
 def _that_matter(unboxed: Sequence[Expression], derivation: Derivation | None, restricted: Iterable[str]) -> tuple[Expression, ...]:
-    """The assumptions that have to do with what rows restrict, if only by way of others; the rest changes no share."""
+    """The assumptions that have to do with what rows restrict, if only through others; the rest changes no share."""
     linked = _with_inputs(restricted, derivation)
     left, found = list(unboxed), set[str]()
     while near := [e for e in left if not linked.isdisjoint(_with_inputs(e.names, derivation))]:

@@ -2,7 +2,7 @@
 
 The earlier report is the JSON of `contextdb coverage --format json`. Gaps are compared by what they hold, not by how they are cut:
 a gap is new when it holds a context that no earlier gap held, and an earlier one is closed when every context of it has a valid row
-now. Where that cannot be told (the search is too long, a condition is gone) gaps of one id are the same.
+now. Where that cannot be reported (the search is too long, a condition is gone) gaps of one id are the same.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Change:
     """Rows that became dead, or are never chosen any more."""
     is_complete: bool
     """Whether both reports list all their gaps; else a gap that was too small for the earlier list may seem new, as may one that
-    names a rule which was written anew."""
+    names a rule that was rewritten."""
 
     def to_json(self) -> dict[str, object]:
         """As plain data."""
@@ -102,10 +102,10 @@ def read_baseline(text: str, file: str) -> dict[str, Earlier]:
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise ValueError('it has no "format": 1')
         if document.get("digest", expected := digest_of(document)) != expected:
-            raise ValueError("it was altered after it was written: its contents do not give its digest")
+            raise ValueError("it was altered after it was written: its contents do not match its digest")
         return {_text(entry["table"]): _earlier(entry) for entry in document["tables"]}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        why = f"{error} is missing" if isinstance(error, KeyError) else str(error) or "lists stand in lists too deep"
+        why = f"{error} is missing" if isinstance(error, KeyError) else str(error) or "lists are nested too deeply"
         fault = Fault(f"the baseline cannot be read: {why}.", ACCEPTED, place=Place(file))
         raise ContextError(fault) from None
 
@@ -135,19 +135,19 @@ def _earlier(entry: Mapping[str, Any]) -> Earlier:
     dead = Counter((_text(f["rule"]), str(f.get("asset"))) for f in found if f["rule"] in DEAD_RULES)
     n_rows = entry.get("rows", 0)
     if isinstance(n_rows, bool) or not isinstance(n_rows, int):
-        raise TypeError(f"{n_rows!r:.60} is no number of rows")
+        raise TypeError(f"{n_rows!r:.60} is not a number of rows")
     return Earlier(_share(entry["covered"]["lower"]), tuple(items), gaps["complete"] is True, dead, n_rows)
 
 
 def _text(value: object) -> str:
     if not isinstance(value, str):
-        raise TypeError(f"{value!r:.60} is no text")
+        raise TypeError(f"{value!r:.60} is not text")
     return value
 
 
 def _share(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not (math.isfinite(value) and 0 <= value <= 1):
-        raise ValueError(f"{value!r:.60} is no share from 0 to 1")
+        raise ValueError(f"{value!r:.60} is not a share from 0 to 1")
     return float(value)
 
 
@@ -195,7 +195,7 @@ def _reads(cells: Mapping[str, str], domains: Mapping[str, Domain]) -> bool:
 
 
 def _is_in(box: Box | None, others: BoxSet) -> bool:
-    """Whether some boxes hold a whole box; "no" where that cannot be told."""
+    """Whether some boxes hold a whole box; "no" where that cannot be reported."""
     try:
         return box is not None and others.outside(others.all, box, Steps(STEPS)) is None
     except OutOfSteps:

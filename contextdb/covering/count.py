@@ -164,15 +164,20 @@ def _tiny(
 
 
 def is_prepared() -> bool:
-    """Whether the loop was compiled on this machine already, or runs as it stands."""
+    """Whether the loop was compiled on this machine already, or runs as it is."""
     from contextdb.covering.kernels import IS_COMPILED
 
     if not IS_COMPILED:
         return True
     from contextdb.covering.count_kernels import uncovered
 
-    folder = Path(uncovered.stats.cache_path or "")
-    return bool(uncovered.signatures) or any(folder.glob("count_kernels.uncovered-*.nbi"))
+    return was_compiled(uncovered)
+
+
+def was_compiled(loop: Any) -> bool:
+    """Whether a numba function is compiled: in this process, or in numba's cache on this machine."""
+    folder, module = Path(loop.stats.cache_path or ""), loop.py_func.__module__.rpartition(".")[2]
+    return bool(loop.signatures) or any(folder.glob(f"{module}.{loop.py_func.__qualname__}-*.nbi"))
 
 
 def prepare(progress: Progress) -> None:

@@ -3,7 +3,7 @@
 A part (`part_kernels`) with some of its boxes open is solved in one of four ways. Boxes that share no factor are independent: their
 shares multiply. Where boxes are small, one box after the other is taken, the largest first, and what it alone holds is the share
 that the boxes before it leave open within it. Else one factor is fixed, to each group of classes in turn. A part of few boxes is
-made anew, in fewer words. Parts that are alike, by 128-bit hashes of what is left of their boxes, are worked out once.
+made again, in fewer words. Parts that are alike, by 128-bit hashes of what is left of their boxes, are worked out once.
 
 `scratch` is (open uint64 [D, W], kept uint64 [D, W], listed int64 [D, F], chosen int64 [D, G], shares float64 [D, G], hashes
 uint64 [m, 2], volumes float64 [m], once uint64 [W], twice uint64 [W]): for each depth the open boxes, the factors that some of them
@@ -23,7 +23,7 @@ from contextdb.covering.kernels import ALL, NONE, ONE, lowest_bit, mixed, n_bits
 from contextdb.covering.part_kernels import part_of
 
 WORK, LIMIT, CUT, STOP, SHARED = 0, 1, 2, 3, 4
-"""What stands in `state`: steps done and allowed here, parts that were cut short, whether to stop (set meanwhile), and whether
+"""What is in `state`: steps done and allowed here, parts that were cut short, whether to stop (set meanwhile), and whether
 every box gets its share of the steps that are left, where else those that come first may take them all."""
 PROBES = 4
 PER_NODE = 16
@@ -32,7 +32,7 @@ FEW, MANY = 6, 16
 SMALL_SUM = 0.9
 """Boxes whose measures sum to no more are small: then no rounding can make the share that is left 0."""
 DENSE = 16
-"""A part is made anew when it has so many boxes a word, or fewer."""
+"""A part is made again when it has so many boxes a word, or fewer."""
 ROOM, LEAST_DEPTH = 4, 160
 """A part that lies less than `ROOM` above the deepest level is cut short. Boxes are taken one after the other down to
 `LEAST_DEPTH` at least, and where factors are few further down."""

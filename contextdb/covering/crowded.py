@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from contextdb.covering.factors import TagFactor
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, Point
@@ -31,19 +32,20 @@ def find_crowds(space: Space, seeds: Iterable[Point], most: int = MOST_CROWDS, p
     """The fullest boxes that climbing from the seeds leads to, most rows first; none lies within the rows of another."""
     rows = BoxSet.of(space.full, space.boxes, progress)
     impossible = BoxSet.of(space.full, space.impossible, progress)
-    found: dict[int, None] = {}
+    found: dict[int, Point] = {}
     for point in seeds:
         progress.check()
-        found[_climbed(space, rows, impossible, point)] = None
+        top = _climbed(space, rows, impossible, point)
+        found[_holding(rows, list(top))] = top
     kept: list[int] = []
     for bits in sorted(found, key=lambda b: (-b.bit_count(), b)):
         if bits.bit_count() > 1 and not any(bits & ~other == 0 for other in kept):
             kept.append(bits)
-    return [CrowdBox(bits, _shared(space, bits)) for bits in kept[:most]]
+    return [CrowdBox(bits, _written(space, _shared(space, bits), found[bits])) for bits in kept[:most]]
 
 
-def _climbed(space: Space, rows: BoxSet, impossible: BoxSet, start: Point) -> int:
-    """The boxes that hold the fullest possible context which changes of one factor at a time lead to."""
+def _climbed(space: Space, rows: BoxSet, impossible: BoxSet, start: Point) -> Point:
+    """The fullest possible context which changes of one factor at a time lead to."""
     point = list(start)
     n_valid = _holding(rows, point).bit_count()
     for _ in range(SWEEPS):
@@ -51,7 +53,7 @@ def _climbed(space: Space, rows: BoxSet, impossible: BoxSet, start: Point) -> in
         n_valid = _swept(space, rows, impossible, point, n_valid)
         if n_valid == before:
             break
-    return _holding(rows, point)
+    return tuple(point)
 
 
 def _swept(space: Space, rows: BoxSet, impossible: BoxSet, point: list[int], n_valid: int) -> int:
@@ -72,6 +74,15 @@ def _swept(space: Space, rows: BoxSet, impossible: BoxSet, point: list[int], n_v
 
 def _holding(boxes: BoxSet, point: list[int]) -> int:
     return boxes.behind(point)[0]
+
+
+def _written(space: Space, box: Box, point: Point) -> Box:
+    """The box as cells can say it, around a point: of "not +Move -InAir" the part that one conjunction of tags holds."""
+    sides = list(box)
+    for f, factor in enumerate(space.factors):
+        if isinstance(factor, TagFactor) and factor.classes(factor.accepts(box[f])) != box[f]:
+            sides[f] = factor.widest(point[f], box[f])
+    return tuple(sides)
 
 
 def _shared(space: Space, bits: int) -> Box:

@@ -23,7 +23,7 @@ from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
 from contextdb.covering.sample import LITTLE, Counts, Sampler
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
-from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
+from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_counts
 from contextdb.tables.table import EitherTable
 
 WORK = 40_000_000
@@ -56,12 +56,12 @@ def coverage(
     progress: Tell | None = None,
     should_stop: Stops | None = None,
 ) -> CoverageReport:
-    """Work out which contexts have a valid row.
+    """Compute which contexts have a valid row.
 
     Parameters
     ----------
     table : Table or CompiledTable
-        Findings of a Table carry lines, and tell rows that are written alike; a CompiledTable has no assumptions.
+        Findings of a Table have lines, and include rows that are written alike; a CompiledTable has no assumptions.
     seed : int
         Where samples start; the same input and seed give the same report.
     work : int
@@ -69,14 +69,14 @@ def coverage(
     samples : int
         Random contexts, for the estimate where the count is not finished and for overlap. 0: none.
     max_gaps : int
-        The report names at most so many gaps, the largest.
+        The report names at most this many gaps, the largest.
     impossible : sequence of mapping of str to Cell or cell text
-        Contexts that cannot happen, as boxes, besides those that the table's own `assume` rules out: they belong to no share.
+        Contexts that cannot occur, as boxes, besides those that the table's own `assume` excludes: no share counts them.
     weights : mapping of str to mapping of value or cell text to float, optional
-        For some conditions how often their values come up, in any unit; a cell's weight is spread over it. Default: all values
+        For some conditions, how often their values occur, in any unit; a cell's weight is spread over it. Default: all values
         alike, numbers by length.
     assume : bool
-        False leaves aside what contextdb.toml says of contexts: `assume` of the table, and that derived facts are computed.
+        False ignores what contextdb.toml says about contexts: the `assume` of the table, and how derived facts are computed.
     progress : callable of (str, float), optional
         Is told what is being worked out and which share of the whole is done; the report is the same without it.
     should_stop : callable that gives bool, optional
@@ -89,7 +89,7 @@ def coverage(
     TableError
         The table has cells that cannot be read, or a condition whose domain is empty.
     ContextError, CellError
-        `impossible` or `weights` name what is not there.
+        `impossible` or `weights` name what is missing.
     Cancelled
         `should_stop` said so.
 
@@ -129,7 +129,8 @@ def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, w
     if drawer is not None:
         gaps = [gap for gap in gaps if gap.share > 0.0]
     judging = watcher.within("Comparing rows", FINDINGS_AT, CROWDS_AT)
-    judge = Judge(space, compiled, opened.table, finding_steps(work, len(space.boxes)), judging, drawer)
+    compared = space.first(comparable_rows(compiled))
+    judge = Judge(compared, compiled, opened.table, finding_steps(work, len(compared.boxes)), judging, drawer)
     findings = judge.findings()
     middle = (possible.lower + possible.upper) / 2.0
     if middle == 0.0 and drawer is None:

@@ -24,6 +24,7 @@ from operator import and_
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.cells import intervals
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, ValueSet, format_cell, format_number, tags_above
@@ -58,8 +59,12 @@ class ValueFactor:
     def classes(self, accepts: Accepted) -> int:
         """The classes that a set holds."""
         assert isinstance(accepts, ValueSet)
-        held = sum(1 << k for k, value in enumerate(self.values) if accepts.holds(value))
-        return held | (1 << len(self.values) if self.has_others and accepts.is_complement else 0)
+        held = bitmask.int_of(sorted(self._class_of[value] for value in accepts.values if value in self._class_of))
+        return ((1 << len(self.values) + self.has_others) - 1) ^ held if accepts.is_complement else held
+
+    @cached_property
+    def _class_of(self) -> dict[Value, int]:
+        return {value: k for k, value in enumerate(self.values)}
 
     def accepts(self, classes: int) -> Accepted:
         """The values of some classes."""
@@ -136,7 +141,10 @@ class TagFactor:
             chances = after
             if len(chances) > MOST_ANSWERS:
                 raise TableError(
-                    Fault(f"{plural(len(tags), 'tag')} that hang together answer in too many ways.", f"{MOST_ANSWERS:,}")
+                    Fault(
+                        f"{plural(len(tags), 'tag')} that depend on each other have too many combinations of answers.",
+                        f"{MOST_ANSWERS:,}",
+                    )
                 )
         answers = tuple(sorted(chances))
         return cls(tuple(tags), answers, np.array([chances[a] for a in answers]))
@@ -244,7 +252,7 @@ def _whole_domain(domain: Domain) -> Span:
     span = (domain.minimum, domain.maximum)
     whole = intervals.whole((span,)) if domain.kind == "int" else (span,)
     if not whole or span[0] > span[1]:
-        raise TableError(Fault(f"no {domain.kind} lies between min {span[0]:g} and max {span[1]:g}.", "a domain that is not empty"))
+        raise TableError(Fault(f"no {domain.kind} is between min {span[0]:g} and max {span[1]:g}.", "a domain that is not empty"))
     return whole[0]
 
 

@@ -14,10 +14,10 @@ What of these is variety, under the table's policy, is information: see `context
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import islice
+from itertools import groupby, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.draw import Drawer
-from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.questions import MANY, Questions
+from contextdb.covering.progress import PREPARING, SILENT, Progress
+from contextdb.covering.questions import MANY, Questions, is_prepared
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
@@ -39,6 +39,8 @@ MOST_CAUSES = 24
 """Up to so many rows the causes of a redundant row are thinned out to those that are needed."""
 MOST_SIBLINGS = 50
 """So many other rows of a row's asset are compared with it one by one."""
+MOST_JOINT = 1000
+"""A finding names at most so many other rows that can be valid at the same time."""
 QUESTIONS = 40
 """One question may use this part of the steps."""
 QUICK, QUICK_BOXES = 50, 5000
@@ -62,6 +64,8 @@ class Judge:
     """False when the steps ended before an answer."""
     unsure: set[int] = field(default_factory=set)
     """The rows of which some question had no answer."""
+    _pairs_left: int = 10_000_000
+    """So many pairs of rows that may be valid together are looked at."""
     _asked_of: int | None = None
     """The box that questions are about."""
     _held: dict[tuple[int, int], int] = field(default_factory=dict)
@@ -73,9 +77,17 @@ class Judge:
             return [
                 self._whole("no-context", "error", "no context is possible under the assumptions; do they contradict each other?")
             ]
-        found = [*self._identical, *self._rows(), *self._policy()]
+        found = [*self._left_out(), *self._identical, *self._rows(), *self._policy()]
         found = softened(found, self.compiled.assets) if lets_choose(self.compiled.policies) else found
         return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
+
+    def _left_out(self) -> Iterator[Finding]:
+        """That the last rows of a table that is too large are not compared."""
+        if self.space.n_left:
+            self.is_complete = False
+            left = f"the last {self.space.n_left:,} of {plural(self.compiled.n_rows, 'row')}"
+            message = f"the table is too large to compare all its rows: {left} are only searched for rows that are written alike."
+            yield self._whole("undecided-rows", "info", message)
 
     def gathered(self, findings: Sequence[Finding]) -> list[Finding]:
         """The findings, those of variety in one for each group of rows where the policy wants it."""
@@ -101,34 +113,36 @@ class Judge:
         return [] if self.table is None else list(identical_rows(self.table))
 
     @cached_property
-    def _equal(self) -> dict[Box, int]:
-        """For each distinct box the rows that have it, as bits."""
-        groups: dict[Box, int] = {}
+    def _equal(self) -> dict[Box, list[int]]:
+        """For each distinct box the rows that have it."""
+        groups: dict[Box, list[int]] = {}
         for i, box in enumerate(self.space.boxes):
-            groups[box] = groups.get(box, 0) | 1 << i
+            groups.setdefault(box, []).append(i)
         return groups
 
     def _rows(self) -> Iterator[Finding]:
         told = {f.row for f in self._identical}
-        assets = self._of_asset
+        first_of: dict[tuple[int, str], int] = {}
         for i, box in enumerate(self.space.boxes):
             self.progress.at(i / len(self.space.boxes))
             self._asked_of = i
-            equal = self._equal[box]
+            same = self._equal[box]
+            first_same = first_of.setdefault((same[0], self._asset(i)), i)
             if self.space.impossible and not self._is_possible(box):
-                yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions rule out.")
+                yield self._at(i, "dead-row", "warning", "the row is valid only in contexts that the assumptions exclude.")
                 continue
-            if equal & ((1 << i) - 1):
+            if same[0] != i:
                 if self.space.rows[i] not in told:
-                    first = _lowest(equal & assets[self._asset(i)] & ((1 << i) - 1) or equal)
+                    first = same[0] if first_same == i else first_same
                     yield self._at(
                         i, "equal-row", "warning", f"is valid in just the contexts of {self._named(first, i)}.", 1 << first
                     )
                 continue
-            yield from self._contained(i, box, equal)
+            yield from self._contained(i, box, same)
 
-    def _contained(self, i: int, box: Box, equal: int) -> Iterator[Finding]:
-        other = self._own_holder(i, box, equal)
+    def _contained(self, i: int, box: Box, same: Sequence[int]) -> Iterator[Finding]:
+        other = self._own_holder(i, box)
+        equal = bitmask.int_of(same)
         other = self._first_holder(i, box, equal) if other is None else other
         if other is not None:
             yield self._at(i, "subsumed-row", "warning", f"wherever it is valid, {self._named(other, i)} is valid too.", 1 << other)
@@ -150,7 +164,7 @@ class Judge:
                 self._asked_of = i
                 before = self._before(i) & self._meeting(box)
                 if before and self._covered(box, before | self._impossible) and self._is_possible(box):
-                    why = "stands above it" if self.compiled.policy == "first" else "has a higher priority"
+                    why = "is above it" if self.compiled.policy == "first" else "has a higher priority"
                     why = why if ways is None else "comes before it"
                     message = f"the row is never chosen: wherever it is valid, a valid row {why}."
                     yield self._at(
@@ -172,30 +186,40 @@ class Judge:
         own = [int(self.compiled.priorities[row]) for row in self.space.rows]
         picked = [self.compiled.row_weights[row] > 0.0 for row in self.space.rows]
         higher, so_far = {}, 0
-        for priority in sorted(set(own), reverse=True):
+        for priority, group in groupby(sorted(range(len(own)), key=lambda i: (-own[i], i)), key=lambda i: own[i]):
             higher[priority] = so_far
-            so_far |= sum(1 << i for i, p in enumerate(own) if p == priority and picked[i])
+            so_far |= bitmask.int_of([i for i in group if picked[i]])
         return higher
 
     def _overlapping(self) -> Iterator[Finding]:
         for i, box in enumerate(self.space.boxes):
             self.progress.check()
             self._asked_of = i
-            others, joint = 0, None
-            for j in _bits(self._meeting(box) & ((1 << i) - 1)):
-                if self.compiled.ways and not self.compiled.ways.forbids_both(self.space.rows[i], self.space.rows[j]):
+            others = list(islice(self._joint(i, _bits(self._meeting(box) & ((1 << i) - 1))), MOST_JOINT))
+            if others:
+                cells = self.space.cells(self._shared(i, others[0]), is_label=True)
+                told = ", ".join(f"{name}: {cell}" for name, cell in cells.items()) or "every context"
+                message = f'the policy is "unique", and {self._named(others[0], i)} can be valid at the same time: {told}.'
+                yield self._at(i, "policy-overlap", "error", message, bitmask.int_of(others))
+
+    def _joint(self, i: int, others: Iterable[int]) -> Iterator[int]:
+        """Those of some rows, which all share contexts with row i, that may be valid in one with it that can happen."""
+        ways, rows = self.compiled.ways, self.space.rows
+        for j in others:
+            if self._pairs_left == 0:
+                self._leave_open()
+                return
+            self._pairs_left -= 1
+            if ways is not None and not ways.forbids_both(rows[i], rows[j]):
+                continue
+            if self.space.impossible or self.drawer is not None:
+                shared = self._shared(i, j)
+                if not (self._is_possible(shared) and self._was_seen(shared)):
                     continue
-                shared = tuple(a & b for a, b in zip(box, self.space.boxes[j], strict=True))
-                if self._is_possible(shared) and self._was_seen(shared):
-                    others |= 1 << j
-                    joint = joint or (j, shared)
-            if joint:
-                cells = (
-                    ", ".join(f"{name}: {cell}" for name, cell in self.space.cells(joint[1], is_label=True).items())
-                    or "every context"
-                )
-                message = f'the policy is "unique", and {self._named(joint[0], i)} can be valid at the same time: {cells}.'
-                yield self._at(i, "policy-overlap", "error", message, others)
+            yield j
+
+    def _shared(self, i: int, j: int) -> Box:
+        return tuple(a & b for a, b in zip(self.space.boxes[i], self.space.boxes[j], strict=True))
 
     def _is_possible(self, box: Box) -> bool:
         return not (self.space.impossible and self._covered(box, self._impossible))
@@ -205,7 +229,7 @@ class Judge:
         return self.drawer is None or self.drawer.may_happen(box, np.random.default_rng(0))
 
     def _covered(self, box: Box, by: int) -> bool:
-        """Whether some boxes hold all of a box; "no" where that cannot be told within the steps."""
+        """Whether some boxes hold all of a box; "no" where that cannot be reported within the steps."""
         allowed = min(self.steps, max(200, self.steps // QUESTIONS))
         if self._questions is not None:
             return self._asked(self._questions, box, by & self._meeting(box), allowed)
@@ -228,7 +252,11 @@ class Judge:
     def _questions(self) -> Questions | None:
         """Compiled loops that answer where boxes are many."""
         boxes = self.space.boxes + self.space.impossible
-        return Questions(boxes, self.space.full) if len(boxes) >= MANY and self.space.full else None
+        if len(boxes) < MANY or not self.space.full:
+            return None
+        if not is_prepared():
+            self.progress.within(PREPARING, self.progress.start, self.progress.start)
+        return Questions(boxes, self.space.full)
 
     def _asked(self, questions: Questions, box: Box, by: int, allowed: int) -> bool:
         self.progress.check()
@@ -248,7 +276,7 @@ class Judge:
         """Boxes that together hold a box, without those that are not needed."""
         by &= self._meeting(box)
         if by.bit_count() <= MOST_CAUSES:
-            for j in reversed(list(_bits(by))):
+            for j in reversed(_bits(by)):
                 if self._covered(box, by & ~(1 << j)):
                     by &= ~(1 << j)
         return by
@@ -262,17 +290,17 @@ class Judge:
                 found &= self._met[f, side]
         return found
 
-    def _own_holder(self, i: int, box: Box, equal: int) -> int | None:
+    def _own_holder(self, i: int, box: Box) -> int | None:
         """The first row of the same asset that is valid wherever row i is, and elsewhere too; of very many the first few count."""
-        others = _bits(self._of_asset[self._asset(i)] & ~equal)
+        others = (j for j in self._of_asset[self._asset(i)] if self.space.boxes[j] != box)
         return next((j for j in islice(others, MOST_SIBLINGS) if _holds(self.space.boxes[j], box)), None)
 
     @cached_property
-    def _of_asset(self) -> dict[str, int]:
-        """For each asset its rows, as bits."""
-        rows: dict[str, int] = {}
+    def _of_asset(self) -> dict[str, list[int]]:
+        """For each asset its rows."""
+        rows: dict[str, list[int]] = {}
         for i in range(len(self.space.boxes)):
-            rows[self._asset(i)] = rows.get(self._asset(i), 0) | 1 << i
+            rows.setdefault(self._asset(i), []).append(i)
         return rows
 
     def _asset(self, i: int) -> str:
@@ -325,12 +353,6 @@ def _holds(outer: Box, inner: Box) -> bool:
     return all(side & ~around == 0 for around, side in zip(outer, inner, strict=True))
 
 
-def _lowest(bits: int) -> int:
-    return (bits & -bits).bit_length() - 1
-
-
-def _bits(bits: int) -> Iterator[int]:
-    while bits:
-        lowest = bits & -bits
-        yield lowest.bit_length() - 1
-        bits ^= lowest
+def _bits(bits: int) -> list[int]:
+    """The numbers of the boxes in a set, ascending."""
+    return list(map(int, bitmask.rows(bitmask.from_int(bits, bits.bit_length()))))

@@ -1,6 +1,6 @@
 """What compiled loops share, and the one that tells how many boxes hold each of many contexts. Arrays only.
 
-Compiled by numba where it is installed, else run as they stand: the same sums in the same order, so the same bytes.
+Compiled by numba where it is installed, else run as they are: the same sums in the same order, so the same bytes.
 """
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return, no-redef"
 

@@ -28,6 +28,8 @@ from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
 from contextdb.tables.table import EitherTable
 
 SAMPLES = 50_000
+MOST_CONDITIONS = 120
+"""A report compares no more conditions than so many with each other: pairs, and what they take, grow with their square."""
 DIGITS = 12
 """Shares that are equal to so many decimals are sorted as equal."""
 
@@ -170,8 +172,8 @@ def pairs(
 ) -> PairTable:
     """Work out the coverage of pairs of conditions.
 
-    Exact where the contexts that cells tell apart are few enough to go through; else out of random contexts. That no row accepts
-    two parts is certain in either case. Rows' own rules count, and stand in no pair themselves. The arguments, and what is raised,
+    Exact where the contexts that cells distinguish are few enough to go through; else out of random contexts. That no row accepts
+    two parts is certain in either case. Rows' own rules count, and are in no pair themselves. The arguments, and what is raised,
     are those of `coverage`.
     """
     require_counts(samples=samples, seed=seed)

@@ -63,7 +63,7 @@ def _joined(parts: list[Array], nothing: Array) -> Array:
 
 
 def _groups(known: Array, weights: Array, table: Part) -> tuple[Array, Array]:
-    """For each group of classes that the cells cannot tell apart which cells accept it, bool [G, cells], and its share."""
+    """For each group of classes that the cells cannot distinguish which cells accept it, bool [G, cells], and its share."""
     _, runs, first, _, _ = table
     turns = np.zeros((len(weights) + 1, len(known)), np.int8)
     has_cell = np.flatnonzero(known >= 0)

@@ -4,7 +4,7 @@ m boxes are in W = ceil(m / 64) words each: bit i % 64 of word i // 64 is box i.
 
     factors   int64 [L]       the number of each factor that some box restricts
     limits    uint64 [L, W]   the boxes that restrict it
-    groups    uint64 [G, W]   for each group of classes that the boxes cannot tell apart those that accept it
+    groups    uint64 [G, W]   for each group of classes that the boxes cannot distinguish those that accept it
     masses    float64 [G]     the share of its factor that the group is
     starts    int64 [L + 1]   where the groups of each factor begin
     sides     int32 [L, m]    the number of the side of each box, -1 where it accepts everything

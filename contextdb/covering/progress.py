@@ -12,8 +12,8 @@ Tell = Callable[[str, float], None]
 Stops = Callable[[], bool]
 
 
-PREPARING = "Preparing the count, for the first time on this machine only"
-"""What is told while the loops are compiled."""
+PREPARING = "Preparing the loops, for the first time on this machine only"
+"""What is reported while the loops are compiled."""
 
 
 class Cancelled(ContextDBError):

@@ -14,11 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.covering.count import scratch_of, table_of
+from contextdb.covering.count import scratch_of, table_of, was_compiled
 from contextdb.covering.space import Box, runs_of
 
 MANY = 1000
 """From so many boxes on the loops are worth loading."""
+
+
+def is_prepared() -> bool:
+    """Whether the loops that answer were compiled on this machine already, or run as they stand."""
+    from contextdb.covering.kernels import IS_COMPILED
+    from contextdb.covering.search_kernels import first_holders, leaves_open
+
+    return not IS_COMPILED or (was_compiled(leaves_open) and was_compiled(first_holders))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What coverage tells of a table: numbers, gaps and findings. Data only; `to_json` is what `coverage --format json` prints."""
+"""What coverage says of a table: numbers, gaps and findings. Data only; `to_json` is what `coverage --format json` prints."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Crowd:
 class CoverageReport:
     """The context coverage of one table.
 
-    `covered` lies between `lower` and `upper`: all equal when `method` is "exact"; with "bounds" it is their middle and they are
+    `covered` is between `lower` and `upper`: all are equal when `method` is "exact"; with "bounds" it is their middle and they are
     certain; with "estimate" it was sampled and they are its 99 % interval (Wilson). All are shares of the possible contexts.
     """
 
@@ -137,7 +137,7 @@ class CoverageReport:
 
     @property
     def headline(self) -> str:
-        """The covered share in one sentence that says how it is known."""
+        """The covered share in one sentence, with how it was computed."""
         if self.method == "exact":
             return f"{format_percent(self.covered)} of the contexts have a valid row (exact)."
         ends = " and ".join(told_apart(self.lower, self.upper))

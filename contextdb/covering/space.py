@@ -10,8 +10,9 @@ assumed, but for the contexts named as impossible.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 
@@ -26,12 +27,16 @@ from contextdb.cells.plain_ends import plain
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.errors import ContextError, Fault, Place, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, plural, some
 
 _WEIGHTS = "a mapping of conditions to mappings of cells to numbers"
 
 MOST_COUNTED = 1 << 48
 """The most steps, samples or gaps."""
+MOST_COMPARED = 1 << 37
+"""Rows × rows × conditions of a table all of whose rows are compared with each other: seconds."""
+MOST_HELD = 1 << 31
+"""Rows × the different cells of all columns, of a table that fits into memory: a bit for each."""
 
 Box = tuple[int, ...]
 CellBox = Mapping[str, Cell | str]
@@ -54,6 +59,8 @@ class Space:
     """The conditions whose weights were given."""
     is_strict: bool = False
     """Whether two valid rows are an error: then cells are written to the last bit, however many digits that takes."""
+    n_left: int = 0
+    """Enabled rows that are no boxes because the table is too large."""
 
     @classmethod
     def of(
@@ -62,8 +69,9 @@ class Space:
         impossible: Sequence[CellBox] = (),
         weights: WeightsOf | None = None,
         progress: Progress = SILENT,
+        most_rows: int | None = None,
     ) -> Space:
-        """The space of a compiled table; see `contextdb.covering.coverage` for the arguments."""
+        """The space of a compiled table, or of its first rows; see `contextdb.covering.coverage` for the arguments."""
         boxes = require_many(impossible, "impossible", "a list of mappings of conditions to cells")
         excluded = [_read_box(box, compiled.conditions) for box in boxes]
         shares = {} if weights is None else require_mapping(weights, "weights", _WEIGHTS)
@@ -73,7 +81,8 @@ class Space:
         for at, condition in enumerate(compiled.conditions):
             progress.check()
             is_text = condition.domain.kind == "text"  # its values are those that cells name, soft ones too
-            accepted = [c.accepts for c in compiled.cells(at) if c.accepts is not None and (is_text or not c.is_soft)]
+            cells = [compiled.cells(at)[code] for code in _codes_of(compiled, at, most_rows)]
+            accepted = [c.accepts for c in cells if c.accepts is not None and (is_text or not c.is_soft)]
             accepted += [cell.accepts for box in excluded for name, cell in box.items() if name == condition.name and cell.accepts]
             accepted += [cell.accepts for cell in given.get(condition.name, {}) if cell.accepts]
             new = factors_of(accepted, condition, given.get(condition.name))
@@ -89,17 +98,22 @@ class Space:
             tuple(given),
             is_strict="unique" in compiled.policies,
         )
-        return space._with_boxes(compiled, excluded, progress)
+        return space._with_boxes(compiled, excluded, progress, most_rows)
 
-    def _with_boxes(self, compiled: CompiledTable, excluded: Sequence[Mapping[str, Cell]], progress: Progress) -> Space:
-        columns = []
+    def _with_boxes(
+        self, compiled: CompiledTable, excluded: Sequence[Mapping[str, Cell]], progress: Progress, most_rows: int | None
+    ) -> Space:
+        columns: list[dict[int, tuple[int, ...]]] = []
         for at in range(len(self.conditions)):
             progress.check()
-            columns.append([self.sides(at, None if c.is_soft else c.accepts) for c in compiled.cells(at)])
-        codes = [compiled.texts[at].codes.tolist() for at in range(len(self.conditions))]
+            cells = compiled.cells(at)
+            used = _codes_of(compiled, at, most_rows)
+            columns.append({code: self.sides(at, None if cells[code].is_soft else cells[code].accepts) for code in used})
+        codes = [compiled.texts[at].codes[:most_rows].tolist() for at in range(len(self.conditions))]
         found: list[tuple[int, Box]] = []
         n_factors = len(self.factors)  # a cell of tags that accepts nothing has one side too many
-        for row in np.flatnonzero(bitmask.unpack(compiled.enabled, compiled.n_rows)).tolist():
+        enabled = np.flatnonzero(bitmask.unpack(compiled.enabled, compiled.n_rows))
+        for row in enabled[: None if most_rows is None else int(np.searchsorted(enabled, most_rows))].tolist():
             progress.check()
             own = [columns[at][codes[at][row]] for at in range(len(columns))]
             box = tuple(chain.from_iterable(own))
@@ -116,7 +130,13 @@ class Space:
             tuple(dict.fromkeys(b for b in impossible if b is not None)),
             self.weighted,
             self.is_strict,
+            0 if most_rows is None else int((enabled >= most_rows).sum()),
         )
+
+    def first(self, n_boxes: int) -> Space:
+        """The same space with the first boxes only."""
+        left = self.n_left + max(0, len(self.boxes) - n_boxes)
+        return replace(self, rows=self.rows[:n_boxes], boxes=self.boxes[:n_boxes], n_left=left)
 
     def _is_void(self, sides: Sequence[int], at: int) -> bool:
         """Whether a cell of tags accepts nothing where the condition has no factor to say so."""
@@ -220,6 +240,35 @@ class Space:
         }
 
 
+def comparable_rows(compiled: CompiledTable) -> int:
+    """How many rows of a table, from the first on, may be compared with each other without growing out of time or memory."""
+    n_rows = min(compiled.n_rows, math.isqrt(MOST_COMPARED // max(1, len(compiled.conditions))))
+    while n_rows > 1 and n_rows * _n_cells(compiled, n_rows) > MOST_HELD:
+        n_rows //= 2
+    return n_rows
+
+
+def require_measurable(compiled: CompiledTable) -> None:
+    """Raise TableError where the bits of a table's rows would not fit into memory."""
+    n_cells = _n_cells(compiled, compiled.n_rows)
+    if compiled.n_rows * n_cells > MOST_HELD:
+        found = f"the table {in_quotes(compiled.name)} is too large for coverage: {plural(compiled.n_rows, 'row')} x "
+        accepted = f"rows times different cells up to {MOST_HELD:,}, or contextdb check, which compares the first rows"
+        raise TableError(Fault(f"{found}{plural(n_cells, 'different cell')}.", accepted))
+
+
+def _n_cells(compiled: CompiledTable, n_rows: int) -> int:
+    return sum(len(_codes_of(compiled, at, n_rows)) for at in range(len(compiled.conditions)))
+
+
+def _codes_of(compiled: CompiledTable, at: int, most_rows: int | None) -> Sequence[int]:
+    """The codes of a condition's cells that the first rows use; of all rows those that no row uses, too."""
+    texts = compiled.texts[at]
+    if most_rows is None or most_rows >= compiled.n_rows:
+        return range(len(compiled.cells(at)))
+    return [int(code) for code in np.unique(texts.codes[:most_rows])]
+
+
 def tags_of(accepts: TagSet) -> frozenset[str]:
     """The tags that a set of tag sets names."""
     parts = accepts.parts if isinstance(accepts, TagMeet) else (accepts,)
@@ -237,7 +286,8 @@ def require_counts(**numbers: object) -> None:
 
 def weight_of(factor: Factor, side: int) -> float:
     """The share of a factor that some classes make up."""
-    return float(sum(w for k, w in enumerate(factor.weights.tolist()) if side >> k & 1))
+    parts = [factor.weights[first:stop] for first, stop in runs_of(side)]
+    return float(np.cumsum(np.concatenate(parts))[-1]) if parts else 0.0  # one after the other, as every count adds them
 
 
 def factors_of(accepted: Sequence[Accepted], condition: Condition, parts: Mapping[Cell, float] | None = None) -> list[Factor]:
@@ -256,7 +306,7 @@ def factors_of(accepted: Sequence[Accepted], condition: Condition, parts: Mappin
         sides[side] = sides.get(side, 0.0) + weight
     if sides.get(0, 0.0) > 0.0 or sum(sides.values()) <= 0.0:
         place = Place(column=condition.name)
-        raise ContextError(Fault("the weights lie outside the domain, or are all 0.", "a weight above 0 inside", place=place))
+        raise ContextError(Fault("the weights are outside the domain, or all 0.", "a weight above 0 inside", place=place))
     return [weighted(factor, {s: w for s, w in sides.items() if w > 0.0})]
 
 
@@ -281,11 +331,11 @@ def _read_weights(name: str, parts: Mapping[object, float], conditions: Sequence
     condition = _condition(name, conditions)
     place = Place(column=name)
     if condition.domain.kind == "tags":
-        raise ContextError(Fault("tags take no weights.", "a condition of another type", place=place))
+        raise ContextError(Fault("tags do not accept weights.", "a condition of another type", place=place))
     read: dict[Cell, float] = {}
     for text, weight in require_mapping(parts, f"weights of {in_quotes(name)}", _WEIGHTS).items():
         if not (isinstance(weight, (int, float)) and 0.0 <= weight < float("inf")):
-            raise ContextError(Fault(f"the weight {weight!r} is no share.", "a number from 0 up", place=place))
+            raise ContextError(Fault(f"the weight {weight!r} is not a share.", "a number from 0 up", place=place))
         cell = parse_cell(str(text), condition.domain)
         read[cell] = read.get(cell, 0.0) + float(weight)
     return read

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
+from contextdb import bitmask
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, runs_of
 
@@ -73,16 +74,18 @@ class BoxSet:
         accepts, restricts = [], []
         for f, side_full in enumerate(full):
             progress.check()
-            sides: dict[int, int] = {}
+            sides: dict[int, list[int]] = {}
             for i, box in enumerate(boxes):
                 if box[f] != side_full:
-                    sides[box[f]] = sides.get(box[f], 0) | 1 << i
+                    sides.setdefault(box[f], []).append(i)
             turns = [0] * (side_full.bit_length() + 1)
-            for side, bits in sides.items():
+            restricted = 0
+            for side, members in sides.items():
+                bits = bitmask.int_of(members)
+                restricted |= bits
                 for first, stop in runs_of(side):
                     turns[first] ^= bits
                     turns[stop] ^= bits
-            restricted = sum(sides.values())
             own, so_far = [], everything & ~restricted
             for turn in turns[:-1]:
                 so_far ^= turn
@@ -150,7 +153,7 @@ class BoxSet:
     def points(self, within: Box, steps: Steps) -> Iterator[Point]:
         """Contexts of `within` that are in no box, one after the other, until there is none.
 
-        Before the next one is asked for, a box that holds the last one must be added. The search goes on where it was: what was
+        Before the next one is asked for, a box that holds the last one must be added. The search continues where it was: what was
         searched once is not searched again. Raises OutOfSteps when the steps, which count down, are used up.
         """
         open_boxes = self.all

@@ -1,6 +1,6 @@
 """Bytes of files: read whole, written atomically. An edge: this touches the disk.
 
-A save writes a temporary file beside the old one, has the system put it on the disk, and renames it. So at any moment, killed or
+A save writes a temporary file next to the old one, has the system put it on the disk, and renames it. So at any moment, killed or
 out of power, the file is wholly the old one or wholly the new one. What the system refuses is a `FileError` that says what to do.
 
 Saves into one folder take turns for the moment in which they look at the old file and replace it (`contextdb.disk.folder_lock`), so
@@ -49,13 +49,13 @@ def read_bytes(path: str | Path) -> bytes:
         if stat.S_ISDIR(mode):
             raise FileError(_is_folder(file))
         if not stat.S_ISREG(mode):  # reading a pipe could wait for ever
-            raise FileError(Fault("this is no plain file.", "a file", place=Place(str(file))))
+            raise FileError(Fault("this is not a regular file.", "a file", place=Place(str(file))))
         return file.read_bytes()
 
 
 def names_a_table(name: str) -> bool:
     """Whether a file of this name in a folder of tables is a table: no saved contexts, and nothing hidden, as macOS and editors put
-    beside a file."""
+    next to a file."""
     folded = name.lower()
     return folded.endswith(TABLE_SUFFIXES) and not folded.endswith(CASES_SUFFIX) and not folded.startswith(".")
 
@@ -69,7 +69,7 @@ def write_atomic(path: str | Path, data: Data, was: Was = "any", syncs: bool = T
     Parameters
     ----------
     was : bytes or None, optional
-        Only if the file holds these bytes; None: only if it is not there. Default: whatever is there.
+        Only if the file holds these bytes; None: only if it is missing. Default: whatever is there.
     syncs : bool
         False does not wait until the bytes are on the disk: for what can be computed again.
 
@@ -117,7 +117,7 @@ def is_still(file: Path, was: Was) -> bool:
 
 @dataclass
 class Staged:
-    """New bytes of a file, in a temporary file beside it that this process holds."""
+    """New bytes of a file, in a temporary file next to it that this process holds."""
 
     target: Path
     temporary: Path
@@ -137,7 +137,7 @@ class Staged:
 
 @contextmanager
 def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = None) -> Iterator[Staged]:
-    """New bytes beside a file, or in another folder, not yet under its name; gone at the end where they did not take it.
+    """New bytes next to a file, or in another folder, not yet under its name; gone at the end where they did not take it.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def staged(file: Path, data: Data, syncs: bool = True, folder: Path | None = Non
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, where they are not there yet.
+    """Make a folder and those above it, where they are missing yet.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def _require_writable(file: Path, old: os.stat_result) -> None:
     if stat.S_ISDIR(old.st_mode):
         raise FileError(_is_folder(file))
     if not stat.S_ISREG(old.st_mode):
-        raise FileError(Fault("this is no plain file.", "a file", place=Place(str(file))))
+        raise FileError(Fault("this is not a regular file.", "a file", place=Place(str(file))))
     if not old.st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH):
         mend = "to check it out of version control, or to make it writable"
         raise FileError(Fault("the file is marked read-only.", "a file that may be written", mend, Place(str(file))))
@@ -246,7 +246,7 @@ def _refused(file: Path, why: Callable[[OSError, Path], Fault]) -> Iterator[None
     except OSError as error:
         raise FileError(why(error, file)) from None
     except ValueError as error:  # a path with a NUL character
-        raise FileError(Fault(f"this is no path: {error}.", "a path", place=Place(str(file)))) from None
+        raise FileError(Fault(f"this is not a valid path: {error}.", "a path", place=Place(str(file)))) from None
 
 
 def _is_folder(folder: Path) -> Fault:
@@ -259,7 +259,7 @@ def _why_unread(error: OSError, file: Path) -> Fault:
     if isinstance(error, FileNotFoundError):
         return _missing(file)
     if isinstance(error, NotADirectoryError):
-        return Fault(f"{path_in_quotes(file.parent)} is no folder.", "a file in a folder", place=place, rule="no-such-path")
+        return Fault(f"{path_in_quotes(file.parent)} is not a folder.", "a file in a folder", place=place, rule="no-such-path")
     if isinstance(error, PermissionError):
         return Fault("the file may not be read.", "a file that you have the permission to read", place=place)
     return Fault(f"the file cannot be read: {error.strerror}.", place=place)
@@ -270,7 +270,7 @@ def _missing(file: Path) -> Fault:
     place = Place(str(file))
     if file.is_symlink():
         return Fault(
-            f"this is a link to {path_in_quotes(os.readlink(file))}, which is not there.", place=place, rule="no-such-path"
+            f"this is a link to {path_in_quotes(os.readlink(file))}, which does not exist.", place=place, rule="no-such-path"
         )
     part = file
     while not part.parent.is_dir() and part.parent != part:
@@ -296,7 +296,7 @@ def _why_unwritten(error: OSError, file: Path, size: int | None) -> Fault:
     if error.errno == errno.EROFS:
         return Fault(f"the folder {folder} is on a disk that cannot be written.{kept}", mend="to save elsewhere", place=place)
     if isinstance(error, (FileNotFoundError, NotADirectoryError)):
-        return Fault(f"there is no folder {folder}.", "a folder that is there", place=place, rule="no-such-path")
+        return Fault(f"there is no folder {folder}.", "an existing folder", place=place, rule="no-such-path")
     if isinstance(error, PermissionError):
         busy = ", or another program has the file open" if os.name == "nt" else ""
         return Fault(f"the folder {folder} may not be written in{busy}.{kept}", mend="to save elsewhere", place=place)

@@ -29,7 +29,7 @@ except ImportError:  # Windows
 IGNORED = ".contextdb-*"
 """The names of temporary files and folders, as a line of .gitignore."""
 UNFINISHED = ".contextdb-unfinished.json"
-"""Where it stands, several files are being replaced in one step (`contextdb.disk.together`): their temporary files are still
+"""Where it is, several files are being replaced in one step (`contextdb.disk.together`): their temporary files are still
 wanted."""
 
 _TURN = ".contextdb-turn"

@@ -42,7 +42,7 @@ class NewFile:
 def write_together(folder: Path, files: Sequence[NewFile]) -> bool:
     """Replace files in or below a folder, or make them, in one step.
 
-    Files that stand elsewhere, behind a link say, are replaced one after another.
+    Files that are elsewhere, behind a link say, are replaced one after another.
 
     Returns
     -------
@@ -171,7 +171,7 @@ def write_record(path: Path, said: object) -> None:
 
 
 def finish(folder: Path) -> None:
-    """Bring to an end what a killed process has begun in a folder; it is told as an `UnfinishedWarning`.
+    """Bring to an end what a killed process has begun in a folder; it is reported as an `UnfinishedWarning`.
 
     Raises
     ------

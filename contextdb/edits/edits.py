@@ -245,7 +245,7 @@ def set_settings(table: Table, **said: Any) -> Edit:
 
 
 def _require_known(table: Table, assume: Sequence[str]) -> None:
-    """Raise SchemaError where an assumption cannot be read, or names what is no condition of the table and not declared."""
+    """Raise SchemaError where an assumption cannot be read, or names what is not a condition of the table and not declared."""
     known = {**table.schema.conditions, **{c.condition.name: c.condition for c in table.conditions}}
     if faults := list(assumption_faults(assume, known)):
         raise SchemaError(*faults)

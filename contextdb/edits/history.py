@@ -113,7 +113,7 @@ class History:
         return self.position != self._saved
 
     def saved(self, table: Table) -> None:
-        """The present table stands on the disk, and this is how `Table.save` gave it back. Its past stays."""
+        """The present table is on the disk, and this is how `Table.save` gave it back. Its past stays."""
         self.table = self._kept[self.position] = table
         self._pinned.add(self.position)
         self._saved = self.position
@@ -123,7 +123,7 @@ class History:
         self._pinned -= set(later)
 
     def based_on(self, table: Table, is_saved: bool) -> None:
-        """The present texts stand on another source now, that somebody else wrote; `is_saved` when the file holds just them."""
+        """The present texts are on another source now, that somebody else wrote; `is_saved` when the file holds just them."""
         self.saved(table)
         if not is_saved:
             self._saved = None
@@ -173,13 +173,13 @@ class History:
 
 
 def where_now(came_from: CameFrom, n_before: int) -> CameFrom:
-    """Where each row of before stands now, -1 where it is gone; of a row that was copied, the first."""
+    """Where each row of before is now, -1 where it is gone; of a row that was copied, the first."""
     found = np.full(n_before + 1, -1, np.int64)
     found[came_from[::-1]] = np.arange(len(came_from))[::-1]
     return found[:n_before]
 
 
 def _own_bytes(table: Table, before: Table) -> int:
-    """About what a table takes beside the one before it: its own codes, and twice as much for the masks made of them."""
+    """About what a table takes next to the one before it: its own codes, and twice as much for the masks made of them."""
     shared = {id(c.codes) for c in before.columns}
     return sum(3 * c.codes.nbytes for c in table.columns if id(c.codes) not in shared)

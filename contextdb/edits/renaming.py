@@ -110,7 +110,7 @@ class Renaming:
 
 @dataclass(frozen=True)
 class _File:
-    """A table's file and what stands in it."""
+    """A table's file and what is in it."""
 
     name: str
     path: Path
@@ -232,7 +232,7 @@ def _rewritten_table(file: _File, old: str, new: str) -> Iterator[Rewrite]:
 
 
 def _rewritten_actors(path: Path, old: str, new: str) -> Iterator[Rewrite]:
-    """The actors that are kept beside a table, where they have a fact of the role under its old name."""
+    """The actors that are kept next to a table, where they have a fact of the role under its old name."""
     (role, _, was), (new_role, _, now) = old.partition("."), new.partition(".")
     if not (was and now and role == new_role and path.is_file()):
         return

@@ -1,4 +1,4 @@
-"""Write into contextdb.toml what edits of a table say anew: settings, conditions, blueprints, selectors. An edge: this
+"""Write into contextdb.toml what edits of a table change: settings, conditions, blueprints, selectors. An edge: this
 touches the disk.
 
 Only the keys that an edit changed are written; every other byte of the file stays, also what somebody else wrote into it meanwhile.
@@ -25,7 +25,7 @@ from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
 from contextdb.tables.table import Table
 
 Keys = dict[KeyPath, object]
-"""What each key says: ("tables", "jog", "policy") to "first". Lists are lists, and a key without a say is not there."""
+"""What each key says: ("tables", "jog", "policy") to "first". Lists are lists, and a key without a say is missing."""
 
 Changes = dict[KeyPath, tuple[object, object]]
 """What each key said, and what it shall say now; None for nothing."""
@@ -113,7 +113,7 @@ def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
 
 
 def schema_path(table: Table) -> Path:
-    """The contextdb.toml of a table: the one it was read under, else the one beside it."""
+    """The contextdb.toml of a table: the one it was read under, else the one next to it."""
     assert table.path is not None, "a table without a file has no contextdb.toml"
     if table.schema.file is not None and _is_below(table.path, Path(table.schema.file).parent):
         return Path(table.schema.file)
@@ -205,10 +205,10 @@ def _is_file_by_default(key: KeyPath, file: object, theirs: Schema) -> bool:
 
 def _conflict(key: KeyPath, theirs: object, ours: object, path: Path) -> Fault:
     said = "is gone from the file" if theirs is None else f"is {_short(theirs)} in the file"
-    wanted = "to be taken away" if ours is None else f"to be {_short(ours)}"
+    wanted = "to be removed" if ours is None else f"to be {_short(ours)}"
     where = f"[{dotted(key[:-1])}] {key[-1]}"
     found = f"{where} {said}, where somebody else changed it, and was {wanted} here."
-    return Fault(found, "a key that one of the two changed", "to reload the table, or to take the change back", Place(str(path)))
+    return Fault(found, "a key that one of the two changed", "to reload the table, or to undo the change", Place(str(path)))
 
 
 def _short(value: object) -> str:
@@ -240,7 +240,7 @@ def _edited(text: str, wanted: Changes, table: Table, name: str) -> str:
 
 
 def _new_conditions(text: str, parts: Mapping[KeyPath, Mapping[str, object]], table: Table) -> dict[KeyPath, dict[str, object]]:
-    """The parts that are conditions of the table and of which nothing stands in the text, and what their keys say."""
+    """The parts that are conditions of the table and of which nothing is in the text, and what their keys say."""
     own = {("conditions", c.condition.name) for c in table.conditions}
     new = toml_edit.absent(text, [part for part in parts if part in own])
     return {part: {key: now for key, now in parts[part].items() if now is not None} for part in new}

@@ -22,7 +22,7 @@ def require_no_conflicts(text: str, file: str) -> None:
     Raises
     ------
     TableError
-        With the lines on which conflicts start; a mark that stands alone, after a mend that was not finished, is named too.
+        With the lines on which conflicts start; a mark that is alone, after a mend that was not finished, is named too.
     """
     unified = text.replace("\r\n", "\n").replace("\r", "\n")
     marks, line, at = list[tuple[int, str]](), 1, 0
@@ -33,6 +33,6 @@ def require_no_conflicts(text: str, file: str) -> None:
     if not starts and not any(mark == ">" for _, mark in marks):
         return
     first = starts[0] if starts else marks[0][0]
-    what = "an unresolved git conflict starts here" if starts else "a mark that git leaves in a conflict stands here"
+    what = "an unresolved git conflict starts here" if starts else "this line is a conflict mark of git"
     more = f"; there are {plural(len(starts), 'conflict')} in the file" if len(starts) > 1 else ""
     raise TableError(Fault(f"{what}{more}.", _ACCEPTED, _MEND, Place(file, first)))

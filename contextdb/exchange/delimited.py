@@ -2,7 +2,7 @@
 
 Commas, semicolons, tabs or vertical bars; fields in double quotes with quotes doubled; "sep=;" as the first line, which Excel
 obeys. Numbers with decimal commas are told from pairs (centre, tolerance) by what else the file holds. What was decided, and why,
-stands in the remarks.
+is in the remarks.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _DECIMAL_POINT = re.compile(r"(?<!\.)\.(?!\.)\d")
 _NUMERIC = re.compile(r"(?:not\b|[\d\s.,+\-±<>=()\[\]|~])+", re.IGNORECASE)
 _BROKEN = {
     "unexpected end of data": "a quoted field is never closed",
-    "'\"' expected after '\"'": "a field goes on after a quote that closes it",
-    "delimiter": "a field goes on after a quote that closes it",
+    "'\"' expected after '\"'": "a field continues after its closing quote",
+    "delimiter": "a field continues after its closing quote",
 }
 
 
@@ -88,7 +88,7 @@ def dialect_of(text: str, wanted: str | None = None) -> Dialect:
     counts = {mark: _field_counts(text, mark) for mark in DELIMITERS}
     best = max(DELIMITERS, key=lambda mark: _fitness(counts[mark]))
     if _fitness(counts[best])[0] == 0:
-        return Dialect(",", 0, (Remark("one column: no delimiter stands in the first line."),))
+        return Dialect(",", 0, (Remark("one column: the first line has no delimiter."),))
     header, agreeing, total = _fit(counts[best])
     told = f"{DELIMITERS[best]} between the fields: {header} in the first line and in {agreeing:,} of the next {total:,}."
     return Dialect(
@@ -217,7 +217,7 @@ def with_points(
             if pointed is not None
             else "; say so if it is a decimal comma."
         )
-        return columns, [Remark(f"{in_quotes(example)} is taken as centre and tolerance{why}", f"column {where}")]
+        return columns, [Remark(f"{in_quotes(example)} is read as centre and tolerance{why}", f"column {where}")]
     changed = [_pointed(column, texts) if has else column for column, texts, has in zip(columns, numeric, has_comma, strict=True)]
     told = f"decimal commas became points: {in_quotes(example)} is now {in_quotes(_DECIMAL_COMMA.sub('.', example))}."
     return changed, [Remark(told, f"column {where}")]

@@ -142,11 +142,9 @@ def _parsed(raw: bytes, file: str) -> Element:
         root = ElementTree.fromstring(re.sub(r"^\s*<\?xml[^>]*\?>", "", text))
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         line = error.position[0] if isinstance(error, ElementTree.ParseError) else None
-        raise TableError(
-            Fault(f"this is no XML that can be read: {shown(str(error))}.", _ACCEPTED, place=Place(file, line))
-        ) from None
+        raise TableError(Fault(f"this is not readable XML: {shown(str(error))}.", _ACCEPTED, place=Place(file, line))) from None
     if tag_of(root) != "definitions":
-        raise TableError(Fault(f"this is no DMN: its root is <{shown(tag_of(root))}>.", _ACCEPTED, place=Place(file)))
+        raise TableError(Fault(f"this is not DMN: its root is <{shown(tag_of(root))}>.", _ACCEPTED, place=Place(file)))
     return root
 
 
@@ -172,7 +170,7 @@ def _chosen(root: Element, wanted: str | None, file: str) -> tuple[Element, str]
 
 
 def _tables(root: Element) -> Iterator[tuple[Element, Element]]:
-    """The decision tables of a file in its order, each with the decision that it stands in; each element is looked at once."""
+    """The decision tables of a file in its order, each with the decision that it is in; each element is looked at once."""
     open_ones: list[tuple[Element, Element | None]] = [(root, None)]
     while open_ones:
         one, holder = open_ones.pop()
@@ -236,7 +234,7 @@ def _conditions(inputs: Sequence[_Column], rules: Rules) -> tuple[list[TextColum
         for rule, (entry, cell) in enumerate(zip(one.entries, one.cells, strict=True), 1):
             is_rule = cell is None and rules.add(rule - 1, one.name, entry)
             if cell is None and not is_rule:
-                told = f"{in_quotes(entry)} is no test that a cell or a rule can say; it is kept as text, which no type reads."
+                told = f"{in_quotes(entry)} is not a test that a cell or a rule can express; it is kept as unreadable text."
                 lost.append(Remark(told, _place(rule, one.name), True))
             texts.append("-" if is_rule else f"= {entry}" if cell is None else cell)
         columns.append(TextColumn.of(one.name, texts))
@@ -245,7 +243,7 @@ def _conditions(inputs: Sequence[_Column], rules: Rules) -> tuple[list[TextColum
 
 @dataclass
 class Rules:
-    """The rules of rows that tests become, and the facts that they name beside the inputs."""
+    """The rules of rows that tests become, and the facts that they name next to the inputs."""
 
     conditions: Mapping[str, Condition]
     types: Types
@@ -296,7 +294,7 @@ class Rules:
     def remarks(self) -> Iterator[Remark]:
         """What is said of the rules."""
         if self.n_tests:
-            named = f"; the game gives the facts that they name beside: {listed(list(self.facts))}" if self.facts else ""
+            named = f"; the game supplies the other facts that they name: {listed(list(self.facts))}" if self.facts else ""
             yield Remark(f"{plural(self.n_tests, 'test')} that no cell can say became rules of their rows{named}.")
 
 
@@ -323,7 +321,7 @@ def _expressions(element: Element) -> list[Remark]:
     for one in children_of(element, "input"):
         said, label = text_of(next(iter(children_of(one, "inputExpression")), None)), one.get("label")
         if said and not _NAME.fullmatch(said) and said != label:
-            told = f"{in_quotes(said)} is an expression; as a column it is a fact that the game gives."
+            told = f"{in_quotes(said)} is an expression; as a column it is a fact that the game supplies."
             remarks.append(Remark(told, f"input {in_quotes(label or said)}", True))
     return remarks
 
@@ -368,7 +366,7 @@ def _results(root: Element, inputs: Sequence[_Column]) -> Iterator[Remark]:
     results = {one.get(key) for decision in decisions for one in (decision, *children_of(decision, "variable")) for key in _NAMES}
     for one in inputs:
         if one.name in results:
-            told = "another decision of the file gives it; as a column it is a fact that the game gives."
+            told = "another decision of the file computes it; as a column it is a fact that the game supplies."
             yield Remark(told, f"input {in_quotes(one.name)}", True)
 
 

@@ -5,7 +5,7 @@
     integer, long                      int, the same
     string with allowed values         enum
     string where every test is one     text
-    an item definition                 what it stands for, with its allowed values or its type constraint
+    an item definition                 what it refers to, with its allowed values or its type constraint
 
 Source: OMG, Decision Model and Notation 1.5, 7.3.2 (ItemDefinition) and 8.3.2 (input values).
 """

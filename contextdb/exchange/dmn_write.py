@@ -1,13 +1,15 @@
 """A table as a DMN 1.3 decision table: conditions are inputs, the asset the first output, other columns further outputs.
 
-What unary tests cannot say is told with its place: a row that can never match or is disabled is left out, a soft cell excludes
+What unary tests cannot say is reported with its place: a row that can never match or is disabled is left out, a soft cell excludes
 nothing, a column of tags becomes an annotation.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
+from xml.sax.saxutils import escape
 
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import format_number
@@ -15,11 +17,13 @@ from contextdb.console import printable
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.feel import literal, unary_tests
 from contextdb.exchange.reading import Remark, capped
-from contextdb.exchange.xlsx_parts import DECLARATION, NEVER, attribute
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.table import Table
 
 NAMESPACE = "https://www.omg.org/spec/DMN/20191111/MODEL/"
+_HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
+_NEVER = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
+"""Characters that XML cannot hold."""
 _POLICIES = {"unique": "UNIQUE", "first": "FIRST", "collect": "COLLECT", "priority": "PRIORITY"}
 _TYPES = {"bool": "boolean", "int": "number", "number": "number", "angle": "number", "enum": "string", "text": "string"}
 
@@ -41,13 +45,13 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
     parts = [
         *(_input(column) for column in inputs),
         *(_output(at, name, table.settings.fallback if at == 1 else None) for at, name in enumerate(outputs, 1)),
-        *(f'<annotation name="{attribute(column.condition.name)}"/>' for column in tags),
+        *(f'<annotation name="{_attribute(column.condition.name)}"/>' for column in tags),
         *(_rule(table, row, inputs, outputs, tags) for row in rows),
     ]
     body = "\n      ".join(parts)
     text = (
-        f'{DECLARATION}<definitions xmlns="{NAMESPACE}" id="definitions" name="{attribute(table.name)}" namespace="contextdb">\n'
-        f'  <decision id="decision" name="{attribute(table.name)}">\n'
+        f'{_HEAD}\n<definitions xmlns="{NAMESPACE}" id="definitions" name="{_attribute(table.name)}" namespace="contextdb">\n'
+        f'  <decision id="decision" name="{_attribute(table.name)}">\n'
         f'    <decisionTable id="table" hitPolicy="{_POLICIES[table.settings.policy]}">\n      {body}\n'
         "    </decisionTable>\n  </decision>\n</definitions>\n"
     )
@@ -57,13 +61,13 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
 def _require_xml(table: Table) -> None:
     for column in table.columns:
         for text in (column.name, *column.texts):
-            if NEVER.search(text) or any(ord(c) < 32 and c not in "\t\n\r" for c in text):
+            if _NEVER.search(text):
                 found = f"{in_quotes(text)} has a character that XML cannot hold."
                 raise TableError(Fault(found, "text without it", place=Place(column=printable(column.name))))
 
 
 def _plain(table: Table) -> list[str]:
-    """The columns that are no conditions; the enabled one is told by which rows there are."""
+    """The columns that are not conditions; the enabled one is told by which rows there are."""
     conditions = {column.condition.name for column in table.conditions}
     return [c.name for c in table.columns if c.name not in conditions and c.name != table.settings.enabled]
 
@@ -88,10 +92,15 @@ def _rows(table: Table, inputs: Sequence[ConditionColumn]) -> tuple[list[int], t
     return rows, capped(remarks, "losses")
 
 
+def _attribute(text: str) -> str:
+    """A text inside the quotes of an attribute."""
+    return escape(text, {'"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+
+
 def _input(column: ConditionColumn) -> str:
-    name, domain = attribute(column.condition.name), column.condition.domain
+    name, domain = _attribute(column.condition.name), column.condition.domain
     values = ",".join(map(literal, domain.values)) if domain.values else _bounds(domain)
-    allowed = f"<inputValues><text>{attribute(values)}</text></inputValues>" if values else ""
+    allowed = f"<inputValues><text>{_attribute(values)}</text></inputValues>" if values else ""
     expression = f'<inputExpression typeRef="{_TYPES[domain.kind]}"><text>{name}</text></inputExpression>'
     return f'<input label="{name}">{expression}{allowed}</input>'
 
@@ -105,8 +114,8 @@ def _bounds(domain: Domain) -> str:
 
 
 def _output(number: int, name: str, default: str | None) -> str:
-    entry = f"<defaultOutputEntry><text>{attribute(literal(default))}</text></defaultOutputEntry>" if default else ""
-    return f'<output id="output_{number}" name="{attribute(name)}" typeRef="string">{entry}</output>'
+    entry = f"<defaultOutputEntry><text>{_attribute(literal(default))}</text></defaultOutputEntry>" if default else ""
+    return f'<output id="output_{number}" name="{_attribute(name)}" typeRef="string">{entry}</output>'
 
 
 def _rule(
@@ -115,7 +124,7 @@ def _rule(
     entries = [("inputEntry", unary_tests(column.cell(row)) or "-") for column in inputs]
     entries += [("outputEntry", literal(table.text(row, name))) for name in outputs]
     entries += [("annotationEntry", column.texts[row]) for column in tags]
-    return f"<rule>{''.join(f'<{tag}><text>{attribute(text)}</text></{tag}>' for tag, text in entries)}</rule>"
+    return f"<rule>{''.join(f'<{tag}><text>{_attribute(text)}</text></{tag}>' for tag, text in entries)}</rule>"
 
 
 def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
@@ -124,14 +133,14 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
         said = "tags become an annotation, which excludes nothing: DMN has no tests of sets."
         yield Remark(said, f"column {in_quotes(column.condition.name)}", True)
     if any(_is_angle(column.condition.domain) for column in table.conditions):
-        yield Remark("angles are told from -180 to 180; give the decision angles within these.")
+        yield Remark("angles are written from -180 to 180; give the decision angles in this range.")
     if table.settings.policy == "priority":
         yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
     if table.settings.when:
         said = "its rules become an output, which excludes nothing: a cell of a decision table looks at one fact."
         yield Remark(said, f"column {in_quotes(table.settings.when)}", True)
     if table.settings.assume:
-        yield Remark("assume is not kept: a decision table has no such thing.", is_loss=True)
+        yield Remark("assume is not kept: a decision table has no equivalent.", is_loss=True)
 
 
 def _is_angle(domain: Domain) -> bool:

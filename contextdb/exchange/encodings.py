@@ -29,7 +29,7 @@ def decoded(raw: bytes, file: str, encoding: str | None = None) -> tuple[str, li
     Raises
     ------
     TableError
-        The bytes are no text of that encoding, with the line; or no text at all.
+        The bytes are not text of that encoding, with the line; or no text at all.
     """
     if encoding is not None:
         return _decoded_as(raw, file, _known(encoding, file)), []
@@ -37,9 +37,11 @@ def decoded(raw: bytes, file: str, encoding: str | None = None) -> tuple[str, li
         if raw.startswith(mark):
             return _decoded_as(raw[len(mark) :], file, name), [Remark(f"the text is {told}.")] if name != "utf-8" else []
     if found := _utf16(raw):
-        return _decoded_as(raw, file, found), [Remark("the text is UTF-16, though no byte order mark says so.")]
+        return _decoded_as(raw, file, found), [Remark("the text is UTF-16 without a byte order mark.")]
     if b"\0" in raw:
-        raise TableError(Fault("this is no text: it holds NUL bytes.", "a text file", place=Place(file, line_of(raw, raw.find(0)))))
+        raise TableError(
+            Fault("not a text file: it contains NUL bytes.", "a text file", place=Place(file, line_of(raw, raw.find(0))))
+        )
     try:
         return raw.decode(), []
     except UnicodeDecodeError as error:
@@ -60,7 +62,7 @@ def _decoded_as(raw: bytes, file: str, encoding: str) -> str:
         return raw.decode(encoding).removeprefix("\ufeff")
     except UnicodeError as error:
         start = error.start if isinstance(error, UnicodeDecodeError) else 0
-        found = f"byte 0x{raw[start]:02X} on this line is no text in {encoding}." if raw else f"the text is not {encoding}."
+        found = f"byte 0x{raw[start]:02X} on this line is not text in {encoding}." if raw else f"the text is not {encoding}."
         mend = "to name its encoding with --encoding"
         raise TableError(Fault(found, "UTF-8 or UTF-16, or the encoding named", mend, Place(file, line_of(raw, start)))) from None
 

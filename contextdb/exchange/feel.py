@@ -24,7 +24,7 @@ from contextdb.cells.grammar import Cell, NumberSet, ValueSet, format_cell
 from contextdb.cells.words import NUMBER_TEXT, quoted
 
 _PART = re.compile(r'"(?:[^"\\]|\\.)*"?|[^,"]+|,', re.DOTALL)
-"""A string, also one that is not closed, so that no part of a text is looked at twice; a comma; or what stands between."""
+"""A string, also one that is not closed, so that no part of a text is looked at twice; a comma; or what is between."""
 STRING = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 """A string of FEEL."""
 STRINGS = re.compile(rf"\s*{STRING.pattern}\s*(?:,\s*{STRING.pattern}\s*)*", re.DOTALL)
@@ -38,7 +38,7 @@ _OURS = re.compile(rf"([\[(]?)({NUMBER_TEXT})?\.\.({NUMBER_TEXT})?([\])]?)")
 
 
 MOST_NOTS = 8
-"""How deep not(…) may stand in itself; FEEL's own grammar has one level."""
+"""How deep not(…) may be in itself; FEEL's own grammar has one level."""
 
 
 # ---- from FEEL
@@ -71,7 +71,7 @@ def _plain_cell(text: str) -> str | None:
 
 
 def _split(text: str) -> Iterator[str]:
-    """The tests between commas that stand outside quotes."""
+    """The tests between commas that are outside quotes."""
     part = ""
     for token in _PART.findall(text):
         if token == ",":

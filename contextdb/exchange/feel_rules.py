@@ -22,7 +22,7 @@ from contextdb.exchange.feel import string_of
 from contextdb.expressions.tokens import MOST_CHARACTERS, written_name, written_text
 
 MOST_TOKENS = 400
-"""A longer test is no rule; so no test is looked at for long."""
+"""A longer test is not a rule; so no test is looked at for long."""
 
 _TOKEN = re.compile(
     r'\s*(?:(?P<text>"(?:[^"\\]|\\.)*")|(?P<number>\d+(?:\.(?!\.)\d+)?|\.\d+)|(?P<sign>\.\.|<=|>=|!=|\*\*|[-+*/<>=()\[\],?])'
@@ -98,7 +98,7 @@ def _token(found: re.Match[str]) -> _Token:
 
 
 def _stands_at(text: str, at: int, name: str) -> bool:
-    """Whether a name stands at a place, and ends there."""
+    """Whether a name is at a place, and ends there."""
     after = text[at + len(name) : at + len(name) + 1]
     return bool(name) and text.startswith(name, at) and not (after.isalnum() or after in ("_", "("))
 

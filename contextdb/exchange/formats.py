@@ -28,7 +28,7 @@ class Format:
 FORMATS: Mapping[str, Format] = {
     one.name: one
     for one in (
-        Format("csv", "CSV; commas, semicolons or tabs are told apart when it is read", (".csv", ".txt")),
+        Format("csv", "CSV; commas, semicolons or tabs are detected on reading", (".csv", ".txt")),
         Format("tsv", "tab-separated text, as on the clipboard", (".tsv", ".tab")),
         Format("xlsx", "an Excel workbook", (".xlsx", ".xlsm", ".xls")),
         Format("parquet", "Parquet", (".parquet", ".pq")),
@@ -41,6 +41,9 @@ FORMATS: Mapping[str, Format] = {
 }
 _GRIDS = ("csv", "tsv", "xlsx")
 """Formats in which only its place says that a row names the columns."""
+_OTHER_WORKBOOKS = (".ods", ".fods", ".xlsb", ".numbers")
+"""Workbooks that are not read, nor written."""
+SAVE_AS_XLSX = 'to save it as "Excel workbook" (.xlsx)'
 _BINARY_SIGNS = {"an Excel workbook (.xlsx)": "xlsx", "an old Excel workbook (.xls)": "xlsx", "a Parquet file": "parquet"}
 
 
@@ -69,7 +72,7 @@ def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writin
     Raises
     ------
     FileError
-        There is no such format, or the suffix tells of none.
+        There is no such format, or the suffix gives none.
     """
     known = {key: one for key, one in FORMATS.items() if (one.is_written if for_writing else one.is_read)}
     if wanted is not None:
@@ -84,13 +87,14 @@ def format_of(name: str, wanted: str | None = None, raw: bytes = b"", for_writin
     if found and not (for_writing and suffix not in found.suffixes[:1] and found.name == "xlsx"):
         return found
     suffixes = [one.suffixes[0] for one in known.values() if one.suffixes]
-    near = nearest(suffix, suffixes)
+    near = ".xlsx" if suffix in _OTHER_WORKBOOKS else nearest(suffix, suffixes)
+    mend = SAVE_AS_XLSX if suffix in _OTHER_WORKBOOKS and not for_writing else in_quotes(near) if near else ""
     said = (
         f"a file that ends in {in_quotes(suffix)} is of no known format."
         if suffix
-        else "the name has no suffix that tells a format."
+        else "the name has no suffix that gives a format."
     )
-    raise FileError(Fault(said, f"{', '.join(suffixes)}, or --as with a format", in_quotes(near) if near else "", Place(name)))
+    raise FileError(Fault(said, f"{', '.join(suffixes)}, or --as with a format", mend, Place(name)))
 
 
 def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading:
@@ -108,7 +112,7 @@ def read(raw: bytes, name: str, options: ReadOptions = ReadOptions()) -> Reading
     TableError
         The file cannot be read as what it is, with the place of every fault.
     FileError
-        It is of no known format, or what reads it is not installed.
+        It is of no known format.
     """
     kind = format_of(name, options.format, raw)
     reading = _read(kind.name, raw, name, options)
@@ -130,8 +134,8 @@ def sheet_names(raw: bytes, name: str) -> list[str]:
 
     Raises
     ------
-    TableError, FileError
-        It is no workbook that can be read, or what reads it is not installed.
+    TableError
+        It is not a workbook that can be read.
     """
     from contextdb.exchange.xlsx_read import sheets_of
 
@@ -164,7 +168,7 @@ def _read_parquet(raw: bytes, name: str) -> Reading:
 
 
 def _own_csv(raw: bytes, name: str) -> Reading | None:
-    """A CSV that contextdb reads as it stands, so that it is written as it stands; None for every other."""
+    """A CSV that contextdb reads as it is, so that it is written as it is; None for every other."""
     from contextdb.exchange.conflicts import begins_like_a_mark
     from contextdb.exchange.unreal import is_unreal_header
     from contextdb.files.csv_source import read_csv

@@ -1,6 +1,6 @@
 """A grid of texts, as a sheet or a text file holds it, as the columns of one table.
 
-What stands around the table is told: a title above it, blank rows in it, a second table beside or below it. A table's first row
+What stands around the table is reported: a title above it, blank rows in it, a second table beside or below it. A table's first row
 names its columns.
 """
 
@@ -29,11 +29,11 @@ MOST_BLOCKS = 8
 MOST_ABOVE = 10
 """Rows in which the header is looked for."""
 MOST_NAMELESS = 3
-"""Columns without a name that are told one by one."""
+"""Columns without a name that are reported one by one."""
 _VALUES = frozenset(("true", "false", "any"))
 _SUMS = frozenset(("total", "totals", "grand total", "sum", "average", "summe", "gesamt", "somme"))
 MOST_LOOKED_AT = 1_000
-"""Blocks of cells that are compared with each other; a sheet with more is no list of assets."""
+"""Blocks of cells that are compared with each other; a sheet with more is not a list of assets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ def columns_of(
     Parameters
     ----------
     block : Block, optional
-        Where the table stands, its first row the names; default: it is looked for, also below a title.
+        Where the table is, its first row the names; default: it is looked for, also below a title.
     row_noun : str
         What a row of the grid is called in messages: "sheet row" of a workbook, "line" of a text.
     sheet : str, optional
@@ -178,8 +178,8 @@ def doubts(columns: Sequence[TextColumn]) -> list[Remark]:
     found = []
     odd = next((c for c in columns if _is_value(c.name) or (c.name and c.name in c.texts)), None)
     if odd is not None:
-        why = "stands among its cells too" if odd.name in odd.texts else "looks like a value"
-        told = f"is the header missing? The column name {in_quotes(odd.name)} {why}. The first row is taken for names."
+        why = "also appears among its cells" if odd.name in odd.texts else "looks like a value"
+        told = f"is the header missing? The column name {in_quotes(odd.name)} {why}. The first row is read as names."
         found.append(Remark(told))
     last = columns[0].n_rows - 1 if columns else -1
     first = next((c[last] for c in columns if c[last].strip()), "") if last > 0 else ""
@@ -198,7 +198,7 @@ def _require_short(columns: Sequence[TextColumn], file: str) -> None:
             )
 
 
-# ---- where the table stands
+# ---- where the table is
 
 
 def _found(grid: Grid, file: str) -> tuple[Block, list[Remark]]:
@@ -219,7 +219,9 @@ def _found(grid: Grid, file: str) -> tuple[Block, list[Remark]]:
         found = f"the sheet holds {len(tables)} tables: {places}{more}."
         raise TableError(Fault(found, "one of them", f'to name its cells, as in --sheet "SHEET!{tables[0]}"', Place(file)))
     left = [block for block in blocks if block is not tables[0]]
-    notes = [Remark(f"left out, as it is no table: {in_quotes(_first_text(grid, block))}.", f"cells {block}") for block in left]
+    notes = [
+        Remark(f"left out because it is not a table: {in_quotes(_first_text(grid, block))}.", f"cells {block}") for block in left
+    ]
     return tables[0], list(capped([*titles, *notes], "such texts"))
 
 
@@ -249,7 +251,7 @@ def _first_text(grid: Grid, block: Block) -> str:
 def blocks_of(grid: Grid) -> list[Block]:
     """The tables of a grid: what blank columns, or blank rows, part from each other.
 
-    Rows below a blank one belong to the same table when they stand under its columns, and do not begin with other names.
+    Rows below a blank one belong to the same table when they are under its columns, and do not begin with other names.
 
     Raises
     ------
@@ -270,7 +272,7 @@ def blocks_of(grid: Grid) -> list[Block]:
 
 
 def _add(blocks: list[Block], block: Block, is_filled: NDArray[np.bool_]) -> None:
-    """Add a block, or grow the one above it that it goes on."""
+    """Add a block, or grow the one above it that it continues."""
     for at, above in enumerate(blocks):
         is_under = above.left <= block.left and block.right <= above.right and above.n_rows > 1
         if is_under and above.bottom < block.top and is_filled[block.top, above.left]:

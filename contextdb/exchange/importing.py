@@ -11,17 +11,53 @@ import numpy as np
 
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
-from contextdb.disk import write_atomic
+from contextdb.disk import TABLE_SUFFIXES, write_atomic
 from contextdb.disk.together import NewFile, write_together
 from contextdb.edits.schema_file import SchemaChange, schema_change
-from contextdb.errors import Fault, FileError, Place, TableError
+from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes
 from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, propose
-from contextdb.exchange.reading import Reading
+from contextdb.exchange.reading import Reading, listed
 from contextdb.files.texts import AnySource, new_source
 from contextdb.schema.sections import condition_to_dict, job_faults
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.project import schema_for, settings_of
 from contextdb.tables.table import Table
+
+NAMES = {"whole": "each text is one name", "words": "each word is a name"}
+"""How the texts of a column that nobody declares may be read, as `--names` and the dialog of the editor call it."""
+
+
+def has_whole_names(names: str | None, path: Path | None) -> bool | None:
+    """Whether a text is one name, where that is said; else not in a table of ours, and None, which leaves it to the format."""
+    if names:
+        return names == "whole"
+    return False if path is not None and _is_of_a_project(path) else None
+
+
+def _is_of_a_project(path: Path) -> bool:
+    """Whether a contextdb.toml declares a file as a table, so that its cells are cells of ours."""
+    if path.suffix.lower() not in TABLE_SUFFIXES or not path.is_file():
+        return False
+    try:
+        folder, schema = schema_for(path)
+    except ContextDBError:  # it is no concern of this import
+        return False
+    said = (path.parent.resolve() / path.name).relative_to(folder.resolve()).as_posix()
+    return any(said in settings.files for settings in schema.tables.values())
+
+
+def whole_names_told(columns: Sequence[Mapped], reading: Reading, other_way: str) -> str:
+    """Which columns have texts that became one name each though blanks part names in a cell, with the first such text.
+
+    `other_way` says how to read each word as a name; the sentence is empty where there is no such text.
+    """
+    changed = [(column, reading.column(column.source)) for column in columns if column.cells is not None]
+    names = [column.source for column, _ in changed]
+    example = next((text for _, column in changed for text in column.texts if " " in text.strip()), None)
+    if example is None:
+        return ""
+    where = "column" if len(names) == 1 else "columns"
+    return f"{where} {listed(names)}: each text is one name, such as {in_quotes(example)}; {other_way} reads each word as a name."
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +74,7 @@ class Plan:
 
     @property
     def new_conditions(self) -> list[str]:
-        """The conditions that contextdb.toml will declare anew."""
+        """The conditions that contextdb.toml will newly declare."""
         return [column.name for column in self.columns if column.is_new and column.job == "condition"]
 
     def write(self) -> None:
@@ -122,7 +158,7 @@ def table_of(
 
 
 def _named_beside(reading: Reading, kept: Sequence[Mapped], schema: Schema) -> dict[str, Condition]:
-    """Conditions that the file declares and that are no columns: facts that its rules name, where those come in."""
+    """Conditions that the file declares and that are not columns: facts that its rules name, where those come in."""
     if not any(column.job == "when" for column in kept):
         return {}
     taken = {*reading.names, *(column.name for column in kept), *schema.conditions}
@@ -152,6 +188,6 @@ def _settings(settings: TableSettings, kept: Sequence[Mapped], reading: Reading)
 
 
 def declared_differently(reading: Reading, schema: Schema) -> list[str]:
-    """Conditions that the file itself declares otherwise than the project, which goes first."""
+    """Conditions that the file itself declares differently from the project, which goes first."""
     ours, theirs = schema.conditions, reading.schema.conditions
     return [name for name in theirs if name in ours and condition_to_dict(ours[name]) != condition_to_dict(theirs[name])]

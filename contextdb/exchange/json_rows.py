@@ -21,7 +21,7 @@ from contextdb.schema.shapes import what
 _ACCEPTED = 'a list of objects, [{"Asset Name": "jog", "speed": "2..4"}], or one object a line'
 MOST_FAULTS = 20
 MOST_LEVELS = 16
-"""How deep objects may stand in a row: each makes the name of a column longer."""
+"""How deep objects may be in a row: each makes the name of a column longer."""
 
 
 def read_json(text: str, file: str, format_name: str = "json") -> Reading:
@@ -33,7 +33,7 @@ def read_json(text: str, file: str, format_name: str = "json") -> Reading:
     Raises
     ------
     TableError
-        The text is no JSON, with its line; or no list of objects; or a git conflict stands in it.
+        The text is not JSON, with its line; or no list of objects; or a git conflict is in it.
     """
     require_no_conflicts(text, file)
     rows, lines = parsed_rows(text, file)
@@ -107,9 +107,9 @@ def _loaded(text: str, file: str, line: int | None = None) -> Any:
         )
     except json.JSONDecodeError as error:
         place = Place(file, error.lineno if line is None else line)
-        raise TableError(Fault(f"this is no JSON: {error.msg} at character {error.colno}.", _ACCEPTED, place=place)) from None
+        raise TableError(Fault(f"this is not JSON: {error.msg} at character {error.colno}.", _ACCEPTED, place=place)) from None
     except RecursionError:
-        raise TableError(Fault("lists or objects stand in each other too deep.", _ACCEPTED, place=Place(file, line))) from None
+        raise TableError(Fault("lists or objects are nested too deeply.", _ACCEPTED, place=Place(file, line))) from None
     except _TwinError as error:
         raise TableError(Fault(f"{error}.", "each key once in an object", place=Place(file, line))) from None
     except ValueError:  # Python reads no whole number of more than some thousand digits
@@ -117,7 +117,7 @@ def _loaded(text: str, file: str, line: int | None = None) -> Any:
 
 
 class _TwinError(ValueError):
-    """A key stands twice in one object."""
+    """A key appears twice in one object."""
 
 
 def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -125,7 +125,7 @@ def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         seen = set[str]()
         twin = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
-        raise _TwinError(f"the key {in_quotes(twin)} stands twice in one object")
+        raise _TwinError(f"the key {in_quotes(twin)} appears twice in one object")
     return found
 
 
@@ -142,13 +142,13 @@ def _objects(rows: Sequence[Any], lines: Sequence[int | None], file: str) -> tup
 
 def _flat(row: Mapping[str, Any], place: Place, prefix: str = "", level: int = 1) -> dict[str, str]:
     if level > MOST_LEVELS:
-        raise TableError(Fault("objects stand in each other too deep.", f"at most {MOST_LEVELS} levels", place=place))
+        raise TableError(Fault("objects are nested too deeply.", f"at most {MOST_LEVELS} levels", place=place))
     found: dict[str, str] = {}
     for key, value in row.items():
         name = prefix + key
         texts = _flat(value, place, f"{name}.", level + 1) if isinstance(value, dict) else {name: _text(value, name, place)}
         for twin in texts.keys() & found.keys():
-            raise TableError(Fault(f"the key {in_quotes(twin)} stands twice in one row.", "each key once", place=place))
+            raise TableError(Fault(f"the key {in_quotes(twin)} appears twice in one row.", "each key once", place=place))
         found |= texts
     return found
 

@@ -51,11 +51,11 @@ class Mapped:
     n_unreadable: int = 0
     """Rows whose cell cannot be read as the condition."""
     near: str | None = None
-    """A declared condition whose name is near, and which may be meant."""
+    """A declared condition whose name is near, and which possible."""
     names: TextColumn | None = None
     """The column with each text as one whole name, where its file has whole names and some must be quoted for it."""
     cells: TextColumn | None = None
-    """The cells that the texts become, where some are written otherwise than in the file."""
+    """The cells that the texts become, where some are written differently than in the file."""
 
     @property
     def kind(self) -> str:
@@ -80,7 +80,7 @@ def propose(
     Raises
     ------
     ContextDBError
-        `renames` speaks of a column that is not there, or two columns would have one name.
+        `renames` speaks of a column that is missing, or two columns would have one name.
     """
     renames = renames or {}
     _require_known(renames, reading.names)
@@ -158,7 +158,7 @@ class _Known:
         return cls(schema.conditions, folded, n_columns * len(folded) <= MOST_COMPARED)
 
     def near(self, name: str) -> str | None:
-        """A declared name that may be meant."""
+        """A declared name that possible."""
         return nearest(name, self.conditions) if self.is_compared else None
 
     def noted(self, why: str) -> str:
@@ -226,7 +226,7 @@ def _mapped(
 
 
 def _plain_job(name: str, column: TextColumn, settings: TableSettings) -> Job | None:
-    """The job of a column that is no condition: what the settings say, or its name where they say nothing."""
+    """The job of a column that is not a condition: what the settings say, or its name where they say nothing."""
     if name in settings.outputs:
         return "output"
     for job in PLAIN_JOBS:

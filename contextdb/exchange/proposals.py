@@ -38,7 +38,7 @@ _FRACTION = re.compile(r"\d\.\d|(?<!\.)\.\d|\de-?\d", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Proposal:
-    """A type for a column: what `[conditions.NAME]` would say, and why. None: the cells are no condition's."""
+    """A type for a column: what `[conditions.NAME]` would say, and why. None: the cells are not a condition's."""
 
     declared: Mapping[str, object] | None
     why: str
@@ -146,7 +146,7 @@ def _number_type(name: str, said: _Said) -> Proposal:
     backwards = next((t for t in texts if _runs_backwards(t)), None)
     is_angle = _ANGLE_NAME.search(name) is not None or backwards is not None
     if is_angle and all(_is_within_turn(text) and reads(text, ANGLE) for text in texts):
-        why = f'"{backwards}" runs through 180' if backwards else "the name tells of an angle, and no number is above 360"
+        why = f'"{backwards}" runs through 180' if backwards else "the name suggests an angle, and no number is above 360"
         return _with_unread({"type": "angle"}, why, said, ANGLE)
     measured = _measured(name, texts)
     if measured is None:
@@ -159,8 +159,8 @@ def _measured(name: str, texts: Sequence[str]) -> str | None:
     if fraction := next((text for text in texts if _FRACTION.search(text)), None):
         return f"numbers with fractions, such as {in_quotes(fraction)}"
     if extent := next((text for text in texts if not _WHOLE.fullmatch(text)), None):
-        return f"a fact may lie between whole numbers in {in_quotes(extent)}"
-    return "its name tells of something that is measured" if _is_measure(name) else None
+        return f"a fact may be between whole numbers in {in_quotes(extent)}"
+    return "its name suggests a measurement" if _is_measure(name) else None
 
 
 def _is_measure(name: str) -> bool:
@@ -203,7 +203,7 @@ def _is_short(text: str) -> bool:
 def _names(said: _Said, are_names: bool) -> Proposal:
     """An enum of the names there are, where those are few and come back; a text; or, of whole sentences, no condition at all."""
     if not are_names:
-        return Proposal(None, "the cells are no names, numbers or tags: data for the game, or a note")
+        return Proposal(None, "the cells are not names, numbers or tags: data for the game, or a note")
     names: dict[str, None] = {}
     for cell in _cells(said, TEXT):
         if isinstance(cell.accepts, ValueSet):
@@ -212,7 +212,7 @@ def _names(said: _Said, are_names: bool) -> Proposal:
         why = f"{plural(len(names), 'name')} in {plural(said.n_rows, 'cell')}: {listed(list(names), 4)}"
         return _with_unread({"type": "enum", "values": list(names)}, why, said, Domain("enum", tuple(names)))
     if len(names) == said.n_rows:
-        return Proposal(None, "every row has a name of its own: data for the game, or a note")
+        return Proposal(None, "every row has a different name: data for the game, or a note")
     return _with_unread({"type": "text"}, f"{plural(len(names), 'different name')}", said, TEXT)
 
 
@@ -240,7 +240,7 @@ def names_of(column: TextColumn) -> list[str]:
 def pair_in(texts: Iterable[str]) -> str:
     """What is said of a number with a comma and no blank behind it, which could be meant as 1.5; empty where there is none."""
     found = next((text for text in texts if _PAIR.fullmatch(text)), None)
-    return "" if found is None else f"; {in_quotes(found)} is taken as centre and tolerance"
+    return "" if found is None else f"; {in_quotes(found)} is read as centre and tolerance"
 
 
 def n_unreadable(column: TextColumn, domain: Domain) -> tuple[int, str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from contextdb.cells.words import ANY_WORDS, quoted
 from contextdb.columns import TextColumn
-from contextdb.errors import shown
+from contextdb.errors import TableError, shown
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema
 
@@ -33,7 +33,11 @@ ERRORS = frozenset(
 """What Excel shows in a cell whose formula failed. No cell of ours reads it, so that it is never taken for a value or for Any."""
 
 MOST_REMARKS = 20
-"""Remarks of one kind that are listed; then how many more there are is told."""
+"""Remarks of one kind that are listed; then how many more there are is reported."""
+
+
+class SheetWanted(TableError):
+    """Several sheets of a workbook hold cells, and none of them is named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +66,7 @@ class Reading:
     schema: Schema = EMPTY
     """What the file itself says: the types of its columns, and at most one table's settings."""
     source: AnySource | None = None
-    """The bytes, where the file is one that contextdb writes as it stands."""
+    """The bytes, where the file is one that contextdb writes as it is."""
     sheets: tuple[str, ...] = ()
     """The sheets of a workbook that hold cells."""
     outputs: tuple[str, ...] = field(default=())

@@ -1,6 +1,6 @@
 """Columns as tab-separated text, as Excel, LibreOffice and Google Sheets read it; `contextdb.exchange.delimited` reads it here.
 
-A cell with a tab, a line end or a double quote at its start stands in double quotes, with quotes in it doubled.
+A cell with a tab, a line end or a double quote at its start is in double quotes, with quotes in it doubled.
 """
 
 from __future__ import annotations

@@ -89,7 +89,7 @@ def _is_set(text: str) -> bool:
 
 
 def _localised(text: str) -> str | None:
-    """The last string of NSLOCTEXT("space", "key", "text"), which is what people read; None where it is written otherwise."""
+    """The last string of NSLOCTEXT("space", "key", "text"), which is what people read; None where it is written differently."""
     last = next(iter(deque(_STRING.finditer(text), maxlen=1)), None)
     is_sound = last is not None and last[2] and text[last.end() :].strip() == ")"
     return last[1].replace('\\"', '"') if last is not None and is_sound else None
@@ -104,7 +104,7 @@ def write_csv(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
     Raises
     ------
     TableError
-        An asset stands twice or is empty: Unreal's row names are unique.
+        An asset appears twice or is empty: Unreal's row names are unique.
     """
     columns, remarks = _unreal_columns(table)
     out = io.StringIO(newline="")
@@ -149,12 +149,10 @@ def _require_unique(table: Table) -> None:
     for row, asset in enumerate(table.assets):
         if not asset.strip() or asset in rows:
             said = (
-                f"the asset {in_quotes(asset)} stands in {row_name(rows[asset])} too."
-                if asset in rows
-                else "the row names no asset."
+                f"the asset {in_quotes(asset)} is also in {row_name(rows[asset])}." if asset in rows else "the row names no asset."
             )
             faults.append(
-                Fault(said, "a name of its own for each row, as Unreal wants it", place=Place(row=row, column=table.asset_column))
+                Fault(said, "a different name for each row, as Unreal requires", place=Place(row=row, column=table.asset_column))
             )
         rows.setdefault(asset, row)
     if faults:

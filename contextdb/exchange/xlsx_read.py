@@ -9,21 +9,19 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import python_calamine as calamine
 
 from contextdb.columns import TextColumn
-from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes, nearest, plural, shown, some
+from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, plural, shown, some
+from contextdb.exchange.described import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.grid import Block, column_letters, columns_of, parse_block
-from contextdb.exchange.reading import ERRORS, Reading, Remark, capped, listed
+from contextdb.exchange.reading import ERRORS, Reading, Remark, SheetWanted, capped, listed
 from contextdb.exchange.values import DATES, text_of_value
-from contextdb.exchange.xlsx_parts import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook
 from contextdb.schema.settings import EMPTY, Schema, read_schema
 
-if TYPE_CHECKING:
-    from python_calamine import CalamineWorkbook
-
-INSTALL = 'to install it: pip install "contextdb[xlsx]"'
 _TEXT = {str}
 
 
@@ -38,9 +36,9 @@ def read_workbook(raw: bytes, file: str, sheet: str | None = None) -> Reading:
     Raises
     ------
     TableError
-        The workbook is locked or broken, has no such sheet, or several of which none is named; or the sheet holds no table.
-    FileError
-        python-calamine is not installed.
+        The workbook is locked or broken, has no such sheet, or the sheet holds no table.
+    SheetWanted
+        Several sheets hold cells, and none is named.
     """
     require_workbook(raw, file)
     book = _opened(raw, file)
@@ -69,20 +67,14 @@ def sheets_of(raw: bytes, file: str) -> list[str]:
 
     Raises
     ------
-    TableError, FileError
+    TableError
         As `read_workbook`.
     """
     require_workbook(raw, file)
     return [name for name in _opened(raw, file).sheet_names if name.casefold() != TYPES_SHEET]
 
 
-def _opened(raw: bytes, file: str) -> CalamineWorkbook:
-    try:
-        import python_calamine as calamine
-    except ImportError:
-        raise FileError(
-            Fault("workbooks are read by python-calamine, which is not installed.", mend=INSTALL, place=Place(file))
-        ) from None
+def _opened(raw: bytes, file: str) -> calamine.CalamineWorkbook:
     try:
         return calamine.CalamineWorkbook.from_filelike(io.BytesIO(raw))
     except calamine.PasswordError:
@@ -118,7 +110,7 @@ def _wanted(sheet: str | None, names: Sequence[str], file: str) -> tuple[str | N
     raise TableError(Fault(f"there is no sheet {in_quotes(sheet)}.", some(names), in_quotes(near) if near else "", Place(file)))
 
 
-def _hidden_sheets(book: CalamineWorkbook) -> frozenset[str]:
+def _hidden_sheets(book: calamine.CalamineWorkbook) -> frozenset[str]:
     """The sheets that Excel does not show."""
     return frozenset(one.name for one in book.sheets_metadata if not str(one.visible).endswith(".Visible"))
 
@@ -129,7 +121,7 @@ def _only(sheets: dict[str, _Sheet], hidden: frozenset[str], file: str) -> tuple
     seen = [name for name in filled if name not in hidden]
     if len(seen or filled) > 1:
         found = f"{len(seen or filled)} sheets hold cells: {listed(seen or filled)}."
-        raise TableError(Fault(found, "one of them", f"to name it: --sheet {in_quotes((seen or filled)[0])}", Place(file)))
+        raise SheetWanted(Fault(found, "one of them", f"to name it: --sheet {in_quotes((seen or filled)[0])}", Place(file)))
     if not filled:
         return next(iter(sheets)), []
     if not seen:
@@ -146,7 +138,7 @@ class _Sheet:
     merged: Sequence[tuple[tuple[int, int], tuple[int, int]]] = ()
 
     @classmethod
-    def read(cls, book: CalamineWorkbook, name: str, file: str) -> _Sheet:
+    def read(cls, book: calamine.CalamineWorkbook, name: str, file: str) -> _Sheet:
         try:
             sheet = book.get_sheet_by_name(name)
             return cls(sheet.to_python(skip_empty_area=False), sheet.merged_cell_ranges or ())
@@ -158,7 +150,7 @@ class _Sheet:
 # ---- a workbook of our own
 
 
-def _kept_types(book: CalamineWorkbook, file: str) -> tuple[Schema | None, list[Remark]]:
+def _kept_types(book: calamine.CalamineWorkbook, file: str) -> tuple[Schema | None, list[Remark]]:
     """What the sheet of types says, nothing where that cannot be used; None where there is no such sheet."""
     name = next((name for name in book.sheet_names if name.casefold() == TYPES_SHEET), None)
     if name is None:
@@ -174,7 +166,7 @@ def _kept_types(book: CalamineWorkbook, file: str) -> tuple[Schema | None, list[
 
 
 def _own_block(grid: Sequence[Sequence[str]]) -> Block | None:
-    """All of the sheet, as far as its first row has names; None where somebody put cells beside the table."""
+    """All of the sheet, as far as its first row has names; None where somebody put cells next to the table."""
     if not grid:
         return None
     width = max((at for at, name in enumerate(grid[0], 1) if name), default=0)
@@ -200,7 +192,7 @@ def _fill_merged(grid: list[list[str]], merged: Sequence[tuple[tuple[int, int], 
         block, text = Block(top, left, min(bottom + 1, len(grid)), min(right + 1, len(grid[0]))), grid[top][left]
         n_left -= (block.bottom - block.top) * (block.right - block.left)
         if n_left < 0:
-            fault = Fault("the workbook is broken: merged areas lie over each other.", "a workbook as Excel saves it")
+            fault = Fault("the workbook is broken: merged areas overlap.", "a workbook as Excel saves it")
             raise TableError(fault.at(Place(file)))
         for row in grid[block.top : block.bottom]:
             row[block.left : block.right] = [text] * (block.right - block.left)
@@ -222,9 +214,9 @@ def _date(value: object, row: int, column: int) -> Remark:
 
 
 def _fill_errors(grid: list[list[str]], marks: Marks, is_old: bool) -> Sequence[Remark]:
-    """Write the errors of Excel into their cells, which the reader of workbooks leaves empty, and say where they stand."""
+    """Write the errors of Excel into their cells, which the reader of workbooks leaves empty, and say where they are."""
     if is_old:
-        told = "errors of Excel in an .xls cannot be told from empty cells, which say Any; saved as .xlsx they are named."
+        told = "Excel errors in an .xls file look like empty cells, which mean Any; in an .xlsx file they are reported."
         return [Remark(told, is_loss=True)]
     for row, column, error in marks.errors:
         if row < len(grid) and column < len(grid[row]):

@@ -49,7 +49,7 @@ _ENTITY = re.compile(rb"<!(?:DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
 def require_workbook(raw: bytes, file: str) -> None:
-    """Refuse what is no workbook that can be read.
+    """Refuse what is not a workbook that can be read.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def _fault(raw: bytes) -> Fault | None:
             )
         return None  # .xls, which calamine reads too
     if not raw.startswith(b"PK"):
-        return Fault("this is no workbook.", accepted)
+        return Fault("this is not a workbook.", accepted)
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             return _other_kind(archive) or _bomb(archive) or _unreadable_part(archive)
@@ -99,7 +99,7 @@ def _other_kind(archive: zipfile.ZipFile) -> Fault | None:
         return None
     others = {"content.xml": "an OpenDocument file", "xl/workbook.bin": "a binary workbook (.xlsb)"}
     kind = next((kind for name, kind in others.items() if name in names), "an archive")
-    return Fault(f"this is {kind}, no .xlsx.", "a workbook as Excel saves it (.xlsx)", 'to save it as "Excel workbook"')
+    return Fault(f"this is {kind}, no .xlsx.", "a workbook as Excel saves it (.xlsx)", 'to save it as "Excel workbook" (.xlsx)')
 
 
 def _unreadable_part(archive: zipfile.ZipFile) -> Fault | None:
@@ -147,12 +147,12 @@ def _last_of_rows(xml: bytes) -> list[tuple[bytes, bytes]]:
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """What a sheet of an XLSX says beside its values. Rows and columns count from 0."""
+    """What a sheet of an XLSX says next to its values. Rows and columns count from 0."""
 
     formulas: Sequence[tuple[str, str, bool]] = ()
     """The cell, the formula, and whether a value was saved with it."""
     errors: Sequence[tuple[int, int, str]] = ()
-    """Row, column, and the error that stands there as a value."""
+    """Row, column, and the error that is there as a value."""
     hidden_rows: Sequence[int] = ()
     hidden_columns: Sequence[range] = ()
 
@@ -163,7 +163,7 @@ def is_old(raw: bytes) -> bool:
 
 
 def marks_of(raw: bytes, sheet: str) -> Marks:
-    """What a sheet says beside its values; nothing of an .xls."""
+    """What a sheet says next to its values; nothing of an .xls."""
     if not raw.startswith(b"PK"):
         return Marks()
     try:

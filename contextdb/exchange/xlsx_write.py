@@ -1,35 +1,52 @@
-"""A table as an XLSX workbook that Excel leaves as it is.
+"""A table as an XLSX workbook that Excel leaves as it is, written by XlsxWriter.
 
 Every cell is text, formatted as text, so that `5..10`, `1-2`, `007` and `True` stay what they are, and what is typed later stays
 text too. The header and the asset stand frozen, columns are as wide as their texts, bools and enums have a drop-down that
-suggests without forbidding. A second sheet keeps what contextdb.toml says. Texts are rendered once each, so that a cell costs a
-look-up; nothing is installed for this.
+suggests without forbidding. A second sheet keeps what contextdb.toml says. The same table gives the same bytes.
 """
 
 from __future__ import annotations
 
 import io
-import zipfile
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
+import xlsxwriter
 
 from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.console import width_of
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
-from contextdb.exchange import xlsx_parts as parts
-from contextdb.exchange.described import described
+from contextdb.exchange.described import TYPES_SHEET, described
 from contextdb.exchange.grid import column_letters
 from contextdb.tables.table import Table
 
+MOST_ROWS, MOST_COLUMNS, MOST_CHARACTERS, MOST_OF_NAME = 1_048_576, 16_384, 32_767, 31
+"""What a sheet of Excel, a cell and the name of a sheet can hold. Characters beyond U+FFFF count as two."""
 LEAST_WIDTH, MOST_WIDTH, WIDTH_SAMPLE = 8, 44, 2_000
+TYPES_WIDTH = 90
 PAGE_WIDTH = 220
 """A table of so many characters across is printed on one page's width; a wider one would be too small to read."""
 SPARE_ROWS = 1_000
 """Rows below the table that have drop-downs too."""
-_BLOCK = 5_000
-_TIME = (1980, 1, 1, 0, 0, 0)  # the same table gives the same bytes
+NEVER = re.compile(r"[\x00\ufffe\uffff\ud800-\udfff]")
+"""Characters that no workbook holds."""
+
+_OPTIONS = {"in_memory": True, "use_zip64": True}
+_CREATED = datetime(1980, 1, 1)  # the day that a ZIP archive begins to count from
+_TEXT = {"num_format": "@"}
+_BOLD = {**_TEXT, "bold": True}
+_HEADER = {**_BOLD, "bg_color": "#E7EDF3", "bottom": 1, "bottom_color": "#8497A8"}
+_UNFIT_IN_NAMES = re.compile(r"[\[\]:*?/\\\x00-\x1f]")
+_FALSE_MARK = re.compile(r"_(?=x[0-9A-Fa-f]{4}[_\x01-\x08\x0b-\x1f])")
+_MISSPELT = re.compile(r"\A<r>.*</r>\Z|_x[0-9A-Fa-f]{4}(?:_x[0-9A-Fa-f]{4}_|[\x01-\x08\x0b-\x1f])", re.DOTALL)
+
+Lists = dict[str, tuple[str, ...]]
+"""What the drop-down of each column suggests, by the column's name."""
 
 
 def write_xlsx(table: Table) -> bytes:
@@ -40,138 +57,137 @@ def write_xlsx(table: Table) -> bytes:
     TableError
         More rows or columns than a sheet has, or texts longer than Excel takes.
     """
-    _require_room(table)
-    strings: dict[str, int] = {}
-    lists = _lists(table)
-    sheets = [_table_sheet(table, lists, strings), _types_sheet(described(table).splitlines(), lists, strings)]
-    files = {
-        "[Content_Types].xml": parts.CONTENT_TYPES,
-        "_rels/.rels": parts.RELATIONS,
-        "xl/workbook.xml": parts.workbook(parts.sheet_name(table.name), column_letters(_n_frozen(table) - 1)),
-        "xl/_rels/workbook.xml.rels": parts.WORKBOOK_RELATIONS,
-        "xl/styles.xml": parts.STYLES,
-        "xl/worksheets/sheet1.xml": sheets[0],
-        "xl/worksheets/sheet2.xml": sheets[1],
-        "xl/sharedStrings.xml": parts.shared_strings(list(strings)),
-    }
+    lines, lists = described(table), _lists(table)
+    _require_room(table, lines)
     out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        for name, text in files.items():
-            archive.writestr(zipfile.ZipInfo(name, _TIME), text.encode(), zipfile.ZIP_DEFLATED)
+    with xlsxwriter.Workbook(out, _OPTIONS) as book:
+        book.set_properties({"created": _CREATED})
+        text, bold, header = map(book.add_format, (_TEXT, _BOLD, _HEADER))
+        sheet = book.add_worksheet(sheet_name(table.name))
+        _set_up(sheet, table, text)
+        for at, column in enumerate(table.columns):
+            is_asset = column.name == table.asset_column
+            _put(sheet, 0, at, column.name, header)
+            _write_column(sheet, at, column, bold if is_asset else text, keeps_empty=is_asset)
+        _suggest(sheet, table, lists)
+        _write_types(book.add_worksheet(TYPES_SHEET), lines, lists, text, header)
     return out.getvalue()
 
 
-def _require_room(table: Table) -> None:
+# ---- what fits
+
+
+def _require_room(table: Table, lines: list[str]) -> None:
     faults = []
-    for n, most, noun in ((table.n_rows + 1, parts.MOST_ROWS, "row"), (len(table.columns), parts.MOST_COLUMNS, "column")):
+    for n, most, noun in ((table.n_rows + 1, MOST_ROWS, "row"), (len(table.columns), MOST_COLUMNS, "column")):
         if n > most:
             faults.append(
                 Fault(f"the table has {plural(n, noun)}, its header counted.", f"at most {most:,}, as a sheet of Excel has")
             )
     for column in table.columns:
-        faults += [_unfit(column, text) for text in (column.name, *column.texts) if _is_unfit(text)]
+        faults += [_unfit(text).at(_place(column, text)) for text in (column.name, *column.texts) if _is_unfit(text)]
+    faults += [_unfit(line).at(Place(f'sheet "{TYPES_SHEET}"')) for line in lines if _is_unfit(line)]
     if faults:
         raise TableError(*faults)
 
 
 def _is_unfit(text: str) -> bool:
-    return len(text) > parts.MOST_CHARACTERS or parts.NEVER.search(text) is not None
+    return _n_characters(text) > MOST_CHARACTERS or NEVER.search(text) is not None
 
 
-def _unfit(column: TextColumn, text: str) -> Fault:
+def _unfit(text: str) -> Fault:
+    if NEVER.search(text):
+        return Fault(f"{in_quotes(text)} has a character that no workbook holds.", "text without it")
+    found = f"{in_quotes(text)} takes {_n_characters(text):,} characters in a workbook."
+    return Fault(found, f"at most {MOST_CHARACTERS:,}, as a cell of Excel has")
+
+
+def _place(column: TextColumn, text: str) -> Place:
     row = None if text == column.name else int(np.argmax(column.codes == column.texts.index(text)))
-    place = Place(column=ascii(column.name)[1:-1] if parts.NEVER.search(column.name) else column.name, row=row)
-    if len(text) > parts.MOST_CHARACTERS:
-        found = f"{in_quotes(text)} has {len(text):,} characters."
-        return Fault(found, f"at most {parts.MOST_CHARACTERS:,}, as a cell of Excel has", place=place)
-    return Fault(f"{in_quotes(text)} has a character that no workbook holds.", "text without it", place=place)
+    return Place(column=ascii(column.name)[1:-1] if NEVER.search(column.name) else column.name, row=row)
+
+
+def _n_characters(text: str) -> int:
+    """How many characters a text takes in a cell, as Excel counts them."""
+    spelt = _spelt(text)
+    return len(spelt) if 2 * len(spelt) <= MOST_CHARACTERS else len(spelt.encode("utf-16-le", "surrogatepass")) // 2
+
+
+def sheet_name(name: str) -> str:
+    """A name that a sheet may have, as near to a table's as can be."""
+    fit = _UNFIT_IN_NAMES.sub("_", name).strip(" '")
+    kept = fit.encode("utf-16-le")[: 2 * MOST_OF_NAME].decode("utf-16-le", "ignore").strip(" '") or "table"
+    return f"{kept}_" if kept.casefold() in (TYPES_SHEET, "history") else kept
+
+
+# ---- cells
+
+
+def _put(sheet: Any, row: int, column: int, text: str, style: Any) -> None:
+    sheet.write_string(row, column, _spelt(text), style)
+
+
+def _spelt(text: str) -> str:
+    """What XlsxWriter is given, so that a reader finds the text again: nearly always the text itself.
+
+    A control character stands in a workbook as `_x0001_`, and a text that looks so as `_x005F_x0001_`. XlsxWriter overlooks the
+    second of two such marks that share a `_`, and takes `<r>…</r>` for formatted text: these it is given as formatted text.
+    """
+    if not _MISSPELT.search(text):
+        return text
+    return f'<r><t xml:space="preserve">{escape(_FALSE_MARK.sub("_x005F_", text)).replace("_", "&#95;")}</t></r>'
+
+
+def _write_column(sheet: Any, at: int, column: TextColumn, style: Any, keeps_empty: bool) -> None:
+    """The cells of a column. An empty one is blank, unless it `keeps_empty` texts: a row without any text is a row all the same."""
+    write, blank = sheet.write_string, sheet.write_blank
+    texts = [_spelt(text) for text in column.texts]
+    for row, code in enumerate(column.codes.tolist(), 1):
+        text = texts[code]
+        if text or keeps_empty:
+            write(row, at, text, style)
+        else:
+            blank(row, at, None, style)
 
 
 # ---- the sheet of the table
 
 
-def _table_sheet(table: Table, lists: dict[str, tuple[str, ...]], strings: dict[str, int]) -> str:
-    n_rows, columns = table.n_rows, table.columns
-    last = column_letters(len(columns) - 1)
-    asset, widths = _asset_at(table), [_width(column) for column in columns]
-    fits_page = sum(widths) <= PAGE_WIDTH
-    xml = [parts.sheet_start(fits_page), f'<dimension ref="A1:{last}{n_rows + 1}"/>', _frozen(_n_frozen(table)), "<cols>"]
-    xml += [
-        f'<col min="{at}" max="{at}" width="{width}" style="{parts.TEXT}" customWidth="1"/>' for at, width in enumerate(widths, 1)
-    ]
-    xml += ["</cols><sheetData>", _row(1, [(c.name, parts.HEADER) for c in columns], strings)]
-    xml += _rows(columns, asset, strings)
-    xml += ["</sheetData>", *_drop_downs(columns, n_rows, lists), parts.page(fits_page)]
-    xml += [f'<ignoredErrors><ignoredError sqref="A1:{last}{n_rows + 1}" numberStoredAsText="1"/></ignoredErrors></worksheet>']
-    return "".join(xml)
-
-
-def _asset_at(table: Table) -> int:
-    return [c.name for c in table.columns].index(table.asset_column)
+def _set_up(sheet: Any, table: Table, text: Any) -> None:
+    """What is frozen on the screen and repeated on each page in print, how wide columns are, and how the sheet is printed."""
+    n_frozen, widths = _n_frozen(table), [_width(column) for column in table.columns]
+    sheet.freeze_panes(1, n_frozen)
+    sheet.repeat_rows(0)
+    sheet.repeat_columns(0, n_frozen - 1)
+    for at, width in enumerate(widths):
+        sheet.set_column(at, at, width, text)
+    _print_across(sheet, fits_page=sum(widths) <= PAGE_WIDTH)
+    last = column_letters(len(widths) - 1)
+    sheet.ignore_errors({"number_stored_as_text": f"A1:{last}{table.n_rows + 1}"})
 
 
 def _n_frozen(table: Table) -> int:
     """How many columns stay in view: those up to the asset's, unless they would fill the screen."""
-    n_columns = _asset_at(table) + 1
+    n_columns = [c.name for c in table.columns].index(table.asset_column) + 1
     return n_columns if n_columns <= 3 else 1
 
 
-def _frozen(n_columns: int) -> str:
-    """The header row and the first columns stay in view."""
-    corner = f"{column_letters(n_columns)}2"
-    return (
-        '<sheetViews><sheetView tabSelected="1" workbookViewId="0">'
-        f'<pane xSplit="{n_columns}" ySplit="1" topLeftCell="{corner}" activePane="bottomRight" state="frozen"/>'
-        '<selection pane="topRight"/><selection pane="bottomLeft"/>'
-        f'<selection pane="bottomRight" activeCell="{corner}" sqref="{corner}"/>'
-        "</sheetView></sheetViews>"
-    )
-
-
-def _width(column: TextColumn) -> float:
+def _width(column: TextColumn) -> int:
     longest = max(map(width_of, (column.name, *column.texts[:WIDTH_SAMPLE])))
     return min(max(longest, LEAST_WIDTH), MOST_WIDTH) + 2
 
 
-def _rows(columns: Sequence[TextColumn], asset: int, strings: dict[str, int]) -> Iterator[str]:
-    """The rows of the table. Between the row's numbers stand pieces that are the same for equal texts, so a row is one join."""
-    pieces = [_pieces(column, at, len(columns), at == asset, strings) for at, column in enumerate(columns)]
-    n_rows = columns[0].n_rows
-    for start in range(0, n_rows, _BLOCK):
-        stop = min(start + _BLOCK, n_rows)
-        taken = [texts[column.codes[start:stop]].tolist() for texts, column in zip(pieces, columns, strict=True)]
-        numbers = map(str, range(start + 2, stop + 2))
-        yield "".join([n.join(('<row r="', '"><c r="A', *row)) for n, row in zip(numbers, zip(*taken, strict=True), strict=True)])
+def _print_across(sheet: Any, fits_page: bool) -> None:
+    sheet.set_landscape()
+    if fits_page:
+        sheet.fit_to_pages(1, 0)
 
 
-def _pieces(column: TextColumn, at: int, n_columns: int, is_asset: bool, strings: dict[str, int]) -> np.ndarray:
-    """For each text of a column what stands behind its row's number: the cell, and the beginning of the next."""
-    after = "</row>" if at == n_columns - 1 else f'<c r="{column_letters(at + 1)}'
-    style = parts.ASSET if is_asset else parts.TEXT
-    found = np.empty(len(column.texts), object)
-    for code, text in enumerate(column.texts):
-        if text or is_asset:  # a row without any text is a row all the same
-            found[code] = f'" s="{style}" t="s"><v>{strings.setdefault(text, len(strings))}</v></c>{after}'
-        else:
-            found[code] = f'" s="{style}"/>{after}'
-    return found
+# ---- drop-downs, and the sheet of types
 
 
-def _row(number: int, cells: Sequence[tuple[str, int]], strings: dict[str, int]) -> str:
-    written = (
-        f'<c r="{column_letters(at)}{number}" s="{style}" t="s"><v>{strings.setdefault(text, len(strings))}</v></c>'
-        for at, (text, style) in enumerate(cells)
-        if text
-    )
-    return f'<row r="{number}">{"".join(written)}</row>'
-
-
-# ---- drop-downs
-
-
-def _lists(table: Table) -> dict[str, tuple[str, ...]]:
-    """What the drop-down of each column suggests, by the column's name."""
-    lists: dict[str, tuple[str, ...]] = {table.settings.enabled: ("True", "False")} if table.settings.enabled else {}
+def _lists(table: Table) -> Lists:
+    lists: Lists = {table.settings.enabled: ("True", "False")} if table.settings.enabled else {}
     for column in table.conditions:
         domain = column.condition.domain
         if domain.kind == "bool":
@@ -181,33 +197,29 @@ def _lists(table: Table) -> dict[str, tuple[str, ...]]:
     return lists
 
 
-def _drop_downs(columns: Sequence[TextColumn], n_rows: int, lists: dict[str, tuple[str, ...]]) -> Iterator[str]:
+def _placed(lists: Lists) -> Iterator[tuple[int, str, tuple[str, ...]]]:
+    """Where each list stands on the sheet of types, from column C on, the first column that it is for, and what it suggests."""
+    for at, values in enumerate(dict.fromkeys(lists.values()), 2):
+        yield at, next(name for name, of in lists.items() if of == values), values
+
+
+def _suggest(sheet: Any, table: Table, lists: Lists) -> None:
     """Lists to choose from, which stand on the sheet of types: a list in the rule itself is limited to 255 characters."""
-    if not lists:
-        return
-    bottom = min(n_rows + 1 + SPARE_ROWS, parts.MOST_ROWS)
-    places = {values: at for at, values in enumerate(dict.fromkeys(lists.values()), 2)}
-    yield f'<dataValidations count="{len(lists)}">'
-    for at, column in enumerate(columns):
-        if column.name in lists:
-            letter, source = column_letters(at), column_letters(places[lists[column.name]])
-            area = f"{parts.TYPES_SHEET}!${source}$2:${source}${len(lists[column.name]) + 1}"
-            cells = f"{letter}2:{letter}{bottom}"
-            rule = f'<dataValidation type="list" allowBlank="1" showErrorMessage="0" sqref="{cells}">'
-            yield f"{rule}<formula1>{area}</formula1></dataValidation>"
-    yield "</dataValidations>"
+    bottom = min(table.n_rows + SPARE_ROWS, MOST_ROWS - 1)
+    places = {values: column_letters(at) for at, _, values in _placed(lists)}
+    for at, column in enumerate(table.columns):
+        if values := lists.get(column.name):
+            letter = places[values]
+            source = f"={TYPES_SHEET}!${letter}$2:${letter}${len(values) + 1}"
+            rule = {"validate": "list", "source": source, "show_error": False, "show_input": False}
+            sheet.data_validation(1, at, bottom, at, rule)
 
 
-def _types_sheet(lines: Sequence[str], lists: dict[str, tuple[str, ...]], strings: dict[str, int]) -> str:
+def _write_types(sheet: Any, lines: list[str], lists: Lists, text: Any, header: Any) -> None:
     """Column A: the lines of a contextdb.toml. From column C on: what the drop-downs suggest."""
-    distinct = list(dict.fromkeys(lists.values()))
-    names = {values: next(name for name, of in lists.items() if of == values) for values in distinct}
-    xml = [parts.sheet_start(fits_page=True), '<cols><col min="1" max="1" width="90" style="1" customWidth="1"/></cols><sheetData>']
-    for number in range(1, max([len(lines) + 1, *(len(values) + 1 for values in distinct)]) + 1):
-        line = parts.FIRST_LINE if number == 1 else lines[number - 2] if number - 2 < len(lines) else ""
-        cells = [(line, parts.HEADER if number == 1 else parts.TEXT), ("", 0)]
-        for values in distinct:
-            text = names[values] if number == 1 else values[number - 2] if number - 2 < len(values) else ""
-            cells.append((text, parts.HEADER if number == 1 else parts.TEXT))
-        xml.append(_row(number, cells, strings))
-    return "".join([*xml, "</sheetData>", parts.page(fits_page=True), "</worksheet>"])
+    sheet.set_column(0, 0, TYPES_WIDTH, text)
+    _print_across(sheet, fits_page=True)
+    for at, texts in ((0, lines), *((at, [name, *values]) for at, name, values in _placed(lists))):
+        for row, each in enumerate(texts):
+            if each:
+                _put(sheet, row, at, each, text if row else header)

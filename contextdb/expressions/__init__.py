@@ -11,7 +11,7 @@
 
 All numbers are IEEE doubles, ints too, exact up to 2**53. An exponent is a whole number from 0 to 64. Where an angle is compared
 for equality both sides are wrapped; in an order it lies from -180 to 180, and half a turn counts as either, as in a cell.
-After `in` stands a list of constants, a fact of type tags (a tag covers what stands under it), or a cell: `heading in "170..-170"`.
+After `in` stands a list of constants, a fact of type tags (a tag covers what is under it), or a cell: `heading in "170..-170"`.
 
 Missing: a fact that is absent, None or NaN is missing, and so is what is not finite: `1 / x` where x is 0, a root below 0, an
 overflow. Missing spreads through arithmetic and comparison; `and` and `or` know their answer without it where one part decides

@@ -162,7 +162,7 @@ def read_assumptions(
 
 
 def assumption_faults(assume: Sequence[str], conditions: Mapping[str, Condition]) -> Iterator[Fault]:
-    """Why assumptions cannot be read; the rule is "unknown-fact" where one names what is no condition of these."""
+    """Why assumptions cannot be read; the rule is "unknown-fact" where one names what is not a condition of these."""
     for text in assume:
         try:
             read_expression(text, conditions, WANTS)

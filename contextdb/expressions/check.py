@@ -152,7 +152,7 @@ class Checker:
         (then, a), (otherwise, b) = self.check(node.then), self.check(node.otherwise)
         kind = _common_kind(a, b)
         if kind is None:
-            why = f'before "if" stands {said(a)}, after "else" {said(b)}'
+            why = f'before "if" is {said(a)}, after "else" {said(b)}'
             raise Refusal(node.start, node.stop, why, "two values of one type")
         values = a.values | b.values if a.values is not None and b.values is not None else None
         result = Type(kind, values, self._common_unit(node, [a, b]))
@@ -163,7 +163,7 @@ class Checker:
     def _no_condition(self, node: Name) -> Refusal:
         if node.is_bare and node.name.casefold() in ("true", "false"):
             meant = node.name.capitalize()
-            return Refusal(node.start, node.stop, f"{in_quotes(node.name)} is no name", "True or False", meant)
+            return Refusal(node.start, node.stop, f"{in_quotes(node.name)} is not a name", "True or False", meant)
         why = f"there is no condition {in_quotes(node.name)}"
         if node.is_bare and node.name in FUNCTIONS:
             return Refusal(node.start, node.stop, f"{in_quotes(node.name)} is a function", FUNCTIONS[node.name].form)
@@ -222,7 +222,7 @@ class Checker:
             self._need_number(part, found, '"**"')
         exponent = parts[1][0]
         if not (isinstance(exponent, Const) and exponent.value in range(MOST_POWER + 1)):
-            why = f'after "**" stands a whole number from 0 to {MOST_POWER}, written out'
+            why = f'"**" accepts only a whole number from 0 to {MOST_POWER}, written out'
             raise Refusal(node.right.start, node.right.stop, why, "sqrt(x) for a root, 1 / x ** 2 for a negative power")
         return self._applied(node, power_of(int(exponent.value)), parts[:1])
 
@@ -267,14 +267,16 @@ class Checker:
         if sign in ("==", "!="):
             return Link(sign, is_wrapped=n_angles > 0)
         if n_angles == 2:
-            why = "two angles have no order, for they go round"
-            raise Refusal(left.start, right.stop, why, "wrap_angle(a - b) > 0 where a lies to the left of b")
+            why = "two angles have no order, because they wrap around"
+            raise Refusal(left.start, right.stop, why, "wrap_angle(a - b) > 0 where a is to the left of b")
         if n_angles == 0:
             return Link(sign)
         for node, (plan, _) in ((left, a), (right, b)):
             if isinstance(plan, Const) and not -180.0 <= float(plan.value) <= 180.0:
                 told = format_number(float(plan.value))
-                raise Refusal(node.start, node.stop, f"an angle lies from -180 to 180, and {told} outside", 'heading in "170..190"')
+                raise Refusal(
+                    node.start, node.stop, f"an angle is from -180 to 180, and {told} is outside", 'heading in "170..190"'
+                )
         is_upper = sign in (">", ">=")
         return Link(sign, left_is_high=is_upper and a[1].kind == "angle", right_is_high=not is_upper and b[1].kind == "angle")
 

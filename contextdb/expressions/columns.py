@@ -150,7 +150,7 @@ def _placed(error: Exception, row: int, condition: Condition) -> ContextError:
     place = Place(row=row, column=condition.name)
     if isinstance(error, ContextError):
         return ContextError(*(fault.at(place) for fault in error.faults))
-    return ContextError(Fault("this is no fact.", "one value in each context", place=place))
+    return ContextError(Fault("this is not a fact.", "one value in each context", place=place))
 
 
 def _column_of(codes: list[int], values: list[Any], kind: Kind) -> Column:

@@ -51,7 +51,7 @@ class Derivation:
     steps: tuple[Step, ...]
 
     def __reduce__(self) -> tuple[object, ...]:
-        """What is worked out from the steps is worked out anew in another process."""
+        """What is worked out from the steps is worked out again in another process."""
         return Derivation, (self.steps,)
 
     @cached_property
@@ -111,12 +111,12 @@ class Derivation:
         return found
 
     def complete(self, facts: Mapping[str, object]) -> dict[str, object]:
-        """The facts of one context with the derived ones beside them; raises as `compute` does."""
+        """The facts of one context with the derived ones next to them; raises as `compute` does."""
         return {**facts, **self.compute(facts)}
 
     @cached_property
     def _reading(self) -> tuple[tuple[str, Condition, type | None, Value], ...]:
-        """Each input, the type of which any value is in canonical form already, and what stands for it where it is missing."""
+        """Each input, the type of which any value is in canonical form already, and its replacement where it is missing."""
         usual = {"number": float, "bool": bool, "text": str}
         return tuple((c.name, c, usual.get(c.domain.kind), NAN if c.domain.kind in NUMERIC else None) for c in self.inputs)
 
@@ -125,7 +125,7 @@ class Derivation:
         return tuple((s.condition.name, s.condition, s.expression.run, s.expression.names) for s in self.steps)
 
     def complete_frame(self, columns: Mapping[str, Any], n_contexts: int) -> dict[str, Any]:
-        """The columns of N contexts with the derived ones beside them, as `query_many` takes them.
+        """The columns of N contexts with the derived ones next to them, as `query_many` takes them.
 
         Derived numbers are float64 arrays with NaN where missing, bools and texts polars series, sets of tags lists, with null
         where missing. The same values as `complete` gives.
@@ -224,7 +224,7 @@ def derive(conditions: Mapping[str, Condition]) -> Derivation:
 
 
 def derivation_faults(conditions: Mapping[str, Condition]) -> Iterator[tuple[str, Fault]]:
-    """Every fault of the derived facts, with the name of the condition whose `expr` it stands in."""
+    """Every fault of the derived facts, with the name of the condition whose `expr` it is in."""
     needs: dict[str, list[str]] = {}
     for name, condition in conditions.items():
         if condition.expr is None:

@@ -71,7 +71,7 @@ class Expression:
         Parameters
         ----------
         columns : mapping of str to list, flat numpy array or polars Series, each of length N
-            Facts by the name of the condition. A column that is absent is missing; others may stand beside.
+            Facts by the name of the condition. A column that is absent is missing; other columns are ignored.
         n_contexts : int
             N.
 
@@ -136,7 +136,7 @@ def read_expression(
     Raises
     ------
     ExpressionError
-        With the character where the fault stands, what is accepted and, where one is near, a text that would be read.
+        With the character where the fault is, what is accepted and, where one is near, a text that would be read.
     """
     known = conditions if isinstance(conditions, Mapping) else {c.name: c for c in conditions}
 

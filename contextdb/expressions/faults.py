@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from contextdb.errors import SHOWN_CHARACTERS, Fault, SchemaError, in_quotes
 
 MOST_SLIPS = 8
-"""So many slips in one text are mended together; with more of them only the first is told."""
+"""So many slips in one text are mended together; with more of them only the first is reported."""
 
 
 class ExpressionError(SchemaError):
@@ -33,7 +33,7 @@ class ExpressionFault(Fault):
 
 
 class Refusal(Exception):
-    """Raised while an expression is read: text[start:stop] is not accepted. `meant` is what may stand there instead."""
+    """Raised while an expression is read: text[start:stop] is not accepted. `meant` is what may be there instead."""
 
     rule = "unreadable"
 
@@ -61,7 +61,7 @@ def fault_of(text: str, refusal: Refusal, read: Callable[[str], object]) -> Expr
 
 
 def _excerpt(text: str, start: int) -> str:
-    """The text, or of a long one what stands round a character."""
+    """The text, or of a long one what is round a character."""
     if len(text) <= SHOWN_CHARACTERS:
         return in_quotes(text)
     half = SHOWN_CHARACTERS // 2

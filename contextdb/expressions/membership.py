@@ -1,4 +1,4 @@
-"""What may stand after `in`: a list of constants, the tags of a fact, or the text of a cell. Each becomes a cell that is asked.
+"""What may be after `in`: a list of constants, the tags of a fact, or the text of a cell. Each becomes a cell that is asked.
 
 gait in ["Walk", "Run"]      "InAir" in Defender.Tags      heading in "170..-170"
 """
@@ -44,7 +44,7 @@ def holding(node: Membership, item: tuple[Part, Type], choices: Sequence[Choice]
     Raises
     ------
     Refusal
-        What stands after `in` does not fit the item.
+        What is after `in` does not fit the item.
     """
     if isinstance(node.choices, tuple):
         return Held(item[0], Cell(_listed(node, item[1], choices)))
@@ -52,9 +52,9 @@ def holding(node: Membership, item: tuple[Part, Type], choices: Sequence[Choice]
     if found.kind == "tags":
         return Held(plan, Cell(_tag(node.item, item[0], plan, conditions)))
     if not isinstance(choice, Text):
-        raise Refusal(choice.start, choice.stop, f'after "in" stands {said(found)}', _AFTER_IN)
+        raise Refusal(choice.start, choice.stop, f'after "in" is {said(found)}', _AFTER_IN)
     if isinstance(item[0], Const):
-        raise Refusal(node.start, node.stop, 'no fact stands beside "in"', 'a fact: speed in "0..5", "InAir" in Tags')
+        raise Refusal(node.start, node.stop, 'there is no fact before or after "in"', 'a fact: speed in "0..5", "InAir" in Tags')
     return Held(item[0], _cell(choice, _domain(*item, conditions)))
 
 

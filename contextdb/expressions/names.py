@@ -15,7 +15,7 @@ def names_in(text: str) -> tuple[str, ...]:
 
 
 def unknown_in(text: str, known: Container[str]) -> tuple[str, int] | None:
-    """The first name of a fact that is not known, and the character from 0 where it stands."""
+    """The first name of a fact that is not known, and the character from 0 where it is."""
     return next(((token.value, token.start) for token in _names(text) if token.value not in known), None)
 
 

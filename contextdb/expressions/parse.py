@@ -109,7 +109,7 @@ class _Parser:
         return Refusal(start, stop, "the expression is nested too deeply", f"{MOST_NESTED} levels at most")
 
     def _binding(self) -> int:
-        """How tightly the next token joins what stands before it; 0 when it does not."""
+        """How tightly the next token joins what is before it; 0 when it does not."""
         token = self.token
         if token.kind == "sign":
             return _BINDING.get(token.text, 0)
@@ -222,11 +222,11 @@ class _Parser:
         if token.kind == "end":
             return Refusal(token.start, token.stop, "a value is missing at the end", _VALUE)
         if token.text == "[":
-            return Refusal(token.start, token.stop, 'a list stands after "in" only', 'gait in ["Walk", "Run"]')
+            return Refusal(token.start, token.stop, 'a list is allowed only after "in"', 'gait in ["Walk", "Run"]')
         return Refusal(token.start, token.stop, f"before {in_quotes(token.text)} a value is missing", _VALUE)
 
     def unexpected(self, why: str = "", accepted: str = "", meant: str | None = None) -> Refusal:
-        """What stands here has no place."""
+        """What is here has no place."""
         token = self.token
         slip = token.text.casefold() if token.is_bare else ""
         if slip in _REFUSED:
@@ -245,8 +245,8 @@ class _Parser:
     def _slipped(self, token: Token, slip: str) -> Refusal:
         ahead = self.tokens[min(self.at + 1, len(self.tokens) - 1)]
         if slip == "is" and ahead.text == "not":
-            return Refusal(token.start, ahead.stop, '"is not" is no comparison', meant="!=")
-        what = "is written in small letters" if _SLIPS[slip] == slip else "is no operator"
+            return Refusal(token.start, ahead.stop, '"is not" is not a comparison', meant="!=")
+        what = "is written in small letters" if _SLIPS[slip] == slip else "is not an operator"
         return Refusal(token.start, token.stop, f"{in_quotes(token.text)} {what}", meant=_SLIPS[slip])
 
     def _side_by_side(self, before: Token, token: Token) -> str:

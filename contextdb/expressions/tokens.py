@@ -2,7 +2,7 @@
 
 number   3  0.5  .5  1e-3
 text     "CB" or 'CB'; a quote inside is doubled
-name     speed  Defender.DepthChart; any other name stands in backquotes: `Asset Name`
+name     speed  Defender.DepthChart; any other name is in backquotes: `Asset Name`
 sign     + - * / // % ** == != < <= > >= ( ) [ ] ,
 end      after the last character
 """
@@ -20,7 +20,7 @@ MOST_CHARACTERS = 4000
 """A longer expression is refused: nobody could read it, and the work on it stays bounded."""
 
 RESERVED = frozenset(("and", "or", "not", "in", "if", "else", "True", "False"))
-"""Words of the language; a condition of such a name stands in backquotes."""
+"""Words of the language; a condition of such a name is in backquotes."""
 
 TokenKind = Literal["number", "text", "name", "sign", "end"]
 
@@ -40,9 +40,9 @@ _MEANT = {
 _WHY = {
     "=": '"=" would set a value, and nothing is set here',
     ":=": '":=" would set a value, and nothing is set here',
-    "?": '"?" is no operator',
-    ":": '":" is no operator',
-    ".": "a dot stands inside the name of a condition only",
+    "?": '"?" is not an operator',
+    ":": '":" is not an operator',
+    ".": "a dot is allowed only inside the name of a condition",
     "#": "there are no comments inside an expression",
 }
 _ACCEPTED = {
@@ -55,7 +55,7 @@ _ACCEPTED = {
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """One word: `text` as it is written, `value` what it stands for (a name without backquotes, a text without quotes)."""
+    """One word: `text` as it is written, `value` what it refers to (a name without backquotes, a text without quotes)."""
 
     kind: TokenKind
     text: str
@@ -120,7 +120,7 @@ def _number(text: str, number: re.Match[str]) -> Token:
         plain = word.replace("_", "")
         meant = plain if plain != word and _NUMBER.fullmatch(plain) else None
         accepted = _ACCEPTED[".."] if ".." in word else "a number such as 3, 0.5 or 1e-3"
-        raise Refusal(number.start(), stop, f"{in_quotes(word)} is no number", accepted, meant)
+        raise Refusal(number.start(), stop, f"{in_quotes(word)} is not a number", accepted, meant)
     return Token("number", number[0], number.start(), number[0])
 
 
@@ -131,7 +131,7 @@ def _slip(text: str, at: int) -> Refusal:
         return Refusal(
             at, len(text), f"the quote {sign} is not closed", "a text in quotes; a quote inside is doubled", text[at:] + sign
         )
-    why = _WHY.get(sign, f"{in_quotes(sign)} is no sign of an expression")
+    why = _WHY.get(sign, f"{in_quotes(sign)} is not a sign of an expression")
     meant = _MEANT.get(sign)
     accepted = _ACCEPTED.get(sign[:2], "" if meant else "+ - * / // % ** == != < <= > >= and or not in if else")
     return Refusal(at, at + len(sign), why, accepted, meant)

@@ -68,7 +68,7 @@ class Unary(Node):
 
 @dataclass(frozen=True)
 class Arithmetic(Node):
-    """`left sign right`; the sign stands at `sign_start`."""
+    """`left sign right`; the sign is at `sign_start`."""
 
     sign: str
     sign_start: int

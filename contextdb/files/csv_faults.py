@@ -1,6 +1,6 @@
 """What is wrong with the records of a CSV: git's marks, wrong quotes, another number of fields than the header, cells too long.
 
-Each fault stands at its line, with the nearest mend. Of one kind the first few are listed, and how many more there are.
+Each fault is at its line, with the nearest mend. Of one kind the first few are listed, and how many more there are.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _conflict_faults(raw: bytes, records: Records) -> Iterator[Found]:
             mend = 'to keep one side and delete the lines "<<<<<<<", "=======" and ">>>>>>>"'
             yield start, Fault(f"an unresolved git conflict starts here{extent}.", "one version of each row", mend)
         elif not raw.startswith(CONFLICT) and not 0 <= first < start:
-            yield start, Fault("a mark that git leaves in a conflict stands here.", "one version of each row", "to delete the line")
+            yield start, Fault("this line is a conflict mark of git.", "one version of each row", "to delete the line")
 
 
 def _stray_faults(raw: bytes, strays: list[Stray]) -> Iterator[Found]:
@@ -66,7 +66,7 @@ def _stray_fault(raw: bytes, stray: Stray) -> Fault:
     accepted = "a field in double quotes from its start to its end, each quote in it doubled"
     if stray.is_inside:
         field = _line_at(raw, _field_start(raw, stray.opening)).split(",", 1)[0]
-        return Fault(f"a quote stands inside the field {in_quotes(field)}.", accepted, _doubled(field))
+        return Fault(f"a quote is inside the field {in_quotes(field)}.", accepted, _doubled(field))
     line = in_quotes(_line_at(raw, stray.opening))
     if stray.closing is None:
         return Fault(f"the quoted field that opens here is never closed: {line}.", accepted, "to close it on this line")
@@ -75,7 +75,7 @@ def _stray_fault(raw: bytes, stray: Stray) -> Fault:
         found = f"the quoted field that opens here runs on for {plural(n_lines, 'line')} and past the next quote: {line}."
         return Fault(found, accepted, "to close it on this line")
     field = raw[stray.opening : stray.closing].decode() + _line_at(raw, stray.closing).split(",", 1)[0]
-    found = f"the field {in_quotes(field)} goes on after a quote that closes it."
+    found = f"the field {in_quotes(field)} continues after its closing quote."
     return Fault(found, accepted, _doubled(field[1:].removesuffix('"')))
 
 

@@ -1,6 +1,6 @@
-"""Where the records and fields of a CSV stand in its bytes.
+"""Where the records and fields of a CSV are in its bytes.
 
-Strict RFC 4180 with commas: a field with a comma, a quote or a line end in it stands in double quotes, a quote in it doubled. Lines
+Strict RFC 4180 with commas: a field with a comma, a quote or a line end in it is in double quotes, a quote in it doubled. Lines
 end with "\\n", "\\r\\n" or a lone "\\r"; blank ones are no records. A field whose quotes are wrong is a `Stray`.
 
 Characters become bits, 64 to a word, and the words tell at once what is inside quotes: the prefix sum of the quotes, modulo 2. So a
@@ -40,7 +40,7 @@ class Records:
     stops: Positions
     n_fields: Positions
     is_sound: Flags
-    """Whether each record's quotes stand where they may, so that its fields can be told. bool [n]."""
+    """Whether each record's quotes stand where they may, so that its fields can be reported. bool [n]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Stray:
     opening: int
     closing: int | None
     is_inside: bool
-    """The quote stands inside a field that does not begin with one."""
+    """The quote is inside a field that does not begin with one."""
 
 
 def find_records(raw: bytes) -> tuple[Records, list[Stray]]:
@@ -123,7 +123,7 @@ def field_bounds(chunk: bytes, lengths: Positions, n_fields: int) -> tuple[Posit
 
 
 def fields_of(record: bytes, n_fields: int) -> list[bytes]:
-    """The fields of one record, as they stand in it."""
+    """The fields of one record, as they are in it."""
     starts, stops = field_bounds(record, np.array([len(record)]), n_fields)
     return [record[a:b] for a, b in zip(starts[0].tolist(), stops[0].tolist(), strict=True)]
 
@@ -150,7 +150,7 @@ def needs_quotes(data: bytes) -> bool:
 
 
 def _bits(octets: Octets, mark: int) -> Words:
-    """Where a byte stands. A block at a time, so that nothing leaves the cache."""
+    """Where a byte is. A block at a time, so that nothing leaves the cache."""
     packed = np.zeros(bitmask.n_words(len(octets) + 1) * 8, np.uint8)
     for start in range(0, len(octets), _BLOCK):
         block = np.packbits(octets[start : start + _BLOCK] == mark, bitorder="little")
@@ -181,7 +181,7 @@ def _later(words: Words) -> Words:
 
 
 def _rank(words: Words, positions: Positions) -> Positions:
-    """How many bits stand before each position."""
+    """How many bits are before each position."""
     before = np.append(0, np.cumsum(np.bitwise_count(words), dtype=np.int64))
     at, bit = positions >> 6, (positions & 63).astype(np.uint64)
     below = np.bitwise_count(words[at] & ((np.uint64(1) << bit) - np.uint64(1)))
@@ -192,7 +192,7 @@ def _rank(words: Words, positions: Positions) -> Positions:
 
 
 def _split(octets: Octets, breaks: Positions, commas: Words, strays: list[Stray]) -> Records:
-    """Records between line ends that stand outside quotes, the last of them the end of the file; blank lines are left out."""
+    """Records between line ends that are outside quotes, the last of them the end of the file; blank lines are left out."""
     starts, stops = np.append(0, breaks[:-1] + 1), breaks.copy()
     stops[:-1] -= (octets[breaks[:-1]] == LF) & (octets[breaks[:-1] - 1] == CR) & (breaks[:-1] > starts[:-1])
     is_record = stops > starts
@@ -217,7 +217,7 @@ def _has_strays(quotes: Words, inside: Words, edges: Words) -> bool:
 
 
 def _settled_quotes(octets: Octets, quotes: Positions, line_ends: Positions) -> tuple[Positions, list[Stray]]:
-    """The quotes without those of faulty fields, and these fields. After a fault, reading starts afresh on the next line."""
+    """The quotes without those of faulty fields, and these fields. After a fault, reading starts from scratch on the next line."""
     settled, strays, rest = [], list[Stray](), quotes
     while (found := _first_stray(octets, rest)) is not None:
         first, last = found

@@ -1,7 +1,7 @@
 """Texts written over the CSV they came from: what nobody changed keeps its bytes.
 
 Rows that are as they were are copied in runs, with their line ends. A row that changed, or whose columns moved, is put together
-from the fields as the source has them and those that are written anew. So an edit changes its line, and in it its field.
+from the fields as the source has them and those that are rewritten. So an edit changes its line, and in it its field.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Origin = NDArray[np.int64]
 """For each row, the record of the source it came from, or -1 for a new row."""
 
 _SAMPLE = 100
-"""Records that tell whether a column's fields always stand in quotes."""
+"""Records that tell whether a column's fields always are in quotes."""
 
 
 def write_csv(columns: Sequence[TextColumn], source: Source | None, origin: Origin, field_of: Sequence[int] | None = None) -> bytes:
@@ -178,7 +178,7 @@ def _built_rows(change: _Change) -> dict[int, bytes]:
 
 
 def _written(column: TextColumn, rows: Positions, is_quoted: bool) -> list[bytes]:
-    """A column's fields in some rows, written anew."""
+    """A column's fields in some rows, rewritten."""
     codes = column.codes[rows]
     written = {code: as_field(column.texts[code], is_quoted) for code in np.unique(codes).tolist()}
     return [written[code] for code in codes.tolist()]
@@ -186,7 +186,7 @@ def _written(column: TextColumn, rows: Positions, is_quoted: bool) -> list[bytes
 
 def _parts_of_old_rows(change: _Change, rows: Positions, is_quoted: Sequence[bool]) -> Iterator[list[bytes]]:
     """What the lines of some rows consist of, from left to right: runs of fields as the source has them, and fields written
-    anew."""
+    again."""
     source, fields, end = change.source, change.fields, 0
     records = change.origin[rows] + 1
     first, last = source.starts[records], source.stops[records]
@@ -221,7 +221,7 @@ def _is_quoted_without_need(field: bytes) -> bool:
 
 
 def _always_quoted(source: Source) -> list[bool]:
-    """Whether each column of the source always stands in quotes, needed or not, as far as a sample shows."""
+    """Whether each column of the source always is in quotes, needed or not, as far as a sample shows."""
     width = len(source.columns)
     taken = range(1, min(_SAMPLE, source.n_records) + 1) if source.n_records > 0 else range(len(source.stops))
     sample = [fields_of(source.raw[source.starts[r] : source.stops[r]], width) for r in taken]
@@ -263,7 +263,7 @@ def _assembled(change: _Change, built: Mapping[int, bytes]) -> Source:
 
 
 def _pieces(source: Source, records: Origin, built: Mapping[int, bytes], is_copied: Flags, is_ended: Flags) -> Iterator[bytes]:
-    """Runs of records as they stand in the source, and between them single lines that are new or end otherwise."""
+    """Runs of records as they are in the source, and between them single lines that are new or end otherwise."""
     line_end = source.line_end.encode()
     is_next = is_copied[1:] & is_copied[:-1] & (records[1:] == records[:-1] + 1)
     breaks = [0, *(np.flatnonzero(~is_next) + 1).tolist(), len(records)]

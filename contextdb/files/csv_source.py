@@ -1,6 +1,6 @@
 """A CSV as texts, with all that is needed to write the same bytes again.
 
-`Source` keeps the bytes of a file and where its records stand in them; `contextdb.files.csv_rewrite` writes texts over it. Columns
+`Source` keeps the bytes of a file and where its records are in them; `contextdb.files.csv_rewrite` writes texts over it. Columns
 are read by polars and kept as their distinct texts, so that no cell is an object of its own. Nothing here touches the disk.
 """
 
@@ -26,10 +26,10 @@ FEW_TEXTS = 8
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """The bytes of a CSV and where its records stand in them: record 0 is the first row, -1 the header.
+    """The bytes of a CSV and where its records are in them: record 0 is the first row, -1 the header.
 
     `starts` is int64 [n_records + 2]: where each record begins, the header first, and last the end of the file. `stops` is int64
-    [n_records + 1]: where each ends; its line end, and blank lines after it, stand between its stop and the next start. What stands
+    [n_records + 1]: where each ends; its line end, and blank lines after it, are between its stop and the next start. What stands
     before the header is a BOM or blank lines. `columns` are the texts that the bytes mean.
     """
 
@@ -95,7 +95,7 @@ def read_csv(raw: bytes, file: str) -> tuple[Source, list[TextColumn]]:
     Source
         What is needed to write the same bytes again.
     list of TextColumn
-        The columns in the order of the file, every text as it stands there, without its quotes.
+        The columns in the order of the file, every text as it is there, without its quotes.
 
     Raises
     ------
@@ -112,14 +112,14 @@ def read_csv(raw: bytes, file: str) -> tuple[Source, list[TextColumn]]:
         faults = [fault.at(place) for fault in name_faults(names)] + faults
     if faults:
         kind = seems_markup(raw)
-        hint = [Fault(f"this is no CSV: it seems to be {kind}.", "CSV text in UTF-8", place=Place(file))] if kind else []
+        hint = [Fault(f"not a CSV file: looks like {kind}.", "CSV text in UTF-8", place=Place(file))] if kind else []
         raise TableError(*hint, *faults)
     columns = _columns(raw, names, records)
     return Source(raw, np.append(records.starts, len(raw)), records.stops, tuple(columns)), columns
 
 
 def name_faults(names: Sequence[str]) -> Iterator[Fault]:
-    """What is wrong with the names of the columns: one is empty, or stands twice. The first few are told, and how many more."""
+    """What is wrong with the names of the columns: one is empty, or appears twice. The first few are told, and how many more."""
     faults = list(_name_faults(names))
     yield from faults[:MOST_NAME_FAULTS]
     if len(faults) > MOST_NAME_FAULTS:
@@ -136,7 +136,7 @@ def _name_faults(names: Sequence[str]) -> Iterator[Fault]:
             where = "the last" if at == len(names) else f"field {at:,}"
             yield Fault(f"{where} of {len(names):,} column names is empty.", "a name for each column")
         elif name in first:
-            yield Fault(f"the column name {in_quotes(name)} stands twice, in fields {first[name]:,} and {at:,}.", "each name once")
+            yield Fault(f"the column name {in_quotes(name)} appears twice, in fields {first[name]:,} and {at:,}.", "each name once")
         first.setdefault(name, at)
 
 
@@ -171,7 +171,7 @@ def _columns(raw: bytes, names: Sequence[str], records: Records) -> list[TextCol
 
 
 def _rows_only(raw: bytes, records: Records) -> tuple[bytes, int]:
-    """The rows as polars reads them, with plain line ends and no blank lines between them, and how many lines stand before them."""
+    """The rows as polars reads them, with plain line ends and no blank lines between them, and how many lines are before them."""
     starts, stops = records.starts[1:], records.stops[1:]
     first, has_bom = int(starts[0]), raw.startswith(UTF8_BOM, int(starts[0]))
     if not has_bom and _are_plain(np.frombuffer(raw, np.uint8), starts, stops):
@@ -181,7 +181,7 @@ def _rows_only(raw: bytes, records: Records) -> tuple[bytes, int]:
 
 
 def _are_plain(octets: Octets, starts: Positions, stops: Positions) -> bool:
-    """Whether "\\n" or "\\r\\n" stands before each row, and nothing else between rows or after the last."""
+    """Whether "\\n" or "\\r\\n" is before each row, and nothing else between rows or after the last."""
     between = starts[1:] - stops[:-1]
     is_plain = (between == 1) | ((between == 2) & (octets[stops[:-1]] == CR))
     return bool(is_plain.all() and (octets[starts - 1] == LF).all() and octets[int(stops[-1]) :].tobytes() in (b"", b"\n", b"\r\n"))

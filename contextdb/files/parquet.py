@@ -141,7 +141,7 @@ def _no_parquet(raw: bytes) -> Fault | None:
     if not raw.startswith(MAGIC):
         kind = seems_to_be(raw) or ("binary data" if b"\0" in raw[:1000] else "text")
         mend = "the suffix .csv" if kind == "text" else ""
-        return Fault(f"this is no Parquet file: it seems to be {kind}.", "a Parquet file", mend)
+        return Fault(f"not a Parquet file: looks like {kind}.", "a Parquet file", mend)
     size = int.from_bytes(raw[-8:-4], "little")
     if len(raw) < 12 or not raw.endswith(MAGIC) or size > len(raw) - 12:
         return Fault(

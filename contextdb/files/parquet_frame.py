@@ -73,7 +73,7 @@ def require_whole(raw: bytes | memoryview, most_values: int | None = MOST_VALUES
     """
     frame = _checked(raw, most_values)
     if frame.is_sealed and _digest(raw, frame) != frame.metadata[SEAL]:
-        raise DamagedFrame("it was altered after it was saved: its contents do not give its digest")
+        raise DamagedFrame("it was altered after it was saved: its contents do not match its digest")
     return frame
 
 
@@ -101,7 +101,7 @@ def sealed(raw: bytes) -> bytes:
 
 
 def _seal_at(raw: bytes | memoryview, frame: Frame) -> int:
-    """Where the digest stands in the file."""
+    """Where the digest is in the file."""
     digest, end = frame.metadata[SEAL], bytes(raw[frame.start :])
     at = end.rfind(digest.encode())
     if at < 0 or len(digest) != len(UNSEALED[SEAL]):
@@ -164,7 +164,7 @@ def _check_chunk(raw: bytes | memoryview, body: int, about: Struct, n_rows: int 
         raise DamagedFrame("a column has another number of values than rows")
     at = min(_count(about, field) for field in (9, 11) if field in about or field == 9)
     if not 4 <= at <= at + size <= body:
-        raise DamagedFrame("a column lies outside of the file")
+        raise DamagedFrame("a column is outside of the file")
     n_left = n_values
     while n_left > 0:
         reader = _Reader(raw, at, min(body, at + _MOST_HEADER_BYTES))

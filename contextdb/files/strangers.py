@@ -1,4 +1,4 @@
-"""What stands in the way before a CSV can be read at all: other kinds of file, other encodings, other delimiters.
+"""What is in the way before a CSV can be read at all: other kinds of file, other encodings, other delimiters.
 
 Each is told by its bytes and named, so that nobody has to guess from a hundred strange rows what has happened to the file.
 """
@@ -89,8 +89,8 @@ def _binary(raw: bytes) -> Fault | None:
         return None
     kind = seems_to_be(raw)
     if kind:
-        return Fault(f"this is no text: it seems to be {kind}.", "CSV text in UTF-8", _way_out(kind))
-    found = f"this is no text: it holds {plural(raw.count(0), 'NUL byte')}, the first on this line."
+        return Fault(f"not a text file: looks like {kind}.", "CSV text in UTF-8", _way_out(kind))
+    found = f"not a text file: it contains {plural(raw.count(0), 'NUL byte')}, the first on this line."
     return Fault(found, "CSV text in UTF-8", place=Place(line=line_of(raw, nul)))
 
 
@@ -114,7 +114,7 @@ def _not_utf8(raw: bytes) -> Fault | None:
     except UnicodeDecodeError as error:
         kind = seems_to_be(raw)
         if kind:
-            return Fault(f"this is no text: it seems to be {kind}.", "CSV text in UTF-8", _way_out(kind))
+            return Fault(f"not a text file: looks like {kind}.", "CSV text in UTF-8", _way_out(kind))
         byte = raw[error.start : error.start + 1]
         read = byte.decode("cp1252", "ignore")
         hint = f" (in Windows-1252 it would be {in_quotes(read)})" if read else ""

@@ -38,7 +38,7 @@ def read_texts(path: str | Path) -> tuple[AnySource, list[TextColumn]]:
     FileError
         There is no such file, it may not be read, or its suffix is another.
     TableError
-        The file is no table, with every fault in it.
+        The file is not a table, with every fault in it.
     """
     raw = read_bytes(path)
     return read_parquet(raw, str(path)) if _suffix(path) == ".parquet" else read_csv(raw, str(path))
@@ -91,7 +91,7 @@ def write_texts(
     path : str or Path
         A .csv or .parquet file, there already or not.
     columns, source, origin, field_of
-        As in `contextdb.files.csv_rewrite.rewritten`. When the source has the other format, the file is written afresh.
+        As in `contextdb.files.csv_rewrite.rewritten`. When the source has the other format, the file is written from scratch.
 
     Raises
     ------

@@ -47,7 +47,7 @@ def numbers_of(values: object, what: str) -> Floats:
 
 
 def flags_of(values: object, n_wanted: int, what: str, of: str) -> Flags:
-    """A bool array of one length; numbers are refused, for they may be meant as indices."""
+    """A bool array of one length; numbers are refused, for they possible as indices."""
     accepted = f"{'Matches, or ' if what == 'valid' else ''}one bool for each of {plural(n_wanted, of)}"
     try:
         array = np.asarray(values)

@@ -70,7 +70,7 @@ class Section:
             return None
         known = tuple(number for number in found if number is not None)
         if any(abs(number) > most for number in known) or len(set(known)) < len(known):
-            self.wrong(key, "a number is out of range or stands twice", accepted)
+            self.wrong(key, "a number is out of range or appears twice", accepted)
             return None
         return known
 
@@ -94,7 +94,7 @@ class Section:
 
 
 def as_number(value: object) -> float | None:
-    """A finite float, or None for anything else; True is no number."""
+    """A finite float, or None for anything else; True is not a number."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         return None
     try:

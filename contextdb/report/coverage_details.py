@@ -69,11 +69,11 @@ def _row_lines(measured: Measured, row: int, width: int) -> Iterator[str]:
             yield printable(f"  {measured.named(cause)}, valid in {share_text}")
     if not found:
         yield ""
-        sure = "" if report.findings_complete else ", as far as the work allowed to tell"
+        sure = "" if report.findings_complete else ", as far as the work limit allowed"
         yield f"Nothing is wrong with it: no other rows are valid wherever it is{sure}."
     needed_by = [f for f in findings if row in f.by]
     if needed_by:
         yield ""
-        yield f"It is among what makes {plural(len(needed_by), 'row')} needless:"
+        yield f"It is one of the rows that make {plural(len(needed_by), 'row')} redundant:"
         for finding in needed_by[:10]:
             yield printable(f"  {measured.named(finding.row or 0)}: {finding.rule}")

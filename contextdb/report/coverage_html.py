@@ -1,6 +1,6 @@
 """Coverage as one HTML page that needs no network: every text of a table is escaped, and nothing of it can become markup or script.
 
-What stands in the page is complete without its script, which only sorts tables and opens the squares of the map.
+What is in the page is complete without its script, which only sorts tables and opens the squares of the map.
 """
 
 from __future__ import annotations
@@ -85,6 +85,8 @@ def _section(measured: Measured, number: int) -> str:
     parts += [*_change(measured), *_telemetry(measured), *_gaps(measured)]
     if measured.pairs is not None:
         parts.append(heat_map(measured.pairs, number))
+    elif measured.left_out:
+        parts.append(_paragraph(measured.left_out, "muted"))
     parts += [*_overlap(measured), *_findings(measured), *_rows(measured)]
     return f"<article>\n{''.join(parts)}</article>\n"
 

@@ -36,7 +36,7 @@ def _suite(measured: Measured) -> ET.Element:
 
 
 def _gone_suite(table: str, gate: Gate) -> ET.Element:
-    """A table of the baseline that is not there any more: one case."""
+    """A table of the baseline that no longer exist: one case."""
     label = printable(table)
     suite = ET.Element("testsuite", name=label)
     _told(_case(suite, label, gate.name, None), gate, "")

@@ -127,6 +127,8 @@ def _gaps(measured: Measured, most: int) -> Iterator[str]:
 
 
 def _pairs(measured: Measured, most: int) -> Iterator[str]:
+    if measured.left_out:
+        yield measured.left_out
     worst = measured.worst_pairs(most)
     if worst:
         yield "| pair covered least | covered | of the contexts |\n| --- | --- | --- |"

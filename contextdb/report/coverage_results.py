@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
 from contextdb.covering.baseline import Change, digest_of
+from contextdb.covering.pairs import MOST_CONDITIONS
 from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.findings import Finding
@@ -51,7 +52,7 @@ class Measured:
     telemetry: Observed | None = None
     gates: tuple[Gate, ...] = ()
     inside: Mapping[int, str] = field(default_factory=dict)
-    """For the rows of inner tables that stand in other files: the file, from the folder of the table."""
+    """For the rows of inner tables that are in other files: the file, from the folder of the table."""
 
     @property
     def summary(self) -> TableSummary:
@@ -69,6 +70,14 @@ class Measured:
         """The gaps of the recording that are not in the list of gaps."""
         listed = {gap.id for gap in self.report.gaps}
         return () if self.telemetry is None else tuple(gap for gap in self.telemetry.gaps if gap.id not in listed)
+
+    @property
+    def left_out(self) -> str:
+        """What was not measured as the table is too large for it, as a sentence; "" where nothing was left out."""
+        if self.pairs is not None or self.report.n_conditions <= MOST_CONDITIONS:
+            return ""
+        n_conditions = plural(self.report.n_conditions, "condition")
+        return f"Pairs of conditions are not compared: the table has {n_conditions}, and at most {MOST_CONDITIONS} are."
 
     def worst_pairs(self, most: int) -> list[Slice]:
         """Of each pair of conditions the combination that is covered least; the worst of these, the largest of equals first."""
@@ -98,7 +107,7 @@ class CoverageResults:
 
     tables: tuple[Measured, ...]
     gone: Mapping[str, Gate] = field(default_factory=dict)
-    """For each table of the baseline that is not there any more the bar that this misses, or keeps where it is intended."""
+    """For each table of the baseline that no longer exist the bar that this misses, or keeps where it is intended."""
 
     @property
     def passed(self) -> bool:
@@ -114,8 +123,8 @@ class CoverageResults:
         gates = self._gates()
         n_failed = sum(not gate.passed for gate in gates)
         if n_failed:
-            return f"{n_failed} of {plural(len(gates), 'bar')} missed."
-        return f"{plural(len(gates), 'bar')} kept." if gates else ""
+            return f"{n_failed} of {plural(len(gates), 'threshold')} missed."
+        return f"{plural(len(gates), 'threshold')} met." if gates else ""
 
     def to_json(self) -> dict[str, object]:
         """The JSON document."""
@@ -165,7 +174,7 @@ def max_drop(change: Change, limit: float) -> Gate:
 
 def table_gone(name: str, is_intended: bool, new: Sequence[str] = ()) -> Gate:
     """Require that a table of the baseline is still there; `new` are the tables that the baseline does not have."""
-    found = f"the table {in_quotes(name)} of the baseline is not there any more"
+    found = f"the table {in_quotes(name)} of the baseline no longer exists"
     renamed = f" New since the baseline: {some(new)}." if new else ""
     return _still_there(name, found, is_intended, renamed)
 
@@ -189,7 +198,7 @@ def fail_under_telemetry(telemetry: Observed, limit: float) -> Gate:
 def _bar(name: str, value: float, limit: float, said: str, rule: str) -> Gate:
     passed = reaches(value, limit)
     found, bar = told_apart(value, limit) if not passed else (format_percent(value), format_percent(limit))
-    message = f"{said.format(found)}, which {'reaches' if passed else 'is below'} the bar of {bar}."
+    message = f"{said.format(found)}, which {'reaches' if passed else 'is below'} the threshold of {bar}."
     return Gate(name, limit, value, passed, message, rule)
 
 

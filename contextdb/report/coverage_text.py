@@ -40,7 +40,7 @@ def render(results: CoverageResults, colour: bool = False, width: int = 100, sho
     tail = [line for gate in results.gone.values() for line in _gate(gate, colour, width)]
     tail += [styled(results.verdict, "green" if results.passed else "red", colour)] if results.verdict else []
     if not is_one and not shows_all:
-        tail.append("contextdb coverage TABLE tells more of one; --all tells all.")
+        tail.append("contextdb coverage TABLE shows more of one table; --all shows everything.")
     return "\n".join([*sections, *("".join(f"{line}\n" for line in [part]) for part in tail)])
 
 
@@ -106,12 +106,12 @@ def _gaps(measured: Measured, colour: bool, width: int, most: int) -> Iterator[s
             yield from hanging(" " * width_of(head), nearest_sentence(measured, gap), width)
     if len(shown) < len(report.gaps):
         yield from hanging(
-            INDENT, f"… and {len(report.gaps) - len(shown):,} more; --gap N tells all of one, --all lists them", width
+            INDENT, f"… and {len(report.gaps) - len(shown):,} more; --gap N shows one in full, --all lists them", width
         )
 
 
 def hanging(head: str, text: str, width: int) -> Iterator[str]:
-    """A text beside a head, wrapped in its own column; where that would be narrow, under it."""
+    """A text next to a head, wrapped in its own column; where that would be narrow, under it."""
     text, indent = printable(text), width_of(head)
     if width - indent < 30:
         yield head.rstrip()
@@ -130,6 +130,8 @@ def _overlap(measured: Measured, colour: bool, width: int) -> Iterator[str]:
 
 
 def _pairs(measured: Measured, colour: bool, width: int, most: int) -> Iterator[str]:
+    if measured.left_out:
+        yield from wrapped(measured.left_out, width)
     worst = measured.worst_pairs(most)
     if not worst:
         return

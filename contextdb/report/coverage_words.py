@@ -14,7 +14,7 @@ from contextdb.tables.variety import VARIETY
 from contextdb.telemetry.observed import FactNote, Observed
 
 MOST_TOLD = 8
-"""Conditions and assumptions that are told one by one."""
+"""Conditions and assumptions that are reported one by one."""
 MOST_COUNTS = 6
 """Numbers of rows that the histogram tells one by one."""
 
@@ -22,7 +22,7 @@ MOST_COUNTS = 6
 def assumed_sentences(report: CoverageReport) -> Iterator[str]:
     """What the share rests on."""
     if report.method == "bounds":
-        yield "The count was not finished and nothing was sampled, or samples told no more; --work and --samples allow more."
+        yield "The count was not finished and nothing was sampled, or samples did not help; --work and --samples allow more."
     if report.weighted:
         yield f"Weighed by the values of {', '.join(report.weighted)}; those of the others count the same."
     if report.assumptions:
@@ -51,7 +51,7 @@ def gaps_sentence(report: CoverageReport) -> str:
     if not report.gaps:
         if report.gaps_complete:
             return "No gap: every context has a valid row"
-        return "No gap was found; that there is none is not proved"
+        return "No gap was found, but it is not proved that there is none"
     listed = "all of them" if report.gaps_complete else "there are more"
     moments = [gap.telemetry or 0.0 for gap in report.gaps]
     is_by_moments = has_moments(report) and moments == sorted(moments, reverse=True)  # not where rules are part of the gaps
@@ -119,7 +119,7 @@ def facts_sentences(seen: Observed) -> Iterator[str]:
         if told:
             yield f"{word}: {_some(told, ', ')}"
     if seen.unknown_columns:
-        yield f"columns that the table does not ask for: {_some(seen.unknown_columns, ', ')}"
+        yield f"columns that the table does not use: {_some(seen.unknown_columns, ', ')}"
     if seen.unread:
         yield f"not read: {_some([file.file for file in seen.unread], ', ')}"
 

@@ -1,6 +1,6 @@
 """Findings as SARIF 2.1.0, for GitHub code scanning and for editors.
 
-Each rule that was broken is described with its cure; each finding stands at its file and line. Paths are relative to the source
+Each rule that was broken is described with its cure; each finding is at its file and line. Paths are relative to the source
 root (`%SRCROOT%`) unless they were given absolute. A fingerprint of what a finding is about, not of its line, follows it from run
 to run.
 

@@ -17,7 +17,7 @@ MOST_CLEAN = 8
 """Tables without a finding that are listed by name."""
 
 LEAST_ROOM = 40
-"""With fewer terminal cells beside its place, a message stands under it."""
+"""With fewer terminal cells next to its place, a message is under it."""
 
 STYLES: dict[Level, str] = {"error": "red", "warning": "yellow", "info": "cyan"}
 

@@ -36,7 +36,7 @@ class TableSummary:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """All that was found in one table, or in one file that is no table: contextdb.toml, or a file that could not be read."""
+    """All that was found in one table, or in one file that is not a table: contextdb.toml, or a file that could not be read."""
 
     label: str
     """The table's name, with its file where another table has the same name; the file where there is no name."""
@@ -85,7 +85,7 @@ class CheckReport:
 
 
 def place_of(finding: Finding) -> str:
-    """Where a finding stands, so that editors and terminals can open it: "tables/jog.csv:12", without a line only the file."""
+    """Where a finding is, so that editors and terminals can open it: "tables/jog.csv:12", without a line only the file."""
     if not finding.file:
         return ""
     return as_path(finding.file) if finding.line is None else f"{as_path(finding.file)}:{finding.line}"
@@ -127,7 +127,7 @@ def _group(table: TableSummary | None, findings: list[Finding]) -> Group:
 
 
 def _with_labels(groups: list[Group]) -> Iterator[Group]:
-    """The groups with different labels: with the file where a name stands twice, and a number where that does not help."""
+    """The groups with different labels: with the file where a name appears twice, and a number where that does not help."""
     times = Counter(group.label for group in groups)
     taken: set[str] = set()
     for group in groups:

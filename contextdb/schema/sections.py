@@ -19,7 +19,7 @@ Part = dict[str, object]
 """The keys of one named section, such as `[conditions.speed]`, and their values as TOML has them."""
 
 EDITED_SECTIONS = ("conditions", "blueprints", "selectors")
-"""The sections that edits may change, beside the settings of a table."""
+"""The sections that edits may change, next to the settings of a table."""
 
 
 def condition_to_dict(condition: Condition) -> Part:
@@ -61,16 +61,16 @@ def schema_to_dict(schema: Schema) -> dict[str, dict[str, Part]]:
 
 
 def differences(before: Mapping[str, object], after: Mapping[str, object]) -> dict[str, object]:
-    """What each key says anew; None where it says nothing any more."""
+    """The new value of each key; None where it is removed."""
     changed = {key: value for key, value in after.items() if key not in before or before[key] != value}
     return changed | {key: None for key in before if key not in after}
 
 
-# ---- what is said anew
+# ---- what changes
 
 
 def schema_with(schema: Schema, parts: Mapping[str, Mapping[str, Mapping[str, object] | None]]) -> Schema:
-    """The schema with some parts said anew, None taking one away.
+    """The schema with some parts changed; None removes one.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def schema_with(schema: Schema, parts: Mapping[str, Mapping[str, Mapping[str, ob
 
 
 def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSettings:
-    """The settings with some keys said anew, None taking one away.
+    """The settings with some keys changed; None removes one.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSett
 
 
 def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) -> Iterator[Fault]:
-    """Why a table of these columns cannot have these settings: a column that is not there, has two jobs, or is a condition."""
+    """Why a table of these columns cannot have these settings: a column that is missing, has two jobs, or is a condition."""
     jobs: dict[str, str] = {}
     known = frozenset(columns)
     named = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
@@ -135,7 +135,7 @@ def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) 
             yield Fault(f"{key} and {jobs[column]} both name the column {in_quotes(column)}.", "one job for a column")
         elif column in schema.conditions:
             found = f"{key} names {in_quotes(column)}, which contextdb.toml declares as a condition."
-            yield Fault(found, "a column that is no condition")
+            yield Fault(found, "a column that is not a condition")
         jobs.setdefault(column, key)
 
 
@@ -155,7 +155,7 @@ def _with(parts: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _names(blueprint: str, part: Any) -> tuple[str, ...]:
-    """The conditions of a blueprint: as they were, or checked where they are said anew."""
+    """The conditions of a blueprint: as they were, or checked where they change."""
     if isinstance(part, tuple):
         return part
     wrong = wrong_name(blueprint) or NAMES.wrong(part.get("conditions"))

@@ -34,7 +34,7 @@ _BOUNDED = ("int", "number")
 _EACH_ONCE = 'each name in one pair, such as { Left = "Right" }'
 _KINDS_WITH = {"min": _BOUNDED, "max": _BOUNDED, "values": ("enum", "tags")}
 _HAS_NO_PLACE = {
-    "angle": "an angle goes round, so it has no ends and no list",
+    "angle": "an angle wraps around, so it has no ends and no list",
     "bool": "a bool is True or False",
     "enum": "names have no order",
     "tags": "tags have no order",
@@ -46,7 +46,7 @@ _HAS_NO_PLACE = {
 
 @dataclass(frozen=True)
 class TableSettings:
-    """What `[tables.NAME]` says: the table's file, and which of its columns are no conditions."""
+    """What `[tables.NAME]` says: the table's file, and which of its columns are not conditions."""
 
     name: str
     file: str | None = None
@@ -150,7 +150,7 @@ def read_schema(text: str, file: str) -> Schema:
 def conditions_from_dict(mapping: Mapping[str, Mapping[str, object]]) -> dict[str, Condition]:
     """Conditions from what `[conditions.NAME]` of contextdb.toml would hold: `{"speed": {"type": "number"}}`.
 
-    What an `expr` says is not looked at: it may name conditions that stand elsewhere.
+    What an `expr` says is not looked at: it may name conditions that are elsewhere.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def _no_section(name: str, section: object) -> Fault:
     near = nearest(name, SECTIONS)
     inner = next(iter(section), None) if isinstance(section, dict) and near != "project" else None
     mend = _header((near, inner) if inner else (near,)) if near else ""
-    return Fault(f"{in_quotes(name)} is no section.", ", ".join(_HEADERS.values()), mend)
+    return Fault(f"{in_quotes(name)} is not a section.", ", ".join(_HEADERS.values()), mend)
 
 
 def _section_faults(name: str, section: object) -> Iterator[Found]:
@@ -334,7 +334,7 @@ def _unknown_partners(mirror: Mapping[str, str], kind: str, values: Sequence[str
     for value in values if kind == "tags" and not unknown else ():
         image = swapped_tag(value, tuple(mirror.items()))
         if not covers(image, known):
-            found = f"{in_quotes(value)} changes places with {in_quotes(image)}, which is no declared value."
+            found = f"{in_quotes(value)} is exchanged with {in_quotes(image)}, which is not a declared value."
             yield Fault(found, "values that hold both", f"to add {in_quotes(image)} to the values")
 
 
@@ -349,7 +349,7 @@ def _column_faults(path: Path, table: Section, conditions: Set[str]) -> Iterator
         if column in conditions:
             found = f"{_header(path)} {key} names {in_quotes(column)}, which is declared as a condition."
             mend = f"to leave out {_header(('conditions', column))}"
-            yield (*path, key), Fault(found, "a column that is no condition", mend)
+            yield (*path, key), Fault(found, "a column that is not a condition", mend)
 
 
 def _file_faults(tables: Mapping[str, Section]) -> Iterator[Found]:
@@ -364,7 +364,7 @@ def _file_faults(tables: Mapping[str, Section]) -> Iterator[Found]:
             continue
         standing = {alike(one) for one in TableSettings(name, file).files}
         if shared := next((one for one in sorted(standing) if one in owners), None):
-            found = f"{_header(path)} stands in {in_quotes(shared)}, as {_header(('tables', owners[shared]))} does."
+            found = f"{_header(path)} uses the file {in_quotes(shared)}, as {_header(('tables', owners[shared]))} does."
             yield (*path, "file"), Fault(found, "one file for each table")
         owners |= dict.fromkeys(standing - owners.keys(), name)
 

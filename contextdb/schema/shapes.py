@@ -60,7 +60,7 @@ class Shape:
 
 
 def as_toml(value: object) -> str:
-    """A value as contextdb.toml writes it; what stands inside tables and inner lists is left out."""
+    """A value as contextdb.toml writes it; what is inside tables and inner lists is left out."""
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join("[…]" if isinstance(v, (list, tuple)) else as_toml(v) for v in value) + "]"
     if isinstance(value, Mapping):
@@ -80,7 +80,7 @@ def wrong_name(value: object) -> str | None:
     """What is wrong with a name: of a condition, a table, a column, a value."""
     if not isinstance(value, str) or not value.strip():
         return _wrong_text(value) or "this is empty"
-    return None if value == value.strip() else "a space stands before or after it"
+    return None if value == value.strip() else "a space is before or after it"
 
 
 def _wrong_text(value: object) -> str | None:
@@ -107,7 +107,7 @@ def _wrong_list(value: object) -> str | None:
         if wrong := wrong_name(name):
             return f"entry {i + 1} cannot be used: {wrong}"
         if name in seen:
-            return f"{in_quotes(name)} stands twice"
+            return f"{in_quotes(name)} appears twice"
         seen.add(name)
     return None
 

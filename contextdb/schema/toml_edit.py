@@ -2,7 +2,7 @@
 
 A text that reads is cut into its statements: section headers and `key = value`. A key is found under whichever form it is written
 in: `[tables.a]` and `policy = …`, dotted (`tables.a.policy = …`), or in an inline table. Changing one replaces its value alone; a
-new one stands behind the last key of its section, a new section behind another one. `contextdb.schema.toml_values` writes the
+new one is behind the last key of its section, a new section behind another one. `contextdb.schema.toml_values` writes the
 values. Nothing here reads a file; whether the text then says what it should is for the caller to check.
 """
 
@@ -20,7 +20,7 @@ from contextdb.schema.toml_values import TOKEN, Path, as_toml, dotted, end_of_li
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A section header or `key = value`: its whole path, that of the section it stands in, and where it stands in the text."""
+    """A section header or `key = value`: its whole path, that of the section it is in, and where it is in the text."""
 
     path: Path
     section: Path
@@ -40,7 +40,7 @@ def statements(text: str) -> list[Statement]:
 
 
 def set_key(text: str, path: Path, value: object, behind: Sequence[Path] = ()) -> str:
-    """The text with a key set. A section that is not there yet is put behind the last of those of `behind`, else at the end."""
+    """The text with a key set. A section that is missing yet is put behind the last of those of `behind`, else at the end."""
     found = statements(text)
     for one in found:
         if one.value and one.path == path[: len(one.path)]:
@@ -70,7 +70,7 @@ def add_sections(text: str, sections: Mapping[Path, Mapping[str, object]], behin
 
 
 def absent(text: str, paths: Sequence[Path]) -> list[Path]:
-    """Those of some sections of which nothing stands in the text, in whichever form."""
+    """Those of some sections of which nothing is in the text, in whichever form."""
     found = statements(text)
     said = {one.path[:depth] for one in found for depth in range(1, len(one.path) + 1)}
     whole = {one.path for one in found if one.value}
@@ -99,7 +99,7 @@ def drop_empty_section(text: str, path: Path) -> str:
 
 
 def has_comment(text: str, path: Path) -> bool:
-    """Whether a comment stands behind a key, on its line."""
+    """Whether a comment is behind a key, on its line."""
     return any(one.path == path and text[one.span[1] : one.stop].strip() for one in statements(text))
 
 
@@ -183,7 +183,7 @@ def _inserted(text: str, at: int, lines: Sequence[str]) -> str:
 
 
 def _without(text: str, gone: Sequence[Statement]) -> str:
-    """The text without some statements; with a section goes what stands between its lines, and one blank line before it."""
+    """The text without some statements; with a section goes what is between its lines, and one blank line before it."""
     for start, stop in reversed(list(_spans(text, gone))):
         before, after = text[:start], text[stop:]
         if not after and not text.endswith("\n"):

@@ -1,7 +1,7 @@
-"""TOML with the lines kept: which line a key stands on, and which line cannot be read.
+"""TOML with the lines kept: which line a key is on, and which line cannot be read.
 
-`tomllib` gives the values of a document but not where they stand. So a document that reads is walked once more, statement by
-statement (`contextdb.schema.toml_edit`), when a fault in it has to be placed. Keys of inline tables are not followed: they stand on
+`tomllib` gives the values of a document but not where they are. So a document that reads is walked once more, statement by
+statement (`contextdb.schema.toml_edit`), when a fault in it has to be placed. Keys of inline tables are not followed: they are on
 the line of their statement.
 """
 
@@ -55,13 +55,13 @@ def read_toml(text: str, file: str) -> dict[str, object]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise SchemaError(Fault("lists stand in lists too deep to be read.", "lists of names", place=Place(file))) from None
+        raise SchemaError(Fault("lists are nested too deeply to be read.", "lists of names", place=Place(file))) from None
     except ValueError as error:  # TOMLDecodeError, and a whole number of too many digits
         raise SchemaError(_syntax_fault(str(error), text, file)) from None
 
 
 def _require_short_keys(text: str, file: str) -> None:
-    """Refuse a key of very many parts; what stands in strings and comments does not count."""
+    """Refuse a key of very many parts; what is in strings and comments does not count."""
     if text.count(".") <= MOST_PARTS:
         return
     line = 1
@@ -101,7 +101,7 @@ def _syntax_fault(error: str, text: str, file: str) -> Fault:
     number = int(found[2]) if found[2] else text.rstrip().count("\n") + 1
     line, place = text.split("\n")[number - 1].strip(), Place(file, number)
     if _TWICE.fullmatch(found[1]):
-        return Fault(f"{in_quotes(line)} stands twice.", "each section once, and each key once in it", place=place)
+        return Fault(f"{in_quotes(line)} appears twice.", "each section once, and each key once in it", place=place)
     character = f"at character {found[3]}" if found[2] else "the file ends here"
     why = f"{found[1][:1].lower()}{found[1][1:]}, {character}"
     return Fault(f"cannot read {in_quotes(line)} as TOML: {why}.", _ACCEPTED, _line_mend(line[:1000]), place)

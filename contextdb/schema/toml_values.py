@@ -46,7 +46,7 @@ def end_of_line(text: str) -> str:
 
 
 def merged(old: str, keys: Path, value: object) -> str:
-    """The text of a value set anew, or of an inline table with a key of it set, or with None taken away."""
+    """The text of a new value, or of an inline table with a key of it set, or with None removed."""
     if keys:
         return _inline(old, keys, value)
     if isinstance(value, (list, tuple)) and old.startswith("["):
@@ -86,7 +86,7 @@ class _Item:
 
 
 def _list(old: str, values: Sequence[object]) -> str:
-    """The text of a list set anew; items that stay keep their text and their comments."""
+    """The text of a new list; items that stay keep their text and their comments."""
     items, below = _items(old)
     if not items:
         return as_toml(values)

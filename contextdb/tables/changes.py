@@ -119,7 +119,7 @@ class Columns:
 
 @dataclass(frozen=True)
 class Sections:
-    """What contextdb.toml says anew, as plain data in its own form; what is not named stays.
+    """What changes in contextdb.toml, as plain data in its own form; what is not named stays.
 
     It becomes part of the file when the table is saved: see `contextdb.edits.schema_file`.
     """
@@ -139,7 +139,7 @@ class Sections:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is said anew."""
+        """Whether nothing changes."""
         return not self.settings and not any(self.parts.values())
 
     def apply(self, table: AnyTable) -> AnyTable:

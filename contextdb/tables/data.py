@@ -1,12 +1,13 @@
 """What a table is: assets (rows) against conditions (columns), as texts and as the cells they mean.
 
 It is never changed: an edit gives a new one that shares every column it did not touch, and with it whatever was already
-worked out for that column (its cells, its masks). Texts that cannot be read stay as they are and stand in `faults`; only
+worked out for that column (its cells, its masks). Texts that cannot be read stay as they are and are in `faults`; only
 `compile` insists on none. Nothing here touches the disk.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -53,7 +54,7 @@ class TableData(Unchanging):
     origin: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     """Which record of the source each row came from; -1 for a new row."""
     around: Mapping[str, TableData] | None = field(default=None, repr=False)
-    """The tables of its folder by name, for rows that stand for another table; None where they are not known."""
+    """The tables of its folder by name, for rows that refer to another table; None where they are not known."""
 
     @classmethod
     def build(
@@ -65,7 +66,7 @@ class TableData(Unchanging):
         path: Path | None = None,
         source: AnySource | None = None,
     ) -> Self:
-        """A table of texts under a schema; cells that cannot be read are kept and stand in its `faults`.
+        """A table of texts under a schema; cells that cannot be read are kept and are in its `faults`.
 
         Raises
         ------
@@ -83,7 +84,7 @@ class TableData(Unchanging):
 
     @property
     def n_rows(self) -> int:
-        """How many rows the table has."""
+        """The number of rows."""
         return self.columns[0].n_rows if self.columns else 0
 
     def __len__(self) -> int:
@@ -112,11 +113,11 @@ class TableData(Unchanging):
         raise TableError(_no_such("condition", name, [c.condition.name for c in self.conditions]))
 
     def text(self, row: int, column: str) -> str:
-        """The text of one cell; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        """The text of one cell; raises NoSuchPlace, also an IndexError, for a row that the table does not have."""
         return self.text_column(column)[require_row(row, self.n_rows)]
 
     def place(self, row: int, column: str | None = None) -> Place:
-        """Where a row stands: its file and line where it has one, else its number."""
+        """Where a row is: its file and line where it has one, else its number."""
         row = require_whole(row, "row")
         file = str(self.path) if self.path else None
         record = int(self.origin[row]) if self.source is not None and row < len(self.origin) else -1
@@ -154,7 +155,7 @@ class TableData(Unchanging):
         accepted = "a row, a column and a text for each cell"
         for edit in require_many(edits, "edits", accepted):
             if not isinstance(edit, (tuple, list)) or len(edit) != 3:
-                raise ContextError(Fault("edits hold what is no edit.", accepted))
+                raise ContextError(Fault("edits contain something that is not an edit.", accepted))
             row, name, text = require_whole(edit[0], "row"), edit[1], require_text(edit[2], "text")
             at = self._column_at(name)
             if not 0 <= row < self.n_rows:
@@ -247,8 +248,8 @@ def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, pat
     names = [c.name for c in columns]
     place = Place(str(path) if path else None)
     faults = [
-        Fault(f"the column name {in_quotes(n)} stands twice.", "each name once", place=place)
-        for n in sorted({n for n in names if names.count(n) > 1})
+        Fault(f"the column name {in_quotes(n)} appears twice.", "each name once", place=place)
+        for n in sorted(n for n, count in Counter(names).items() if count > 1)
     ]
     wanted = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
     for key, name in [*wanted, *(("outputs", n) for n in settings.outputs)]:

@@ -1,4 +1,4 @@
-"""The columns of a table that are no conditions but mean something to it: enabled, priority, weight."""
+"""The columns of a table that are not conditions but mean something to it: enabled, priority, weight."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class Project(Unchanging, ByName[Table]):
         return project
 
     def __getitem__(self, name: str) -> Table:
-        """One table by its name; a name that is not there raises NoSuchTable, which is a KeyError too, and names the nearest."""
+        """One table by its name; a name that is missing raises NoSuchTable, which is a KeyError too, and names the nearest."""
         if name not in self.tables:
             near = nearest(str(name), self.tables)
             found = f"there is no table {in_quotes(str(name))}."
@@ -96,17 +96,17 @@ class Project(Unchanging, ByName[Table]):
         return len(self.tables)
 
     def with_table(self, table: Table) -> Project:
-        """The project with one table in another version, for those too whose rows stand for it."""
+        """The project with one table in another version, for those too whose rows refer to it."""
         require_kind(table, Table, "table", "a Table")
         return replace(self, tables=around_each_other({**self.tables, table.name: table}))
 
     @property
     def inner(self) -> set[str]:
-        """The names of the tables that rows of other tables stand for."""
+        """The names of the tables that rows of other tables refer to."""
         return inner_tables(self.tables.values()) & set(self.tables)
 
     def require_sound(self) -> None:
-        """Raise TableError with what is wrong with rows that stand for tables."""
+        """Raise TableError with what is wrong with rows that refer to tables."""
         faults: dict[Fault, None] = {}
         for table in self.tables.values():
             if is_nested(table):
@@ -141,7 +141,7 @@ def load(path: str | Path, strict: bool = True) -> Table:
 
 
 def load_table(path: Path, strict: bool = True) -> Table:
-    """Read one table under the contextdb.toml beside it, or above it where that one declares the file."""
+    """Read one table under the contextdb.toml next to it, or above it where that one declares the file."""
     folder, schema = schema_for(path)
     around = Neighbours(_Folder(folder, schema))
     table = _read_table(path, schema, folder, strict, around)
@@ -151,7 +151,7 @@ def load_table(path: Path, strict: bool = True) -> Table:
 
 
 def neighbours(path: Path) -> Neighbours[Table]:
-    """The tables that the rows of a table file may stand for: those of its folder, each read when it is first asked for."""
+    """The tables that the rows of a table file may refer to: those of its folder, each read when it is first asked for."""
     return Neighbours(_Folder(*schema_for(path)))
 
 
@@ -234,7 +234,7 @@ def table_files(folder: Path, schema: Schema) -> Iterator[tuple[str, Path]]:
 
 
 def stray_files(folder: Path, schema: Schema) -> Iterator[tuple[Path, str]]:
-    """The files that lie beside the tables and look like something else, each with a sentence that says so."""
+    """The files that lie next to the tables and look like something else, each with a sentence that says so."""
     for path in _undeclared_files(folder, list(_declared_files(folder, schema))):
         form = other_form(path, schema.conditions)
         if form is not None:
@@ -254,7 +254,7 @@ def _undeclared_files(folder: Path, declared: Iterable[tuple[str, Path]]) -> Ite
 
 
 def _on_disk(path: Path, names: dict[Path, list[str]]) -> Path | None:
-    """A file as its folder spells it: in another Unicode form perhaps, on some disks in other capitals; None where it is not there.
+    """A file as its folder spells it: in another Unicode form perhaps, on some disks in other capitals; None where it is missing.
     `names` are those of folders that were listed already."""
     if path.parent not in names:
         names[path.parent] = _names_in(path.parent)
@@ -297,7 +297,7 @@ def twice_named(found: Iterable[tuple[str, Path]]) -> list[Fault]:
     faults = []
     for name, path in found:
         if first.setdefault(name, path) != path:
-            stands = f"the table {in_quotes(name)} stands in {path_in_quotes(first[name])} too."
+            stands = f"table {in_quotes(name)} is also defined in {path_in_quotes(first[name])}."
             faults.append(Fault(stands, "one file for each table", place=Place(str(path))))
     return faults
 
@@ -313,7 +313,7 @@ def folder_of(path: Path) -> Path:
     if path.name == SCHEMA_FILE and os.path.isfile(path):
         return path.parent
     noun = "file" if path.name == SCHEMA_FILE else "folder"
-    found = "it is no folder." if os.path.exists(path) else f"there is no such {noun}."
+    found = "not a folder." if os.path.exists(path) else f"there is no such {noun}."
     siblings = [p.name for p in path.parent.iterdir() if p.is_dir()] if os.path.isdir(path.parent) else []
     near = nearest(path.name, siblings)
     mend = path_in_quotes(path.parent / near) if near else ""

@@ -36,9 +36,9 @@ def save_table(table: AnyTable, target: Path, overwrite: bool) -> AnyTable:
 
 
 def require_related(base: TableData, on_disk: TableData, mend: str) -> None:
-    """Raise TableError when what stands in a file has no row in common with the table that was read from it."""
+    """Raise TableError when what is in a file has no row in common with the table that was read from it."""
     if base.n_rows and not (align(base, on_disk).rows >= 0).any():
-        said = "what stands in the file now has no row in common with the table that was read from it."
+        said = "the file now has no row in common with the table that was read from it."
         accepted = "the table as it was, with changes"
         raise TableError(Fault(said, accepted, mend, Place(str(on_disk.path)), "merge-conflict"))
 
@@ -57,7 +57,7 @@ def _joined(table: AnyTable, file: Path, there: bytes) -> AnyTable:
     Raises
     ------
     FileError
-        Both changed a cell otherwise, or the file is no table any more.
+        Both changed a cell otherwise, or the file is not a table any more.
     """
     assert table.source is not None
     if there == table.source.raw:
@@ -74,7 +74,7 @@ def _joined(table: AnyTable, file: Path, there: bytes) -> AnyTable:
     if found.conflicts:
         n = len(found.conflicts)
         named = "; ".join(map(_told, found.conflicts[:MOST_NAMED])) + (f"; and {n - MOST_NAMED:,} more" if n > MOST_NAMED else "")
-        said = f"the file has been changed since it was read, in {plural(n, 'place')} otherwise than here: {named}."
+        said = f"the file has been changed since it was read, in {plural(n, 'place')} differently than here: {named}."
         raise FileError(Fault(said, mend=mend, place=place, rule="merge-conflict"))
     now = found.edit_of_theirs().apply(theirs)
     return replace(now, name=table.name, schema=table.schema, around=table.around)

@@ -1,8 +1,8 @@
 """Variety: rows of different assets that are valid in the same contexts, where the table's policy wants a choice.
 
-A policy "first" or "unique" lets one row play: a row that others make needless is a slip there, and each has its warning. Under
+A policy "first" or "unique" lets one row play: a row that others make redundant is a slip there, and each has its warning. Under
 any other policy several valid rows are what the game chooses from. Such rows are gathered: one finding `variety` for each group,
-whose `row` and `by` are the rows of the group. A row that another row *of the same asset* makes needless adds no choice and keeps
+whose `row` and `by` are the rows of the group. A row that another row *of the same asset* makes redundant adds no choice and keeps
 its warning.
 """
 
@@ -19,7 +19,7 @@ VARIETY = "variety"
 ONE_CHOICE = ("first", "unique")
 """The policies under which one row at most may play."""
 NEEDLESS = ("identical-rows", "equal-row", "subsumed-row", "redundant-row")
-"""The rules that tell of a row which others make needless."""
+"""The rules that tell of a row which others make redundant."""
 MOST_NAMED = 3
 
 Named = Callable[[int, int], str]
@@ -42,7 +42,7 @@ def gathered(findings: Sequence[Finding], assets: Sequence[str], at: PlaceOf, na
     """The findings, those of variety in one for each group of rows.
 
     Rows that are valid in the same contexts are a group; rows within one row and that row are another; rows that several others
-    make needless are the last. What one row holds, a row that holds this row holds too, so a group stands at the outermost.
+    make redundant are the last. What one row holds, a row that holds this row holds too, so a group is at the outermost.
     """
     told: list[Finding] = []
     same: dict[int, list[int]] = {}
@@ -72,7 +72,7 @@ def needless(findings: Iterable[Finding], assets: Sequence[str]) -> list[Finding
 
 
 def _is_variety(finding: Finding, assets: Sequence[str]) -> bool:
-    """Whether a finding says that rows of other assets make a row needless."""
+    """Whether a finding says that rows of other assets make a row redundant."""
     return finding.rule in NEEDLESS and any(assets[row] != finding.asset for row in finding.by)
 
 
@@ -108,7 +108,7 @@ def _by_many(rows: list[int], named: Named) -> Iterator[Sentence]:
 
 
 def _rows(others: list[int], row: int, named: Named) -> str:
-    """The rows of a group beside one of it: the first by their names, and how many there are."""
+    """The rows of a group next to one of it: the first by their names, and how many there are."""
     names = [named(other, row) for other in others[:MOST_NAMED]]
     if len(others) == 1:
         return names[0]

@@ -64,7 +64,7 @@ def context_files(pattern: str) -> list[Path]:
 
 
 def _near(path: Path) -> str:
-    """What may have been meant by a name that is no file's: the files of a folder, or a file of nearly that name."""
+    """What may have been meant by a name that is not a file's: the files of a folder, or a file of nearly that name."""
     if os.path.isdir(path):
         suffixes = {file.suffix for file in path.iterdir()}
         return next((path_in_quotes(path / f"*{suffix}") for suffix in (".parquet", ".csv") if suffix in suffixes), "")
@@ -78,7 +78,7 @@ def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
     Raises
     ------
     TableError, ContextError, FileError
-        The file cannot be read, or holds facts that the table cannot be asked with; file, line and fact are named.
+        The file cannot be read, or holds facts that the table cannot use; file, line and fact are named.
     """
     if path.suffix.lower() == ".parquet":
         return Contexts(path, _read_parquet(path, compiled))

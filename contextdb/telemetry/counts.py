@@ -37,7 +37,7 @@ def moments_of(count: str | None, names: tuple[str, ...], chunk: Chunk, file: st
     if not is_number or not right.all():
         at = 0 if not is_number else int(np.flatnonzero(~right.to_numpy())[0])
         value = given[at]
-        said = "is missing" if value is None else f"{in_quotes(str(value))} is no count"
+        said = "is missing" if value is None else f"{in_quotes(str(value))} is not a count"
         place = Place(file, chunk.line(at), count, chunk.first_row + at)
         raise TableError(Fault(f"the count {said}.", f"a whole number from 0 to {MOST_COUNT:,}", place=place))
     return numbers.cast(pl.Int64).to_numpy()

@@ -18,13 +18,13 @@ from contextdb.errors import ContextDBError, Fault, plural
 Engine = Literal["local", "dask"]
 ENGINES: tuple[Engine, ...] = ("local", "dask")
 RETRIES = 3
-"""How often a file is tried anew when it is lost for another reason than a dead worker."""
+"""How often a file is tried again when it is lost for another reason than a dead worker."""
 What = TypeVar("What")
 Result = TypeVar("Result")
 
 
 class EngineError(ContextDBError):
-    """Dask is not there, cannot be reached, or did not finish some files."""
+    """Dask is missing, cannot be reached, or did not finish some files."""
 
 
 def with_dask(
@@ -79,7 +79,7 @@ def _unfinished(lost: dict[Path, str], mend: str) -> EngineError:
 def _client(distributed: Any, scheduler: str | None) -> Any:
     try:
         if scheduler is None:
-            quiet = logging.CRITICAL  # what is lost is told at the end, by its name
+            quiet = logging.CRITICAL  # what is lost is reported at the end, by its name
             return distributed.Client(processes=True, threads_per_worker=1, dashboard_address=None, silence_logs=quiet)
         return distributed.Client(scheduler, timeout="10s")
     except KeyboardInterrupt:

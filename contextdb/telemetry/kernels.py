@@ -1,7 +1,7 @@
 """Numba kernels of telemetry: contexts as packed keys, the distinct ones of many, and sums over their valid rows. Arrays only.
 
 N contexts, P fields each, K words a key, W words a mask. A field is a few bits of one word of the key. `contextdb.telemetry.keys`
-does the same with numpy where numba is not there.
+does the same with numpy where numba is missing.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Contexts as keys: which are the same, how many there are, and a sample of them that can be summed over files.
 
 N contexts, K words a key. The smallest hashes seen are a uniform sample of the distinct contexts that is the same in
-whichever order files come; as long as it is not full it is all of them. Where numba is not there numpy does the same, slower.
+whichever order files come; as long as it is not full it is all of them. Where numba is missing numpy does the same, slower.
 
 Source: Bar-Yossef et al., "Counting distinct elements in a data stream", RANDOM 2002 (the k-th smallest hash as an estimator).
 """

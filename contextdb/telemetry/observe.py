@@ -67,7 +67,7 @@ def observe(
     Returns
     -------
     Observed
-        The same for any engine, and for files in any order. Files that cannot be read stand in `unread`; nothing of such a file is
+        The same for any engine, and for files in any order. Files that cannot be read are in `unread`; nothing of such a file is
         counted.
 
     Raises

@@ -72,7 +72,7 @@ class BadFile:
 
 @dataclass(frozen=True)
 class Observed:
-    """Recorded moments held against a table.
+    """Recorded contexts evaluated against a table.
 
     A moment is a row of a file, or as many as the count column says. A missing fact, and one outside its domain, is accepted by no
     cell but Any; a number outside its bounds is compared as it is. Sums are exact.
@@ -86,7 +86,7 @@ class Observed:
     moments: int
     """Rows, each counted as often as its count column says."""
     distinct: int
-    """Contexts that the table tells apart."""
+    """Contexts that the table distinguishes."""
     distinct_is_exact: bool
     """False where there were too many to keep; `distinct` is then an estimate (standard error 0.4 %)."""
     uncovered: int

@@ -32,7 +32,7 @@ class Plan:
     compiled: CompiledTable
     count: str | None
     tags: Mapping[str, tuple[TagFactor, ...]]
-    """For each condition of tags its factors; their classes stand behind the codes in a key."""
+    """For each condition of tags its factors; their classes are behind the codes in a key."""
 
     @cached_property
     def fields(self) -> Fields:

@@ -1,8 +1,8 @@
-"""Parts of an observation kept on disk, so that an interrupted run goes on where it stopped.
+"""Parts of an observation kept on disk, so that an interrupted run continues where it stopped.
 
 A folder holds one file for each telemetry file that was observed to its end: numpy arrays and a line of JSON, no pickle. It is
 written in one step. A part counts only for the same table, settings and version, and for a file of the same size and time;
-otherwise its file is read anew.
+otherwise its file is read again.
 """
 
 from __future__ import annotations

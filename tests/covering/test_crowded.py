@@ -6,7 +6,7 @@ import random
 
 import pytest
 from brute import Brute, random_boxes, random_table
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from strategies import examples
 
@@ -31,6 +31,7 @@ def test_the_fullest_contexts_of_a_small_table_are_found(seed):
 
 @examples(2)
 @given(SEEDS)
+@example(3544)  # a cell that excludes a conjunction of tags
 def test_all_rows_of_a_crowd_are_valid_in_each_of_its_contexts(seed):
     rng = random.Random(seed)
     table = random_table(rng, most_rows=12)

@@ -6,8 +6,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 from contextdb.covering.count import uncovered_share
 from contextdb.covering.factors import ValueFactor
@@ -40,7 +41,7 @@ def open_share(space: Space) -> float:
 WEIGHTS = st.tuples(*(st.lists(st.sampled_from([0.0, 1.0, 1.0, 2.0]), min_size=n, max_size=n).filter(any) for n in SIZES))
 
 
-@settings(max_examples=150, deadline=None)
+@examples(1.5)
 @given(boxes=MANY_BOXES, weights=WEIGHTS)
 def test_the_count_is_that_of_going_through_every_context(boxes, weights):
     space = space_of(boxes, list(weights))
@@ -50,7 +51,7 @@ def test_the_count_is_that_of_going_through_every_context(boxes, weights):
     assert (found.lower == 0.0) == (expected == 0.0)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(0.6)
 @given(boxes=MANY_BOXES, weights=WEIGHTS, work=st.integers(0, 3000))
 def test_a_count_that_is_cut_anywhere_gives_bounds_that_hold_the_share(boxes, weights, work):
     space = space_of(boxes, list(weights))
@@ -59,7 +60,7 @@ def test_a_count_that_is_cut_anywhere_gives_bounds_that_hold_the_share(boxes, we
     assert found == uncovered_share(space, space.boxes, work)
 
 
-@settings(max_examples=150, deadline=None)
+@examples(1.5)
 @given(boxes=MANY_BOXES, box=BOXES)
 def test_whether_boxes_hold_another_is_the_same_by_loops_and_by_search(boxes, box):
     by = (1 << len(boxes)) - 1
@@ -68,7 +69,7 @@ def test_whether_boxes_hold_another_is_the_same_by_loops_and_by_search(boxes, bo
     assert (is_held, is_certain) == (point is None, True)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(1)
 @given(boxes=MANY_BOXES)
 def test_the_first_holder_of_each_box_is_that_of_comparing_all_pairs(boxes):
     def first(i: int) -> int:

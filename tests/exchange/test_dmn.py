@@ -213,7 +213,7 @@ def test_what_cannot_be_said_in_dmn_is_listed_with_its_place():
 def test_an_entry_that_no_cell_can_say_is_told_and_becomes_no_other_meaning():
     reading = dishes(old="&lt;= 8", new="maximum(guests)")
     assert texts(reading)["guests"][0] == "= maximum(guests)"
-    assert 'rule 1, column "guests": "maximum(guests)" is no test that a cell or a rule can say' in told(reading)
+    assert 'rule 1, column "guests": "maximum(guests)" is not a test that a cell or a rule can express' in told(reading)
     table, _ = table_of(reading, propose(reading, EMPTY, TableSettings("dish")), EMPTY, TableSettings("dish"))
     assert [fault.place.row for fault in table.faults] == [0]
     reading = dishes(old='"Roast"</text>', new="price * 2</text>")
@@ -260,9 +260,9 @@ def test_bombs_and_external_entities_are_refused(start: str, encoding: str):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "no XML that can be read"),
-        ("<definitions>", "line 1: this is no XML that can be read"),
-        ("<html/>", "this is no DMN: its root is <html>"),
+        ("", "not readable XML"),
+        ("<definitions>", "line 1: this is not readable XML"),
+        ("<html/>", "this is not DMN: its root is <html>"),
         ("<definitions/>", "the file has no decision table"),
         ("<definitions><decision><decisionTable/></decision></definitions>", "has no output"),
         ("<a>" * 20_000 + "</a>" * 20_000, "its root is <a>"),

@@ -175,7 +175,7 @@ def test_every_cell_of_a_foreign_file_means_what_it_meant_or_is_listed(form: str
                 n_unread += 1
                 continue
             has_comma = isinstance(value, str) and "," in value
-            told = has_comma and (report.says("is taken as centre and tolerance") or report.says("decimal commas became points"))
+            told = has_comma and (report.says("is read as centre and tolerance") or report.says("decimal commas became points"))
             assert told or is_same(value, cell, domain.kind), (value, text, domain.kind)
         assert column.n_unreadable == n_unread
         assert n_unread == 0 or "cannot be read so" in column.why

@@ -59,10 +59,10 @@ def test_nan_is_empty_and_infinity_is_a_number():
     [
         ("", "the file is empty"),
         ("[1, 2]", "row 1 is a number, no object."),
-        ('[{"a": 1},\n {"a": }]', "line 2: this is no JSON: Expecting value at character 8."),
-        ('{"a": 1}\n{"a": \n', "line 2: this is no JSON"),
-        ('[{"a": 1, "a": 2}]', 'the key "a" stands twice in one object'),
-        ('[{"a": {"b": 1}, "a.b": 2}]', 'the key "a.b" stands twice in one row'),
+        ('[{"a": 1},\n {"a": }]', "line 2: this is not JSON: Expecting value at character 8."),
+        ('{"a": 1}\n{"a": \n', "line 2: this is not JSON"),
+        ('[{"a": 1, "a": 2}]', 'the key "a" appears twice in one object'),
+        ('[{"a": {"b": 1}, "a.b": 2}]', 'the key "a.b" appears twice in one row'),
         ('[{"a": [[1]]}]', '"a" holds a list with lists or objects in it'),
         ("[" * 100_000, "too deep"),
         ('"text"', "the document is text without one list of rows"),
@@ -92,7 +92,7 @@ def test_an_unreal_table_keeps_structs_as_text_and_says_so():
 
 def test_unreal_wants_each_asset_once():
     table = Table.from_columns({"Asset": ["jog", "jog"], "speed": ["5", "6"]})
-    with pytest.raises(TableError, match='row 2, column "Asset": the asset "jog" stands in row 1 too'):
+    with pytest.raises(TableError, match='row 2, column "Asset": the asset "jog" is also in row 1'):
         write(table, FORMATS["unreal-csv"])
 
 

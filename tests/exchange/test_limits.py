@@ -32,9 +32,9 @@ def refused(raw: bytes | str, name: str) -> str:
         ("x.json", f'[{{"a": "{LONG}"}}]', '"a" has 3,000,000 characters.'),
         ("x.jsonl", f'{{"a": "{LONG}"}}\n', '"a" has 3,000,000 characters.'),
         ("x.json", f'[{{"a": {"9" * 6000}}}]', "a number has too many digits."),
-        ("x.dmn", f"<definitions>{LONG}", "this is no XML that can be read"),
-        ("x.dmn", "<a>" * 200_000, "this is no XML that can be read"),
-        ("x.json", "[" * 200_000, "lists or objects stand in each other too deep."),
+        ("x.dmn", f"<definitions>{LONG}", "this is not readable XML"),
+        ("x.dmn", "<a>" * 200_000, "this is not readable XML"),
+        ("x.json", "[" * 200_000, "lists or objects are nested too deeply."),
     ],
     ids=lambda value: value if len(value) < 60 else "",
 )

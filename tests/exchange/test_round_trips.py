@@ -17,7 +17,7 @@ from contextdb.columns import TextColumn
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.importing import plan_import, table_of
 from contextdb.exchange.mapping import propose
-from contextdb.exchange.xlsx_parts import NEVER
+from contextdb.exchange.xlsx_write import NEVER
 from contextdb.files.csv_source import read_csv
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.table import Table
@@ -27,6 +27,7 @@ TEXTS = st.one_of(
     st.sampled_from(
         ["5..10", "1-2", "007", "True", "1e5", "=1+1", "3,5", "20, 9.99", " x ", "_x000D_", "zwei\nZeilen", 'say "no"']
     ),
+    st.lists(st.sampled_from(["_x0041", "_", "x0041_", "\x01", "<r>", "</r>"]), min_size=1, max_size=5).map("".join),
     st.text(st.characters(exclude_characters="\0\ufffe\uffff", exclude_categories=["Cs"]), max_size=8),
 )
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import builtins
 import io
-import sys
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,8 @@ import openpyxl
 import pytest
 from openpyxl.worksheet.worksheet import Worksheet
 
-from contextdb.errors import ContextDBError, TableError
+from contextdb.columns import TextColumn
+from contextdb.errors import FileError, TableError
 from contextdb.exchange import xlsx_scan
 from contextdb.exchange.formats import FORMATS, ReadOptions, read, write
 from contextdb.exchange.reading import Reading
@@ -78,7 +78,7 @@ def test_the_header_and_the_assets_stand_frozen_and_columns_are_as_wide_as_their
     columns = {"Asset": ["a_long_name_of_an_asset"], "speed": ["5"], "note": ["x" * 500]}
     sheet = written_sheet(Table.from_columns(columns))
     assert sheet.freeze_panes == "B2"
-    assert [sheet.column_dimensions[letter].width for letter in "ABC"] == [25, 10, 46]
+    assert [int(sheet.column_dimensions[letter].width) for letter in "ABC"] == [25, 10, 46]
 
 
 def test_bools_and_enums_have_drop_downs_that_forbid_nothing():
@@ -103,21 +103,60 @@ def test_a_sheet_is_printed_across_with_its_header_and_assets_on_every_page():
         assert bool(sheet.sheet_properties.pageSetUpPr and sheet.sheet_properties.pageSetUpPr.fitToPage) is fits_page
 
 
-def test_the_same_table_gives_the_same_bytes():
+def test_the_same_table_gives_the_same_bytes_on_every_day():
     table = Table.from_columns({"Asset": ["x", "y"], "speed": ["5", "6"]})
-    assert write(table, FORMATS["xlsx"])[0] == write(table, FORMATS["xlsx"])[0]
+    raw = write(table, FORMATS["xlsx"])[0]
+    assert raw == write(table, FORMATS["xlsx"])[0]
+    with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        assert {info.date_time for info in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert re.findall(rb">(\d{4})-", archive.read("docProps/core.xml")) == [b"1980", b"1980"]
 
 
-@pytest.mark.parametrize("name", ["a/b:c*d?[e]", "x" * 40, "contextdb", "History", "'", ""])
+def test_no_text_becomes_a_formula_a_number_or_a_link():
+    texts = ["=1+1", "{=A1}", "5", "1e5", "True", "https://example.org", "mailto:a@example.org", "internal:t!A1", "#N/A"]
+    sheet = written_sheet(Table.build("t", [TextColumn.of("Asset", texts)]))
+    cells = [row[0] for row in sheet.iter_rows(min_row=2)]
+    assert [(cell.value, cell.data_type, cell.hyperlink) for cell in cells] == [(text, "s", None) for text in texts]
+
+
+MARKS = [
+    "_x0041_x0042_",
+    "_x0041_x0042_x0043_",
+    "_x0041\x01",
+    "_x0041_x0042\x01",
+    "__x0041_",
+    "_x005F_x0041_",
+    "_x0001_\x01",
+    "_x0041__x0042_",
+]
+
+
+@pytest.mark.parametrize(
+    "text", [*MARKS, "<r>a</r>", "<r><t>a</t></r>", "<r>\n&amp;\x01_x0041_x0042_</r>", "a\r\nb\tc", "\u2028", "\u3000x "]
+)
+def test_a_text_that_looks_like_the_inside_of_a_workbook_comes_back(text: str):
+    table = Table.build("t", [TextColumn.of("Asset", [text, "x"]), TextColumn.of(text, ["x", text])])
+    reading = read(write(table, FORMATS["xlsx"])[0], "t.xlsx")
+    assert texts(reading) == {"Asset": [text, "x"], text: ["x", text]}
+
+
+@pytest.mark.parametrize("name", ["a/b:c*d?[e]", "x" * 40, "\U0001f3c3" * 20, "contextdb", "History", "'", ""])
 def test_a_table_of_any_name_gives_a_sheet_with_a_name_that_excel_takes(name: str):
     table = Table.from_columns({"Asset": ["x"]}, settings=TableSettings(name or "t"), name=name or "t")
     title = written_sheet(table).title
-    assert 1 <= len(title) <= 31
+    assert 1 <= len(title.encode("utf-16-le")) // 2 <= 31
     assert not set(title) & set("[]:*?/\\")
     assert title.casefold() not in ("contextdb", "history")
 
 
-@pytest.mark.parametrize(("text", "why"), [("x" * 40_000, "40,000 characters"), ("a\ufffe", "a character that no workbook holds")])
+UNFIT = [
+    ("x" * 40_000, "takes 40,000 characters in a workbook"),
+    ("\U0001f3c3" * 16_384, "takes 32,768 characters in a workbook"),
+    ("a\ufffe", "has a character that no workbook holds"),
+]
+
+
+@pytest.mark.parametrize(("text", "why"), UNFIT)
 def test_a_text_that_excel_cannot_hold_is_refused_with_its_place(text: str, why: str):
     table = Table.from_columns({"Asset": ["x", "y"], "speed": ["5", "6"]}, settings=TableSettings("t", outputs=("speed",)))
     with pytest.raises(TableError, match=why) as caught:
@@ -177,7 +216,7 @@ def test_merged_cells_hold_their_value_everywhere_and_are_told():
 def test_a_title_above_the_table_is_left_out_and_told():
     reading = read_book(book(moves=[["Moves of 2026"], [], ["Asset", "speed"], ["jog", 1], [], ["run", 2]]))
     assert texts(reading) == {"Asset": ["jog", "run"], "speed": ["1", "2"]}
-    assert 'cells A1: left out, as it is no table: "Moves of 2026".' in told(reading)
+    assert 'cells A1: left out because it is not a table: "Moves of 2026".' in told(reading)
     assert "sheet row 5: 1 blank sheet row left out." in told(reading)
 
 
@@ -212,6 +251,27 @@ def test_a_row_that_a_designer_adds_to_our_workbook_comes_back_with_the_types():
     assert reading.schema.conditions["speed"].unit == "m/s"
 
 
+DECLARED: list[tuple[str, dict[str, Any]]] = [
+    ("v1", {"type": "enum", "values": [f"v{i}" for i in range(9_000)]}),
+    ("L", {"type": "enum", "values": ["L", "R"], "mirror": {"L": "R"}}),
+    ("5", {"type": "number", "unit": 'm/"s"', "description": "one\u2028two\x7f\nthree \\ four"}),
+]
+
+
+@pytest.mark.parametrize(("cell", "declared"), DECLARED)
+def test_all_that_is_declared_of_a_condition_comes_back(cell: str, declared: dict[str, Any]):
+    table = Table.from_columns({"Asset": ["x"], "fact": [cell]}, {"fact": declared})
+    reading = read(write(table, FORMATS["xlsx"])[0], "x.xlsx")
+    assert reading.schema.conditions == table.schema.conditions
+    assert not reading.remarks
+
+
+def test_a_declaration_that_no_cell_holds_is_refused():
+    table = Table.from_columns({"Asset": ["x"], "fact": ["5"]}, {"fact": {"type": "number", "description": "x" * 40_000}})
+    with pytest.raises(TableError, match=r'sheet "contextdb": .description = .* takes 40,016 characters'):
+        write(table, FORMATS["xlsx"])
+
+
 def test_cells_of_our_own_workbook_can_be_chosen_too():
     raw, _ = write(Table.from_columns({"Asset": ["jog", "run"], "speed": ["1", "2"]}), FORMATS["xlsx"])
     assert texts(read(raw, "x.xlsx", ReadOptions(sheet="table!A1:A2"))) == {"Asset": ["jog"]}
@@ -226,7 +286,7 @@ def test_a_sheet_of_types_that_somebody_broke_is_told_and_the_table_is_read_all_
     assert 'sheet "contextdb": the types it keeps cannot be used' in told(reading)
 
 
-# ---- what is no workbook
+# ---- what is not a workbook
 
 
 def test_a_locked_workbook_is_told_as_locked():
@@ -283,18 +343,10 @@ def test_archives_of_other_kinds_are_named(part: str, kind: str):
     assert f"this is {kind}, no .xlsx." in refused(out.getvalue())
 
 
-def test_without_the_reader_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch):
-    real = builtins.__import__
-
-    def without(name: str, *rest: Any, **more: Any) -> Any:
-        if name == "python_calamine":
-            raise ImportError(name)
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    monkeypatch.delitem(sys.modules, "python_calamine", raising=False)
-    with pytest.raises(ContextDBError, match=r'pip install "contextdb\[xlsx\]"'):
-        read(raw_of(book(moves=[["Asset"], ["jog"]])), "x.xlsx")
+@pytest.mark.parametrize("name", ["moves.ods", "moves.xlsb", "moves.numbers"])
+def test_a_workbook_that_is_not_read_is_refused_with_what_to_do(name: str):
+    with pytest.raises(FileError, match=r'Try to save it as "Excel workbook" \(\.xlsx\)\.'):
+        read(b"PK\x03\x04", name)
 
 
 def test_a_workbook_named_csv_is_known_by_its_first_bytes():

@@ -99,9 +99,9 @@ def test_a_result_that_fits_its_condition_is_taken(text, wants):
         ("__builtins__", "no condition"),
         ("speed.__class__.__mro__", "no condition"),
         ("exec('1')", "no function"),
-        ("().__class__", "a dot stands inside"),
+        ("().__class__", "a dot is allowed only inside"),
         ("speed[0]", "no place"),
-        ("speed\x00", "no sign"),
+        ("speed\x00", "not a sign"),
         ("speed > 3\nimport os", "operator is missing"),
     ],
 )

@@ -7,8 +7,9 @@ import threading
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 from contextdb.errors import ClipError, FileError, MotionError, SchemaError
 from contextdb.motion import (
@@ -155,7 +156,7 @@ edits = st.tuples(st.sampled_from([drop, add, spoil]), st.sampled_from(["idle", 
 )
 
 
-@settings(max_examples=25, deadline=None)
+@examples(0.25)
 @given(st.lists(st.lists(edits, min_size=1, max_size=3), min_size=1, max_size=4))
 def test_after_any_edits_a_build_with_the_cache_is_one_without(tmp_path_factory, rounds):
     folder = tmp_path_factory.mktemp("edits")

@@ -141,14 +141,14 @@ REFUSED = {
     "a root without a name": (changed("ROOT Hips", "ROOT"), "line 2: a joint has no name."),
     "a second joint of one name": (
         changed("Leg", "Hips"),
-        'line 6: a second joint is named "Hips"; the first stands on line 2. Accepted: different names for all joints.',
+        'line 6: a second joint is named "Hips"; the first is on line 2. Accepted: different names for all joints.',
     ),
     "a misspelt keyword": (changed("OFFSET 1", "OFSET 1"), 'line 8: found "OFSET". Accepted: in joint "Leg": "OFFSET", "CHANNELS"'),
     "no offset": (changed("    OFFSET 1 -2 .5\n", ""), 'joint "Leg" has no OFFSET.'),
     "two offsets": (changed("OFFSET 1 -2 .5", "OFFSET 1 -2 .5 OFFSET 0 0 0"), 'joint "Leg" has a second OFFSET.'),
     "no channels": (changed("    CHANNELS 3 Zrotation Xrotation Yrotation\n", ""), 'joint "Leg" has no CHANNELS.'),
     "two lists of channels": (changed("Yrotation\n    End", "Yrotation CHANNELS 0\n    End"), 'joint "Leg" has a second CHANNELS.'),
-    "an offset that is no number": (
+    "an offset that is not a number": (
         changed("OFFSET 1 -2 .5", "OFFSET 1 -2,5 .5"),
         'line 8: OFFSET y of joint "Leg" is "-2,5". Accepted: a finite number. Did you mean "-2.5"?',
     ),
@@ -164,8 +164,8 @@ REFUSED = {
         "CHANNELS says 4, but 3 are named. Accepted: as many names as it says. Did you",
     ),
     "too many channels": (changed("CHANNELS 3", "CHANNELS 2"), 'line 9: found "Yrotation". Accepted: in joint "Leg"'),
-    "a count of channels that is no count": (changed("CHANNELS 3", "CHANNELS -3"), 'the number of channels is "-3".'),
-    "a position channel twice": (changed("6 Xposition Yposition", "6 Xposition Xposition"), "channel Xposition stands twice."),
+    "a count of channels that is not a count": (changed("CHANNELS 3", "CHANNELS -3"), 'the number of channels is "-3".'),
+    "a position channel twice": (changed("6 Xposition Yposition", "6 Xposition Xposition"), "channel Xposition appears twice."),
     "an end without site": (changed("End Site", "End Sight"), 'line 10: found "Sight". Accepted: "End Site". Did you mean "Site"?'),
     "a brace too many": (changed("}\nMOTION", "}\n}\nMOTION"), 'line 16: this "}" closes nothing: every joint is closed.'),
     "a brace too few": (
@@ -177,7 +177,7 @@ REFUSED = {
     "no motion": (SMALL[: SMALL.index("MOTION")], 'found the end of the file. Accepted: "MOTION" behind the root\'s block.'),
     "a misspelt motion": (changed("MOTION", "MOTOIN"), 'Did you mean "MOTION"?'),
     "no frames": (changed("Frames: 2\n", ""), 'found "Frame". Accepted: "Frames:" and their number.'),
-    "frames that are no number": (changed("Frames: 2", "Frames: two"), 'the number of frames is "two".'),
+    "frames that are not a number": (changed("Frames: 2", "Frames: two"), 'the number of frames is "two".'),
     "frames with a point": (
         changed("Frames: 2", "Frames: 2.0"),
         'the number of frames is "2.0". Accepted: a whole number. Did you mean "2"?',

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from motion_oracles import SlowBody, slow_channel
+from strategies import examples
 from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError, SchemaError
@@ -61,7 +62,7 @@ def short_clips(draw):
     return Clip("short", clip.skeleton, 1.0 / 30.0, values, clip.metres_per_unit)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(0.6)
 @given(short_clips(), st.lists(bone_channels() | trajectory_channels(), min_size=1, max_size=3, unique_by=lambda c: c.name))
 def test_features_are_what_matrices_frame_by_frame_give(clip, channels):
     found = features(clip, *channels)
@@ -71,7 +72,7 @@ def test_features_are_what_matrices_frame_by_frame_give(clip, channels):
     assert np.allclose(found, expected, rtol=1e-5, atol=1e-4)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(0.4)
 @given(short_clips(), st.lists(bone_channels() | trajectory_channels(), min_size=1, max_size=3, unique_by=lambda c: c.name))
 def test_mirrored_features_are_those_of_the_mirrored_matrices(clip, channels):
     found = clip_features(clip, schema_of(*channels, mirror=PAIRS), mirrored=True).features

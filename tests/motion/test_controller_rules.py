@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lines import DT, RATE, line
+from strategies import examples
 
 from contextdb.motion import Entry, Selector
 from contextdb.motion.markup.marks import Mark
@@ -37,7 +38,7 @@ def scenes(draw):
     return made, rules, asked
 
 
-@settings(max_examples=300)
+@examples(3)
 @given(scenes())
 def test_every_update_follows_from_the_rules_read_frame_by_frame(scene):
     database, rules, asked = scene

@@ -31,7 +31,7 @@ def test_settings_are_read_from_the_project():
         ({"history_s": "0.3"}, 'history_s = "0.3": this is text, not a number'),
         ({"jump_threshold_s": -1}, "jump_threshold_s = -1: this is out of range"),
         ({"variation_memory": 2}, 'has "variation_memory", but without "variation_within" nothing varies'),
-        ({"variation_within": 0.1, "variation_memory": 1.5}, "this is no whole number. Accepted: a whole number from 0 to 1000"),
+        ({"variation_within": 0.1, "variation_memory": 1.5}, "this is not a whole number. Accepted: a whole number from 0 to 1000"),
         ({"variation_within": True}, "variation_within = true: this is true or false, not a number"),
     ],
 )

@@ -87,8 +87,11 @@ REFUSED = {
     ),
     "no channels": ({"rate": 30.0}, '[features.loco] has no "channels".'),
     "an empty list": ({"rate": 30.0, "channels": []}, "[features.loco] channels = []: the list is empty."),
-    "channels that are no list": ({"rate": 30.0, "channels": "all"}, '[features.loco] channels = "all": this is text, not a list.'),
-    "a channel that is no table": (
+    "channels that are not a list": (
+        {"rate": 30.0, "channels": "all"},
+        '[features.loco] channels = "all": this is text, not a list.',
+    ),
+    "a channel that is not a table": (
         {"rate": 30.0, "channels": ["LeftFoot"]},
         '[features.loco] channel 1 is "LeftFoot": this is text, not a table.',
     ),
@@ -102,7 +105,7 @@ REFUSED = {
     ),
     "a type under another name": (one_channel(type="path", what="speed", at=[1]), 'Did you mean type = "trajectory"?'),
     "no bone": (one_channel(type="position"), '[features.loco] channel 1 has no "bone".'),
-    "a bone that is no text": (one_channel(type="position", bone=3), "bone = 3: this is a number, not text."),
+    "a bone that is not text": (one_channel(type="position", bone=3), "bone = 3: this is a number, not text."),
     "a misspelt key of a channel": (one_channel(type="position", bone="Hips", wieght=1), 'has no key "wieght".'),
     "a key of another type": (one_channel(type="position", bone="Hips", along=[1]), 'channel 1 has no key "along".'),
     "an axis of a position": (one_channel(type="position", bone="Hips", axis="x"), 'channel 1 has no key "axis".'),
@@ -120,23 +123,23 @@ REFUSED = {
         'Did you mean type = "angular_velocity"?',
     ),
     "a rotation for an orientation": (one_channel(type="rotation", bone="Hips"), 'Did you mean type = "orientation"?'),
-    "a pose a day later": (one_channel(type="orientation", bone="Hips", at=[86400]), "a number is out of range or stands twice."),
-    "feet that are no pair": (one_channel(type="phase", feet=["LeftFoot"]), 'feet = ["LeftFoot"]: this is no pair of bones.'),
+    "a pose a day later": (one_channel(type="orientation", bone="Hips", at=[86400]), "a number is out of range or appears twice."),
+    "feet that are no pair": (one_channel(type="phase", feet=["LeftFoot"]), 'feet = ["LeftFoot"]: this is not a pair of bones.'),
     "a phase of a bone": (one_channel(type="phase", bone="LeftFoot"), 'channel 1 has no key "bone".'),
     "no function": (one_channel(type="custom"), 'channel 1 has no "function".'),
-    "a function that is no name": (one_channel(type="custom", function=3), "function = 3: this is a number, not text."),
+    "a function that is not a name": (one_channel(type="custom", function=3), "function = 3: this is a number, not text."),
     "half a feature": (one_channel(type="custom", function="f", size=1.5), "size = 1.5: this is not whole."),
     "a custom channel of nothing": (one_channel(type="custom", function="f", size=0), "size = 0: this is out of range."),
     "a size in quotes": (one_channel(type="custom", function="f", size="2"), "Did you mean size = 2?"),
     "a facing smoothed for ever": ({**POINTS, "facing_smooth_s": 1e9}, "facing_smooth_s = 1000000000.0: this is out of range."),
-    "a mirror that is no list": ({**POINTS, "mirror": "Left*"}, 'mirror = "Left*": this is text, not a list.'),
+    "a mirror that is not a list": ({**POINTS, "mirror": "Left*"}, 'mirror = "Left*": this is text, not a list.'),
     "a mirror of nothing": ({**POINTS, "mirror": []}, "mirror = []: the list is empty."),
     "a mirror of one bone": (
         {**POINTS, "mirror": [["Left*", "Left*"]]},
-        '[features.loco] mirror pair 1 is ["Left*", "Left*"]: this is no pair of different names. '
+        '[features.loco] mirror pair 1 is ["Left*", "Left*"]: this is not a pair of different names. '
         'Accepted: pairs of a left and a right bone, such as [["Left*", "Right*"]].',
     ),
-    "a mirror that is one pair": ({**POINTS, "mirror": ["Left*"]}, 'mirror pair 1 is "Left*": this is no pair'),
+    "a mirror that is one pair": ({**POINTS, "mirror": ["Left*"]}, 'mirror pair 1 is "Left*": this is not a pair'),
     "a mirror with one star": (
         {**POINTS, "mirror": [["Left*", "Right"]]},
         'mirror pair 1 is ["Left*", "Right"]: one name has a * and the other has none.',
@@ -147,19 +150,19 @@ REFUSED = {
     "both at and along": (one_channel(type="trajectory", what="speed", at=[1], along=[1]), 'channel 1 has both "at" and "along".'),
     "neither at nor along": (one_channel(type="trajectory", what="speed"), 'channel 1 has neither "at" nor "along".'),
     "no points": (one_channel(type="trajectory", what="speed", at=[]), "at = []: the list is empty."),
-    "a point that is no number": (
+    "a point that is not a number": (
         one_channel(type="trajectory", what="speed", at=[1, "2"]),
         'at = [1, "2"]: "2" is text, not a number.',
     ),
-    "a point twice": (one_channel(type="trajectory", what="speed", at=[1, 1.0]), "a number is out of range or stands twice."),
-    "a point too far away": (one_channel(type="trajectory", what="speed", at=[61]), "a number is out of range or stands twice."),
+    "a point twice": (one_channel(type="trajectory", what="speed", at=[1, 1.0]), "a number is out of range or appears twice."),
+    "a point too far away": (one_channel(type="trajectory", what="speed", at=[61]), "a number is out of range or appears twice."),
     "a negative weight": (one_channel(type="position", bone="Hips", weight=-1), "weight = -1: this is out of range."),
     "a weight in quotes": (one_channel(type="position", bone="Hips", weight="2"), "Did you mean weight = 2?"),
     "weights that are all zero": (
         one_channel(type="position", bone="Hips", weight=0),
         "[features.loco]: the weight of every channel is 0.",
     ),
-    "a facing of one bone": ({**POINTS, "facing": ["Hips", "Hips"]}, 'facing = ["Hips", "Hips"]: this is no pair of bones.'),
+    "a facing of one bone": ({**POINTS, "facing": ["Hips", "Hips"]}, 'facing = ["Hips", "Hips"]: this is not a pair of bones.'),
     "an empty root": ({**POINTS, "root": " "}, 'root = " ": this is empty.'),
     "an empty group": (one_channel(type="position", bone="Hips", group=""), 'group = "": this is empty.'),
 }

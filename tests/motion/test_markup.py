@@ -101,7 +101,7 @@ def test_a_file_is_read_with_or_without_bom(tmp_path):
         (b"\n \n", "blank lines only"),
         ((HEADER + "jog,Move,,,").encode("utf-16"), "UTF-16"),
         ((HEADER + "jog,Move,,,").encode("utf-16-le"), "UTF-16"),
-        (HEADER.encode() + b"jog\0,Move,,,", "line 2: this is no text: it holds a NUL byte"),
+        (HEADER.encode() + b"jog\0,Move,,,", "line 2: not a text file: it contains a NUL byte"),
         (HEADER.encode() + b"\nj\xf6g,Move,,,", "line 3: byte 0xF6 on this line is not UTF-8"),
         (b"asset;tag;from;to\n", "the header has no comma but 3 semicolons"),
         (b"<<<<<<< HEAD\nasset,tag,from,to\n", "line 1: an unresolved git conflict"),
@@ -146,7 +146,7 @@ def test_unknown_missing_and_doubled_columns_are_told_together():
     assert faults("asset,Tga,to,to,\nx\n") == [
         'marks.csv, line 1, column "Tga": there is no column "Tga". Accepted: "asset", "tag", "from", "to", "value". '
         'Did you mean "tag"?',
-        'marks.csv, line 1, column "to": the column "to" stands twice. Accepted: each column once.',
+        'marks.csv, line 1, column "to": the column "to" appears twice. Accepted: each column once.',
         'marks.csv, line 1: a column has no name. Accepted: "asset", "tag", "from", "to", "value".',
         'marks.csv, line 1: the columns "tag", "from" are missing. Accepted: "asset", "tag", "from", "to", "value".',
     ]
@@ -173,20 +173,20 @@ def test_wrong_quotes_spoil_their_own_line_alone():
         'marks.csv, line 4, column "from"',
     ]
     assert "never closed" in told[0]
-    assert "goes on after the quote" in told[1]
+    assert "continues after its closing quote" in told[1]
 
 
 @pytest.mark.parametrize(
     ("line", "column", "said", "mend"),
     [
-        ("jog,Move,abc,,", "from", '"abc" is no finite number', ""),
-        ("jog,Move,nan,,", "from", '"nan" is no finite number', ""),
-        ("jog,Move,,inf,", "to", '"inf" is no finite number', ""),
-        ("jog,Move,,1e999,", "to", '"1e999" is no finite number', ""),
-        ('jog,Move,"0,5",,', "from", '"0,5" is no finite number', 'Did you mean "0.5"?'),
-        ("jog,Move,,1.5 s,", "to", '"1.5 s" is no finite number', 'Did you mean "1.5"?'),
-        ("jog,Move,-1,,", "from", "-1 is no time in a clip", ""),
-        ("jog,Move,,1e10,", "to", "1e+10 is no time in a clip", ""),
+        ("jog,Move,abc,,", "from", '"abc" is not a finite number', ""),
+        ("jog,Move,nan,,", "from", '"nan" is not a finite number', ""),
+        ("jog,Move,,inf,", "to", '"inf" is not a finite number', ""),
+        ("jog,Move,,1e999,", "to", '"1e999" is not a finite number', ""),
+        ('jog,Move,"0,5",,', "from", '"0,5" is not a finite number', 'Did you mean "0.5"?'),
+        ("jog,Move,,1.5 s,", "to", '"1.5 s" is not a finite number', 'Did you mean "1.5"?'),
+        ("jog,Move,-1,,", "from", "-1 is not a time in a clip", ""),
+        ("jog,Move,,1e10,", "to", "1e+10 is not a time in a clip", ""),
         ("jog,Move,2,1,", "from", "the span ends before it starts", "Did you mean from 1 to 2?"),
         ("jog,Move,,,1", "value", 'the plain tag "Move" takes no value, but this is 1', "leave it empty"),
         ("jog,DoNotChoose,,,1", "value", 'the reserved tag "DoNotChoose" takes no value', "leave it empty"),
@@ -314,7 +314,7 @@ def test_spans_made_in_python_are_checked_alike():
         (3, "asset"),
         (3, "tag"),
     ]
-    with pytest.raises(MotionError, match="the spans are no spans"):
+    with pytest.raises(MotionError, match="the spans are not a list of spans"):
         Markup(("jog",))
 
 
@@ -388,7 +388,7 @@ def test_with_a_rate_a_span_between_two_frames_is_told():
     lines = ["jog,MatchRange,0.51,0.52,", "jog,Move,0.5,0.5,", "jog,DoNotChoose,0.51,0.54,"]
     (told,) = told_for(lines, {"jog": 3.0}, rate=30.0)
     assert "line 2" in told
-    assert "lies between two frames, and holds none" in told
+    assert "is between two frames and contains none" in told
     assert told_for(lines, {"jog": 3.0}) == []
 
 

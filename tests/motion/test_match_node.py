@@ -9,8 +9,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import Clip, MotionDatabase, make_clip, query_from
@@ -216,7 +217,7 @@ def slow_target_cost(database, frame, target, position_weight, rotation_weight):
     return position_weight * ((left - target.left_m) ** 2 + (far - target.ahead_m) ** 2) + rotation_weight * angle**2
 
 
-@settings(max_examples=200)
+@examples(2)
 @given(questions())
 def test_the_frame_entered_is_the_one_that_looking_at_every_frame_finds(question):
     database, query, target, weights = question
@@ -234,7 +235,7 @@ def test_the_frame_entered_is_the_one_that_looking_at_every_frame_finds(question
     assert play.costs.total == pytest.approx(play.hit.cost)
 
 
-@settings(max_examples=200)
+@examples(2)
 @given(questions(), st.data())
 def test_from_any_frame_with_time_to_warp_the_target_is_reached(question, data):
     database, query, target, weights = question

@@ -101,9 +101,9 @@ def test_a_star_may_stand_anywhere_in_a_name():
 REFUSED = {
     "a bone that is missing": (
         (("LeftFoot", "RightFot"),),
-        r'mirror: \["LeftFoot", "RightFot"\] asks for a bone "RightFot", and there is none\..*Did you mean "RightFoot"\?',
+        r'mirror: \["LeftFoot", "RightFot"\] names the bone "RightFot", which does not exist\..*Did you mean "RightFoot"\?',
     ),
-    "a pattern with half its bones": ((("*Hand", "*Palm"),), r'mirror: \["\*Hand", "\*Palm"\] asks for a bone "LeftPalm"'),
+    "a pattern with half its bones": ((("*Hand", "*Palm"),), r'mirror: \["\*Hand", "\*Palm"\] names the bone "LeftPalm"'),
     "a pattern that fits nothing": ((("L_*", "R_*"),), r'mirror: no bone fits \["L_\*", "R_\*"\]'),
     "a bone in two pairs": ((*SIDES, ("LeftHand", "RightFoot")), 'mirror: the bone "LeftHand" is in two pairs'),
     "a pair twice": ((*SIDES, *SIDES), 'mirror: the bone "LeftArm" is in two pairs'),
@@ -143,7 +143,7 @@ def test_a_clip_is_mirrored_only_by_declared_pairs():
 def test_pairs_that_leave_out_the_bones_of_the_facing_are_refused():
     arms = (("LeftArm", "RightArm"), ("LeftForeArm", "RightForeArm"), ("LeftHand", "RightHand"))
     schema = FeatureSchema("loco", 30.0, (Channel("position", 1.0, "Head"),), mirror=arms)
-    with pytest.raises(MotionError, match='the body faces across "LeftUpLeg" and "RightUpLeg", which are no pair'):
+    with pytest.raises(MotionError, match='the body faces across "LeftUpLeg" and "RightUpLeg", which are not a pair'):
         clip_features(make_clip("walk").clip, schema, mirrored=True)
 
 

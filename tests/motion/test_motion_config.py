@@ -104,7 +104,7 @@ def test_nothing_is_a_config_too():
 def test_a_pattern_that_is_none_is_told(folder):
     databases = SECTIONS["databases"] | {"jog": {**SECTIONS["databases"]["jog"], "clips": "clips/**x.bvh"}}
     config = MotionConfig.from_dict({**SECTIONS, "databases": databases})
-    with pytest.raises(MotionError, match=r"\[databases.jog\] (clips = .* is no pattern|no file fits)"):  # newer Pythons read it
+    with pytest.raises(MotionError, match=r"\[databases.jog\] (clips = .* is not a pattern|no file fits)"):  # newer Pythons read it
         config.load_clips("jog", folder)
 
 
@@ -146,14 +146,14 @@ CHANNEL_NAMES = (
 )
 OTHER = {"rate": 60.0, "channels": [{"type": "velocity", "bone": "Hips"}]}
 REFUSED = {
-    "a section that is no table": (("databases",), 3, "databases is a number, not a table."),
-    "a database that is no table": (("databases", "x"), 3, "databases.x = 3: this is a number, not a table."),
+    "a section that is not a table": (("databases",), 3, "databases is a number, not a table."),
+    "a database that is not a table": (("databases", "x"), 3, "databases.x = 3: this is a number, not a table."),
     "a misspelt key": (("databases", "jog", "clip"), "a", '[databases.jog] has no key "clip".'),
     "no clips": (("databases", "jog", "clips"), None, '[databases.jog] has no "clips".'),
     "no features": (("databases", "jog", "features"), None, '[databases.jog] has no "features".'),
     "clips elsewhere": (("databases", "jog", "clips"), "../clips/*.bvh", "this leaves the folder, or is a place on one machine."),
     "clips on one machine": (("databases", "jog", "clips"), "/clips/*.bvh", "this leaves the folder"),
-    "clips of another format": (("databases", "jog", "clips"), "clips/*.fbx", "these are no BVH files."),
+    "clips of another format": (("databases", "jog", "clips"), "clips/*.fbx", "these are not BVH files."),
     "an unknown table": (("databases", "jog", "table"), "locomotoin", 'Did you mean table = "locomotion"?'),
     "a unit of nothing": (("databases", "jog", "metres_per_unit"), 0, "metres_per_unit = 0: this is out of range."),
     "an unknown axis": (
@@ -161,7 +161,7 @@ REFUSED = {
         "Y",
         'up = "Y": there is no such axis. Accepted: "y", "z", "x". Did you mean up = "y"?',
     ),
-    "markup of another format": (("databases", "jog", "markup"), "marks.toml", 'markup = "marks.toml": this is no CSV file.'),
+    "markup of another format": (("databases", "jog", "markup"), "marks.toml", 'markup = "marks.toml": this is not a CSV file.'),
     "markup elsewhere": (("databases", "jog", "markup"), "../marks.csv", 'Did you mean markup = "marks.csv"?'),
     "clips below another folder": (("databases", "jog", "clips"), "..\\clips\\*.bvh", 'Did you mean clips = "clips/*.bvh"?'),
     "a flag in quotes": (
@@ -179,7 +179,7 @@ REFUSED = {
         "[databases.jog] end_s = -0.3: this is out of range. Accepted: seconds from 0 to 60, such as 0.3.",
     ),
     "a misspelt bias": (("databases", "jog", "looping_bais"), 1.0, 'Did you mean "looping_bias"?'),
-    "weights that are no table": (("databases", "jog", "weights"), 2.0, "weights = 2.0: this is a number, not a table."),
+    "weights that are not a table": (("databases", "jog", "weights"), 2.0, "weights = 2.0: this is a number, not a table."),
     "a weight of no channel": (
         ("databases", "jog", "weights"),
         {"Hips velocty": 2.0},
@@ -196,9 +196,9 @@ REFUSED = {
         "[databases.jog] weights: the weight of every channel is 0. Accepted: at least one above 0",
     ),
     "no order": (("selectors", "locomotion", "order"), None, '[selectors.locomotion] has no "order".'),
-    "an order that is no list": (("selectors", "locomotion", "order"), "jog", "this is no list, or empty."),
-    "an empty order": (("selectors", "locomotion", "order"), [], "this is no list, or empty."),
-    "a step that is no table": (
+    "an order that is not a list": (("selectors", "locomotion", "order"), "jog", "this is not a list, or empty."),
+    "an empty order": (("selectors", "locomotion", "order"), [], "this is not a list, or empty."),
+    "a step that is not a table": (
         ("selectors", "locomotion", "order", 1),
         "jog",
         '[selectors.locomotion] order 2 is "jog": this is text, not a table. Accepted: { database = "jog" }.',

@@ -102,7 +102,7 @@ def test_what_is_missing_to_ask_again_is_said(trace):
 
 
 def test_a_name_that_no_asset_holds_is_refused_with_the_nearest():
-    with pytest.raises(MotionError, match=r'no asset\'s name holds "wlak".*Did you mean "walk"\?'):
+    with pytest.raises(MotionError, match=r'no asset\'s name contains "wlak".*Did you mean "walk"\?'):
         require_known("wlak", DATABASES, "session.parquet")
 
 

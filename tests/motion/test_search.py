@@ -9,8 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 from contextdb.errors import QueryError
 from contextdb.motion.features.normalisation import Normalisation
@@ -172,7 +173,7 @@ engines = pytest.mark.parametrize("engine", ["numba", "numpy"])
 
 
 @engines
-@settings(max_examples=150)
+@examples(1.5)
 @given(st.data())
 def test_a_search_is_a_scan_of_all_frames_whatever_masks_tags_skips_and_biases_say(engine, data):
     database = by(engine, data.draw(marked_databases()))
@@ -189,7 +190,7 @@ def test_a_search_is_a_scan_of_all_frames_whatever_masks_tags_skips_and_biases_s
 
 
 @engines
-@settings(max_examples=100)
+@examples(1)
 @given(st.data())
 def test_candidates_begin_with_the_choice_and_every_frame_has_its_reason(engine, data):
     database = by(engine, data.draw(marked_databases()))
@@ -212,7 +213,7 @@ def test_candidates_begin_with_the_choice_and_every_frame_has_its_reason(engine,
 
 
 @engines
-@settings(max_examples=100)
+@examples(1)
 @given(st.data())
 def test_the_best_of_each_range_are_those_near_the_best_of_all(engine, data):
     database = by(engine, data.draw(marked_databases()))

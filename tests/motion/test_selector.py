@@ -137,7 +137,7 @@ def test_a_chain_chooses_as_the_rule_applied_to_each_database_and_the_rest_of_th
     ("entries", "message"),
     [
         ([], "the selector has no database"),
-        ([Entry("a", TIRED, 1.0), Entry("a", JOG)], 'the database "a" stands twice'),
+        ([Entry("a", TIRED, 1.0), Entry("a", JOG)], 'the database "a" appears twice'),
         ([Entry("a", TIRED, math.nan), Entry("b", JOG)], 'the threshold of "a" is not a number'),
         (
             [Entry("a", TIRED, 1.0), Entry("b", MotionDatabase.from_features(np.zeros((1, 2)), [0], [1], ["x"]))],

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lines import DT, RATE, line
+from strategies import examples
 
 from contextdb.errors import ArtefactError, FileError, MotionError
 from contextdb.motion import Entry, Selector, TagFilter
@@ -103,7 +104,7 @@ def trace_of(decisions, **options):
 # ---- what comes back
 
 
-@settings(max_examples=60)
+@examples(0.6)
 @given(st.lists(DECISIONS, max_size=4))
 def test_a_saved_session_comes_back_as_it_was(decisions):
     trace = trace_of(decisions)
@@ -289,11 +290,11 @@ def test_files_that_are_no_session_are_refused_with_the_reason(tmp_path: Path):
     foreign = io.BytesIO()
     pl.DataFrame({"tick": [0]}).write_parquet(foreign)
     assert refused(b"", tmp_path) == "the file is empty."
-    assert refused(b"tick,time_s\n0,0\n", tmp_path) == "this is no Parquet file."
+    assert refused(b"tick,time_s\n0,0\n", tmp_path) == "this is not a Parquet file."
     assert refused(b"PAR1", tmp_path).startswith("the file is cut off")
     assert refused(raw[:-1], tmp_path).startswith("the file is cut off")
     assert refused(raw[: len(raw) // 2], tmp_path).startswith("the file is cut off")
-    assert refused(foreign.getvalue(), tmp_path) == "this Parquet file is no recorded session."
+    assert refused(foreign.getvalue(), tmp_path) == "this Parquet file is not a recorded session."
 
 
 def altered(change, **metadata):

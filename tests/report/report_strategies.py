@@ -25,7 +25,7 @@ TABLES = st.builds(TableSummary, NAMES, st.none() | FILES, ROWS, st.integers(0, 
 
 @st.composite
 def findings(draw: st.DrawFn, tables: list[TableSummary]) -> Finding:
-    """A finding of one of the tables, or of something that is no table."""
+    """A finding of one of the tables, or of something that is not a table."""
     table = draw(st.sampled_from(tables)) if tables and draw(st.booleans()) else None
     return Finding(
         draw(st.sampled_from([*RULES, "a-rule-of-tomorrow"])),

@@ -85,14 +85,14 @@ def test_no_rule_has_two_sections():
 def test_a_section_and_the_help_of_a_report_agree(rule: str):
     words = " ".join(SECTIONS[rule].replace("`", "").split())
     assert RULES[rule].summary.rstrip(".").replace("`", "") in words
-    assert "Cure: " in words
+    assert "Fix: " in words
     if rule != "more":
         assert f"*{RULES[rule].level}*" in words
 
 
 @pytest.mark.parametrize("rule", SECTIONS)
-def test_every_section_tells_the_cure(rule: str):
-    assert re.search(r"^Cure: ", SECTIONS[rule], re.M)
+def test_every_section_tells_the_fix(rule: str):
+    assert re.search(r"^Fix: ", SECTIONS[rule], re.M)
 
 
 @pytest.mark.parametrize("rule", EXAMPLES)

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import polars as pl
 import pytest
 from running import run
+from strategies import IS_FULL
 
 from contextdb.tables.table import Table
 from contextdb.telemetry import observe
@@ -125,6 +126,7 @@ def test_evaluate_names_the_faults_of_every_file_and_writes_nothing(recorded, cl
     assert not list(recorded.glob("*answers*"))
 
 
+@pytest.mark.skipif(not IS_FULL, reason="with EXAMPLES=full: two workers are started for it")
 def test_evaluate_that_kills_every_worker_names_the_files(recorded, cluster, table_file, monkeypatch):
     monkeypatch.setattr("contextdb.telemetry.engines._run", die)
     told = ("evaluate", table_file, str(recorded / "00.parquet"), "--out", str(recorded / "answers.csv"))
@@ -135,6 +137,7 @@ def test_evaluate_that_kills_every_worker_names_the_files(recorded, cluster, tab
     assert not list(recorded.glob("*answers*")) + list(recorded.glob(".contextdb-*"))
 
 
+@pytest.mark.skipif(not IS_FULL, reason="with EXAMPLES=full: two workers are started for it")
 def test_an_opened_artefact_is_asked_on_workers_too(recorded, cluster, table_file):
     artefact = str(recorded / "t.safetensors")
     assert run("compile", table_file, "-o", artefact).code == 0

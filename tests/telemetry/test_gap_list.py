@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import polars as pl
 import pytest
+from strategies import some
 
 from contextdb.cells.grammar import parse_cell
 from contextdb.covering import coverage
@@ -54,7 +55,7 @@ def is_possible(context: dict[str, object], assume: tuple[str, ...]) -> bool:
 
 @pytest.mark.parametrize("assume", [(), ('not (air and mode == "SS")',)])
 @pytest.mark.parametrize("max_gaps", [1, 50])
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", some(range(25), 5))
 def test_every_share_of_the_list_is_what_counting_finds(tmp_path, seed, max_gaps, assume):
     table = drawn(seed, assume)
     moments = random.Random(seed + 100).choices(CONTEXTS, k=30)

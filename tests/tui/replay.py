@@ -35,7 +35,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-sys.path[:0] = [str(HERE), str(ROOT)]
+sys.path[:0] = [str(HERE), str(HERE.parent), str(ROOT)]
 
 from terminal import alone, drive, screen_text, settled  # noqa: E402
 from textual.events import Paste  # noqa: E402
@@ -151,7 +151,7 @@ class Replay:
         if step.command == "press":
             for key in words:
                 await pilot.press(key)
-                await settled(pilot, 2)
+                await settled(pilot)
         elif step.command == "type":
             await pilot.press(*(KEYS_OF.get(c, c) for c in step.rest))
         elif step.command == "paste":

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from unittest.mock import patch
 
+from quick_apps import quick
 from textual.app import App
 from textual.pilot import Pilot
 
@@ -34,13 +35,12 @@ def drive(app: App[Any], script: Callable[[Pilot[Any]], Awaitable[T]], size: tup
             await pilot.pause()
             return await script(pilot)
 
-    return asyncio.run(run())
+    with quick():
+        return asyncio.run(run())
 
 
-async def settled(pilot: Pilot[Any], n_rounds: int = 4) -> None:
+async def settled(pilot: Pilot[Any]) -> None:
     """Wait until what was pressed has gone its way: a message goes on from part to part, and each may tell another."""
-    for _ in range(n_rounds):
-        await pilot.pause(0.0)
     await pilot.pause()
 
 

@@ -96,7 +96,7 @@ def test_a_name_that_nobody_declared_opens_the_form_of_a_new_column(table: Table
         low.focus()
         await pilot.press(*"gusty", "enter")
         await pilot.pause()
-        assert app.wrong("min") == '"gusty" is no number.'
+        assert app.wrong("min") == '"gusty" is not a number.'
         assert low.has_focus
         low.value = "0"
         app.screen.query_one("#column-unit", Input).value = "m/s"
@@ -118,8 +118,8 @@ def test_all_faults_of_a_new_column_stand_beside_their_fields(table: Table):
         await pilot.pause()
         await pilot.click("#column-insert")
         await pilot.pause()
-        assert app.wrong("min") == '"low" is no number.'
-        assert app.wrong("max") == '"high" is no number.'
+        assert app.wrong("min") == '"low" is not a number.'
+        assert app.wrong("max") == '"high" is not a number.'
         return screen_text(app)
 
     assert 'The table has a column "Asset Name" already.' in drive(app, script, (100, 40))

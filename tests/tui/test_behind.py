@@ -94,7 +94,7 @@ def test_a_table_that_cannot_stand_in_a_row_is_a_fault_of_its_cell(asset, word):
     sheet = Sheet(outer)
     assert word in str(sheet.fault(1, 0))
     assert sheet.fault(0, 0) is None
-    assert sheet.query.inside(1).text == "cannot be asked"
+    assert sheet.query.inside(1).text == "cannot be used"
     sheet.query.load({"air": "True"})
     assert sheet.query.valid.tolist() == [True, False]
     sheet.go(0, 0)

@@ -232,7 +232,7 @@ def test_a_bad_entry_stays_with_what_is_wrong_what_is_accepted_and_the_mend():
     assert desk.said == []
     assert '! cannot read "20; 9.99" as an angle.' in screen
     assert 'Accepted: "20, 9.99" (centre, tolerance)' in screen
-    assert 'Did you mean "20, 9.99"? Ctrl+T takes it.' in screen
+    assert 'Did you mean "20, 9.99"? Ctrl+T accepts it.' in screen
 
 
 def test_one_key_takes_the_mend():

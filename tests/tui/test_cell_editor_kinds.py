@@ -68,7 +68,7 @@ def test_a_click_on_a_row_takes_it_at_once():
 
 def test_the_fact_of_a_bool_may_be_left_out():
     desk = Desk(HIT, "True", is_fact=True, open_list=True)
-    assert "(not asked)" in press(desk)
+    assert "(not given)" in press(desk)
     assert taken(HIT, "True", "end", "enter", is_fact=True, open_list=True) == ""
 
 
@@ -86,7 +86,7 @@ def test_one_key_takes_the_first_value_that_the_word_may_be():
 
 def test_the_list_follows_the_caret():
     screen = press(Desk(CHART, "C FS"), "home", "right")
-    assert "2 values may be meant" in screen
+    assert "2 values possible" in screen
     assert "▸" not in screen
     assert "CB" in screen
 

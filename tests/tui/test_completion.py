@@ -310,7 +310,7 @@ def test_what_a_cell_means(text, domain, said):
 @pytest.mark.parametrize(
     ("text", "domain", "said"),
     [
-        ("", BOOL, "not asked for"),
+        ("", BOOL, "not given"),
         ("t", BOOL, "is True"),
         ("Half Back", CHART, "is Half Back"),
         ("CB FS", CHART, "may be 2 of 5 declared values"),

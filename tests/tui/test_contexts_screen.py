@@ -89,7 +89,7 @@ def test_the_chosen_context_is_told_in_full(table: Table):
     lines = shown(pressed(Stage(table), "down"))
     assert '✗ "walk" should be valid and is not; "run" should not be valid and is.' in lines
     assert "speed=5 gait=Run" in lines
-    assert any("quick" in line and "cannot be asked" in line for line in shown(pressed(Stage(table), "end")))
+    assert any("quick" in line and "cannot be evaluated" in line for line in shown(pressed(Stage(table), "end")))
 
 
 def test_enter_gives_back_the_list_standing_on_the_context(table: Table):
@@ -181,21 +181,21 @@ def test_what_is_expected_may_be_nothing_or_written(table: Table, tmp_path: Path
 
 
 def test_a_name_is_wanted_and_a_name_that_is_taken_is_told(table: Table, tmp_path: Path):
-    assert "✗ A name is wanted." in pressed(Stage(table), "f6", "enter")
+    assert "✗ Enter a name." in pressed(Stage(table), "f6", "enter")
     assert "Written over: there is a context of this name." in pressed(Stage(table), "f6", *"fast")
     assert (tmp_path / "t.cases.csv").read_text() == CASES
 
 
 def test_an_expectation_that_cannot_be_read_is_not_saved(table: Table, tmp_path: Path):
     text = pressed(Stage(table, {"speed": "5"}), "f6", *"x", "tab", "tab", "home", *'"', "enter")
-    assert "a double quote stands alone" in " ".join(shown(text))
+    assert "a double quote is unpaired" in " ".join(shown(text))
     assert (tmp_path / "t.cases.csv").read_text() == CASES
 
 
 def test_a_test_row_with_a_fact_that_cannot_be_read_is_saved_only_to_be_looked_at(table: Table, tmp_path: Path):
     app = Stage(table, {"speed": "quick"})
     text = pressed(app, "f6", *"bad")
-    assert "What is valid now cannot be told" in text
+    assert "The valid assets cannot be determined" in text
     pressed(Stage(table, {"speed": "quick"}), "f6", *"bad", "enter")
     assert read_cases(tmp_path / "t.cases.csv")[-1].expected == ""
 

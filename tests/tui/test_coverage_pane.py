@@ -269,7 +269,7 @@ def test_while_contexts_are_counted_no_list_says_that_there_is_nothing(section):
     shown(play, of=large, run=run)
     assert "Not counted yet: R counts." in seen[0]
     assert "  Counting …" in seen[1]
-    assert not any(word in text for text in seen for word in ("No gap", "Nowhere", "No row is said"))
+    assert not any(word in text for text in seen for word in ("No gap", "Nowhere", "No row was found"))
 
 
 def test_after_an_edit_a_large_report_is_called_stale_and_r_renews_it():
@@ -285,7 +285,7 @@ def test_after_an_edit_a_large_report_is_called_stale_and_r_renews_it():
         pilot.app.sheet.type_text("Any")
         pilot.app.pane.show()
         await pilot.pause()
-        assert "The table has changed since. R works it out anew." in screen_text(pilot.app)
+        assert "The table has changed since. R measures it again." in screen_text(pilot.app)
         await pilot.press("r")
         await settled(pilot)
 
@@ -329,7 +329,7 @@ def test_a_gap_over_a_condition_that_is_gone_is_not_filled():
 
     app, _ = shown(play)
     assert [(type(m), m.level) for m in app.told] == [(Told, "warning")]
-    assert '"speed" is no condition any more' in app.told[0].text
+    assert '"speed" is not a condition any more' in app.told[0].text
 
 
 def test_a_table_with_unreadable_cells_says_why_it_cannot_be_measured(tmp_path):

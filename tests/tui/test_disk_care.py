@@ -74,7 +74,7 @@ def test_what_others_wrote_is_merged_and_told(path):
         app.looks(5)
 
     app = run(path, script)
-    assert app.said == ["Merged from disk: 1 cell changed. Ctrl+Z takes it back."]
+    assert app.said == ["Merged from disk: 1 cell changed. Ctrl+Z undoes it."]
     assert app.n_shown == 1
     assert app.session.sheet.table.text(1, "speed") == "5..8"
 
@@ -146,7 +146,7 @@ def test_a_file_that_is_gone_or_no_table_is_told_once(path):
         app.looks(5)
 
     said = run(path, script).said
-    assert said[0] == "t.csv is gone from the disk. Saving makes it anew."
+    assert said[0] == "t.csv is no longer on disk. Saving creates it again."
     assert "found 1 field, the header has 2" in said[1]
     assert len(said) == 2
 
@@ -175,7 +175,7 @@ def test_a_changed_schema_is_read_anew_and_a_bad_one_told_once(path):
         app.looks(4)
 
     app = run(path, script)
-    assert app.said[0] == "contextdb.toml was changed on disk and is read anew."
+    assert app.said[0] == "contextdb.toml changed on disk and was read again."
     assert "nunber" in app.said[1]
     assert len(app.said) == 2
     assert app.session.sheet.table.condition("speed").condition.is_declared

@@ -69,7 +69,7 @@ def test_without_a_terminal_it_says_what_to_use_instead(folder):
     )
     assert done.returncode == 2
     assert done.stdout == ""
-    assert "standard input and output are no terminal" in done.stderr
+    assert "standard input and output are not a terminal" in done.stderr
     assert 'use "contextdb query"' in done.stderr
     assert "Traceback" not in done.stderr
 
@@ -84,7 +84,7 @@ def test_without_a_terminal_it_says_what_to_use_instead(folder):
         (["empty"], {}, "the folder holds no table"),
         (["t.csv", "--theme", "contextdb-drak"], {}, 'there is no theme "contextdb-drak"'),
         (["t.csv"], {"CONTEXTDB_EDITOR": "bad.toml"}, "cannot read the settings of the editor"),
-        (["twice.csv"], {}, 'the column name "a" stands twice'),
+        (["twice.csv"], {}, 'the column name "a" appears twice'),
     ],
     ids=["dumb", "unset", "no-file", "empty-folder", "theme", "settings", "unreadable"],
 )

@@ -272,15 +272,57 @@ def test_without_a_file_nothing_is_imported(table: Table):
 def test_a_sheet_is_chosen_where_a_workbook_has_several(table: Table):
     async def script(pilot: Pilot[Any]) -> None:
         await read_file(pilot, "book.xlsx")
-        assert '✗ 2 sheets hold cells: "Moves", "Other".' in screen_text(pilot.app)
-        assert "--sheet" not in screen_text(pilot.app)
-        pilot.app.screen.query_one("#import-sheet", Select).value = "Other"
+        text = screen_text(pilot.app)
+        assert '2 sheets hold cells: "Moves", "Other".' in text
+        assert "✗" not in text
+        assert "--sheet" not in text
+        await pilot.press("down", "down", "down", "enter")  # the filled one, an empty one, Moves, Other
         await pilot.pause()
         await settled(pilot)
         await pilot.press("f6")
 
     [answer], _ = played(importing(table), script)
     assert answer.edit.apply(table).assets == ["jog", "run", "idle", "Other_jog"]
+
+
+NAMES_SAID = 'column "where": each text is one name, such as "Mid Air"; Names, "each word is a name", reads each word as a name.'
+
+
+def test_a_text_with_blanks_is_one_name_or_several_as_it_is_chosen(table: Table):
+    raw = b"name;where\nrun;Mid Air\nsprint;Mid\n"
+    cells = {None: ['"Mid Air"', "Mid"], "whole": ['"Mid Air"', "Mid"], "words": ["Mid Air", "Mid"]}
+    for names, expected in cells.items():
+        found = Draft.read(table, raw, "more.csv", ReadOptions("csv"), names)
+        after = texts(found.edit().apply(table))
+        assert [after["where"][1], after["where"][3]] == expected
+        assert (NAMES_SAID in found.notes) is (names is None)
+
+
+def test_a_table_of_ours_keeps_its_cells_where_nothing_else_is_chosen(table: Table):
+    assert table.path is not None
+    ours = table.path.with_name("ours.csv")
+    ours.write_text("name,where\nrun,Mid Air\n", encoding="utf-8")
+    ours.with_name("contextdb.toml").write_text(f"{TOML}[tables.ours]\n", encoding="utf-8")
+    for names, cell in ((None, "Mid Air"), ("whole", '"Mid Air"')):
+        found = Draft.read(table, ours.read_bytes(), str(ours), ReadOptions(), names)
+        assert texts(found.edit().apply(table))["where"][1] == cell
+
+
+def test_how_names_are_read_is_chosen_in_the_dialog(table: Table):
+    assert table.path is not None
+    (table.path.parent / "work" / "names.csv").write_text("name;where\nhop;Mid Air\n", encoding="utf-8")
+
+    async def script(pilot: Pilot[Any]) -> None:
+        await read_file(pilot, "names.csv")
+        assert 'each text is one name, such as "Mid Air"' in screen_text(pilot.app)
+        pilot.app.screen.query_one("#import-texts", Select).value = "words"
+        await pilot.pause()
+        await settled(pilot)
+        assert "one name, such as" not in screen_text(pilot.app)
+        await pilot.press("f6")
+
+    [answer], _ = played(importing(table), script)
+    assert answer.edit.apply(table).text(3, "where") == "Mid Air"
 
 
 def test_enter_on_a_column_shows_all_that_it_may_become(table: Table):
@@ -383,7 +425,7 @@ def test_an_export_asks_before_it_writes_over_a_file(table: Table, keys: tuple[s
         ("x.xslx", "✗ a file that ends in"),
         (".", "✗ This is a folder; a file is wanted."),
         ("../moves.csv", "✗ This is the open table itself; Ctrl+S saves it."),
-        ("x\0.csv", "✗ This is no path of a file."),
+        ("x\0.csv", "✗ This is not the path of a file."),
     ],
 )
 def test_a_path_that_cannot_be_exported_to_stays_with_its_reason(table: Table, path: str, said: str):

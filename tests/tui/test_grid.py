@@ -6,9 +6,10 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rich.style import Style
+from strategies import examples
 from terminal import press, said, screen_text, with_editor
 from textual.strip import Strip
 
@@ -425,7 +426,7 @@ def test_a_grid_behind_another_tab_is_not_scrolled_by_an_edit_there(tmp_path):
 VERB_KEYS = [c.keys.split(",")[0] for c in GRID if c.keys and c.id not in ("redo",)]
 
 
-@settings(max_examples=8)
+@examples(0.08)
 @given(keys=st.lists(st.sampled_from(VERB_KEYS), min_size=1, max_size=12))
 def test_whatever_is_pressed_undoing_all_gives_the_same_bytes(keys, tmp_path_factory):
     folder = tmp_path_factory.mktemp("any")

@@ -166,7 +166,7 @@ def test_a_table_that_cannot_be_read_is_refused_and_the_one_that_is_seen_stays(p
 
     name, text = with_editor(path, script)
     assert name == "t"
-    assert "stands twice" in text
+    assert "appears twice" in text
 
 
 def test_going_to_a_row_takes_its_number_or_the_beginning_of_its_name(path):
@@ -195,7 +195,7 @@ def test_why_needs_a_test_row_that_asks(path):
         await press(pilot, "f12")
         return said(app)
 
-    assert with_editor(path, script).startswith("The test row asks for nothing yet")
+    assert with_editor(path, script).startswith("The test row is empty")
 
 
 @pytest.mark.parametrize("size", [(20, 8), (40, 12), (80, 24), (160, 48)])

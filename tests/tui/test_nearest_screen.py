@@ -50,7 +50,7 @@ def test_the_row_of_the_cursor_is_told_cell_by_cell(size: tuple[int, int]):
     lines = [" ".join(line.strip("│ ").split()) for line in text.splitlines()]
     assert any("✗ fails speed 3 m/s 0..2 0..3" in line for line in lines)
     assert any("✓ holds gait Walk Walk" in line for line in lines)
-    assert '"0..3" would accept it too.' in text
+    assert '"0..3" would also accept it.' in text
 
 
 def test_a_row_that_is_valid_says_so_and_the_nearest_rows_are_a_key_away():
@@ -101,7 +101,7 @@ def test_escape_leaves_without_an_answer():
 
 
 def test_a_test_row_that_asks_for_nothing_and_a_fact_that_cannot_be_read_are_told():
-    assert "asks for nothing" in pressed(Stage(0))
+    assert "The test row is empty" in pressed(Stage(0))
     assert "The fact speed cannot be read" in pressed(Stage(0, speed="quick", gait="Run"))
 
 

@@ -124,7 +124,7 @@ def test_an_inner_table_that_cannot_be_read_is_told_and_its_row_is_never_valid(p
         return text, said(app), app.main.session.sheet.query.valid.tolist(), place(app)[0]
 
     text, told, valid, name = with_editor(path, script)
-    assert text == "cannot be asked"
+    assert text == "cannot be used"
     assert "dive.csv" in told
     assert valid == [True, False, False, True]
     assert name == "moves"

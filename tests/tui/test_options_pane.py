@@ -145,7 +145,7 @@ def test_assumptions_are_added_changed_and_taken_away():
         inputs[1].value = "not on"
         await pilot.press("enter")
         await pilot.pause()
-        assert "stands twice" in wrong(app, "assume")
+        assert "appears twice" in wrong(app, "assume")
         inputs[1].value = "not onn"
         await pilot.press("enter")
         await pilot.pause()
@@ -163,7 +163,7 @@ def test_a_bad_bound_stays_in_its_field_with_the_reason_and_escape_puts_it_back(
 
     async def script(pilot):
         await submit(pilot, "#condition-min", "fast")
-        assert wrong(app, "min") == '"fast" is no number.'
+        assert wrong(app, "min") == '"fast" is not a number.'
         assert app.query_one("#condition-min", Input).value == "fast"
         await submit(pilot, "#condition-min", "9")
         assert "is above" in wrong(app, "min")

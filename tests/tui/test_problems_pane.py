@@ -97,7 +97,7 @@ def test_the_detail_has_the_whole_message_and_the_cure(table):
     _, screen = shown(table, "down")
     assert 'Error unreadable-cell: row 2, Run, column "speed"' in screen
     assert 'Did you mean "1..5"?' in screen
-    assert "The text of a cell is not in the grammar of its type." in screen
+    assert "The text of a cell does not follow the grammar of its type." in screen
 
 
 def test_enter_goes_to_the_cell(table):
@@ -162,7 +162,7 @@ def test_a_fact_of_the_test_row_that_cannot_be_read_is_a_problem_too(table):
 def test_a_sound_table_has_nothing_to_show():
     sound = cdb.Table.from_columns({"Asset": ["A"], "up": ["True"]}, {"up": {"type": "bool"}})
     app, screen = shown(sound, "enter", "down", "end", "4")
-    assert "Nothing is wrong with this table" in screen
+    assert "found nothing wrong with this table" in screen
     assert app.told == []
 
 

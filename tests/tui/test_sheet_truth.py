@@ -239,7 +239,7 @@ def test_a_computed_fact_that_lacks_a_fact_says_which(tmp_path):
     sheet = Sheet(cdb.load(tmp_path / "outer.csv"))
     sheet.query.load({"speed": "3"})
     [cell] = [cell for cell in why_row(sheet.query, sheet.table, 0).cells if cell.column == "closing"]
-    assert (cell.state, cell.fact) == ("not asked", 'needs "target"')
+    assert (cell.state, cell.fact) == ("not given", 'needs "target"')
 
 
 def test_typing_into_a_computed_fact_says_why_it_cannot_be_typed(tmp_path):

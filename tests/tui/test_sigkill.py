@@ -14,13 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from strategies import IS_FULL
 
 from tui.model.session import Session, bytes_for
 from tui.model.watched import digest_of
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="SIGKILL and fork are of POSIX systems")
 
-N_KILLS = 100
+N_KILLS = 100 if IS_FULL else 25
 HERE = Path(__file__).parent
 
 
@@ -104,8 +105,8 @@ def test_an_editor_killed_while_it_edits_and_saves_leaves_the_old_or_the_new_fil
             step = chance.randrange(4, 80) if at_steps else None
             kill_one(process, told, seed, step, chance.randrange(0, 40))
             verify(path, told)
-    assert told.n_edits > N_KILLS
-    assert told.n_saves > N_KILLS // 2
+    assert told.n_edits > N_KILLS // 2
+    assert told.n_saves > N_KILLS // 4
 
 
 def test_what_kills_left_behind_is_gone_after_the_next_opening(path):

@@ -112,7 +112,7 @@ def test_a_fact_that_cannot_be_read_is_refused_when_typed_and_told_when_pasted()
 
 def test_two_actors_of_one_name_are_told_and_the_first_counts():
     sheet = TeamSheet("Defender", roles_of(TABLE)["Defender"], [IVY, {**IVY, "chart": "FS"}])
-    assert sheet.faults == ["Ivy stands twice among the actors for Defender."]
+    assert sheet.faults == ["Ivy appears twice among the actors for Defender."]
     assert [actor["Defender.chart"] for actor in sheet.actors()] == ["CB"]
 
 

@@ -53,12 +53,12 @@ def test_the_cells_that_fail_stand_first_and_each_says_its_state():
     query.load({"hit": "False"})
     assert [(c.column, c.state, c.fact, c.mend) for c in why_row(query, table, 1).cells] == [
         ("hit", "fails", "False", "Any"),
-        ("speed", "not asked", "", None),
+        ("speed", "not given", "", None),
     ]
     query.load({"speed": "3"})
     assert [(c.column, c.state, c.fact) for c in why_row(query, table, 1).cells] == [
         ("speed", "holds", "3 m/s"),
-        ("hit", "not asked", ""),
+        ("hit", "not given", ""),
     ]
 
 

@@ -1,7 +1,7 @@
 """The test row's question put to a compiled table: with actors to cast for its roles, or with the rows of tables inside it.
 
-Rows are those of the sheet. One that stands for another table is valid when some row of that table is; how many are is kept for it.
-Where a table inside another cannot be read, the rows that stand for tables have no answer.
+Rows are those of the sheet. One that refers to another table is valid when some row of that table is; how many are is kept for it.
+Where a table inside another cannot be read, the rows that refer to tables have no answer.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Asked:
         if not self._inner:
             return bits_of_rows(rows, self._table.n_rows)
         found = bitmask.to_int(bitmask.pack(np.bincount(self.own[rows], minlength=self._table.n_rows) > 0))
-        if self.fault is not None:  # the flat table could not be made: rows that stand for others have no answer
+        if self.fault is not None:  # the flat table could not be made: rows that refer to others have no answer
             found &= ~sum(1 << row for row in self._inner)
         return found
 
@@ -96,7 +96,7 @@ class Asked:
         return [int(r) for r in indices[self.own[indices] == row]]
 
     def inside(self, row: int) -> Inside | None:
-        """What stands behind a row of the sheet; None for the row of an asset."""
+        """What is behind a row of the sheet; None for the row of an asset."""
         name = self._inner.get(row)
         if name is None:
             return None

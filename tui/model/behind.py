@@ -1,6 +1,6 @@
-"""What stands behind the rows of a sheet that stand for other tables, where not all of these can be read together.
+"""What is behind the rows of a sheet that refer to other tables, where not all of these can be read together.
 
-A row behind is valid when its own cells hold and those of the row that stands for its table. Each table is asked by itself, so that
+A row behind is valid when its own cells hold and those of the row that refers to its table. Each table is asked by itself, so that
 a cell that cannot be read takes away its own row only. Tables that come back to themselves are not gone into.
 """
 
@@ -17,7 +17,7 @@ from contextdb.tables.table import Table
 
 @dataclass(frozen=True, slots=True)
 class Inside:
-    """What stands behind a row that stands for a table."""
+    """What is behind a row that refers to a table."""
 
     table: str
     n_rows: int = 0
@@ -30,7 +30,7 @@ class Inside:
     def text(self) -> str:
         """How much of it is valid."""
         if self.fault is not None:
-            return "cannot be asked"
+            return "cannot be used"
         return plural(self.n_rows, "row") if self.n_valid is None else f"{self.n_valid:,} of {plural(self.n_rows, 'row')}"
 
 
@@ -89,15 +89,15 @@ class Behind:
         return bits
 
     def items(self) -> Iterator[tuple[int, Inside]]:
-        """The rows that stand for tables, each with what stands behind it."""
+        """The rows that refer to tables, each with what is behind it."""
         return ((row, self._found[name]) for row, name in self._rows.items())
 
     def inside(self, row: int) -> Inside | None:
-        """What stands behind a row; None for the row of an asset."""
+        """What is behind a row; None for the row of an asset."""
         return self._found.get(self._rows.get(row, ""))
 
     def answers(self, row: int) -> Iterator[tuple[str, bool]]:
-        """The assets behind a row that stands for a table, and whether each is valid."""
+        """The assets behind a row that refers to a table, and whether each is valid."""
         asked = self._asked.get(self._rows[row])
         return asked.answers() if asked is not None else iter(())
 

@@ -1,6 +1,6 @@
 """Tab-separated text both ways, as Excel, LibreOffice and Google Sheets write and read it, and where a paste goes.
 
-A cell with a tab, a line end or a double quote at its start stands in double quotes, with quotes in it doubled. Lines end in
+A cell with a tab, a line end or a double quote at its start is in double quotes, with quotes in it doubled. Lines end in
 "\\n", "\\r\\n", or "\\r" (a bracketed paste in a terminal); one line end at the end closes the last row.
 """
 
@@ -20,9 +20,9 @@ _NEEDS_QUOTES = re.compile(r'[\t\r\n]|^"')
 
 
 def parse_tsv(text: str) -> Texts:
-    """The cells of a text from the clipboard; short rows are filled with empty cells. No text is no cell.
+    """The cells of a text from the clipboard; short rows are filled with empty cells. No text is not a cell.
 
-    A quote that is not closed, or stands inside a cell, is taken as it is.
+    A quote that is not closed, or is inside a cell, is taken as it is.
     """
     rows: Texts = [[]]
     at = 0
@@ -75,7 +75,7 @@ class Placed:
 def place_paste(texts: Texts, selected: Block, n_columns: int) -> Placed:
     """Where cells go that are pasted over a selection.
 
-    One cell, a row or a block fills the selection when that is a multiple of it, in each direction by itself; else it stands once,
+    One cell, a row or a block fills the selection when that is a multiple of it, in each direction by itself; else it is once,
     from the selection's top left. It grows past the last row, never past the last column.
     """
     height, width = len(texts), len(texts[0]) if texts else 0

@@ -118,7 +118,7 @@ class NewColumnForm:
     condition: ConditionForm = field(default_factory=ConditionForm)
 
     def read(self, table: Table) -> tuple[NewColumn, dict[str, str]]:
-        """The column, and for each field that cannot be meant why."""
+        """The column, and for each invalid field why."""
         name = self.name.strip()
         said, wrong = self.condition.declared() if self.job == "condition" else ({}, {})
         is_known = self.job == "condition" and name in table.schema.conditions

@@ -1,7 +1,7 @@
 """The words of a cell that names values: which one is being typed, what it may become, and which values are named.
 
 A text is taken apart into words even where the grammar refuses it, for it is looked at while it is typed; what it means is for
-`contextdb.cells.grammar` to say. A word may have a sign (tags) and stand in quotes. Before the words `not` may stand, behind them
+`contextdb.cells.grammar` to say. A word may have a sign (tags) and be in quotes. Before the words `not` may stand, behind them
 `~2.5`.
 """
 
@@ -65,7 +65,7 @@ class Words:
         return self._by_name.get(name)
 
     def at(self, caret: int) -> Word | None:
-        """The word that the caret stands in or behind."""
+        """The word that the caret is in or behind."""
         return next((w for w in self.words if w.start <= caret <= w.stop), None)
 
 
@@ -134,7 +134,7 @@ def _rewritten(found: Words, value: str, written: str | None) -> str:
 
 
 def _source(found: Words, word: Word) -> str:
-    """A word as it is written, in quotes if it now needs them: a plain fact that has spaces stands alone."""
+    """A word as it is written, in quotes if it now needs them: a plain fact that has spaces is alone."""
     source = found.text[word.start : word.stop]
     return source if '"' in source or not any(c.isspace() for c in source) else quoted(word.name)
 
@@ -194,7 +194,7 @@ def _rank(folded: str, sought: str) -> int:
 
 
 def vocabulary(domain: Domain, known_texts: Sequence[str] = ()) -> Vocabulary:
-    """The declared values of a condition, or those that the cells of its column name; tags with those they stand under."""
+    """The declared values of a condition, or those that the cells of its column name; tags with those they are under."""
     values = domain.values if domain.values is not None else _named_in(known_texts, domain)
     if domain.kind == "tags":
         values = _with_parents(values)
@@ -213,7 +213,7 @@ def _named_in(texts: Sequence[str], domain: Domain) -> Sequence[str]:
 
 
 def _with_parents(tags: Iterable[str]) -> Sequence[str]:
-    """Each tag behind those that it stands under: Move, Move.Run."""
+    """Each tag behind those that it is under: Move, Move.Run."""
     seen: dict[str, int] = {}
     for tag in tags:
         for name in _path(tag):

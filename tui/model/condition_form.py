@@ -40,7 +40,7 @@ class ConditionForm:
     maximum: str = ""
     unit: str = ""
     values: str = ""
-    """Names, with spaces or commas between them; one with a space in it stands in quotes."""
+    """Names, with spaces or commas between them; one with a space in it is in quotes."""
     description: str = ""
     mirror: str = ""
     """"negate", "none", or names that change places: Left = Right, Up = Down."""
@@ -68,7 +68,7 @@ class ConditionForm:
                 number = _number(text)
                 said[key] = number
                 if number is None:
-                    wrong[key] = f'"{text.strip()}" is no number.'
+                    wrong[key] = f'"{text.strip()}" is not a number.'
         if has_place("values", self.kind) and self.values.strip():
             said["values"] = list(dict.fromkeys(names_in(self.values)))
         said["mirror"] = _mirror(self.mirror)

@@ -17,7 +17,7 @@ from contextdb.tables.table import Table
 
 
 def conflicts_in(path: str | Path) -> Merge[Table] | None:
-    """The merge that a file's marks stand for, to be decided; None where it has none, or no table stands between them."""
+    """The merge that a file's marks stand for, to be decided; None where it has none, or no table is between them."""
     try:
         versions = versions_of(read_bytes(path))
         if versions is None:

@@ -1,6 +1,6 @@
 """The contexts of a file, and where one is in them: saved cases with what is expected of them, or recorded telemetry.
 
-A list stands on a table: facts are those of its conditions, and what is expected is judged by it, anew after each edit. Recorded
+A list belongs to a table: facts are those of its conditions, and what is expected is judged by it, again after each edit. Recorded
 contexts stay in their file until they are looked at. An edge: this reads and writes files of contexts.
 """
 
@@ -46,7 +46,7 @@ BLOCK = 256
 """Rows of a recording that are read in one go."""
 
 KEPT_BLOCKS = 64
-"""Blocks that are kept at hand: a page of rows that a search found may lie in as many."""
+"""Blocks that are kept available: a page of rows that a search found may lie in as many."""
 
 
 class Rows(Protocol):
@@ -172,7 +172,7 @@ class ContextList:
         return cls(table, RecordedRows(recording))
 
     def show(self, table: Table) -> None:
-        """Stand on this table from now on; what is expected is judged anew."""
+        """Stand on this table from now on; what is expected is judged again."""
         self.table = table
         self.conditions = wanted_by(table).given
         """The conditions whose facts are kept: those that a person may give, computed ones not among them."""

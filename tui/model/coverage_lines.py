@@ -43,7 +43,7 @@ def state_text(run: CoverageRun, table: Table) -> str:
     if run.result is None:
         return f"Which contexts have no valid row? R works it out ({size})."
     headline = run.result.report.headline
-    return headline if state == "done" else f"The table has changed since. R works it out anew. Before: {headline}"
+    return headline if state == "done" else f"The table has changed since. R measures it again. Before: {headline}"
 
 
 def unknown_text(run: CoverageRun) -> str:
@@ -181,14 +181,14 @@ def about_text(result: Result) -> str:
     report, pairs = result.report, result.pairs
     how = {
         "exact": "The covered share is exact.",
-        "bounds": "The covered share lies between bounds that are certain; the exact count needs more work than was allowed.",
+        "bounds": "The covered share is between certain bounds; the exact count needs more work than the limit.",
         "estimate": f"The covered share is estimated from {report.n_samples:,} random contexts (seed {report.seed}), "
         "with a confidence of 99 %.",
     }
     lines = [how[report.method]]
     if report.method == "estimate":
         lower, upper = report.certain
-        lines.append(f"For certain it lies between {format_percent(lower)} and {format_percent(upper)}.")
+        lines.append(f"It is certainly between {format_percent(lower)} and {format_percent(upper)}.")
     given = f"Weights were given for {', '.join(report.weighted)}."
     lines.append(given if report.weighted else "Every value of a condition counts the same, numbers by length.")
     lines += [f"{name} is not fully declared: {what}." for name, what in report.assumed.items()]

@@ -49,7 +49,7 @@ def measured(table: Table, tell: Tell, should_stop: Stops) -> Result:
 
 
 def with_rows_of_file(report: CoverageReport, table: Table) -> CoverageReport:
-    """A report whose rows are those of the table's file: where rows stand for other tables it counts the rows behind them."""
+    """A report whose rows are those of the table's file: where rows refer to other tables it counts the rows behind them."""
     flat = table.flat()
     if not isinstance(flat, FlatTable) or flat.expansion is None:
         return report

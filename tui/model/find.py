@@ -33,7 +33,7 @@ class Search:
     is_whole: bool = False
     """The whole cell must match."""
     is_cased: bool = False
-    """Upper and lower case are told apart."""
+    """Upper and lower case are distinguished."""
     is_pattern: bool = False
     """The text is a regular expression."""
 

@@ -17,6 +17,7 @@ from contextdb.columns import TextColumn
 from contextdb.edits.edits import edit_between
 from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, shown
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
+from contextdb.exchange.importing import NAMES, has_whole_names, whole_names_told
 from contextdb.exchange.mapping import PLAIN_JOBS, Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.proposals import names_of
 from contextdb.exchange.reading import Reading, listed
@@ -54,24 +55,26 @@ class Choice:
 class Draft:
     """A file that was read, and what is decided of it so far."""
 
-    def __init__(self, table: Table, reading: Reading, name: str) -> None:
-        """`name` is what the file is called in the step's name."""
+    def __init__(self, table: Table, reading: Reading, name: str, tells_names: bool = True) -> None:
+        """`name` is what the file is called in the step's name; `tells_names` says in the notes which texts became one name."""
         self.table = table
         self.reading = reading
         self.name = name
+        self.tells_names = tells_names
         self.mode: Mode = "merge"
         self.columns: list[Mapped] = list(propose(reading, self._schema, self._settings))
 
     @classmethod
-    def read(cls, table: Table, raw: bytes, name: str, options: ReadOptions) -> Draft:
-        """Read a file for a table.
+    def read(cls, table: Table, raw: bytes, name: str, options: ReadOptions, names: str | None = None) -> Draft:
+        """Read a file for a table; `names` is how its texts are read, "whole" or "words", where that is said.
 
         Raises
         ------
         ContextDBError
             It cannot be read, with every fault.
         """
-        return cls(table, read(raw, name, options), Path(name).name)
+        whole = has_whole_names(names, Path(name))
+        return cls(table, read(raw, name, replace(options, has_whole_names=whole)), Path(name).name, tells_names=not names)
 
     @property
     def _schema(self) -> Schema:
@@ -218,7 +221,8 @@ class Draft:
         have = {self._name(column) for column in self.columns if column.job != "left out"}
         missing = [name for name in self._names if name not in have]
         kept = [f"Not in the file: {listed(missing, 3)}. New rows are empty there, others stay."] if missing else []
-        return (*map(str, self.reading.remarks), *kept)
+        told = whole_names_told(self.columns, self.reading, f'Names, "{NAMES["words"]}",') if self.tells_names else ""
+        return (*map(str, self.reading.remarks), *([told] if told else []), *kept)
 
     def answer(self) -> Import:
         """What the dialog gives back."""

@@ -2,7 +2,7 @@
 
     0 ├──●━━━━━━━○────┤ 7        ● this end is in, ○ it is not
 
-Pictures are runs of (text, is_accepted): whether the cell holds any of the values that stand there. Every character of a line is a
+Pictures are runs of (text, is_accepted): whether the cell holds any of the values that are there. Every character of a line is a
 stretch of the range shown: ━ where all of it is held, ─ where none is, ● or ○ where a span ends.
 """
 
@@ -18,7 +18,7 @@ from contextdb.cells.grammar import Cell, NumberSet, format_cell, format_number
 from contextdb.cells.intervals import CIRCLE, EVERYTHING, Span, Spans
 
 Run = tuple[str, bool]
-"""A piece of a picture, and whether the cell holds any of the values that stand there."""
+"""A piece of a picture, and whether the cell holds any of the values that are there."""
 Range = tuple[float, float]
 
 HELD, FREE, END_IN, END_OUT = "━─●○"
@@ -65,12 +65,12 @@ def pieces(cell: Cell, domain: Domain) -> tuple[Piece, ...]:
 
 
 def _half_turn(degrees: float) -> float:
-    """Half a turn is told as 180, not as the -180 that it is kept as."""
+    """Half a turn is shown as 180, not as the -180 that is stored."""
     return 180.0 if degrees == -180.0 else degrees
 
 
 def _piece(span: Span, domain: Domain) -> Piece:
-    """How the formatter writes a span: it knows which doubles are told as the open end at their neighbour."""
+    """How the formatter writes a span: it knows which doubles are reported as the open end at their neighbour."""
     low, high = span
     text = format_cell(Cell(NumberSet((span,), domain.kind == "angle")), domain)
     is_low_in, is_high_in = not text.startswith("("), not text.endswith(")")
@@ -116,7 +116,7 @@ def _nice(size: float) -> float:
 
 
 def column_of(value: float, shown: Range, width: int) -> int:
-    """The character of a line of `width` that a value of the range stands in."""
+    """The character of a line of `width` that a value of the range is in."""
     low, high = shown
     share = (max(low, min(value, high)) - low) / (high - low)
     return min(int(share * width), width - 1)
@@ -151,7 +151,7 @@ def runs(signs: Iterable[Run]) -> list[Run]:
 
 
 def framed_line(cell: Cell, domain: Domain, width: int) -> list[Run]:
-    """The line with the ends of its range beside it; a bound of the domain has a stop, an end that is only shown has none."""
+    """The line with the ends of its range next to it; a bound of the domain has a stop, an end that is only shown has none."""
     low, high = shown = shown_range(cell, domain)
     left = format_number(_short(low)) + (" ├" if low == domain.minimum else "  ")
     right = ("┤ " if high == domain.maximum else "  ") + format_number(_short(high))
@@ -186,7 +186,7 @@ def dial(cell: Cell, width: int = DIAL_WIDTH, height: int = DIAL_HEIGHT) -> list
 
 
 def dot_of(x: int, y: int, width: int = DIAL_WIDTH, height: int = DIAL_HEIGHT) -> tuple[float, float]:
-    """Where a dot of a dial stands: how far from the middle, and at which angle."""
+    """Where a dot of a dial is: how far from the middle, and at which angle."""
     right, up = x - (width * 2 - 1) / 2.0, (height * 4 - 1) / 2.0 - y
     return math.hypot(right, up), math.degrees(math.atan2(-right, up))
 

@@ -1,6 +1,6 @@
-"""Unsaved edits kept beside the table, so that they come back after a crash or a kill.
+"""Unsaved edits kept next to the table, so that they come back after a crash or a kill.
 
-They stand in the folder `.contextdb-journal` next to the table, which ignores itself in git by a .gitignore of its own. A journal
+They are in the folder `.contextdb-journal` next to the table, which ignores itself in git by a .gitignore of its own. A journal
 is lines of a check sum, a space and JSON. The first names the file and the digest of the bytes that the edits were made for:
 
     {"format": 1, "file": "hit_mid_air.csv", "digest": "…"}
@@ -13,7 +13,7 @@ A line is handed to the system as its edit happens, so a kill loses at most the 
 power failure may lose the last seconds. A line that is cut or altered ends the journal.
 
 Beside a journal stands a second link to the file that its edits were made for. Where the file was replaced after a crash, by a pull
-say, the edits come back on the file as it was, and are then merged with what stands on the disk.
+say, the edits come back on the file as it was, and are then merged with what is on the disk.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def base_path(table: Path) -> Path:
 class Journal:
     """The journal of one table, written as edits happen. It is a `tui.model.sheet.Recorder`.
 
-    When the disk refuses, editing goes on without a journal, and `problem` says why.
+    When the disk refuses, editing continues without a journal, and `problem` says why.
     """
 
     def __init__(self, table: Path, digest: str, recovered: History | None = None) -> None:
@@ -104,7 +104,7 @@ class Journal:
             self._write(record)
 
     def saved(self, raw: bytes, position: int) -> None:
-        """The file has these bytes, at this position of the history: begin anew with the next edit."""
+        """The file has these bytes, at this position of the history: begin again with the next edit."""
         self._digest, self._first, self._is_straight = digest_of(raw), position, True
         self._position = self._n_edits = self._least = 0
         self._is_broken = False
@@ -155,7 +155,7 @@ class Journal:
 
     @contextmanager
     def _told(self) -> Iterator[None]:
-        """Editing goes on when the disk refuses; `problem` says so."""
+        """Editing continues when the disk refuses; `problem` says so."""
         try:
             yield
         except (OSError, ContextDBError) as error:
@@ -216,7 +216,7 @@ def recover(table: Table) -> Recovery | None:
     base = table if records[0].get("digest") == digest else _base_of(table, records[0].get("digest"))
     if records[0].get("format") != FORMAT or base is None:
         n_edits = sum("do" in r for r in records)
-        found = f"the file has changed since {plural(n_edits, 'unsaved edit')} of it were kept, so they cannot be made again."
+        found = f"the file has changed since {plural(n_edits, 'unsaved edit')} of it were kept, so they cannot be applied again."
         return Recovery(History(table), 0, Fault(found, "the file as it was then", place=Place(str(path))))
     found_again = _replayed(History(base), records[1:], path)
     if n_bytes < len(raw):
@@ -252,7 +252,7 @@ def finish_save(table: Table) -> bool:
 
 
 def _base_of(table: Table, digest: object) -> Table | None:
-    """The table as it was when the edits were made, from the link beside the journal; None where it is not that any more."""
+    """The table as it was when the edits were made, from the link next to the journal; None where it is not that any more."""
     assert table.path is not None
     try:
         raw = read_bytes(base_path(table.path))

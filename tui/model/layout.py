@@ -57,24 +57,24 @@ class Layout:
         return max(self.total, self.width + last)
 
     def visible(self, scroll: int) -> range:
-        """The columns not frozen that stand in the window, at least in part, when it is scrolled to the right by so many cells."""
+        """The columns not frozen that are in the window, at least in part, when it is scrolled to the right by so many cells."""
         first = max(bisect_right(self.starts, self.frozen + scroll) - 1, self.n_frozen)
         last = bisect_right(self.starts, self.width - self.gutter + scroll - 1)
         return range(first, min(max(last, first), len(self.widths)))
 
     def column_at(self, x: int, scroll: int) -> int:
-        """Which column stands at cell `x` of the window; the nearest one where none does."""
+        """Which column is at cell `x` of the window; the nearest one where none does."""
         place = x - self.gutter
         place += scroll if place >= self.frozen else 0
         return max(0, min(bisect_right(self.starts, place) - 1, len(self.widths) - 1))
 
     def separator_at(self, x: int, scroll: int) -> int | None:
-        """The column whose separator stands at cell `x` of the window."""
+        """The column whose separator is at cell `x` of the window."""
         column = self.column_at(x, scroll)
         return column if self.place(column, scroll) + self.widths[column] == x else None
 
     def place(self, column: int, scroll: int) -> int:
-        """Where a column's first cell stands in the window."""
+        """Where a column's first cell is in the window."""
         return self.gutter + self.starts[column] - (scroll if column >= self.n_frozen else 0)
 
     def scroll_to(self, column: int, scroll: int) -> int:

@@ -1,4 +1,4 @@
-"""A table held open by one editor, so that a second one is told.
+"""A table held open by one editor, so that a second one is reported.
 
 The lock is a file in the folder of journals that says who holds it. The system lets go of it when the process ends, however it
 ends, so on one machine none is stale. On a network drive locks may not reach another machine: there a name of another host in the
@@ -61,7 +61,7 @@ class Lock:
         self._descriptor = -1
 
     def acquire(self, takes_over: bool = False) -> Holder | None:
-        """Take the lock; gives who has it when somebody else does. Where the disk cannot lock, nobody is told.
+        """Take the lock; gives who has it when somebody else does. Where the disk cannot lock, nobody is reported.
 
         `takes_over`: take it from an editor on another machine, which a person says has ended.
         """

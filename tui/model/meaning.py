@@ -45,12 +45,12 @@ def _cell_meaning(text: str, condition: Condition) -> Meaning:
 def _fact_meaning(text: str, condition: Condition) -> Meaning:
     domain = condition.domain
     if not text.strip():
-        return Meaning("not asked for")
+        return Meaning("not given")
     if domain.kind != "tags" and not reads(text, domain) and text.strip() not in domain.known:
         parse_cell(text, domain, wants_mend=False)
     fact = read_fact_text(text, condition)
     if fact is None:
-        return Meaning("not asked for")
+        return Meaning("not given")
     if isinstance(fact, Cell):
         return Meaning(f"may be {set_words(fact, domain, condition.unit)}", cell=fact)
     if domain.kind in NUMERIC:

@@ -45,7 +45,7 @@ def moment_inside(cells: Mapping[str, str], wanted: Wanted) -> dict[str, str]:
 
 
 def _tries(inputs: tuple[Condition, ...], known: Mapping[str, Cell], given: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """Values for the inputs, inside their own cells: first those at hand, then drawn ones, the same each time."""
+    """Values for the inputs, inside their own cells: first those available, then drawn ones, the same each time."""
     rng = random.Random(0)
     for n in range(MOST_TRIED):
         is_first = n == 0

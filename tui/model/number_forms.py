@@ -16,7 +16,7 @@ from contextdb.cells.words import NUMBER_TEXT
 from tui.model.interval_picture import Piece, pieces
 
 _NUMBER = re.compile(rf"(?:(?<=\+)-)?({NUMBER_TEXT})")
-"""The "-" of "20 +-5" is no sign."""
+"""The "-" of "20 +-5" is not a sign."""
 _CENTRE_MARK = re.compile(r",|±|\+-")
 
 
@@ -34,7 +34,7 @@ def nudged(text: str, caret: int, domain: Domain, steps: int) -> tuple[str, int]
     """The text with the number at the caret moved by so many steps, and where the caret is then.
 
     The number is the one under the caret, or the last one before it. A number within the bounds of the domain stays within them, an
-    angle goes on through half a turn. None where there is no number, or the text would not read or hold nothing.
+    angle continues through half a turn. None where there is no number, or the text would not read or hold nothing.
     """
     found = [m for m in _NUMBER.finditer(text) if math.isfinite(float(m[1]))]
     if not found or not reads(text, domain):

@@ -16,7 +16,7 @@ POLICY_WORDS = {
 """What each policy means, in a few words."""
 
 JOBS = ("enabled", "priority", "weight")
-"""The settings that name one column, beside that of the assets."""
+"""The settings that name one column, next to that of the assets."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Option:
 OPTIONS = (
     Option("policy", "Policy", "What the game does when several rows are valid at once."),
     Option("asset", "Asset column", "Names the asset of each row."),
-    Option("outputs", "Outputs", "Columns that are data for the game. They are no conditions: they exclude no row."),
+    Option("outputs", "Outputs", "Columns that are data for the game. They are not conditions: they exclude no row."),
     Option("enabled", "Enabled column", "A row that says False here never matches."),
     Option("priority", "Priority column", "A whole number in each row. Of the valid rows those with the highest are picked from."),
     Option("weight", "Weight column", "How often a row is picked among equals: 2 is twice as often as 1."),

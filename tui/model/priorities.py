@@ -81,7 +81,7 @@ class Priorities:
         self._answers: dict[str, Answer | str] = {}
 
     def reload(self) -> None:
-        """Look anew for clips and other tables."""
+        """Look again for clips and other tables."""
         self._clips.clear()
         self._tables.clear()
 
@@ -164,7 +164,7 @@ class Priorities:
         return self._clips[settings.clips]
 
     def _valid_in(self, name: str) -> Answer | str:
-        """What a table answers to the test row, or why it cannot be told."""
+        """What a table answers to the test row, or why it cannot be reported."""
         if name not in self._answers:
             self._answers[name] = self._asked(name)
         return self._answers[name]

@@ -89,7 +89,7 @@ class Problems:
     def summary(self) -> str:
         """How many there are, in a sentence."""
         said = [f"{n:,} information" if level == "info" else plural(n, level) for level, n in self.counts.items() if n]
-        return f"{', '.join(said)}." if said else "Nothing is wrong with this table, as far as check can tell."
+        return f"{', '.join(said)}." if said else "The check found nothing wrong with this table."
 
 
 def cell_findings(table: Table) -> list[Finding]:
@@ -98,7 +98,7 @@ def cell_findings(table: Table) -> list[Finding]:
 
 
 def row_findings(table: Table) -> list[Finding]:
-    """What it says beside: rows that others make needless, that are dead or never chosen, and saved contexts that fail."""
+    """What it says beside: rows that others make redundant, that are dead or never chosen, and saved contexts that fail."""
     try:
         rows = check_rows(table)
     except MemoryError:

@@ -3,12 +3,12 @@
 A fact is written as in `contextdb query`: a value, or a set of values as a cell; an empty one is left out of the question. A fact
 that cannot be read has a fault and is left out too. Derived facts are computed, never typed. Rows with a cell that cannot be read
 are never valid. For each condition the mask of rows that accept its fact is kept, so a key pressed in one fact, or an edit in one
-column, works out one mask anew.
+column, works out one mask again.
 
 A valid row is *undecided* where it only may be valid: its cells accept some values of a set, or its rule lacks a fact. Which of the
 valid rows is picked is for `contextdb.compiled.pick` to say.
 
-Where actors are offered for a role, or rows stand for other tables, the compiled table is asked (`tui.model.asked`); where a table
+Where actors are offered for a role, or rows refer to other tables, the compiled table is asked (`tui.model.asked`); where a table
 inside cannot be read, each table is asked by itself (`tui.model.behind`).
 """
 
@@ -74,7 +74,7 @@ class QueryRow:
         self._ranked: tuple[TableSettings, tuple[TextColumn, ...], CompiledTable] | None = None
         self._assets: TextColumn | None = None
         self.is_nested = False
-        """Whether some row stands for another table."""
+        """Whether some row refers to another table."""
         self._table = table
         self.show(table)
 
@@ -111,7 +111,7 @@ class QueryRow:
         return role if dot and role in self.actors else None
 
     def load(self, texts: Mapping[str, str]) -> None:
-        """Write all facts anew: those not named are left out."""
+        """Write all facts again: those not named are left out."""
         self.texts = dict(texts)
         self._read()
 
@@ -139,12 +139,12 @@ class QueryRow:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no fact is asked for."""
+        """Whether no fact is given."""
         return not self.actors and not self._asks_inside and all(self.facts[name] is None for name in self.wanted.given)
 
     @property
     def _asks_inside(self) -> bool:
-        """Whether tables that rows stand for are asked, each by itself, for facts that this one has no condition for."""
+        """Whether tables that rows refer to are asked, each by itself, for facts that this one has no condition for."""
         is_alone = self.is_nested and self._flat is None
         return is_alone and any(text.strip() for name, text in self.texts.items() if name not in self.wanted.given)
 
@@ -157,7 +157,7 @@ class QueryRow:
 
     @property
     def behind(self) -> Behind | None:
-        """The tables that rows stand for, each asked by itself; None where there are none, or the compiled table is asked."""
+        """The tables that rows refer to, each asked by itself; None where there are none, or the compiled table is asked."""
         if self._behind is None and self.is_nested and self.asked is None:
             self._behind = Behind(self._table, self._ask)
         return self._behind
@@ -269,11 +269,11 @@ class QueryRow:
 
     @property
     def has_notes(self) -> bool:
-        """Whether something stands beside cells: who is cast, or how much of a table inside is valid."""
+        """Whether something is beside cells: who is cast, or how much of a table inside is valid."""
         return self.is_nested or bool(self.actors)
 
     def failures(self, row: int) -> tuple[Failure, ...]:
-        """For a table with actors what keeps a row from being valid; of one that stands for a table what does in its own cells."""
+        """For a table with actors what keeps a row from being valid; of one that refers to a table what does in its own cells."""
         explained = self.asked.explained if self.actors and self.asked is not None else None
         if explained is None or self.asked is None or self.asked.fault is not None or self.bits >> row & 1:
             return ()
@@ -289,7 +289,7 @@ class QueryRow:
         return self.asked.casting(row) if self.asked is not None and self.bits >> row & 1 else {}
 
     def inside(self, row: int) -> Inside | None:
-        """What stands behind a row that stands for another table, and how much of that is valid; None for other rows."""
+        """What is behind a row that refers to another table, and how much of that is valid; None for other rows."""
         asked = self.asked or self.behind
         found = asked.inside(row) if asked is not None and self.is_nested else None
         if found is None:
@@ -301,7 +301,7 @@ class QueryRow:
 
     @property
     def outcome(self) -> Outcome:
-        """What the table's policy makes of the valid rows; of the flat table where tables stand in this one."""
+        """What the table's policy makes of the valid rows; of the flat table where tables are in this one."""
         if self._outcome is None:
             asked = self.asked
             if asked is not None and asked.fault is None and asked.matches is not None:
@@ -430,7 +430,7 @@ class QueryRow:
         return compiled.explain({name: fact for name, fact in self.given.items() if name in compiled.asked}, unknown="any")
 
     def _read(self, fresh: Container[str] = ()) -> None:
-        """Read the facts anew, and answer the conditions whose fact is another one, or whose column is."""
+        """Read the facts again, and answer the conditions whose fact is another one, or whose column is."""
         before = self.facts
         self.facts, self.faults = self.wanted.read(self.texts, self.actors)
         self._answered = self._asked = self._behind = self._rules_left = self._outcome = None

@@ -1,7 +1,7 @@
 """One table open in an editor: its sheet, its file, its journal and its lock. An edge: this reads and writes the disk.
 
 Others may write the file, or contextdb.toml, while it is open. `poll` says so; `merge_from_disk` and `take` bring what they did
-into the sheet as one step, and `reload_schema` reads contextdb.toml anew. Unsaved edits stay, and a journal keeps them.
+into the sheet as one step, and `reload_schema` reads contextdb.toml again. Unsaved edits stay, and a journal keeps them.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Session:
         self.problem: Fault | None = found.problem if found else None
         """Why unsaved edits could not be brought back, or not all of them."""
         self.saved_table = found.base if found and found.base else table
-        """The table as it stands in the file: what edits are compared with when they are saved."""
+        """The table as it is in the file: what edits are compared with when they are saved."""
         self.teams: Teams | None = None
         """The actors for the roles of the test row, once they were asked for."""
         self._history = found.history if found and found.n_edits else History(self.saved_table)
@@ -123,19 +123,19 @@ class Session:
         return bool(self.why_read_only)
 
     def merge_from_disk(self) -> Merge[Table]:
-        """Merge what stands on the disk with the sheet. Without conflicts it is taken at once, as one step.
+        """Merge what is on the disk with the sheet. Without conflicts it is taken at once, as one step.
 
         With conflicts nothing has changed yet: decide them with `Merge.resolved`, and `take` the result.
 
         Raises
         ------
         FileError, SchemaError, TableError
-            What stands on the disk is gone, no table, or another one.
+            What is on the disk is gone, no table, or another one.
         """
         if self._schema_file.state != "same":
             self.reload_schema()
         on_disk = load_table(self.path, strict=False)
-        require_related(self.saved_table, on_disk, "to open it anew, or to save over it")
+        require_related(self.saved_table, on_disk, "to open it again, or to save over it")
         found = merge(self.saved_table, self.sheet.table, on_disk)
         if not found.conflicts:
             self.take(found)
@@ -159,7 +159,7 @@ class Session:
         return done
 
     def reload_schema(self) -> None:
-        """Read contextdb.toml anew. What was edited here of it stays; all other conditions and settings are as the file has them.
+        """Read contextdb.toml again. What was edited here of it stays; all other conditions and settings are as the file has them.
 
         Raises
         ------
@@ -174,12 +174,12 @@ class Session:
         self._show()
 
     def know(self, around: Mapping[str, Table]) -> None:
-        """Know of other versions of the tables that rows stand for."""
+        """Know of other versions of the tables that rows refer to."""
         self._history.renewed(lambda table: replace(table, around=around))
         self._show()
 
     def schema_written(self) -> None:
-        """contextdb.toml was written here: what stands in it is known."""
+        """contextdb.toml was written here: what is in it is known."""
         self._schema_file = _watched(self._schema_file.path)
 
     # ---- save and close
@@ -187,7 +187,7 @@ class Session:
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> None:
         """Write the table to its file, or to another one, which is then its file.
 
-        What others wrote since is merged first (`overwrite`: written over). A file that is gone is made anew.
+        What others wrote since is merged first (`overwrite`: written over). A file that is gone is made again.
 
         Raises
         ------
@@ -197,7 +197,7 @@ class Session:
         TableError
             A text that such a file cannot hold.
         SchemaError
-            What contextdb.toml shall say anew disagrees with what others wrote into it: then nothing is written.
+            What shall change in contextdb.toml disagrees with what others wrote into it: then nothing is written.
         """
         target = self.path if path is None else Path(path)
         is_own = target == self.path
@@ -213,7 +213,7 @@ class Session:
         self.journal.saved(saved.source.raw, self.sheet.history.position)
 
     def _written(self, target: Path, is_own: bool, overwrite: bool) -> Table | None:
-        """The table as it now stands in the file, with contextdb.toml; None where others wrote one of them meanwhile."""
+        """The table as it now is in the file, with contextdb.toml; None where others wrote one of them meanwhile."""
         is_merged = is_own and not overwrite
         if is_merged:
             self._merge_first()
@@ -292,7 +292,7 @@ class Session:
             mend = "to save under another name, or over it"
             raise FileError(Fault(said, "a table", mend, place, "merge-conflict")) from None
         if found.conflicts:
-            said = f"the file has been changed since it was read, in {plural(len(found.conflicts), 'place')} otherwise than here."
+            said = f"the file has been changed since it was read, in {plural(len(found.conflicts), 'place')} differently than here."
             raise FileError(Fault(said, mend="to decide which hold", place=place, rule="merge-conflict"))
 
     def _moved_to(self, target: Path) -> None:

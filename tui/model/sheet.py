@@ -98,7 +98,7 @@ class Sheet(ShownTable):
         block = self.block
         source = block.left if block.shape[1] > 1 else block.left - 1
         if source < 0:
-            return Done(notes=("There is no column before to fill from.",))
+            return Done(notes=("There is no column to the left to fill from.",))
         cells = ((r, c, self.text(r, source)) for r, c in self._cells(block) if c != source)
         return self._set(cells, f"Fill right {self._size(block)}")
 
@@ -161,7 +161,7 @@ class Sheet(ShownTable):
     def move_rows(self, down: int) -> Done:
         """Move the selected rows past the next shown row: down 1 or up -1. Not in a sorted view, whose order is not the file's."""
         if self.view.is_sorted:
-            raise TableError(Fault("the rows are shown sorted.", "the order of the file", "to show them as they stand in the file"))
+            raise TableError(Fault("the rows are shown sorted.", "the order of the file", "to show them as they are in the file"))
         block, rows = self.block, self.selected_rows
         beside = block.top - 1 if down < 0 else block.bottom
         if not 0 <= beside < len(self.view):

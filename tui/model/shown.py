@@ -1,7 +1,7 @@
 """What an editor shows of a table: its history, the view of it, what is selected, and the test row.
 
 Places are (row, column) of the view, as in `tui.model.selection`; rows of the file are named so. A view is not sorted or filtered
-anew by an edit, so that a row does not jump away under the fingers: `refresh` does that. `tui.model.sheet` adds the edits.
+again by an edit, so that a row does not jump away under the fingers: `refresh` does that. `tui.model.sheet` adds the edits.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class ShownTable:
         return self.table.columns[column][int(self.view.rows[row])]
 
     def row_number(self, row: int) -> int:
-        """The number beside a row: its place in the file, from 1."""
+        """The number next to a row: its place in the file, from 1."""
         return int(self.view.rows[row]) + 1
 
     def fault(self, row: int, column: int) -> Fault | None:
@@ -116,14 +116,14 @@ class ShownTable:
         return self.text_fault(column, self.text(row, column)) or edits.check_cell(self.table, texts.name, self.text(row, column))
 
     def text_fault(self, column: int, text: str) -> Fault | None:
-        """What is wrong with a text of a column that is no condition: a row's own rule, a table that is to stand in a row."""
+        """What is wrong with a text of a column that is not a condition: a row's own rule, a table that is to are in a row."""
         name, table = self.table.columns[column].name, self.table
         if name == table.settings.when:
             return edits.check_cell(table, name, text)
         return self.inner_fault(text) if name == table.asset_column else None
 
     def inner_fault(self, text: str) -> Fault | None:
-        """Why a table cannot stand in a row whose asset cell has this text."""
+        """Why a table cannot be in a row whose asset cell has this text."""
         if inner_name(text) is None or self.table.around is None:
             return None
         if self._inner_faults[0] is not self.table.around:
@@ -187,7 +187,7 @@ class ShownTable:
         return fails
 
     def notes(self, row: int) -> dict[int, str]:
-        """What stands at the right of cells of a row of the file, by column: who is cast, how much of a table inside is valid."""
+        """What is at the right of cells of a row of the file, by column: who is cast, how much of a table inside is valid."""
         found: dict[int, str] = {}
         names = [c.name for c in self.table.columns]
         if (inside := self.query.inside(row)) is not None:
@@ -199,11 +199,11 @@ class ShownTable:
         return found
 
     def said_of(self, row: int) -> str:
-        """Who is cast for a row of the file, whether it is picked, and how much is valid of the table that it stands for."""
+        """Who is cast for a row of the file, whether it is picked, and how much is valid of the table that it is for."""
         said = [f"{role}: {actor}" for role, actor in self.query.casting(row).items()]
         if (inside := self.query.inside(row)) is not None:
             fault = inside.fault.found.rstrip(".") if inside.fault is not None else ""
-            said.append(fault or f"▸ {inside.text}{'' if inside.n_valid is None else ' valid'} · Alt+O goes in")
+            said.append(fault or f"▸ {inside.text}{'' if inside.n_valid is None else ' valid'} · Alt+O opens it")
         if not self.query.is_empty and self.query.bits >> row & 1:
             outcome = self.query.outcome
             tells = outcome.prefers_some or outcome.refusal is not None or self.query.undecided >> row & 1
@@ -221,7 +221,7 @@ class ShownTable:
         self._select(self.selection.at(row, column, self.shape, extend))
 
     def go_to(self, file_row: int, column: str | None = None) -> None:
-        """Put the cursor on a row of the file; a filter that hides it is taken off."""
+        """Put the cursor on a row of the file; a filter that hides it is removed."""
         if self.view.place(file_row) is None:
             self.set_filter(Filter())
         names = [c.name for c in self.table.columns]
@@ -262,7 +262,7 @@ class ShownTable:
         self._findings = flags
 
     def refresh(self) -> None:
-        """Sort and filter anew; the selection stays on its rows where they are still shown."""
+        """Sort and filter again; the selection stays on its rows where they are still shown."""
         rows = [self._file_row(place[0]) for place in self._corners()]
         valid = self.query.valid if self.filter.is_valid else None
         sort = self.sort if self.sort and any(c.name == self.sort.column for c in self.table.columns) else None
@@ -299,7 +299,7 @@ class ShownTable:
     # ---- after a step
 
     def saved(self, table: Table) -> None:
-        """The table stands on the disk; `table` is what `Table.save` gave back."""
+        """The table is on the disk; `table` is what `Table.save` gave back."""
         self.history.saved(table)
         self.query.show(self.table)
         self.version += 1

@@ -1,7 +1,7 @@
 """Actors for the test row: for each role of a table a team, as a small sheet of one row an actor and one column a fact.
 
 A fact is written as in the test row: a value or a set of values; an empty one is not asked about. Actors of one name in two teams
-are one actor, who plays one role at most. Teams are kept in `NAME.actors.json` beside the table, {role: [actor]}: what
+are one actor, who plays one role at most. Teams are kept in `NAME.actors.json` next to the table, {role: [actor]}: what
 `CompiledTable.query` takes as its actors. An edge: this reads and writes that file.
 """
 
@@ -121,7 +121,7 @@ class TeamSheet(Sheet):
                 if fault := self.fault_of(column, row.get(one.name, "")):
                     found.append(f"{who}, {one.name}: {fault.message}")
             if NAME in row and row[NAME] in seen:
-                found.append(f"{who} stands twice among the actors for {self.role}.")
+                found.append(f"{who} appears twice among the actors for {self.role}.")
             seen.add(row.get(NAME, ""))
         return found
 
@@ -152,7 +152,7 @@ class Teams:
 
     @classmethod
     def beside(cls, table: Table) -> Teams:
-        """The teams of the file beside a table; empty ones where there is none.
+        """The teams of the file next to a table; empty ones where there is none.
 
         Raises
         ------

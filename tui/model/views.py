@@ -40,7 +40,7 @@ class Filter:
     text: str = ""
     """Stands in some cell of the row, without regard to case."""
     columns: tuple[tuple[str, str], ...] = ()
-    """For some columns a text that stands in the cell, without regard to case."""
+    """For some columns a text that is in the cell, without regard to case."""
     cells: tuple[tuple[str, frozenset[str]], ...] = ()
     """For some columns the texts that the cell may be, exactly."""
     is_valid: bool = False
@@ -83,7 +83,7 @@ class View:
 
     def after(self, came_from: CameFrom) -> View:
         """The view of a table whose rows changed. What was shown stays shown, in the order of the file or, in a sorted view, where
-        it was; new rows stand behind the shown row that is before them in the file."""
+        it was; new rows are behind the shown row that is before them in the file."""
         places = np.append(self._places, -1)[came_from]
         is_shown = (places >= 0) | (came_from < 0)
         if self.is_sorted:

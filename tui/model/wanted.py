@@ -1,6 +1,6 @@
 """The facts that a table asks for: what a person may type into the test row, and what is computed from that.
 
-They are those of its columns, of its rows' own rules, of the tables that stand in it, and those that derived facts are computed
+They are those of its columns, of its rows' own rules, of the tables that are in it, and those that derived facts are computed
 from: the facts that `contextdb query` takes.
 """
 

@@ -21,7 +21,7 @@ from tui.model.query_row import QueryRow
 
 NEEDED = "(needed)"
 """What stands for the cell of a role that is not filled."""
-State = Literal["fails", "unreadable", "disabled", "open", "holds", "not asked"]
+State = Literal["fails", "unreadable", "disabled", "open", "holds", "not given"]
 """Of a cell that is open it is not known whether it holds: its rule lacks a fact, or it accepts some values of a set only."""
 
 
@@ -103,7 +103,7 @@ def _cell(query: QueryRow, column: ConditionColumn, row: int, fails: bool) -> Ce
         return CellWhy(row, condition.name, text, said, "unreadable")
     if fact is None:
         lacking = query.lacking([condition.name]) if query.is_computed(condition.name) else ()
-        return CellWhy(row, condition.name, text, f"needs {some(lacking)}" if lacking else "", "not asked")
+        return CellWhy(row, condition.name, text, f"needs {some(lacking)}" if lacking else "", "not given")
     if not fails:
         state: State = "holds" if query.accepts_every(condition.name, row) else "open"
         return CellWhy(row, condition.name, text, said, state)
@@ -120,7 +120,7 @@ def _cast_cell(query: QueryRow, column: ConditionColumn, row: int) -> CellWhy:
         return CellWhy(row, name, text, failure.fact, "fails", failure.mend)
     actor = query.casting(row).get(query.role_of(name) or "")
     if actor is None:
-        return CellWhy(row, name, text, "", "not asked")
+        return CellWhy(row, name, text, "", "not given")
     return CellWhy(row, name, text, actor, "holds", is_cast=True)
 
 
@@ -138,16 +138,16 @@ def _rule(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:
         is_unread = check_cell(table, name, text) is not None
         lacking, failure = query.open_facts(row), next((f for f in query.failures(row) if f.condition == name), None)
         state: State = "fails" if query.excluded_by_rule([row])[0] else "holds" if lacking is None else "open"
-        state = "unreadable" if is_unread else "not asked" if query.is_empty else state
+        state = "unreadable" if is_unread else "not given" if query.is_empty else state
         said = some(lacking) if lacking else failure.fact if failure is not None else ""
         yield CellWhy(row, name, text, said, state, is_of_rule=True)
 
 
 def _behind(query: QueryRow, table: Table, row: int) -> Iterator[CellWhy]:
-    """The table that the row stands for."""
+    """The table that the row refers to."""
     if (inside := query.inside(row)) is not None:
         is_wrong = inside.fault is not None or inside.n_valid == 0
-        state: State = "fails" if is_wrong else "not asked" if inside.n_valid is None else "holds"
+        state: State = "fails" if is_wrong else "not given" if inside.n_valid is None else "holds"
         yield CellWhy(row, table.asset_column, table.text(row, table.asset_column), f"{inside.text}", state)
 
 

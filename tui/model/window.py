@@ -1,4 +1,4 @@
-"""The part of a sheet that stands on the screen, read once and then painted line by line."""
+"""The part of a sheet that is on the screen, read once and then painted line by line."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Kind = Literal["text", "any", "failing", "fault"]
 """How a cell is meant: it accepts everything; it does not accept its fact; it cannot be read."""
 
 MARKS: dict[Kind, str] = {"text": " ", "any": " ", "failing": "×", "fault": "!"}
-"""What stands before the text of a cell, so that no colour is needed to tell them apart."""
+"""What is before the text of a cell, so that no colour is needed to tell them apart."""
 
 
 PICKED, VALID, MAY_BE = "◉", "●", "◐"
-"""What stands beside a valid row: the policy may pick it; it picks others; it is not known whether the row is valid."""
+"""What is next to a valid row: the policy may pick it; it picks others; it is not known whether the row is valid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class Window:
         return self._columns[column][row - self.top]
 
     def note(self, row: int, column: int) -> str | None:
-        """What stands at the right of a cell."""
+        """What is at the right of a cell."""
         return self._notes[row - self.top].get(column) if self._notes else None
 
     def _read(self, column: int) -> list[tuple[str, Kind]]:

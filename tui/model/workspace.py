@@ -67,7 +67,7 @@ class Workspace:
         return self.sessions[name]
 
     def know_others(self, name: str) -> None:
-        """Let a table whose rows stand for others know of those as they are being edited."""
+        """Let a table whose rows refer to others know of those as they are being edited."""
         session = self.sessions[name]
         table = session.sheet.table
         if table.around is None or not session.sheet.query.is_nested:
@@ -77,7 +77,7 @@ class Workspace:
             session.know(Neighbours(OpenTables(_of_disk(table.around), edited), getattr(table.around, "last", None)))
 
     def reopen(self, name: str, takes_over: bool = False) -> Session:
-        """Let go of a table and open it anew; errors as of `Session`."""
+        """Let go of a table and open it again; errors as of `Session`."""
         if (session := self.sessions.pop(name, None)) is not None:
             session.close()
         self.sessions[name] = Session(self.files[name], takes_over)
@@ -101,7 +101,7 @@ class Workspace:
     def rename(self, name: str, old: str, new: str, only_here: bool = False) -> tuple[str, ...]:
         """Give a condition of a table another name, in the files of the project or of this table; gives which were written.
 
-        The tables whose files are written are opened anew: what was edited before cannot be taken back any more.
+        The tables whose files are written are opened again: what was edited before cannot be taken back any more.
 
         Raises
         ------

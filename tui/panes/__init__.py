@@ -1,1 +1,1 @@
-"""What stands behind the tabs: each a view of one table that is being edited."""
+"""What is behind the tabs: each a view of one table that is being edited."""

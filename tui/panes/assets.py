@@ -253,7 +253,7 @@ class AssetsPane(Pane):
         self.grid.post_message(Grid.Moved())
 
     def refresh_valid(self) -> None:
-        """Filter anew where only valid rows are shown, and make room for what stands beside cells."""
+        """Filter again where only valid rows are shown, and make room for what is beside cells."""
         if self.sheet.filter.is_valid:
             self.sheet.refresh()
         self.grid.refit()
@@ -283,7 +283,7 @@ class AssetsPane(Pane):
         self.query_one(FindBar).open()
 
     def action_find_next(self, is_backwards: bool) -> None:
-        """Go to the next cell found."""
+        """Go to the next hit."""
         if not self._search.text:
             self.action_find()
         else:
@@ -336,7 +336,7 @@ class AssetsPane(Pane):
             self._show_filtered(replace(self.sheet.filter, cells=(*others, (name, frozenset([text])))))
 
     def action_show_all(self) -> None:
-        """Take the filter off."""
+        """Remove the filter."""
         self.query_one(FilterBar).clear()
         self._show_filtered(Filter())
 
@@ -416,7 +416,7 @@ class AssetsPane(Pane):
         self.grid.autofit()
 
     def refresh_view(self) -> None:
-        """Sort and filter anew."""
+        """Sort and filter again."""
         self.sheet.refresh()
         self.show()
 

@@ -33,7 +33,7 @@ NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About")
 EMPTY = {
     "gaps": "No gap is known.",
     "crowded": "Nowhere are two rows valid at once, as far as is known.",
-    "rows": "No row is said to be too many.",
+    "rows": "No row was found to be redundant.",
 }
 """What a list without lines says once the table is measured."""
 
@@ -58,7 +58,7 @@ class CoveragePane(Pane):
         Binding("left_square_bracket", "turn(-1)", "Section before", show=False),
         Binding("right_square_bracket", "turn(1)", "Next section", show=False),
         Binding("t", "try_context", "To the test row"),
-        Binding("r", "measure", "Work out anew"),
+        Binding("r", "measure", "Measure again"),
         Binding("escape", "back", "Stop, or back", show=False),
     ]
     DEFAULT_CSS = """
@@ -107,7 +107,7 @@ class CoveragePane(Pane):
                 id="crowded",
             )
             yield RowList(
-                [ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2), ListColumn("What is said of it", 22, 2)],
+                [ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2), ListColumn("Details", 22, 2)],
                 empty=EMPTY["rows"],
                 id="rows",
             )
@@ -198,7 +198,7 @@ class CoveragePane(Pane):
         return [f"{at + 1} {name}{counts[at]}" for at, name in enumerate(NAMES)]
 
     def on_resize(self) -> None:
-        """Draw the bar anew."""
+        """Draw the bar again."""
         self._show_bar()
 
     def take_focus(self) -> None:
@@ -255,7 +255,7 @@ class CoveragePane(Pane):
         self.take_focus()
 
     def action_measure(self) -> None:
-        """Work the coverage out anew."""
+        """Work the coverage out again."""
         self.run.start(self.sheet.table)
 
     def action_back(self) -> None:
@@ -289,13 +289,15 @@ class CoveragePane(Pane):
                 Told(f"{in_quotes(min(gone))} is a condition of a table inside: a row for the gap belongs there.", "warning")
             )
         elif gone:
-            self.post_message(Told(f"{in_quotes(min(gone))} is no condition any more. R works the coverage out anew.", "warning"))
+            self.post_message(
+                Told(f"{in_quotes(min(gone))} is not a condition any more. R measures the coverage again.", "warning")
+            )
         else:
             self.post_message(FillGap(dict(cells)))
 
     def _go_to(self, row: int, column: str | None = None) -> None:
         if self.run.state == "stale" and row >= self.sheet.table.n_rows:
-            self.post_message(Told("That row is gone. R works the coverage out anew.", "warning"))
+            self.post_message(Told("That row is gone. R measures the coverage again.", "warning"))
         else:
             self.post_message(GoToCell(row, column))
 

@@ -1,6 +1,6 @@
 """The tab Options: the settings of the table, each with what it means, and the condition of the column under the cursor.
 
-Whatever is picked or typed becomes an edit at once, one step of the sheet's history. What cannot be meant stays in its field with
+Whatever is picked or typed becomes an edit at once, one step of the sheet's history. What is invalid stays in its field with
 the reason.
 """
 
@@ -36,7 +36,7 @@ from tui.widgets.field import Field
 from tui.widgets.ticks import TickList
 
 WIDE = 120
-"""From so many columns on the condition stands beside the table's settings."""
+"""From so many columns on the condition is next to the table's settings."""
 
 _BY_COLUMN = ("asset", *JOBS)
 _FORM = {"min": "minimum", "max": "maximum", "unit": "unit", "values": "values", "mirror": "mirror", "description": "description"}
@@ -49,7 +49,7 @@ class OptionsPane(Pane):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("down", "app.focus_next", "Next field", show=False),
         Binding("up", "app.focus_previous", "Previous field", show=False),
-        Binding("escape", "put_back", "Put back", show=False),
+        Binding("escape", "put_back", "Reset", show=False),
     ]
 
     DEFAULT_CSS = """
@@ -130,11 +130,11 @@ class OptionsPane(Pane):
         self.show()
 
     def on_show(self) -> None:
-        """The tab is opened: the cursor may stand elsewhere."""
+        """The tab is opened: the cursor may be elsewhere."""
         self.show()
 
     def on_resize(self, event: Resize) -> None:
-        """Put the condition beside the settings where there is room."""
+        """Put the condition next to the settings where there is room."""
         self.set_class(event.size.width >= WIDE, "-wide")
 
     def show(self) -> None:

@@ -6,7 +6,7 @@ from textual.widget import Widget
 
 
 class Pane(Widget):
-    """What stands behind a tab."""
+    """What is behind a tab."""
 
     def show(self) -> None:
         """Show the sheet as it is now: called when the tab is gone to, and after every edit while it is seen."""

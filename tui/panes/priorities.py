@@ -107,7 +107,7 @@ class PrioritiesPane(Pane):
         self.show()
 
     def on_show(self) -> None:
-        """The tab is opened: look anew for clips and for other tables."""
+        """The tab is opened: look again for clips and for other tables."""
         self.priorities.reload()
         self.show()
 
@@ -129,7 +129,7 @@ class PrioritiesPane(Pane):
         query = self.sheet.query
         said = [f"{name} {text}" for name, text in query.texts.items() if text.strip()]
         if not said:
-            return Content("The test row asks for nothing, so every row counts as valid. Fill it in the tab Assets.")
+            return Content("The test row is empty, so every row counts as valid. Fill it in the tab Assets.")
         return Content.assemble(("For the test row  ", ""), (", ".join(said), "bold"))
 
     def _show_list(self) -> None:

@@ -45,7 +45,7 @@ class ProblemsPane(Pane):
         *(Binding(str(at + 1), f"filter({at})", name, show=False) for at, name in enumerate(NAMES)),
         Binding("left_square_bracket", "turn(-1)", "Level before", show=False),
         Binding("right_square_bracket", "turn(1)", "Next level"),
-        Binding("r", "check", "Check anew"),
+        Binding("r", "check", "Recheck"),
     ]
     DEFAULT_CSS = """
     ProblemsPane {
@@ -189,7 +189,7 @@ class ProblemsPane(Pane):
         if problem.row is not None and problem.row < self.sheet.table.n_rows:
             self.post_message(GoToCell(problem.row, problem.column))
         elif problem.is_of_test_row:
-            self.post_message(Told(f'Mend the fact "{problem.column}" in the test row, at the foot of the grid.'))
+            self.post_message(Told(f'Correct the fact "{problem.column}" in the test row, at the bottom of the grid.'))
         elif problem.is_of_cases:
             self.post_message(Told("That is about a saved context: F9 lists them."))
         else:

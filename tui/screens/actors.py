@@ -66,7 +66,7 @@ class ActorsDialog(Dialog[Teams]):
     }
     """
     title_text = "Actors"
-    keys_text = "Tab right · Enter down · Esc take them"
+    keys_text = "Tab right · Enter down · Esc apply"
 
     def __init__(self, table: Table, teams: Teams, clipboard: Clipboard) -> None:
         super().__init__()
@@ -136,7 +136,7 @@ class ActorsDialog(Dialog[Teams]):
             self._show()
 
     def action_clear(self) -> None:
-        """Offer nobody: Ctrl+Z takes it back."""
+        """Offer nobody: Ctrl+Z undoes it."""
         for sheet in self.teams.sheets.values():
             sheet.select(lambda selection, shape: selection.everything())
             sheet.delete_rows()

@@ -156,7 +156,7 @@ class AddColumn(Dialog[Insertion]):
 
     @on(Input.Submitted)
     def _submitted(self, event: Input.Submitted) -> None:
-        """Insert; from the name of a new column one goes on to what it is first."""
+        """Insert; from the name of a new column one continues to what it is first."""
         if event.input.id == "column-name" and self._choice() is None and event.value.strip():
             self._say()
             self.query_one("#column-job").focus()

@@ -21,7 +21,7 @@ class AskDialog(Dialog[str]):
     AskDialog > #dialog > #dialog-body > Input { margin: 1 0; }
     AskDialog #ask-fault { color: $text-error; height: auto; }
     """
-    keys_text = "Enter take · Esc cancel"
+    keys_text = "Enter OK · Esc cancel"
 
     def __init__(self, title: str, question: str, text: str, check: Callable[[str], str]) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ class ChooseDialog(Dialog[int]):
         Binding("pageup", "move(-10)", show=False),
         Binding("pagedown", "move(10)", show=False),
     ]
-    keys_text = "↑↓ choose · Enter take · Esc cancel"
+    keys_text = "↑↓ choose · Enter OK · Esc cancel"
 
     def __init__(self, title: str, lines: Sequence[str], chosen: int = 0, about: str = "") -> None:
         """`about`: what one should know before choosing."""

@@ -94,7 +94,7 @@ class TestRow:
         if self.list.next() if by > 0 else self.list.previous():
             self._load()
         else:
-            self.screen.say("There is no other context. F9 opens a file of them, and saves the test row as one.")
+            self.screen.say("There is no other context. F9 opens a file of contexts, or saves the test row.")
 
     def _load(self) -> None:
         if self.list is not None:
@@ -118,7 +118,7 @@ class TestRow:
         self.screen.app.push_screen(ActorsDialog(sheet.table, self._teams(), self.screen.clipboard), decided)
 
     def _teams(self) -> Teams:
-        """The actors for the table as it is; at first those of the file beside it."""
+        """The actors for the table as it is; at first those of the file next to it."""
         table, teams = self.session.sheet.table, self.session.teams
         self.session.teams = Teams.beside(table) if teams is None else teams.of(table)
         return self.session.teams
@@ -129,7 +129,7 @@ class TestRow:
         """Why the row of the cursor is not valid, and which rows are nearest."""
         sheet = self.session.sheet
         if sheet.query.is_empty:
-            self.screen.say("The test row asks for nothing yet: F6 goes there, F9 loads a context.")
+            self.screen.say("The test row is empty: F6 goes there, F9 loads a context.")
             return
         row = int(sheet.view.rows[sheet.cursor[0]]) if len(sheet.view) else None
         self.screen.app.push_screen(NearestDialog(sheet.query, sheet.table, row), self._answered)

@@ -85,7 +85,7 @@ class Blueprints(Dialog[BlueprintAnswer]):
         yield OptionList(*(Option(_line(one, self._width)) for one in self.blueprints), id="blueprint-list", compact=True)
         yield Static(id="blueprint-detail")
         what = ", ".join(map(shown, self.selected))
-        meaning = f"Keeps {what}" if what else "Select columns in the sheet first: those that are conditions are kept."
+        meaning = f"Keeps {what}" if what else "Select columns in the sheet first: the conditions among them are saved."
         yield Field(
             "Keep selection", Input(compact=True, placeholder="name of a new blueprint", id="blueprint-name"), meaning, "keep"
         )
@@ -118,7 +118,9 @@ class Blueprints(Dialog[BlueprintAnswer]):
     def _show_detail(self) -> None:
         chosen, detail = self._chosen(), self.query_one("#blueprint-detail", Static)
         detail.update(
-            "There is no blueprint yet: a set of conditions that several tables have." if chosen is None else _detail(chosen)
+            "There is no blueprint yet. A blueprint is a set of conditions that several tables share."
+            if chosen is None
+            else _detail(chosen)
         )
 
     @on(OptionList.OptionSelected)

@@ -21,7 +21,7 @@ CHOSEN, OPEN = "●", "○"
 WHERE_WIDTH = 10
 TEXT_WIDTH = 11
 N_OTHER_LINES = 15
-"""What the dialog has beside its list: the border, the texts of the chosen place, the choices, and the lines between."""
+"""What the dialog has next to its list: the border, the texts of the chosen place, the choices, and the lines between."""
 
 
 class ConflictLines(LineList):
@@ -81,7 +81,7 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         """How many there are, the list, the texts of the chosen one in full, and what can be clicked."""
         where = f" in {shown(self._file)}" if self._file else ""
         yield Static(
-            Content(f"{plural(len(self.conflicts), 'place')}{where} changed both here and on disk. All else goes together.")
+            Content(f"{plural(len(self.conflicts), 'place')}{where} changed both here and on disk. Everything else is merged.")
         )
         columns = [ListColumn("Asset", WHERE_WIDTH, 2), ListColumn("Column", WHERE_WIDTH, 1)]
         texts = [ListColumn(title, TEXT_WIDTH, 2) for title in ("Before", "Mine", "On disk")]
@@ -188,7 +188,7 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
 
 
 def told(text: str | None, gone: str = "(deleted)") -> str:
-    """A text on one line; one that is not there, or empty, in words."""
+    """A text on one line; one that is missing, or empty, in words."""
     return gone if text is None else shown(text, 400) if text.strip() else "(empty)"
 
 

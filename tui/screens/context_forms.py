@@ -60,10 +60,10 @@ class KeepDialog(Dialog[Kept]):
     keys_text = "Enter save · Tab next field · Esc cancel"
 
     def __init__(self, contexts: ContextList, facts: Mapping[str, str], kept: Kept | None = None, has_actors: bool = False) -> None:
-        """`kept` is the case that is to be written anew; its name may be changed all the same. `has_actors` as in
+        """`kept` is the case that is to be written again; its name may be changed all the same. `has_actors` as in
         `ContextsDialog`."""
         super().__init__()
-        self.about_actors = "The actors are not kept: these assets are valid without them." if has_actors else ""
+        self.about_actors = "The actors are not saved: these assets are valid without them." if has_actors else ""
         self.facts = facts
         self.kept = kept or Kept("", "")
         self.is_new = kept is None
@@ -80,7 +80,7 @@ class KeepDialog(Dialog[Kept]):
 
     def compose_body(self) -> ComposeResult:
         """Name, what is expected, note."""
-        told = summary({name: text for name, text in self.facts.items() if text.strip()}) or "no fact is asked for"
+        told = summary({name: text for name, text in self.facts.items() if text.strip()}) or "no fact is given"
         yield Static(Content(told), id="keep-facts")
         yield Field(
             "Name", Input(self.kept.name, id="keep-name", compact=True), "Says in messages which context fails.", key="name"
@@ -102,7 +102,7 @@ class KeepDialog(Dialog[Kept]):
         taken = 2 if self.kept.expected.strip() else 0 if self.unreadable or not self.is_new else 1
         self.query(Choice)[taken].value = True
         if self.unreadable:
-            self.query_one("#field-choice", Field).say(f"What is valid now cannot be told: {self.unreadable}")
+            self.query_one("#field-choice", Field).say(f"The valid assets cannot be determined: {self.unreadable}")
 
     @on(Input.Changed, "#keep-expected")
     def _written(self, event: Input.Changed) -> None:
@@ -122,7 +122,7 @@ class KeepDialog(Dialog[Kept]):
         """Give back what is to be saved, unless something is wrong with it."""
         name = self.query_one("#keep-name", Input).value.strip()
         if not name:
-            self.query_one("#field-name", Field).say("A name is wanted.")
+            self.query_one("#field-name", Field).say("Enter a name.")
             self.query_one("#keep-name", Input).focus()
             return
         choice = self.query_one("#keep-choice", RadioSet).pressed_index
@@ -153,7 +153,7 @@ class NameDialog(Dialog[str]):
     @on(Input.Submitted)
     def _submitted(self, event: Input.Submitted) -> None:
         name = event.value.strip()
-        wrong = "" if name else "A name is wanted."
+        wrong = "" if name else "Enter a name."
         wrong = "There is a context of this name already." if name in self.taken else wrong
         self.query_one(Field).say(wrong)
         if not wrong:

@@ -410,7 +410,7 @@ def cells_of(contexts: ContextList, i: int, shown: Mapping[str, int]) -> list[Li
 def detail_of(contexts: ContextList, i: int) -> str:
     """A context in full: what came out, what is expected, its facts, its note."""
     try:
-        facts = summary(contexts.facts(i)) or "no fact is asked for"
+        facts = summary(contexts.facts(i)) or "no fact is given"
     except ContextDBError as error:
         return refusal(error)
     verdict = contexts.verdict(i)
@@ -431,7 +431,7 @@ def refusal(error: ContextDBError) -> str:
 def outcome(verdict: Verdict, assets: Sequence[str]) -> str:
     """What came out of a case, in a sentence."""
     if verdict.faults:
-        return f"✗ It cannot be asked: {verdict.faults[0]}"
+        return f"✗ It cannot be evaluated: {verdict.faults[0]}"
     if verdict.holds is None:
         return f"– Nothing is expected; {plural(verdict.n_valid, 'row')} valid."
     return f"✓ It holds; {plural(verdict.n_valid, 'row')} valid." if verdict.holds else f"✗ {told(verdict, assets)}."

@@ -48,7 +48,7 @@ class Dialog(ModalScreen[Answer | None], Generic[Answer]):
         box.border_subtitle = self.keys_text
 
     def compose_body(self) -> ComposeResult:
-        """What stands in the box."""
+        """What is in the box."""
         yield Static()
 
     def action_cancel(self) -> None:

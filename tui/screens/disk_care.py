@@ -34,7 +34,7 @@ class DiskCare:
     """Keeps a session and the files on the disk together."""
 
     def __init__(self, screen: Screen[Any], session: Session, say: Say, changed: Callable[[], None]) -> None:
-        """`changed` shows the sheet anew; it is called after every merge and reload."""
+        """`changed` shows the sheet again; it is called after every merge and reload."""
         self._screen, self._session, self._say, self._changed = screen, session, say, changed
         self._told = ""
         """What was said last of the disk, so that a timer does not say it again."""
@@ -52,11 +52,11 @@ class DiskCare:
         if found.schema != "same":
             self._reload()
         if found.taken_by is not None:
-            self._say_once(f"{found.taken_by} has taken this table over: it can only be saved under another name.", "warning")
+            self._say_once(f"{found.taken_by} has taken over this table: you can only save it under another name.", "warning")
         elif found.is_free:
             self._say_once("The other editor has closed this table: open it again to edit it here.")
         if found.table == "gone":
-            self._say_once(f"{self._session.path.name} is gone from the disk. Saving makes it anew.", "warning")
+            self._say_once(f"{self._session.path.name} is no longer on disk. Saving creates it again.", "warning")
         elif found.table == "changed" and self._session.disk_stamp != self._left:
             self._merge_unasked()
 
@@ -76,17 +76,17 @@ class DiskCare:
             try:
                 self.merge(then=lambda: self.save(path, overwrite, then))
             except ContextDBError:
-                raise error from None  # what stands on the disk is no table
+                raise error from None  # what is on the disk is not a table
             return
         then()
 
     def merge(self, then: Callable[[], None] = lambda: None) -> None:
-        """Merge what stands on the disk, and ask about conflicts. `then` is called when it is merged.
+        """Merge what is on the disk, and ask about conflicts. `then` is called when it is merged.
 
         Raises
         ------
         FileError, SchemaError, TableError
-            What stands on the disk is gone, no table, or another one.
+            What is on the disk is gone, no table, or another one.
         """
         merged = self._session.merge_from_disk()
         if merged.conflicts:
@@ -120,7 +120,7 @@ class DiskCare:
 
     def _merged(self, merged: Merge[Table], then: Callable[[], None]) -> None:
         self._changed()
-        self._say(f"Merged from disk: {diff(merged.base, merged.theirs).summary}. Ctrl+Z takes it back.")
+        self._say(f"Merged from disk: {diff(merged.base, merged.theirs).summary}. Ctrl+Z undoes it.")
         then()
 
     def _reload(self) -> None:
@@ -130,7 +130,7 @@ class DiskCare:
             self._say_once(str(error), "error")
             return
         self._changed()
-        self._say("contextdb.toml was changed on disk and is read anew.")
+        self._say("contextdb.toml changed on disk and was read again.")
 
     def _say_once(self, text: str, level: Level = "information") -> None:
         if text != self._told:

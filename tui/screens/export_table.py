@@ -134,7 +134,7 @@ class ExportDialog(Dialog[Export]):
                 return
             is_there = path.exists()
         except (OSError, ValueError):
-            self._say("This is no path of a file.")
+            self._say("This is not the path of a file.")
             return
         if not is_there:
             self._make(path)
@@ -148,7 +148,7 @@ class ExportDialog(Dialog[Export]):
         self.app.push_screen(SureDialog("The file is there", question), answered)
 
     def _wrong(self, path: Path) -> str:
-        """Why nothing can be written to a path, as far as it can be told beforehand."""
+        """Why nothing can be written to a path, as far as it can be reported beforehand."""
         if path.is_dir():
             return "This is a folder; a file is wanted."
         if not path.parent.is_dir():

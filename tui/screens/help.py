@@ -17,15 +17,15 @@ from tui.screens.dialog import Dialog
 
 CELLS = (
     ("Any, or nothing", "every value"),
-    ("True  False", "that value; t, f, yes, no, 1, 0 too"),
-    ("20, 9.99", "centre and tolerance: 10.01 to 29.99, both ends in; 20 ± 9.99 too"),
-    ("10..30", "from 10 to 30, both in; (10..30] leaves 10 out; 10.. has no upper end"),
+    ("True  False", "that value; also t, f, yes, no, 1, 0"),
+    ("20, 9.99", "centre and tolerance: 10.01 to 29.99, both included; also 20 ± 9.99"),
+    ("10..30", "from 10 to 30, both included; (10..30] excludes 10; 10.. has no upper end"),
     ("5  <5  >=5", "as in mathematics"),
     ("0..5 | 10..15", "either"),
     ("170..-170", "an angle: upwards through 180, on the circle"),
-    ("CB FS SS", "one of these names; a name with blanks stands in double quotes"),
+    ("CB FS SS", "one of these names; write a name with blanks in double quotes"),
     ("+InAir -Stunned", "tags: all of the first, none of the second"),
-    ("not …", "everything but what follows"),
+    ("not …", "everything except what follows"),
     ("… ~2.5", "soft: a row that does not match costs 2.5 more in a search"),
 )
 MARKS = (
@@ -34,7 +34,7 @@ MARKS = (
     ("◐", "the row may be valid: its rule lacks a fact, or a fact is a set of values"),
     ("=", "in the test row: this fact is computed from others"),
     ("×", "this cell does not accept its fact"),
-    ("▸", "the row stands for another table: Alt+O goes into it"),
+    ("▸", "the row refers to another table: Alt+O opens it"),
     ("!", "this cell cannot be read"),
     ("–", "the row is disabled"),
 )

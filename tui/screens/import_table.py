@@ -20,6 +20,8 @@ from textual.worker import get_current_worker
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, ReadOptions, format_of, sheet_names
+from contextdb.exchange.importing import NAMES
+from contextdb.exchange.reading import SheetWanted
 from contextdb.tables.table import Table
 from tui.model.importing import MODES, Choice, Draft, Import, Mode, suffixes_read, why_not
 from tui.model.paths import common_start, completions, resolved
@@ -29,6 +31,7 @@ from tui.widgets.line_list import LineList, ListCell, ListColumn
 
 BY_ITSELF = "by its content"
 THE_ONLY = "the filled sheet"
+THE_USUAL = "each text is one name, but in our own files"
 COLUMNS = (ListColumn("Column", 18, 2), ListColumn("First cells", 12, 3), ListColumn("Becomes", 20, 3))
 
 
@@ -77,10 +80,10 @@ class ImportDialog(Dialog[Import]):
         & Field:focus-within { height: auto; }
         & > #dialog { padding: 0 2; }
         & LineList { height: 1fr; margin: 1 0 0 0; }
-        & #import-columns, & #field-mode { display: none; }
+        & #import-columns, & #field-mode, & #field-texts { display: none; }
         &.-read #import-columns { display: block; }
         &.-read #import-names { display: none; }
-        &.-read #field-mode { display: block; }
+        &.-read #field-mode, &.-read #field-texts { display: block; }
         & #field-how Horizontal { height: auto; }
         & #field-how Select { width: 1fr; }
         & #import-why { height: auto; max-height: 2; color: $text-muted; display: none; }
@@ -118,6 +121,8 @@ class ImportDialog(Dialog[Import]):
         yield Field("Format, sheet", Horizontal(kind, sheet), key="how")
         modes = [(about, mode) for mode, about in MODES.items()]
         yield Field("Rows", Select(modes, value="merge", allow_blank=False, compact=True, id="import-mode"), key="mode")
+        texts = [(THE_USUAL, ""), *((about, name) for name, about in NAMES.items())]
+        yield Field("Names", Select(texts, value="", allow_blank=False, compact=True, id="import-texts"), key="texts")
         yield LineList(
             [ListColumn(f"In {self.folder.name or self.folder}", 20, 1)],
             empty="No such file.",
@@ -207,17 +212,19 @@ class ImportDialog(Dialog[Import]):
 
     @on(Select.Changed, "#import-format")
     @on(Select.Changed, "#import-sheet")
+    @on(Select.Changed, "#import-texts")
     def _read_otherwise(self) -> None:
         if self.path is not None or (self.text is not None and self.draft is not None):
             self._read()
 
     def _read(self) -> None:
         self._say("Reading …")
-        kind, sheet = (str(self.query_one(f"#import-{name}", Select).value) or None for name in ("format", "sheet"))
-        self._read_file(self.path, ReadOptions(kind, sheet))
+        said = (str(self.query_one(f"#import-{name}", Select).value) or None for name in ("format", "sheet", "texts"))
+        kind, sheet, names = said
+        self._read_file(self.path, ReadOptions(kind, sheet), names)
 
     @work(thread=True, exclusive=True)
-    def _read_file(self, path: Path | None, options: ReadOptions) -> None:
+    def _read_file(self, path: Path | None, options: ReadOptions, names: str | None) -> None:
         """Read in the background, so that a large file does not hold the keys."""
         sheets: list[str] = []
         found: Draft | ContextDBError
@@ -226,7 +233,7 @@ class ImportDialog(Dialog[Import]):
             raw = (self.text or "").encode("utf-8", "replace") if path is None else read_bytes(path)
             sheets = sheet_names(raw, name) if format_of(name, options.format, raw).name == "xlsx" else []
             options = options if options.sheet in sheets else ReadOptions(options.format)
-            found = Draft.read(self.table, raw, name, options)
+            found = Draft.read(self.table, raw, name, options, names)
         except ContextDBError as error:
             found = error
         if not get_current_worker().is_cancelled:
@@ -238,9 +245,11 @@ class ImportDialog(Dialog[Import]):
         self.set_class(is_read, "-read")
         if isinstance(found, ContextDBError):
             self.draft, self.reason = None, why_not(found)
-            self._say(wrong=self.reason)
-            if len(sheets) > 1 and self.query_one("#import-sheet", Select).value == "":
-                self.query_one("#import-sheet", Select).focus()
+            if isinstance(found, SheetWanted):
+                self._say(self.reason)
+                self.query_one("#import-sheet", Select).action_show_overlay()
+            else:
+                self._say(wrong=self.reason)
             return
         if self.draft is not None:
             found.mode = self.draft.mode

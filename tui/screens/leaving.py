@@ -70,8 +70,8 @@ class HeldDialog(Dialog[Opening]):
         if self._holder.is_certain:
             lines.append("Close it there to edit it here. Until then it can be read here, and saved under another name.")
         else:
-            lines.append("It is on another machine, so nobody can tell from here whether that editor still runs.")
-            lines.append("If it does not, take the table over. If it does, each may write over what the other saved.")
+            lines.append("It is on another machine, so this editor cannot tell whether it is still running.")
+            lines.append("If it is not, take over the table. If it is, each may overwrite what the other saved.")
         choices = [("answer('read-only')", "Open to read"), ("answer('take-over')", "Take over"), ("cancel", "Cancel")]
         yield Static(Content("\n".join([*lines, ""])))
         yield Static(_choices([c for c in choices if not (self._holder.is_certain and "take-over" in c[0])]))

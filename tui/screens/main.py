@@ -84,7 +84,7 @@ class MainScreen(Screen[None]):
         self.came_from = ""
         """The table from a row of which this one was gone into."""
         self.renamed = ""
-        """What is said of a rename, after which the table was opened anew."""
+        """What is said of a rename, after which the table was opened again."""
         self._said = ("", "information")
         self.care = DiskCare(self, self.session, self.say, self.show)
         self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
@@ -238,20 +238,20 @@ class MainScreen(Screen[None]):
 
     @on(Grid.OpenWanted)
     def _open_row(self, event: Grid.OpenWanted) -> None:
-        """Go into the table that a row stands for, with the facts of the test row."""
+        """Go into the table that a row refers to, with the facts of the test row."""
         query = self.session.sheet.query
         inside = query.inside(event.row)
         if inside is None:
-            self.say("This row stands for no other table: @ and the name of one in the asset cell makes it do so.")
+            self.say("This row refers to no other table. To change that, write @ and a table's name in its asset cell.")
         elif inside.table not in self.workspace.files:
-            self.say(f"There is no table {in_quotes(inside.table)} to go into.", "error")
+            self.say(f"There is no table {in_quotes(inside.table)} to open.", "error")
         else:
             self.app.go_into(inside.table, self.table_name, {} if query.is_empty else dict(query.texts))
 
     def action_back(self) -> None:
-        """Go back to the row that stands for this table."""
+        """Go back to the row that refers to this table."""
         if not self.app.go_back():
-            self.say("No row was opened: Alt+O goes into the table that a row stands for.")
+            self.say("You did not come here from a row. Press Alt+O on a row that refers to a table to open it.")
 
     def action_new_table(self) -> None:
         """Ask for a name and a blueprint, and make a table."""
@@ -282,10 +282,10 @@ class MainScreen(Screen[None]):
         self.app.open_table(name)
 
     def action_save(self) -> None:
-        """Write the table to its file, and what is said anew to contextdb.toml."""
+        """Write the table to its file, and what changes to contextdb.toml."""
         editor = self.assets.editor
         if editor is not None and editor.fault is not None:
-            self.say("Finish the cell first: Enter takes it, Esc leaves it as it was.", "warning")
+            self.say("Finish the cell first: Enter accepts it, Esc leaves it as it was.", "warning")
             return
         self.try_to(lambda: self.care.save(then=self._saved))
 
@@ -351,7 +351,7 @@ class MainScreen(Screen[None]):
             self.try_to(lambda: self._edited(Edited(sheet.rename_column(new))))
             return
         written = (
-            "A rename is written to the files at once, and no step before it can be undone then: to take it back, rename back."
+            "A rename is written to the files at once, and earlier steps can then no longer be undone. To undo it, rename back."
         )
         lines = ["Rename everywhere: in all that uses it"]
         lines += [f"Only here: this table, its rules and saved contexts; others keep {old}"] if uses.is_elsewhere else []
@@ -367,7 +367,7 @@ class MainScreen(Screen[None]):
         files = self.workspace.rename(self.table_name, old, new, only_here)
         self.app.open_table(self.table_name)
         where = "here" if only_here else "everywhere"
-        self.app.say_renamed(f"Renamed {old} to {new} {where}, in {some(files)}. To take it back, rename it back.")
+        self.app.say_renamed(f"Renamed {old} to {new} {where}, in {some(files)}. To undo it, rename it back.")
 
     def action_blueprints(self) -> None:
         """Insert the conditions of a blueprint, or keep the selected ones as one."""
@@ -408,7 +408,7 @@ class MainScreen(Screen[None]):
         self.test_row.why()
 
     def action_refresh(self) -> None:
-        """Take in what changed on the disk; sort and filter anew."""
+        """Take in what changed on the disk; sort and filter again."""
         self.say("Refreshed.")
         self.try_to(self.workspace.look_again)
         self.care.look()
@@ -418,16 +418,16 @@ class MainScreen(Screen[None]):
     def _opened(self) -> None:
         session = self.session
         if session.n_recovered:
-            self.say(f"{plural(session.n_recovered, 'unsaved edit')} brought back from the last time.", "warning")
+            self.say(f"{plural(session.n_recovered, 'unsaved edit')} restored from the last session.", "warning")
         elif session.problem is not None:
             self.say(str(session.problem), "warning")
         elif self.renamed:
             self.say(self.renamed)
         elif self.came_from:
-            self.say(f"The table that a row of {self.came_from} stands for. Alt+Q goes back.")
+            self.say(f"A row of {self.came_from} refers to this table. Alt+Q goes back.")
             self.assets.grid.test_name = self.came_from if not session.sheet.query.is_empty else ""
         elif why := session.why_read_only:
-            self.say(f"This table can be read, not saved: {why}.", "warning")
+            self.say(f"This table is read-only: {why}.", "warning")
         self._show_bars()
 
     def try_to(self, verb: Callable[[], None]) -> None:
@@ -451,7 +451,7 @@ class MainScreen(Screen[None]):
         done = sheet.insert_rows(below=True, texts=[dict(event.cells)])
         self._edited(Edited(done))
         self.go_to_cell(GoToCell(sheet.row_number(sheet.cursor[0]) - 1, sheet.table.asset_column))
-        self.say("A new row fills the gap: name its asset.")
+        self.say("A new row fills the gap: enter its asset.")
 
     @on(SetContext)
     def set_context(self, event: SetContext) -> None:

@@ -24,7 +24,7 @@ from tui.widgets.line_list import LineList, ListCell, ListColumn
 
 MOST_ROWS = 20
 NARROW = 110
-"""With fewer columns of the screen, fact and cell of the nearest rows stand below the list only."""
+"""With fewer columns of the screen, fact and cell of the nearest rows are below the list only."""
 
 STATES: dict[State, tuple[str, str]] = {
     "fails": ("✗ fails", "error"),
@@ -32,7 +32,7 @@ STATES: dict[State, tuple[str, str]] = {
     "disabled": ("✗ disabled", "error"),
     "open": (f"{MAY_BE} open", "warning"),
     "holds": ("✓ holds", ""),
-    "not asked": ("· not asked", "muted"),
+    "not given": ("· not given", "muted"),
 }
 
 
@@ -51,7 +51,7 @@ class NearestDialog(Dialog[CellAnswer]):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("tab,left,right", "turn", "This row / nearest rows"),
-        Binding("m,f4", "mend", "Mend the cell"),
+        Binding("m,f4", "mend", "Correct the cell"),
     ]
     DEFAULT_CSS = """
     NearestDialog {
@@ -133,7 +133,7 @@ class NearestDialog(Dialog[CellAnswer]):
         self._lay_out()
 
     def _line(self, cell: CellWhy) -> Sequence[ListCell]:
-        tone = "muted" if cell.state in ("holds", "not asked") else ""
+        tone = "muted" if cell.state in ("holds", "not given") else ""
         told: list[ListCell] = [(cell.fact or "–", tone), (cell.cell or "Any", tone), (cell.mend or "", "info")]
         if not self.is_nearest:
             return [STATES[cell.state], (cell.column, tone), *told]
@@ -143,7 +143,7 @@ class NearestDialog(Dialog[CellAnswer]):
     def _state(self) -> str:
         unread = "".join(f"\n! The fact {name} cannot be read and is left out." for name in list(self.faults)[:2])
         if self.asks_nothing:
-            return f"The test row asks for nothing: every row that is enabled is valid.{unread}"
+            return f"The test row is empty: every enabled row is valid.{unread}"
         if self.is_nearest or self.why is None:
             may_be = f", {self.n_undecided:,} may be" if self.n_undecided else ""
             return f"{self.n_valid - self.n_undecided:,} of {plural(self.n_rows, 'row')} valid{may_be}{unread}"
@@ -155,7 +155,7 @@ class NearestDialog(Dialog[CellAnswer]):
         row = f"Row {cell.row + 1:,}, {self.names[cell.row]}: " if cell and self.is_nearest else ""
         self.query_one("#nearest-detail", Static).update(Content(row + cell_state(cell) if cell else ""))
         named = [("go", "Enter Go to the cell")] * (cell is not None)
-        named += [("mend", "M Mend the cell")] * (cell is not None and cell.mend is not None)
+        named += [("mend", "M Correct the cell")] * (cell is not None and cell.mend is not None)
         self.query_one("#nearest-keys", Static).update(
             Content.from_markup("   ".join(f"[@click=screen.{action}]{label}[/]" for action, label in named))
         )
@@ -203,7 +203,7 @@ def cell_state(cell: CellWhy) -> str:
         return f"{cell.column} is {cell.fact}."
     if inner_name(cell.cell) is not None:
         n_valid = f"{cell.fact} valid" if " of " in cell.fact else cell.fact
-        return f"The row stands for the table {inner_name(cell.cell)}: {n_valid}. Alt+O in the grid goes into it."
+        return f"The row refers to the table {inner_name(cell.cell)}: {n_valid}. Alt+O in the grid opens it."
     if cell.state == "open" and not cell.is_of_rule:
         return f"{cell.column} is {cell.fact}; the cell says {text} and accepts a part of that."
     if cell.state == "open":
@@ -212,7 +212,7 @@ def cell_state(cell: CellWhy) -> str:
         return f"The row's own rule says {text}, and that {f'is {cell.fact}' if cell.fact else 'does not hold'}."
     match cell.state:
         case "fails":
-            mend = f'\n"{cell.mend}" would accept it too.' if cell.mend is not None else ""
+            mend = f'\n"{cell.mend}" would also accept it.' if cell.mend is not None else ""
             return f"{cell.column} is {cell.fact}; the cell says {text}.{mend}"
         case "unreadable":
             return f"{cell.column}: the cell {text} cannot be read, so the row is never valid."
@@ -222,4 +222,4 @@ def cell_state(cell: CellWhy) -> str:
             return f"{cell.column} is {cell.fact}; the cell says {text} and accepts it."
     if cell.fact:
         return f"{cell.column} is computed, and {cell.fact}; the cell says {text}."
-    return f"{cell.column} is not asked for; the cell says {text}."
+    return f"{cell.column} is not given; the cell says {text}."

@@ -128,7 +128,7 @@ class StatusLine(Widget):
         self._texts = ("", "")
 
     def show(self, left: str | None = None, right: str | None = None) -> None:
-        """Show other texts; None: the one that stands there."""
+        """Show other texts; None: the one that is there."""
         texts = (self._texts[0] if left is None else left, self._texts[1] if right is None else right)
         if texts != self._texts:
             self._texts = texts
@@ -164,7 +164,7 @@ class CellLine(Widget):
         self._parts = ("", "", "", "")
 
     def show(self, place: str, text: str, fault: str = "", about: str = "") -> None:
-        """Show a cell: where it stands, its text, what is wrong with it, and what its column is about."""
+        """Show a cell: where it is, its text, what is wrong with it, and what its column is about."""
         if (place, text, fault, about) != self._parts:
             self._parts = (place, text, fault, about)
             self.refresh()

@@ -88,7 +88,7 @@ class CellEditor(Widget):
         self._check = check
         self._began_with = None if is_typing else text
         self._chooser = Chooser(condition, kind, known, is_fact)
-        self._choices = ChoiceList("(not asked)" if is_fact else "Any")
+        self._choices = ChoiceList("(not given)" if is_fact else "Any")
         self._popup = Popup(self._choices)
         self._offer = Offer()
         self._meaning = Meaning()
@@ -118,7 +118,7 @@ class CellEditor(Widget):
 
     @property
     def text(self) -> str:
-        """What stands in the entry line."""
+        """What is in the entry line."""
         return self.entry.text
 
     @property
@@ -173,17 +173,17 @@ class CellEditor(Widget):
         if self._refused is not None:
             return Told("", self._refused, True, self._mend)
         if self._meaning.fault is not None and self._offer.word is not None and self._offer.rows:
-            return Told(f"{plural(self._offer.n_values, 'value')} may be meant")
+            return Told(f"{plural(self._offer.n_values, 'value')} possible")
         return Told(self._meaning.words, self._meaning.fault)
 
     def _hint(self) -> str:
         if self._refused is not None:
-            return "Ctrl+T take · Esc leave" if self._mend else "Esc leave"
+            return "Ctrl+T accept · Esc cancel" if self._mend else "Esc leave"
         if self.is_list_open and self._offer.word is not None:
             return "Enter this value · Esc leave"
         if self.is_list_open and self._chooser.has_ticks:
             is_one = self._has_moved and not self._has_ticked
-            return "Enter this one · Space tick several" if is_one else "Enter take · Space tick · Esc leave"
+            return "Enter this one · Space tick several" if is_one else "Enter OK · Space tick · Esc cancel"
         if self.is_list_open:
             return "Enter this one · Esc leave"
         if self._completes:
@@ -218,7 +218,7 @@ class CellEditor(Widget):
 
     @on(Entry.CaretMoved)
     def _caret_moved(self, event: Entry.CaretMoved) -> None:
-        """Another word may be meant."""
+        """Another word possible."""
         event.stop()
         if self._chooser.has_ticks and self._seen != (self.text, self.entry.cursor_position):
             self._update()
@@ -235,7 +235,7 @@ class CellEditor(Widget):
         return True
 
     def _write(self, text: str, caret: int | None = None) -> None:
-        """Change the text. What follows from it is seen when the entry line tells of the change."""
+        """Change the text. What follows from it is seen when the entry line reports the change."""
         is_same = text == self.text
         self.entry.write(text, caret)
         if is_same:

@@ -41,7 +41,7 @@ class SheetBar(Horizontal):
         return self.has_class("-open")
 
     def open(self, text: str = "") -> None:
-        """Show it, ready to type in; `text` stands there chosen."""
+        """Show it, ready to type in; `text` is there chosen."""
         self.add_class("-open")
         entry = self.query(Input).first()
         if text:
@@ -109,7 +109,7 @@ class FindBar(SheetBar):
         self.query_one("#find-count", Static).update(text)
 
     def action_next(self, is_backwards: bool) -> None:
-        """Go to the next cell found."""
+        """Go to the next hit."""
         self.post_message(self.Sought(self.search, is_backwards))
 
     def action_replace(self) -> None:

@@ -35,7 +35,7 @@ class Grid(GridView, can_focus=True):
         """Open an editor over the cell of the cursor."""
 
         text: str
-        """What stands in it at first."""
+        """What is in it at first."""
         is_typing: bool = False
         """It was begun by typing: the text is what was typed."""
         opens_list: bool = False
@@ -50,7 +50,7 @@ class Grid(GridView, can_focus=True):
 
     @dataclass
     class OpenWanted(Message):
-        """Go into the table that a row stands for."""
+        """Go into the table that a row refers to."""
 
         row: int
         """The row of the file, from 0."""
@@ -229,7 +229,7 @@ class Grid(GridView, can_focus=True):
         self._want_edit(self.cell_text())
 
     def action_edit_empty(self) -> None:
-        """Begin the one cell anew, empty. Terminals of old send Ctrl+H as Backspace: it must not clear what is selected."""
+        """Begin the one cell again, empty. Old terminals send Ctrl+H as Backspace: it must not clear what is selected."""
         self._want_edit("", is_typing=True)
 
     def action_choose(self) -> None:
@@ -245,7 +245,7 @@ class Grid(GridView, can_focus=True):
 
     def _want_edit(self, text: str, is_typing: bool = False, opens_list: bool = False) -> None:
         if self.is_in_test_row and not self._is_condition():
-            more = " Facts without a column stand at the right: End goes there." if self.sheet.extra else ""
+            more = " Facts without a column are at the right: End goes there." if self.sheet.extra else ""
             self.post_message(Told(f"Only conditions have a fact to test with.{more}", "warning"))
         elif self.is_in_test_row and (why := self._why_computed()):
             self.post_message(Told(why, "warning"))
@@ -256,7 +256,7 @@ class Grid(GridView, can_focus=True):
             self.post_message(self.EditWanted(text, is_typing, opens_list))
 
     def action_open_row(self) -> None:
-        """Go into the table that the row of the cursor stands for."""
+        """Go into the table that the row of the cursor refers to."""
         if len(self.sheet.view):
             self.post_message(self.OpenWanted(self.sheet.row_number(self.sheet.cursor[0]) - 1))
 
@@ -310,7 +310,7 @@ class Grid(GridView, can_focus=True):
         self.paste(event.text)
 
     def on_key(self, event: events.Key) -> None:
-        """A character begins a cell anew."""
+        """A character begins a cell again."""
         if event.is_printable and event.character:
             event.stop()
             event.prevent_default()

@@ -26,12 +26,12 @@ UP, DOWN, UNSORTED = "▲", "▼", "↕"
 COMPUTED = "="
 """Stands before a fact of the test row that is computed from others."""
 OPENS = "▸"
-"""Stands before the asset cell of a row that stands for another table."""
+"""Stands before the asset cell of a row that refers to another table."""
 LEAST_BESIDE = 6
-"""So much of a text stays where something stands at its right."""
+"""So much of a text stays where something is at its right."""
 
 StyleOf = Callable[[str, str], Style]
-"""The style of a ground and of what stands on it: `style("cursor", "text")`."""
+"""The style of a ground and of what is on it: `style("cursor", "text")`."""
 
 
 def n_headers(height: int) -> int:
@@ -41,7 +41,7 @@ def n_headers(height: int) -> int:
 
 @dataclass(frozen=True)
 class Look:
-    """Where a grid stands at present."""
+    """Where a grid is at present."""
 
     layout: Layout
     height: int
@@ -82,7 +82,7 @@ class Painter:
         self._read = sheet.table, sheet.view
 
     def changed(self) -> None:
-        """Read the sheet anew."""
+        """Read the sheet again."""
         self._window = None
         self._headers.clear()
         self._read = self.sheet.table, self.sheet.view

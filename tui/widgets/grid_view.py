@@ -74,7 +74,7 @@ class GridView(ScrollView, inherit_bindings=False):
         self._widths: dict[str, int] = {}
         self._layout: Layout | None = None
         self._laid_out = sheet.table
-        """The table that the layout is of: a step may have made another one before the screen is told."""
+        """The table that the layout is of: a step may have made another one before the screen is reported."""
         self._said_shape = (-1, -1)
         self._fields: tuple[str, ...] = ()
         """The fields of the test row behind the columns, that the layout is of."""
@@ -111,7 +111,7 @@ class GridView(ScrollView, inherit_bindings=False):
         self.refresh()
 
     def refit(self) -> None:
-        """Make room where something new stands beside cells; no column becomes narrower."""
+        """Make room where something new is beside cells; no column becomes narrower."""
         for at, column in enumerate(self.sheet.table.columns):
             if column.name in self._widths:
                 self._widths[column.name] = max(self._widths[column.name], min(self._beside(at), WIDEST))
@@ -147,13 +147,13 @@ class GridView(ScrollView, inherit_bindings=False):
 
     @property
     def look(self) -> Look:
-        """Where the grid stands at present."""
+        """Where the grid is at present."""
         x, y = self.scroll_offset
         height, is_in_test_row = self.window.height, self.is_in_test_row
         return Look(self.grid_layout, height, x, y, is_in_test_row, self.has_focus, self.has_test_row, self.field)
 
     def cell_region(self) -> Region:
-        """Where the cell of the cursor stands on the screen, without its mark."""
+        """Where the cell of the cursor is on the screen, without its mark."""
         look, row, column = self.look, self.sheet.cursor[0], self.field
         y = look.foot if self.is_in_test_row else look.n_headers + row - look.top
         x = look.layout.place(column, look.left)
@@ -180,7 +180,7 @@ class GridView(ScrollView, inherit_bindings=False):
         return min(max(fitted, self._beside(at)), WIDEST)
 
     def _beside(self, at: int) -> int:
-        """How wide a column must be for what stands at the right of its cells: the actors of a role, the rows of inner tables."""
+        """How wide a column must be for what is at the right of its cells: the actors of a role, the rows of inner tables."""
         query, column = self.sheet.query, self.sheet.table.columns[at]
         role = query.role_of(column.name)
         is_opener = query.is_nested and at == self.sheet.asset_at

@@ -51,7 +51,7 @@ class Square:
 
     @property
     def level(self) -> str:
-        """In which of five colours it stands."""
+        """In which of five colours it is."""
         if self.share is None:
             return "none"
         if self.share <= 0.0 or self.share >= 1.0:
@@ -232,7 +232,7 @@ class HeatMap(ScrollView, can_focus=True):
             self.go(row, column)
 
     def on_resize(self) -> None:
-        """Make room for the labels anew."""
+        """Make room for the labels again."""
         self._resize()
         if self.rows:
             self.go(*self.place)

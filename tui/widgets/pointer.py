@@ -207,11 +207,11 @@ class Pointer:
         return max(0, min(row, len(self.grid.sheet.view) - 1)), look.layout.column_at(x, look.left)
 
     def _is_opener(self, x: int, row: int, column: int, look: Look) -> bool:
-        """Whether the mark before a row that stands for another table is at a place."""
+        """Whether the mark before a row that refers to another table is at a place."""
         sheet = self.grid.sheet
         is_mark = column == sheet.asset_at and x == look.layout.place(column, look.left)
         return is_mark and len(sheet.view) > 0 and sheet.query.inside(sheet.row_number(row) - 1) is not None
 
     def _is_cell_line(self, y: int, look: Look) -> bool:
-        """Whether cells stand on a line of the window: those of a row, or of the test row."""
+        """Whether cells are on a line of the window: those of a row, or of the test row."""
         return y == look.foot or (y >= look.n_headers and look.top + y - look.n_headers < len(self.grid.sheet.view))

@@ -48,7 +48,7 @@ class Names:
 
 
 def _letters(text: str) -> str:
-    """What of a text may stand in a name, accents taken off; two underlines on end belong to compilers."""
+    """What of a text may be in a name, accents removed; two underlines on end belong to compilers."""
     plain = "".join(c for c in normalize("NFKD", text) if c.isascii())
     return re.sub(r"[^A-Za-z0-9]+", "_", plain)[:MOST_LETTERS].strip("_") or "unnamed"
 

@@ -1,4 +1,4 @@
-"""Why a row is valid with some actors or is not: which role cannot be filled, and whose fact is in the way."""
+"""Why a row is valid with some actors or is not: which role cannot be filled, and whose fact fails."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class CastExplanation(Explanation):
         self._plain = plain
 
     def row(self, row: int) -> RowExplanation:
-        """Why this row is valid or not; NoSuchPlace, an IndexError too, for a row that the table does not have."""
+        """Why this row is valid or not; raises NoSuchPlace, also an IndexError, for a row that the table does not have."""
         row = require_row(row, len(self))
         found = super().row(row)
         return RowExplanation(found.row, found.asset, found.is_enabled, (*found.failures, *self._role_failures(row)))

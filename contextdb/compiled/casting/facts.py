@@ -128,7 +128,7 @@ class _Reader:
         for name, is_told in self.preferred.items():
             if not is_told:
                 near = nearest(name, sorted(self.names))
-                found = f"no actor tells {in_quotes(name)}, by which actors are preferred."
+                found = f"no actor has {in_quotes(name)}, by which actors are preferred."
                 mend = in_quotes(near) if near else ""
                 raise ContextError(Fault(found, "a number fact of the actors", mend, rule="unknown-fact"))
 
@@ -242,14 +242,14 @@ class _Reader:
 
 
 def _own_facts(role: str, actor: Actor) -> dict[str, object]:
-    """What an actor says, under the names of the role's conditions; each may be told with the role before it or without."""
+    """What an actor says, under the names of the role's conditions; each may be reported with the role before it or without."""
     given: dict[str, object] = {}
     for name, value in actor.items():
         if not isinstance(name, str):
             raise ContextError(Fault(f"a fact's name is {_kind(name)}.", "text", rule="wrong-fact"))
         full = name if name.startswith(f"{role}.") else f"{role}.{name}"
         if full in given and not _is_same(given[full], value):
-            found = f"{in_quotes(full)} is told twice, {_text(given[full])} and {_text(value)}."
+            found = f"{in_quotes(full)} is given twice, {_text(given[full])} and {_text(value)}."
             raise ContextError(Fault(found, "each fact once, with the role before it or without", rule="wrong-fact"))
         given[full] = value
     return given

@@ -1,6 +1,6 @@
 """Actors that a live context keeps: read again only when one of them, or what else counts for them, has changed.
 
-The game's mappings are kept, not copied, and may change between two questions; so each is held against a copy of what it said when
+The game's mappings are kept, not copied, and may change between two questions; so each is compared with a copy of what it said when
 it was read. That costs a comparison of two dicts, where reading costs every fact of it.
 """
 
@@ -44,7 +44,7 @@ class LiveActors:
             return False
         try:
             return given == self._given and all(_is_same(self.actors[role], copies) for role, copies in self._copies.items())
-        except (TypeError, ValueError):  # what cannot be compared, such as an array, or is no list of actors any more
+        except (TypeError, ValueError):  # what cannot be compared, such as an array, or is not a list of actors any more
             return False
 
     def _keep(self, offered: Offered, given: list[object]) -> None:

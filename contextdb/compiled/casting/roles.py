@@ -39,7 +39,7 @@ class TableRoles:
         """For each column of slots, for each word, the rows that say it."""
 
     def told_to_rules(self, role: str, compiled: CompiledData) -> list[Condition]:
-        """The conditions of a role that are no columns and that rules need: an actor tells them."""
+        """The conditions of a role that are not columns and that rules need: an actor tells them."""
         own = (name for name in self.needed_by_rules if role_of(name) == role and name not in compiled.places)
         return [compiled.asked[name] for name in own if name in compiled.asked]
 
@@ -54,7 +54,7 @@ def roles_of_table(compiled: CompiledData) -> TableRoles:
 
 
 def role_of(name: str) -> str:
-    """The role that a condition belongs to: what stands before its first dot, or nothing."""
+    """The role that a condition belongs to: what is before its first dot, or nothing."""
     role, dot, fact = name.partition(".")
     return role if dot and fact else ""
 

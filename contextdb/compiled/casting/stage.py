@@ -296,7 +296,7 @@ def _ruled_names(compiled: CompiledData, roles: Roles) -> list[str]:
 
 
 def roles_of(compiled: CompiledData, context: Context, actors: Actors) -> Roles:
-    """The roles that are cast: all but those whose facts stand in the context, as plain facts.
+    """The roles that are cast: all but those whose facts are in the context, as plain facts.
 
     Raises
     ------
@@ -323,7 +323,7 @@ def roles_of(compiled: CompiledData, context: Context, actors: Actors) -> Roles:
 
 
 def _given(compiled: CompiledData, role: str, context: Context) -> list[str]:
-    """The facts of a role that stand in the context itself."""
+    """The facts of a role that are in the context itself."""
     known = (n for n in (*compiled.asked, *compiled.places) if n.startswith(f"{role}."))
     return [n for n in known if context.get(n) is not None]
 

@@ -46,7 +46,7 @@ class Renamed:
 
 @dataclass(frozen=True, slots=True)
 class RowMove:
-    """A row or a column that stands elsewhere among the others, and its places before and after."""
+    """A row or a column that is elsewhere among the others, and its places before and after."""
 
     name: str
     place_before: int
@@ -124,7 +124,7 @@ class Diff:
 
     @property
     def cells(self) -> Iterator[CellChange]:
-        """Every cell that changed, in rows and columns that were there before, by row; renamed assets stand in `rows_renamed`."""
+        """Every cell that changed, in rows and columns that were there before, by row; renamed assets are in `rows_renamed`."""
         columns = [at for at in self.changed if at != self._asset_place]
         places = [(row, at, i) for at in columns for i, row in enumerate(self.changed[at].tolist())]
         for row, at, i in sorted(places):
@@ -139,7 +139,7 @@ class Diff:
 
     @cached_property
     def n_rewritten(self) -> int:
-        """Cells that mean the same and are written otherwise."""
+        """Cells that mean the same and are written differently."""
         return sum(int(flags.sum()) for at, flags in self.rewritten.items() if at != self._asset_place)
 
     @property
@@ -148,7 +148,7 @@ class Diff:
         said = [f"{plural(n, 'row')} {verb}" for verb, n in self._row_counts.items() if n]
         said += [f"{plural(n, 'column')} {verb}" for verb, n in self._column_counts.items() if n]
         said += [f"{plural(self.n_changed, 'cell')} changed"] if self.n_changed else []
-        said += [f"{plural(self.n_rewritten, 'cell')} written otherwise"] if self.n_rewritten else []
+        said += [f"{plural(self.n_rewritten, 'cell')} written differently"] if self.n_rewritten else []
         return ", ".join(said) or "no difference"
 
     @property

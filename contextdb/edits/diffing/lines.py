@@ -14,7 +14,7 @@ MOST_CONFLICTS = 127
 
 
 def merged_lines(base: bytes, ours: bytes, theirs: bytes) -> tuple[bytes, int]:
-    """The merged bytes, and how many places stand between marks in them. Where git cannot tell, the whole files stand there."""
+    """The merged bytes, and how many places are between marks in them. Where git cannot tell, the whole files are there."""
     versions = (ours, base, theirs)
     try:
         with TemporaryDirectory(prefix="contextdb-") as folder:

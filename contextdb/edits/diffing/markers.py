@@ -1,6 +1,6 @@
 """Conflicts of a merge in a CSV, between the marks that git uses, and the three versions that such a file holds.
 
-Only rows that the sides disagree about stand between marks, each with what it was, so that a person and the editor can decide:
+Only rows that the sides disagree about are between marks, each with what it was, so that a person and the editor can decide:
 
     <<<<<<< ours
     run,1..2,True
@@ -10,7 +10,7 @@ Only rows that the sides disagree about stand between marks, each with what it w
     run,3..4,True
     >>>>>>> theirs
 
-Where a column itself is in question the whole file stands between them. Nothing here touches the disk.
+Where a column itself is in question the whole file is between them. Nothing here touches the disk.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A three-way merge of contextdb.toml, key by key: what theirs changed is written into the text of ours, whose comments stay.
 
-What both sides changed otherwise stands between git's marks. Nothing here touches the disk.
+What both sides changed otherwise is between git's marks. Nothing here touches the disk.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def _differs(path: Path, one: Mapping[Path, object], other: Mapping[Path, object
 
 
 def _sections_before(path: Path, text: str) -> list[Path]:
-    """The sections that stand before a key's own in a text, the nearest first."""
+    """The sections that are before a key's own in a text, the nearest first."""
     headers = [one.path for one in statements(text) if one.value is None]
     own = headers.index(path[:-1]) if path[:-1] in headers else 0
     return headers[:own][::-1]

@@ -19,10 +19,10 @@ from contextdb.expressions.frame import run_frame
 from contextdb.expressions.rules.rules import WhenRules, no_value
 
 MANY_ROWS = 32
-"""With more rows than this left in a context, on average, rules are held against whole masks instead of row by row."""
+"""With more rows than this left in a context, on average, rules are compared with whole masks instead of row by row."""
 
 Side = tuple[Rows, Words]
-"""The words of a mask that are not 0: where they stand, and what they are."""
+"""The words of a mask that are not 0: where they are, and what they are."""
 
 
 @dataclass(frozen=True, eq=False)

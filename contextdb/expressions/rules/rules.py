@@ -49,7 +49,7 @@ class Rule:
     rows: int
 
     def __reduce__(self) -> tuple[object, ...]:
-        """What is worked out from the two is worked out anew in another process."""
+        """What is worked out from the two is worked out again in another process."""
         return Rule, (self.expression, self.rows)
 
     @cached_property
@@ -96,7 +96,7 @@ class WhenRules:
     """The number of each row's rule; -1 for a row without one. int32 [n_rows]."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        """What computes the rules is functions, made anew in another process."""
+        """What computes the rules is functions, made again in another process."""
         return WhenRules, (self.texts, self.rules, self.of_row)
 
     @classmethod

@@ -22,7 +22,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import CHANNELS, POSITIONS, Skeleton
 
 MOST_FAULTS = 8
-"""A file's first faulty lines are told one by one, the rest counted."""
+"""A file's first faulty lines are reported one by one, the rest counted."""
 LONGEST_FRAME_S = 1.0
 """A longer frame time is a mistake, such as milliseconds: nobody records a body less than once a second."""
 
@@ -143,9 +143,7 @@ def _open_joint(words: Words, joints: _Joints) -> None:
         words.refuse("a joint has no name.", "the name on the line of ROOT or JOINT")
     if name in joints.index:
         first = joints.lines[joints.index[name]]
-        words.refuse(
-            f"a second joint is named {in_quotes(name)}; the first stands on line {first}.", "different names for all joints"
-        )
+        words.refuse(f"a second joint is named {in_quotes(name)}; the first is on line {first}.", "different names for all joints")
     joints.parents.append(joints.open[-1] if joints.open else -1)
     joints.open.append(len(joints.names))
     joints.index[name] = len(joints.names)
@@ -198,7 +196,7 @@ def _channel(words: Words, earlier: list[str], count: str) -> str:
     if name is None:
         words.fail(word, f"a channel: {', '.join(CHANNELS)}", CHANNELS)
     if name in POSITIONS and name in earlier:
-        words.refuse(f"channel {name} stands twice.", "each position channel once")
+        words.refuse(f"channel {name} appears twice.", "each position channel once")
     return name
 
 

@@ -170,7 +170,7 @@ def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFindin
     Returns
     -------
     list of ClipFinding
-        In the order of the clips. Of a clip whose unit is doubtful nothing else is told that is a length.
+        In the order of the clips. Of a clip whose unit is doubtful nothing else is reported that is a length.
     """
     listed = list(clips)
     usual = _usual_shape([measures for _, _, measures in listed])
@@ -201,7 +201,7 @@ def grouped(findings: Iterable[ClipFinding], n_clips: int) -> Iterator[str]:
 
 
 Told = dict[str, Any]
-"""The fields of a finding beside its rule, asset and file."""
+"""The fields of a finding next to its rule, asset and file."""
 Shape = Mapping[str, float]
 """For each bone its share of the length of all."""
 
@@ -227,7 +227,7 @@ def _rules(of: Measures, usual: Shape | None) -> Iterator[tuple[str, Told]]:
         yield "off-ground", _off_ground(of)
     difference = None if usual is None else _difference(_shape(of.bones or {}, usual), usual)
     if difference is not None and difference > OTHER_SHAPE:
-        found = f"{100.0 * difference:.0f} % of the body's length is distributed otherwise than in the other clips."
+        found = f"{100.0 * difference:.0f} % of the body's length is distributed differently from the other clips."
         mend = "the clips of one body for each database, or metres_per_unit where bones are of another unit"
         yield (
             "odd-proportions",
@@ -241,7 +241,7 @@ def _few_frames(of: Measures) -> Told:
     return {
         "found": found,
         "expected": f"at least {FEWEST_FRAMES} frames",
-        "mend": "to export the whole take, or leave the clip where a still pose is meant",
+        "mend": "to export the whole take, or leave the clip if a still pose is intended",
         "measure": float(of.n_frames),
     }
 
@@ -295,7 +295,7 @@ def _jump(of: Measures) -> Told:
     return {
         "found": f"the hips move {_metres(of.farthest_m)} {where}, which is {of.fastest_mps:,.0f} m/s.",
         "expected": f"at most {FASTEST_MPS:g} m/s",
-        "mend": "to cut the clip there, or mend the frames",
+        "mend": "to cut the clip there, or correct the frames",
         "measure": of.fastest_mps,
         "frame": of.fastest_frame,
     }
@@ -308,7 +308,7 @@ def _lying(of: Measures) -> Told:
     return {
         "found": f"the body lies: it reaches {_metres(of.extents[1])} upwards and {_metres(of.size_m)} along the ground.",
         "expected": f"a body that stands, as the file's {of.up} axis is taken to point up",
-        "mend": f'up = "{axis}", or nothing where the body is meant to lie',
+        "mend": f'up = "{axis}", or nothing if the body should lie',
         "measure": of.extents[1],
     }
 

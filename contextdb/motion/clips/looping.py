@@ -1,6 +1,6 @@
-"""A clip that loops, with what goes on before and behind it: features at its ends then see the loop, and no end.
+"""A clip that loops, with what continues before and behind it: features at its ends then see the loop, and no end.
 
-The last frame of a looping clip is the first of its next round. Each round goes on where the one before ended, and faces as that
+The last frame of a looping clip is the first of its next round. Each round continues where the one before ended, and faces as that
 one did then: a clip that walks a quarter of a circle walks the whole of it in four.
 """
 

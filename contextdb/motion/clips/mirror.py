@@ -13,7 +13,7 @@ the opposite of the image of its partner's. That is what a skeleton wants whose 
 most BVH files: D is nothing there. On others, whose right bones have axes unlike the left ones' images, D turns each bone so
 that its children lie at the skeleton's own offsets: see `contextdb.motion.clips.own_axes`.
 
-A declared pair is two names, or two patterns with one `*` each, which stands for the same rest of the name on both sides.
+A declared pair is two names, or two patterns with one `*` each, which matches the same rest of the name on both sides.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def partners_of(skeleton: Skeleton, pairs: Pairs) -> Ints:
     Raises
     ------
     MotionError
-        A bone that the skeleton lacks (the nearest is told), a pattern that fits no bone, a bone in two pairs, or bones whose
+        A bone that the skeleton lacks (the nearest is reported), a pattern that fits no bone, a bone in two pairs, or bones whose
         parents do not change places as they do.
     """
     faults: list[Fault] = []
@@ -113,7 +113,7 @@ def facing_fault(skeleton: Skeleton, partners: Ints, facing: tuple[str, str] | N
     if pair is None or partners[pair[0]] == pair[1]:
         return None
     left, right = (skeleton.names[joint] for joint in pair)
-    found = f"mirror: the body faces across {in_quotes(left)} and {in_quotes(right)}, which are no pair."
+    found = f"mirror: the body faces across {in_quotes(left)} and {in_quotes(right)}, which are not a pair."
     return Fault(found, "pairs that hold these two bones", f'["{left}", "{right}"]')
 
 
@@ -150,7 +150,7 @@ def _named_by(pair: tuple[str, str], skeleton: Skeleton, faults: list[Fault]) ->
 
 
 def _rests(pattern: str, names: tuple[str, ...]) -> list[str]:
-    """What the * of a pattern stands for in each name that fits it."""
+    """What the * of a pattern matches in each name that fits it."""
     before, _, after = pattern.partition("*")
     long = len(before) + len(after)
     return [
@@ -162,7 +162,7 @@ def _rests(pattern: str, names: tuple[str, ...]) -> list[str]:
 
 def _missing(bone: str, pair: tuple[str, str], skeleton: Skeleton) -> Fault:
     near = nearest(bone, skeleton.names)
-    found = f"mirror: {_told(pair)} asks for a bone {in_quotes(bone)}, and there is none."
+    found = f"mirror: {_told(pair)} names the bone {in_quotes(bone)}, which does not exist."
     return Fault(found, some(skeleton.names), in_quotes(near) if near else "", rule="unknown-bone")
 
 

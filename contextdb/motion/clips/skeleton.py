@@ -1,6 +1,6 @@
 """A skeleton: joints with parents, offsets and channels, in the order in which a BVH file lists them.
 
-J joints; a parent always stands before its children, and a joint's descendants directly behind it. Offsets are in the file's units.
+J joints; a parent always is before its children, and a joint's descendants directly behind it. Offsets are in the file's units.
 A bone is named by the joint at its start.
 """
 
@@ -69,7 +69,7 @@ class Skeleton:
 
     @cached_property
     def depths(self) -> Ints:
-        """How many joints stand above each: int64 [J]."""
+        """How many joints are above each: int64 [J]."""
         depths = np.zeros(self.n_joints, np.int64)
         for joint, parent in enumerate(self.parents.tolist()):
             depths[joint] = depths[parent] + 1 if parent >= 0 else 0

@@ -208,7 +208,7 @@ def read_pair(section: Section, key: str, accepted: str) -> tuple[str, str] | No
     value = section.part[key]
     if is_pair(value):
         return value[0], value[1]
-    section.wrong(key, "this is no pair of bones", accepted)
+    section.wrong(key, "this is not a pair of bones", accepted)
     return None
 
 

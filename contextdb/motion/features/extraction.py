@@ -71,7 +71,7 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, 
     mirrored : bool
         Take the clip in a mirror, left and right bones exchanged by the schema's `mirror`.
     looping : bool
-        The clip goes on at its start when it ends: its path goes on too, and does not run out straight.
+        The clip continues at its start when it ends: its path continues too, and does not run out straight.
 
     Raises
     ------

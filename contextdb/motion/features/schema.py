@@ -51,7 +51,7 @@ class FeatureSchema:
         Evens out the facing's sway with each step: the standard deviation in seconds of a Gaussian about each frame, which shifts
         nothing in time. Default: 0, the facing as it is.
     mirror : tuple of (left, right)
-        Pairs of bones that change places when a clip is mirrored; a `*` on both sides stands for the same rest of the name.
+        Pairs of bones that change places when a clip is mirrored; a `*` on both sides matches the same rest of the name.
     functions : mapping of name to function
         What custom channels are computed by. Not compared, and not part of contextdb.toml: see `with_functions`.
     """
@@ -106,7 +106,7 @@ class FeatureSchema:
         Raises
         ------
         SchemaError
-            No channel asks for a name; the nearest that one does ask for is told.
+            No channel asks for a name; the nearest that one does ask for is reported.
         """
         asked = [channel.function for channel in self.channels if channel.function is not None]
         faults = [_unasked(name, asked, self.name) for name in functions if name not in asked]
@@ -170,7 +170,7 @@ def _read_mirror(section: Section) -> Pairs:
         section.wrong("mirror", why, A_MIRROR)
         return ()
     for i, item in enumerate(value):
-        why = pattern_fault(item[0], item[1]) if is_pair(item) else "this is no pair of different names"
+        why = pattern_fault(item[0], item[1]) if is_pair(item) else "this is not a pair of different names"
         if why:
             section.add(f"{section.where} mirror pair {i + 1} is {as_toml(item)}: {why}.", A_MIRROR)
     return tuple((item[0], item[1]) for item in value if is_pair(item))

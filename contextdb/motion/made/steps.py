@@ -2,7 +2,7 @@
 
 A clip's timeline gives for every moment the distance and heading travelled and the phase: cycles since the left foot stood in
 mid-stride under the body. A foot stands for `duty` of each cycle, centred where the phase is whole (left) or half (right); its
-footstep is beside the body's place at that moment, so that a planted foot never slides however the body turns, starts or stops.
+footstep is next to the body's place at that moment, so that a planted foot never slides however the body turns, starts or stops.
 
 Ground positions are (x, z) in metres and headings radians, as in `contextdb.motion.clips.trajectory`.
 
@@ -28,7 +28,7 @@ RATE = 30.0
 GRID = 1000.0
 """Moments a second at which a timeline is worked out."""
 MARGIN_S = 2.0
-"""How long a timeline goes on before and after its clip, for the steps that reach beyond it."""
+"""How long a timeline continues before and after its clip, for the steps that reach beyond it."""
 REST_S = 0.5
 """How long a body stands at least before it starts and after it has stopped."""
 FIRST_LIFT = 0.04

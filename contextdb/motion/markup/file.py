@@ -50,7 +50,7 @@ def text_of(raw: bytes, file: str) -> str:
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or _looks_utf16(raw):
         raise MotionError(Fault("the file is UTF-16 text.", _ACCEPTED, "to save it as UTF-8", Place(file)))
     if nul >= 0:
-        raise MotionError(Fault("this is no text: it holds a NUL byte.", _ACCEPTED, place=Place(file, _line_of(raw, nul))))
+        raise MotionError(Fault("not a text file: it contains a NUL byte.", _ACCEPTED, place=Place(file, _line_of(raw, nul))))
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -118,13 +118,13 @@ def _other_delimiter(line: str) -> str:
 
 
 def _name_faults(given: Sequence[str], missing: Sequence[str], place: Place) -> Iterator[Fault]:
-    """Columns that are unknown, or stand twice."""
+    """Columns that are unknown, or appear twice."""
     seen = set[str]()
     for name in given:
         folded = name.casefold()
         at = Place(place.file, place.line, name or None)
         if folded in seen:
-            yield Fault(f"the column {in_quotes(name)} stands twice.", "each column once", place=at)
+            yield Fault(f"the column {in_quotes(name)} appears twice.", "each column once", place=at)
         elif folded not in COLUMNS:
             near = nearest(name, missing) or nearest(name, COLUMNS)
             what = f"there is no column {in_quotes(name)}." if name else "a column has no name."
@@ -167,7 +167,7 @@ def _form_fault(line: str, error: csv.Error, place: Place) -> Fault:
     if "unexpected end" in str(error):
         return Fault(f"a quote that opens on this line is never closed: {in_quotes(line)}.", mend="to close it", place=place)
     accepted = "a field in double quotes from its start to its end, each quote in it doubled"
-    return Fault(f"a field goes on after the quote that closes it: {in_quotes(line)}.", accepted, place=place)
+    return Fault(f"a field continues after its closing quote: {in_quotes(line)}.", accepted, place=place)
 
 
 def _ragged_fault(line: str, n_fields: int, names: Sequence[str], place: Place) -> Fault:

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class LeftOut(IntEnum):
-    """Why a frame is left out of a search; 0 for one that is not. Where several reasons hold, the lowest number is told."""
+    """Why a frame is left out of a search; 0 for one that is not. Where several reasons hold, the lowest number is reported."""
 
     NO = 0
     NOT_VALID = 1

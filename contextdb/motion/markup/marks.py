@@ -4,7 +4,7 @@ N frames, R ranges, T tags, K kinds. Frames about which the markup says the same
 tag filter lets pass is decided kind by kind, so that a new filter costs nothing that grows with the frames; what the last filters
 let pass is kept.
 
-A frame's flags say what stands in the way of *choosing* it; the frame that plays now may always play on, unless it is excluded.
+A frame's flags say what is in the way of *choosing* it; the frame that plays now may always play on, unless it is excluded.
 
 Source: the tags DoNotChoose and NextNaturalOnly and the include and exclude masks of EA's talk; soft categories, match range and
 warp range of Remedy's.
@@ -37,7 +37,7 @@ KEPT_FILTERS = 64
 
 
 class Mark(IntFlag):
-    """What the markup says of a frame, beside its tags."""
+    """What the markup says of a frame, next to its tags."""
 
     EXCLUDED = 1
     """Never chosen, and never played on to."""
@@ -71,7 +71,7 @@ class Marks:
     kind_root_weights : float64 array, shape (K,)
         How much of the movement comes from the animation: 1 all of it, 0 none (then the game's own model moves the body).
     looping : bool array, shape (R,)
-        Whether the range goes on at its start when it ends.
+        Whether the range continues at its start when it ends.
     warps : float64 array, shape (R, 2, 2)
         For position and rotation, from and to in seconds since the range's start: where a match node may warp. NaN: anywhere.
     """
@@ -196,7 +196,7 @@ _REASONS = (
     (Mark.DO_NOT_CHOOSE, LeftOut.DO_NOT_CHOOSE),
     (Mark.EXCLUDED, LeftOut.EXCLUDED),
 )
-"""From the weakest to the strongest: the strongest is told."""
+"""From the weakest to the strongest: the strongest is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +211,7 @@ class _Tags:
         at = [i for i, known in enumerate(self.names) if covers(tag, known)]
         if not at:
             near = nearest(tag, self.names)
-            accepted = some(self.names) or "none: the markup knows no tags"
+            accepted = some(self.names) or "none: the markup has no tags"
             raise QueryError(Fault(f"there is no tag {in_quotes(tag)}.", accepted, in_quotes(near) if near else ""))
         return np.asarray(self.flags[:, at].any(axis=1))
 

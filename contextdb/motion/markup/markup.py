@@ -35,7 +35,7 @@ from contextdb.motion.markup.span_faults import SECONDS, conflicts, faults_alone
 from contextdb.motion.markup.spans import TOLERANCE_S, WILDCARD, Span, fits
 
 MOST_FAULTS = 100
-"""A file's first faults are told one by one, the rest counted."""
+"""A file's first faults are reported one by one, the rest counted."""
 MOST_MENDS = 20
 """For so many unknown assets the nearest name is looked for; with more, the markup is that of another project."""
 
@@ -48,12 +48,12 @@ class Markup:
     ----------
     spans : tuple of Span
     file : str or None
-        Where they stand, for messages.
+        Where they are, for messages.
 
     Raises
     ------
     MotionError
-        Spans that cannot be meant, alone or together; with every fault.
+        Spans that are invalid, alone or together; with every fault.
     """
 
     spans: tuple[Span, ...] = ()
@@ -62,7 +62,7 @@ class Markup:
     def __post_init__(self) -> None:
         object.__setattr__(self, "spans", tuple(self.spans))
         if not all(isinstance(span, Span) for span in self.spans):
-            raise MotionError(Fault("the spans are no spans.", "a Span each"))
+            raise MotionError(Fault("the spans are not a list of spans.", "a Span each"))
         _refuse(_span_faults(self.spans, self.file, {}))
 
     @classmethod
@@ -100,7 +100,7 @@ class Markup:
         return tuple(self.spans[i] for i in self._indices_of(asset))
 
     def is_looping(self, asset: str) -> bool:
-        """Whether an asset goes on at its start when it ends."""
+        """Whether an asset continues at its start when it ends."""
         return any(reserved_of(span.tag) is ReservedTag.LOOPING for span in self.spans_of(asset))
 
     def conflicts_of(self, asset: str) -> list[Fault]:
@@ -124,7 +124,7 @@ class Markup:
         durations_s : mapping of str to float
             Seconds from the first frame of an asset to its last. Assets that are absent are not measured.
         rate : float, optional
-            Frames a second. With it, spans that fall between two frames are told too.
+            Frames a second. With it, spans that fall between two frames are reported too.
 
         Returns
         -------
@@ -188,9 +188,9 @@ class Markup:
             return Fault(found, f"times up to {longest_s:g} s", place=self._place(i, "from"))
         if rate is None or any(_holds_frame(span, duration_s, rate) for duration_s in durations_s):
             return None
-        found = f"the span from {span.from_s:g} to {span.to_s:g} lies between two frames, and holds none."
+        found = f"the span from {span.from_s:g} to {span.to_s:g} is between two frames and contains none."
         near = round(span.from_s * rate) / rate
-        return Fault(found, f"times that a frame lies between, at {rate:g} frames a second", f"{near:g}", self._place(i, "from"))
+        return Fault(found, f"times with a frame between them, at {rate:g} frames a second", f"{near:g}", self._place(i, "from"))
 
 
 def _fitting(text: str, assets: Collection[str]) -> list[str]:
@@ -231,7 +231,7 @@ def _number(row: Row, column: str, wrong: list[tuple[str, Fault]]) -> float | No
         return float(text)
     rule = VALUE_RULES.get(tag) if column == "value" and (tag := reserved_of(row.fields["tag"])) else None
     accepted = (rule.accepted if rule else "no value") if column == "value" else f"{SECONDS}; empty for the clip's {_END[column]}"
-    wrong.append((column, Fault(f"{in_quotes(text)} is no finite number.", accepted, _meant_number(text))))
+    wrong.append((column, Fault(f"{in_quotes(text)} is not a finite number.", accepted, _meant_number(text))))
     return None
 
 

@@ -46,7 +46,7 @@ def _time_faults(span: Span) -> Iterator[tuple[str, Fault]]:
     wrong = [("from", span.from_s)] if not _is_time(span.from_s) else []
     wrong += [("to", span.to_s)] if not _is_time(span.to_s) and span.to_s != math.inf else []
     for column, time_s in wrong:
-        yield column, Fault(f"{_said(time_s)} is no time in a clip.", SECONDS)
+        yield column, Fault(f"{_said(time_s)} is not a time in a clip.", SECONDS)
     if not wrong and span.from_s > span.to_s:
         found = f"the span ends before it starts: from {span.from_s:g} to {span.to_s:g}."
         yield "from", Fault(found, "from <= to", f"from {span.to_s:g} to {span.from_s:g}")

@@ -20,7 +20,7 @@ class Span:
     Attributes
     ----------
     asset : str
-        The name of an asset, or a pattern: `*` stands for any text, so `jog_*` holds for `jog_left`, and `*` for every asset.
+        The name of an asset, or a pattern: `*` matches any text, so `jog_*` holds for `jog_left`, and `*` for every asset.
     tag : str
         A reserved tag, in its own spelling, or a plain one.
     from_s, to_s : float
@@ -28,7 +28,7 @@ class Span:
     value : float or None
         What some reserved tags need.
     line : int or None
-        Where it stands in a file; spans that differ in this alone are equal.
+        Where it is in a file; spans that differ in this alone are equal.
     """
 
     asset: str

@@ -54,7 +54,7 @@ class TagFilter:
         Raises
         ------
         QueryError
-            A tag that is no text, or a penalty that is no number from 0 to 1e30; all faults together.
+            A tag that is not text, or a penalty that is not a number from 0 to 1e30; all faults together.
         """
         faults: list[Fault] = []
         for field, names in (("include", include), ("every", every), ("exclude", exclude)):
@@ -121,7 +121,7 @@ ANY_TAGS = TagFilter()
 
 
 def covers(tag: str, other: str) -> bool:
-    """Whether a tag is another or stands above it: `Move` covers `Move.Run`."""
+    """Whether a tag is another or is above it: `Move` covers `Move.Run`."""
     return other == tag or other.startswith(f"{tag}.")
 
 

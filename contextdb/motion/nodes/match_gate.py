@@ -88,7 +88,7 @@ class MatchGate:
     Raises
     ------
     MotionError
-        A bar that is no finite number, or one to close at that is below the one to open at.
+        A bar that is not a finite number, or one to close at that is below the one to open at.
     """
 
     def __init__(self, over: MotionDatabase | MatchNode, threshold: float, close_above: float | None = None) -> None:
@@ -142,7 +142,7 @@ class MatchGate:
         return self._search(query, target, valid, **options).cost
 
     def close(self) -> None:
-        """Shut the gate, as when the action it led to is left: the next look may open it anew."""
+        """Shut the gate, as when the action it led to is left: the next look may open it again."""
         self.seen = None
 
     def _search(self, query: ArrayLike, target: Target | None, valid: Valid | None, **options: Unpack[MatchOptions]) -> Hit:

@@ -149,7 +149,7 @@ class MatchNode:
     Raises
     ------
     MotionError
-        A database without root motion or rate, root motion that is not finite, or a weight that is no number from 0 to a million.
+        A database without root motion or rate, root motion that is not finite, or a weight not from 0 to a million.
     """
 
     def __init__(
@@ -324,7 +324,7 @@ def _rate_of(database: MotionDatabase, rate: float | None) -> float:
     known = None if database.schema is None else database.schema.rate
     number = known if rate is None else as_number(rate)
     if number is None or number <= 0.0 or (known is not None and number != known):
-        found = "a match node's database has no schema to tell its rate." if rate is None else f"the rate is {rate!r}."
+        found = "a match node's database has no schema that gives its rate." if rate is None else f"the rate is {rate!r}."
         raise MotionError(Fault(found, "frames a second, more than 0" if known is None else f"{known:g}, the schema's"))
     return number
 

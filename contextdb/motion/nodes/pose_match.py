@@ -1,4 +1,4 @@
-"""Pose matching: at which time to start an animation so that it goes on from the pose the body is in.
+"""Pose matching: at which time to start an animation so that it continues from the pose the body is in.
 
 The pose is that of a few bones, feet and hips as a rule, their positions weighed more than their velocities: it finds the phase of
 an animation. With hands, it lets a left swing follow a right one without anybody setting up a sequence. The search is that of
@@ -153,7 +153,7 @@ def _ranges_of(database: MotionDatabase, names: list[str]) -> NDArray[np.bool_]:
 def _outside(database: MotionDatabase, within: Span | Mapping[str, Span]) -> Floats:
     """What forbids the frames that do not count: 0 or infinite, float64 [N]."""
     if database.schema is None:
-        raise QueryError(Fault("frames cannot be told by their time.", "a database built from clips, or within=None"))
+        raise QueryError(Fault("frames cannot be selected by their time.", "a database built from clips, or within=None"))
     limits = np.array(list(_limits(database, within))).reshape(-1, 2)
     frames = database.layout.frames
     ranges = database.layout.frame_ranges[frames]

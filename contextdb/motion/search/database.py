@@ -3,7 +3,7 @@
     cost of a frame = Σ over channels of channel_weight × squared difference of normalised features + its biases
 
 N frames, F features, R ranges. A range is the frames [start, stop) of one asset; frames between ranges belong to none and are never
-chosen. Which assets may play now comes as a mask beside the cost, so that it can change with every search and rebuilds nothing.
+chosen. Which assets may play now comes as a mask next to the cost, so that it can change with every search and rebuilds nothing.
 Nothing here reads a file or knows a table.
 
 Source: Büttner and Clavet, "Motion Matching", 2015; orangeduck/Motion-Matching; the filter is the context database's (EA, GDC); the
@@ -227,7 +227,7 @@ class MotionDatabase(Searched):
 
     @property
     def features(self) -> Features:
-        """The features as rows: float32 [N, F], gathered anew; frames between ranges hold zeros."""
+        """The features as rows: float32 [N, F], gathered again; frames between ranges hold zeros."""
         found = np.zeros((self.n_frames, self.n_features), np.float32)
         found[self.layout.frames] = self.layout.take(self.layout.frames)
         return found
@@ -350,7 +350,7 @@ class MotionDatabase(Searched):
         ----------
         k : int
         left_out : bool
-            Whether frames that may not be chosen stand among the k too, each with its reason.
+            Whether frames that may not be chosen are among the k too, each with its reason.
         query, valid, **options
             As for `search`.
         """
@@ -374,7 +374,7 @@ class MotionDatabase(Searched):
     def time_s(self, hit: Hit) -> float:
         """Seconds from the start of the hit's range to its frame."""
         if self.schema is None or not hit:
-            raise QueryError(Fault("there is no time to tell.", "a hit of this database, built from clips"))
+            raise QueryError(Fault("there is no time to return.", "a hit of this database, built from clips"))
         return (hit.frame - int(self.starts[hit.range])) / self.schema.rate
 
     def frame_at(self, range_number: int, time_s: float) -> int:
@@ -403,7 +403,7 @@ class MotionDatabase(Searched):
         return replace(self, weights=changed)
 
     def __getstate__(self) -> dict[str, object]:
-        """The fields alone: what a search has prepared is prepared anew where the database is unpickled."""
+        """The fields alone: what a search has prepared is prepared again where the database is unpickled."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def __repr__(self) -> str:

@@ -30,7 +30,7 @@ MOST_FILTERS, MOST_TABLES = 64, 16
 
 
 class SearchOptions(TypedDict, total=False):
-    """The parameters of a search beside the query and the valid assets; see `MotionDatabase.search`."""
+    """The parameters of a search next to the query and the valid assets; see `MotionDatabase.search`."""
 
     tags: Tags | None
     current: int | None
@@ -152,7 +152,7 @@ class FilterMaker:
         if found.shape != self._all_ranges.shape or np.isnan(found).any() or np.isneginf(found).any():
             ranges = plural(len(self.assets), "range")
             accepted = f"a number for each of {ranges}, or for some assets; positive infinity forbids one"
-            raise QueryError(Fault(f"the penalties have shape {found.shape}, or one is no number.", accepted))
+            raise QueryError(Fault(f"the penalties have shape {found.shape}, or one is not a number.", accepted))
         return found
 
     def _kinds_of(self, tags: TagFilter, in_match_range: bool) -> Kinds:

@@ -209,7 +209,7 @@ _given = {
     "bests": types.f8[::1],
     "best_frames": types.i8[::1],
 }
-"""What `search` takes. Told beforehand, so that no array of another kind has it compiled anew in the middle of a game."""
+"""What `search` takes. Told beforehand, so that no array of another kind has it compiled again in the middle of a game."""
 
 
 @njit(types.i8(*_given.values()), **_options)

@@ -2,11 +2,11 @@
 
 N frames, F features, R ranges, B boxes, G groups, S clusters, L = 16 lanes. A box is up to 16 frames of one range, one after
 another; it never straddles two ranges, so that a mask over ranges is a mask over boxes. Its features lie feature by feature, 16
-frames beside each other; a box of fewer frames repeats its last one. A group is 16 boxes, which may be of several ranges, and a
+frames next to each other; a box of fewer frames repeats its last one. A group is 16 boxes, which may be of several ranges, and a
 cluster 16 groups; the least and greatest value of each feature in each box of a group, and in each group of a cluster, lie beside
 each other in the same way. So one instruction works on 16 frames, 16 boxes or 16 groups.
 
-Everywhere the features stand in the order of `order`: those first that tell most boxes from a query, so that most frames are given
+Everywhere the features are in the order of `order`: those first that tell most boxes from a query, so that most frames are given
 up after a few features.
 
 Source: the boxes of 16 frames of orangeduck/Motion-Matching, `database.h`; the lanes are ours.
@@ -47,7 +47,7 @@ class Layout:
     cluster_lows, cluster_highs : float32 array, shape (S, F, L)
         The bounds of each group.
     order : int64 array, shape (F,)
-        Which feature stands at each place.
+        Which feature is at each place.
     box_starts : int64 array, shape (B,)
         The first frame of each box, ascending.
     box_sizes, box_ranges : int32 array, shape (B,)
@@ -119,7 +119,7 @@ class Layout:
 
     @cached_property
     def rank(self) -> Ints:
-        """Where each feature stands: int64 [F]."""
+        """Where each feature is: int64 [F]."""
         return np.argsort(self.order)
 
     def range_of(self, frame: int) -> int:
@@ -178,7 +178,7 @@ def _order(features: Features, box_starts: Ints, box_sizes: Ints, weights: Float
 
 
 def _in_lanes(bounds: Features, nothing: float) -> Features:
-    """Bounds [n, F], 16 beside each other: [ceil(n / 16), F, L]."""
+    """Bounds [n, F], 16 next to each other: [ceil(n / 16), F, L]."""
     n_features = bounds.shape[1]
     n_rows = -(-len(bounds) // LANES)
     padded = np.full((n_rows * LANES, n_features), nothing, np.float32)

@@ -1,5 +1,5 @@
 """The search without boxes and without numba: every frame's total. What the fast search is measured and tested against, what it
-falls back to where numba is not there, and where candidates and reasons come from.
+falls back to where numba is missing, and where candidates and reasons come from.
 
 N frames, R ranges. Costs come from `contextdb.motion.search.cost`, masks and biases from the same `Filter` as the fast search's.
 """

@@ -1,4 +1,4 @@
-"""Ask the compiled search, or scan every frame where numba is not there. Both give the same frames at the same costs.
+"""Ask the compiled search, or scan every frame where numba is missing. Both give the same frames at the same costs.
 
 N frames, F features, R ranges.
 """
@@ -88,7 +88,7 @@ class Searcher:
 
 @cache
 def load_kernels() -> ModuleType | None:
-    """The compiled search; None where numba is not there, or has no place to keep what it compiles."""
+    """The compiled search; None where numba is missing, or has no place to keep what it compiles."""
     try:
         from contextdb.motion.search import kernels
     except (ImportError, RuntimeError):

@@ -1,4 +1,4 @@
-"""What several databases are asked with beside the query: some of it is for all alike, some for each by its name."""
+"""What several databases are asked with next to the query: some of it is for all alike, some for each by its name."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Current: TypeAlias = Choice | tuple[str, int]
 
 
 class Options(TypedDict, total=False):
-    """The parameters of `Selector.search` beside the query, by name."""
+    """The parameters of `Selector.search` next to the query, by name."""
 
     valid: OfValid | None
     tags: OfTags | None

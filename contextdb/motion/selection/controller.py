@@ -2,7 +2,7 @@
 
 At each update the playing animation moves on. A search follows when one is due or forced, when the clip has ended, and when what
 plays is no longer valid, loaded or among the databases of the moment. What would play on takes part in the search as the continuing
-pose, with its bias; some frames are no candidates because of what plays and what was played (see
+pose, with its bias; some frames are not candidates because of what plays and what was played (see
 `contextdb.motion.selection.history`). When nothing is found, the character plays on, or holds the last frame of a clip that has
 ended.
 
@@ -74,7 +74,7 @@ class Controller:
         clock: Clock | None = None,
     ) -> None:
         if settings.variation is not None and rng is None:
-            raise MotionError(Fault("the settings ask for variation, and there is no generator.", "rng=random.Random(seed)"))
+            raise MotionError(Fault("the settings request variation, but there is no generator.", "rng=random.Random(seed)"))
         self.selector, self.settings, self.recorder = selector, settings, recorder
         self._rng, self._clock = rng, clock
         self._state = ControllerState()
@@ -94,7 +94,7 @@ class Controller:
 
     @property
     def state(self) -> ControllerState:
-        """Where the controller stands, to come back to with `restore`."""
+        """Where the controller is, to come back to with `restore`."""
         return replace(self._state, rng=variation.state_of(self._rng))
 
     def restore(self, state: ControllerState) -> None:

@@ -3,7 +3,7 @@
     [controllers.player]
     selector = "locomotion"
     search_every_s = 0.1       # between two searches, unless one is forced
-    jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are no candidates
+    jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are not candidates
     history_s = 0.5            # frames played within so many seconds are not entered again
     variation_within = 0.05    # frames that cost at most so much more than the best are as good as it; without the key, none are
     variation_memory = 2       # and none of the last so many assets is chosen while another is as good
@@ -44,7 +44,7 @@ class ControllerSettings:
     search_every_s : float
         Seconds between two searches; a search that is forced, or needed because the clip has ended, does not wait.
     jump_threshold_s : float
-        Frames of the playing range that are within so many seconds of the playing frame are no candidates.
+        Frames of the playing range that are within so many seconds of the playing frame are not candidates.
     history_s : float
         Frames that were played within the last so many seconds are not entered again.
     variation : Variation, optional
@@ -107,7 +107,7 @@ def _read_variation(section: Section) -> Variation | None:
     if "variation_memory" in section.part:
         memory = section.number("variation_memory", MEMORY, 0.0, MOST_ASSETS)
         if memory is not None and not memory.is_integer():
-            section.wrong("variation_memory", "this is no whole number", MEMORY, f"variation_memory = {math.floor(memory)}")
+            section.wrong("variation_memory", "this is not a whole number", MEMORY, f"variation_memory = {math.floor(memory)}")
         if "variation_within" not in section.part:
             found = (
                 f"{section.where} has {in_quotes('variation_memory')}, but without {in_quotes('variation_within')} nothing varies."

@@ -1,4 +1,4 @@
-"""Where a controller stands: all that its next decision depends on beside what it is then asked. Small, frozen, to be kept and put
+"""Where a controller is: all that its next decision depends on beside what it is then asked. Small, frozen, to be kept and put
 back, as rollback over a network does."""
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class ControllerState:
     recent : tuple of str
         The assets of the last changes, as far as variation remembers them.
     rng : object
-        Where the random generator stands; None without one.
+        Where the random generator is; None without one.
     """
 
     tick: int = 0

@@ -84,7 +84,7 @@ class Playhead:
 
     @property
     def is_looping(self) -> bool:
-        """Whether the range goes on at its start when it ends."""
+        """Whether the range continues at its start when it ends."""
         return bool(self.database.marks.looping[self.range]) and self.stop - self.start > 1
 
     def frame_at(self, time_s: float) -> int:

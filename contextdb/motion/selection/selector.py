@@ -1,7 +1,7 @@
 """Choose among several databases, the prioritized ones first.
 
 The rule: take the best frame of the priority database when its cost is under its threshold. If not, search the default database too
-and take the lower of the two. A default database may itself be a priority database before another: in a chain the search goes on
+and take the lower of the two. A default database may itself be a priority database before another: in a chain the search continues
 until a cost is under its threshold, and the lowest of all that was searched wins; on a tie, the earlier database.
 
 Buckets: a game may keep starts, stops and cycles in databases of their own, and name those of the moment with every search; the
@@ -64,7 +64,7 @@ class Selector:
     Raises
     ------
     MotionError
-        No entry, a name twice, a threshold that is no number, or databases whose costs cannot be compared.
+        No entry, a name twice, a threshold that is not a number, or databases whose costs cannot be compared.
     """
 
     def __init__(self, entries: Sequence[Entry], tags: Sequence[str] = ()) -> None:
@@ -219,7 +219,7 @@ def _check_entries(entries: Sequence[Entry]) -> None:
         raise MotionError(Fault("the selector has no database.", "at least one Entry"))
     for entry in entries:
         if names.count(entry.name) > 1:
-            raise MotionError(Fault(f"the database {in_quotes(entry.name)} stands twice in the selector.", "each once"))
+            raise MotionError(Fault(f"the database {in_quotes(entry.name)} appears twice in the selector.", "each once"))
         if entry.threshold is not None and math.isnan(entry.threshold):
             raise MotionError(Fault(f"the threshold of {in_quotes(entry.name)} is not a number.", "a cost, such as 2.75, or None"))
     loaded = [(entry.name, entry.database) for entry in entries if entry.database is not None]

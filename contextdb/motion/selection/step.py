@@ -38,7 +38,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """An update under way: where the controller stands, what it is asked, and what plays and was played, moved on."""
+    """An update under way: where the controller is, what it is asked, and what plays and was played, moved on."""
 
     selector: Selector
     settings: ControllerSettings

@@ -36,7 +36,7 @@ class Variation:
     Raises
     ------
     MotionError
-        `within` is no finite number of 0 or more, or `memory` no whole one.
+        `within` is not a finite number of 0 or more, or `memory` no whole one.
     """
 
     within: float
@@ -60,7 +60,7 @@ class Variation:
 
 
 def state_of(rng: Rng | None) -> object:
-    """Where a generator stands, to come back to with `restore`; None for none."""
+    """Where a generator is, to come back to with `restore`; None for none."""
     if rng is None:
         return None
     return rng.getstate() if isinstance(rng, random.Random) else rng.bit_generator.state

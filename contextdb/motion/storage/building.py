@@ -43,7 +43,7 @@ class Built:
     ----------
     database : MotionDatabase
     digest : str
-        Of all that it was made of; empty for a schema with functions, of which that cannot be told.
+        Of all that it was made of; empty for a schema with functions, of which that cannot be reported.
     computed, cached : tuple of str
         The clips whose features were computed, and those whose features came from the cache.
     markup_faults : tuple of Fault

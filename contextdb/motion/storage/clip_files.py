@@ -24,12 +24,12 @@ from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.feature_cache import FeatureCache, key_of
 
 UNEVEN_M = 0.005
-"""Sides that differ by more metres are told."""
+"""Sides that differ by more metres are reported."""
 
 
 @dataclass(frozen=True)
 class ClipFile:
-    """A clip of a database: its file, and what its features depend on beside the file's bytes."""
+    """A clip of a database: its file, and what its features depend on next to the file's bytes."""
 
     path: Path
     settings: DatabaseSettings
@@ -98,7 +98,7 @@ def _paths(settings: DatabaseSettings, folder: Path, file: str | None = None) ->
     try:
         return sorted(folder.glob(settings.clips))
     except (ValueError, NotImplementedError):
-        found = f"[databases.{settings.name}] clips = {as_toml(settings.clips)} is no pattern."
+        found = f"[databases.{settings.name}] clips = {as_toml(settings.clips)} is not a pattern."
         raise MotionError(Fault(found, '"clips/*.bvh", "clips/**/*.bvh"', place=Place(file), rule="file")) from None
 
 
@@ -125,7 +125,7 @@ def unmatched(
 def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     """The features of a clip's ranges: from the cache, or computed and then kept in it.
 
-    Nothing is kept of a schema with functions: whether they still are what they were cannot be told.
+    Nothing is kept of a schema with functions: whether they still are what they were cannot be reported.
 
     Raises
     ------

@@ -146,7 +146,7 @@ class MotionConfig:
 
 
 class ControllerOptions(TypedDict, total=False):
-    """What a controller is given beside its selector and settings."""
+    """What a controller is given next to its selector and settings."""
 
     recorder: Recorder | None
     rng: Rng | None
@@ -163,7 +163,7 @@ def _known(section: str, name: str, parts: Mapping[str, Part], file: str | None)
 
 
 def _named_parts(mapping: Mapped, section: str, faults: list[Fault], file: str | None) -> dict[str, Mapped]:
-    """The tables [section.NAME] of a section; what is no table leaves a fault."""
+    """The tables [section.NAME] of a section; what is not a table leaves a fault."""
     whole = mapping.get(section, {})
     parts = whole if isinstance(whole, Mapping) else {}
     if not isinstance(whole, Mapping):
@@ -191,7 +191,7 @@ def _read_selectors(
         section = Section(f"[selectors.{name}]", part, ("order",), faults, file)
         steps = part.get("order") if section.has("order", accepted) else ()
         if not isinstance(steps, (list, tuple)) or (not steps and "order" in part):
-            section.wrong("order", "this is no list, or empty", accepted)
+            section.wrong("order", "this is not a list, or empty", accepted)
             continue
         n_faults = len(faults)
         order = [_read_step(section, i, step, len(steps), list(parts["databases"])) for i, step in enumerate(steps)]

@@ -130,7 +130,7 @@ def _values(section: Section, features: list[str], tables: Collection[str] | Non
     """Every key but the weights, with its value or None."""
     part = section.part
     if section.has("clips", CLIPS):
-        yield "clips", _read_path(section, "clips", ".bvh", "these are no BVH files", CLIPS)
+        yield "clips", _read_path(section, "clips", ".bvh", "these are not BVH files", CLIPS)
     if section.has("features", some(features) or "the name of a [features.NAME]"):
         yield "features", section.one_of("features", features, "feature schema")
     if "table" in part:
@@ -141,7 +141,7 @@ def _values(section: Section, features: list[str], tables: Collection[str] | Non
     if "mirror" in part:
         yield "mirror", _read_flag(section, "mirror")
     if "markup" in part:
-        yield "markup", _read_path(section, "markup", ".csv", "this is no CSV file", MARKUP)
+        yield "markup", _read_path(section, "markup", ".csv", "this is not a CSV file", MARKUP)
     for key, (accepted, least, most) in NUMBERS.items():
         if key in part:
             yield key, section.number(key, accepted, least, most)
@@ -175,7 +175,7 @@ def _read_flag(section: Section, key: str) -> bool | None:
 
 
 def _read_weights(section: Section, schema: FeatureSchema | None) -> dict[str, float] | None:
-    """Weights by the names of channels; without a schema the names are not looked at, as its own faults are told already."""
+    """Weights by the names of channels; without a schema the names are not looked at, as its own faults are reported already."""
     value = section.part["weights"]
     if not isinstance(value, Mapping):
         section.wrong("weights", f"this is {what_is(value)}, not a table", '{ "NAME OF A CHANNEL" = 2.0 }')

@@ -6,7 +6,7 @@
 The key is a digest of all that the features depend on: the bytes of the BVH file, what the settings say of its unit and axis, the
 channels without their weights, and `EXTRACTION`. An entry is written in one step and checked when it is read; one that is missing,
 broken or of another version is as if it were not there; so is one that another version of numpy made, which may round otherwise.
-So builds may be interrupted, and run beside each other.
+So builds may be interrupted, and run next to each other.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class FeatureCache:
     folder: Path
 
     def read(self, database: str, key: str, asset: str, *, mirrored: bool) -> tuple[ClipFeatures, Measures] | None:
-        """The features of a key and the measures of its clip; None when they are not there, or not whole."""
+        """The features of a key and the measures of its clip; None when they are missing, or not whole."""
         entry = self._entry(database, key)
         if not os.path.isfile(entry):  # the error of a missing file would look for the nearest name
             return None
@@ -127,5 +127,5 @@ def _digest(tensors: Tensors, key: str, measures: str) -> str:
 
 
 def file_name(name: str, suffix: str) -> str:
-    """A file's name for a database's: what some system's file names cannot hold stands as %XX."""
+    """A file's name for a database's: what some system's file names cannot hold is as %XX."""
     return "".join(f"%{ord(c):02X}" if c in '%<>:"/\\|?*' or not c.isprintable() else c for c in name) + suffix

@@ -130,7 +130,7 @@ def open_database(path: str | PathLike[str], *, verify: bool = False) -> MotionD
         small, large = _divided(tensors)
         expected = digest_of(small, metadata["about"], metadata["inputs"], _shapes(large))
         if expected != metadata["digest"] or (verify and digest_of(large) != metadata["large_digest"]):
-            raise STORED.refused(file, "the file was altered: its contents do not give its digest.")
+            raise STORED.refused(file, "the file was altered: its contents do not match its digest.")
         try:
             return _database(json.loads(metadata["about"]), tensors)
         except SchemaError as error:

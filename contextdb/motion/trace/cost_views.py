@@ -22,7 +22,7 @@ ROUNDING = 1e-7
 
 
 class View(StrEnum):
-    """Which costs of a candidate are shown beside its total."""
+    """Which costs of a candidate are shown next to its total."""
 
     ALL = "all"
     SUMMARY = "summary"

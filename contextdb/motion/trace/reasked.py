@@ -41,7 +41,7 @@ def reasked(decision: Decision, databases: Mapping[str, MotionDatabase], name: s
     The rank counts the frames of all databases that were searched which may be chosen and cost less. Ranges that are not valid come
     with their cost all the same, and with the reason.
     """
-    assert decision.query is not None, "without a query nothing was asked"
+    assert decision.query is not None, "without a query nothing was searched"
     found: list[tuple[str, Candidate]] = []
     free: list[Floats] = []
     for database, chosen in decision.filters:
@@ -55,11 +55,11 @@ def reasked(decision: Decision, databases: Mapping[str, MotionDatabase], name: s
 
 
 def require_known(name: str, databases: Mapping[str, MotionDatabase], file: str) -> None:
-    """Raise MotionError when no asset's name holds a text, with the nearest."""
+    """Raise MotionError when no asset's name contains a text, with the nearest."""
     known = list(dict.fromkeys(asset for database in databases.values() for asset in database.assets))
     if not any(name.casefold() in asset.casefold() for asset in known):
         near = nearest(name, known)
-        found = f"no asset's name holds {in_quotes(name)}."
+        found = f"no asset's name contains {in_quotes(name)}."
         raise MotionError(Fault(found, some(known), in_quotes(near) if near else "", Place(file)))
 
 

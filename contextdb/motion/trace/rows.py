@@ -1,10 +1,10 @@
 """Decisions as rows of a table with nested columns, and back.
 
-One row a decision. What a decision may lack is null. Times of searching stand in a column of their own, `search_us`, which a file
+One row a decision. What a decision may lack is null. Times of searching are in a column of their own, `search_us`, which a file
 may leave out: all other columns are the same whenever the same session is recorded.
 
-A context becomes JSON: tags a sorted list, a fact that is no number null, and what JSON has no word for its text. Of the frames of
-a search only the candidates stay: `Candidates.why` comes back empty, its sums stand in `counts`.
+A context becomes JSON: tags a sorted list, a NaN fact null, and what JSON has no word for its text. Of the frames of
+a search only the candidates stay: `Candidates.why` comes back empty, its sums are in `counts`.
 """
 
 from __future__ import annotations
@@ -235,7 +235,7 @@ def decision_of(row: Row) -> Decision:
 
 
 def events_in(row: Row) -> Events:
-    """What the markup says of each frame that a row tells of, as far as it says anything."""
+    """What the markup says of each frame that a row mentions, as far as it says anything."""
     return {(database, frame): tuple(events) for database, frame, events in _told(row) if events}
 
 

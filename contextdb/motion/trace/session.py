@@ -6,7 +6,7 @@
     trace.save("session.parquet")
 
 Each decision is packed at once, so that no update waits for the work of others. With 12 candidates of two databases, an hour at 30
-updates and 10 searches a second takes about 100 MB, and to save it half a minute and 1 GB. Of a session that goes on and on, the
+updates and 10 searches a second takes about 100 MB, and to save it half a minute and 1 GB. Of a session that continues and on, the
 last `most` decisions stay.
 
 A file has one row a decision, its columns as `contextdb.motion.trace.rows` says, and in its metadata the format's number and what
@@ -108,7 +108,7 @@ class Trace(Sequence[Decision]):
             yield self._decision_of({**row, "query": None, "candidates": [], FILTERS: []}, place)
 
     def events(self, index: int) -> Events:
-        """What the markup says of the frames that a decision tells of, by (database, frame), as far as it says anything."""
+        """What the markup says of the frames that a decision mentions, by (database, frame), as far as it says anything."""
         return events_in(self._row(self._place(index)))
 
     def save(self, path: str | PathLike[str], *, timings: bool = True) -> None:
@@ -234,7 +234,7 @@ def _old_digest(raw: bytes, frame: Frame) -> str:
 
 
 def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, Mapping[str, Mapping[str, object]]]:
-    """The rows of a file and what it tells of databases, checked."""
+    """The rows of a file and what it says of databases, checked."""
     import polars as pl
 
     why = _no_parquet(raw)
@@ -262,7 +262,7 @@ def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, Mapping[str, Mapping[str
 def _no_parquet(raw: bytes) -> str:
     """What is wrong with the file's first and last bytes, if anything."""
     if not raw.startswith(MAGIC):
-        return "this is no Parquet file." if raw else "the file is empty."
+        return "this is not a Parquet file." if raw else "the file is empty."
     size = int.from_bytes(raw[-8:-4], "little")
     is_whole = len(raw) >= 12 and raw.endswith(MAGIC) and size <= len(raw) - 12
     return "" if is_whole else "the file is cut off: its end, where Parquet lists its columns, is missing."
@@ -270,7 +270,7 @@ def _no_parquet(raw: bytes) -> str:
 
 def _check_format(metadata: Mapping[str, str], file: str) -> None:
     if FORMAT_KEY not in metadata:
-        raise _refused("this Parquet file is no recorded session.", file)
+        raise _refused("this Parquet file is not a recorded session.", file)
     if metadata[FORMAT_KEY] != str(FORMAT):
         found = f"the session has format {in_quotes(metadata[FORMAT_KEY])}; this version reads format {FORMAT}."
         raise _refused(found, file)

@@ -1,6 +1,6 @@
 """Columns of text as lines that fit a terminal: empty columns are left out, headers wrap, long names lose their middle.
 
-What is too wide for one table goes on in a second one below, with the key columns again. Nothing here prints.
+What is too wide for one table continues in a second one below, with the key columns again. Nothing here prints.
 """
 
 from __future__ import annotations

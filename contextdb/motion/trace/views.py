@@ -23,7 +23,7 @@ from contextdb.motion.trace.text_table import WIDTH, Column, shortened, table_li
 
 EventTexts = Mapping[tuple[str, int], Sequence[str]]
 STEADY = (Action.HOLD, Action.NOTHING)
-"""What is told once while it lasts, as playing on is told with what is played."""
+"""What is reported once while it lasts, as playing on is reported with what is played."""
 CAUSES = {
     Trigger.NOTHING_PLAYS: "nothing played",
     Trigger.LOST: "not loaded",
@@ -59,7 +59,7 @@ def session_lines(decisions: Iterable[Decision], *, name: str = "", width: int =
     ----------
     decisions : iterable of Decision
     name : str
-        Only where an asset whose name holds this text plays or is left.
+        Only where an asset whose name contains this text plays or is left.
     width : int
         Cells of a line; the names of assets are shortened to fit.
     """
@@ -157,7 +157,7 @@ def decision_lines(
     if decision.choice is not None:
         yield from ("", "searches", "", *search_lines(decision, width))
     if asked is not None:
-        yield from ("", f"the best frames of assets whose name holds {in_quotes(name)} ({view})", "")
+        yield from ("", f"the best frames of assets whose name contains {in_quotes(name)} ({view})", "")
         yield from candidate_lines(asked, view, told, width)
     elif decision.candidates:
         yield from ("", f"top candidates ({view})", "", *_top_lines(decision, view, name, told, width))
@@ -254,7 +254,7 @@ def _top_lines(decision: Decision, view: View, name: str, events: EventTexts, wi
     if rows:
         yield from candidate_lines(rows, view, events, width)
     else:
-        yield f"none whose name holds {in_quotes(name)}" if name else "none"
+        yield f"none whose name contains {in_quotes(name)}" if name else "none"
     several = len(decision.candidates) > 1
     yield ""
     for database, found in decision.candidates:

@@ -61,7 +61,7 @@ def inverse(came_from: CameFrom, n_before: int) -> CameFrom:
 
 
 def moved(came_from: CameFrom) -> NDArray[np.bool_]:
-    """Which rows changed their order: all known ones but the most that still stand in the order of before: bool [n_rows]."""
+    """Which rows changed their order: all known ones but the most that still are in the order of before: bool [n_rows]."""
     known = np.flatnonzero(came_from >= 0)
     flags = np.zeros(len(came_from), np.bool_)
     places = came_from[known]

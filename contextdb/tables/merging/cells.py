@@ -1,4 +1,4 @@
-"""The cells of one merged column: whose text stands in each, and where both sides changed it."""
+"""The cells of one merged column: whose text is in each, and where both sides changed it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _EMPTY = TextColumn("", ("",), np.zeros(1, np.int32))
 def merge_column(
     tables: Tables, rows: Origins, places: tuple[int, int, int], name: str, decided: Decided
 ) -> tuple[TextColumn, list[Conflict]]:
-    """Merge a column that stands at `places` of base, ours and theirs (-1: nowhere); the conflicts have no asset yet."""
+    """Merge a column that is at `places` of base, ours and theirs (-1: nowhere); the conflicts have no asset yet."""
     as_is = _untouched(tables, rows, places, name)
     if as_is is not None:
         return as_is, []

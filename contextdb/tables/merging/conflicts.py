@@ -35,7 +35,7 @@ class Conflict:
 
     @property
     def place(self) -> str:
-        """Where it stands, in words."""
+        """Where it is, in words."""
         return {"cell": f"{self.asset}, {self.column}", "row": self.asset}.get(self.kind, self.column)
 
     def to_json(self) -> dict[str, object]:

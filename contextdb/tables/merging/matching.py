@@ -109,7 +109,7 @@ def _joined(before: NDArray[np.integer], after: NDArray[np.integer], is_unique: 
 
 
 def _nth(ids: Places) -> Places:
-    """For each id how many of the same stand before it."""
+    """For each id how many of the same are before it."""
     order = np.argsort(ids, kind="stable")
     ordered = ids[order]
     starts = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])) if len(ids) else np.empty(0, np.int64)
@@ -144,7 +144,7 @@ def mixed(signature: Signatures, more: NDArray[np.integer]) -> Signatures:
 
 
 def with_neighbours(names: Sequence[Places], whole: tuple[Signatures, Signatures]) -> Iterator[Keys]:
-    """Keys of rows that are the same, from those that stand between the same rows to those that stand anywhere."""
+    """Keys of rows that are the same, from those that are between the same rows to those that are anywhere."""
     same = [mixed(w, n) for w, n in zip(whole, names, strict=True)]
     earlier = [np.append(-1, n)[: len(n)] for n in names]
     later = [np.append(n, -1)[1:] for n in names]

@@ -2,7 +2,7 @@
 
 A cell that one side changed is as that side has it; what both changed alike is no conflict, nor is a change that only writes the
 same otherwise. Rows and columns that come, go and move on either side do so in the merge (`contextdb.tables.merging.order`). What
-the sides disagree about stands in `conflicts`, and until somebody decides it ours holds. The result keeps the source of ours, so
+the sides disagree about is in `conflicts`, and until somebody decides it ours holds. The result keeps the source of ours, so
 that saving it changes only lines that theirs changed.
 """
 
@@ -109,7 +109,7 @@ def _asset_texts(columns: Sequence[TextColumn], settings: TableSettings) -> Text
 def _settings(
     base: TableData, ours: TableData, theirs: TableData, fields: Origins, names: Sequence[str], schema: Schema
 ) -> TableSettings:
-    """The settings of ours, with what only theirs said anew where that goes together, under the names of the merge."""
+    """The settings of ours, with what only theirs changed where that goes together, under the names of the merge."""
     was, mine, yours = (
         _jobs(table, dict(zip(places.tolist(), names, strict=True)))
         for table, places in ((base, fields.base), (ours, fields.ours), (theirs, fields.theirs))
@@ -126,7 +126,7 @@ def _settings(
 
 
 def _jobs(table: TableData, name_of: Mapping[int, str]) -> dict[str, Any]:
-    """What the settings say, under the names that columns have in the merge; of a column that is not there nothing."""
+    """What the settings say, under the names that columns have in the merge; of a column that is missing nothing."""
     places = {c.name: at for at, c in enumerate(table.columns)}
 
     def named(column: str | None) -> str | None:

@@ -1,7 +1,7 @@
-"""The order that two sides agree on: which rows, or columns, stand in a merge, and where.
+"""The order that two sides agree on: which rows, or columns, are in a merge, and where.
 
-The order of ours is kept. What only theirs moved goes where theirs has it, behind what stands before it there; what both moved
-stays where ours has it. New ones of theirs follow what stands before them in theirs, after those that ours put there.
+The order of ours is kept. What only theirs moved goes where theirs has it, behind what is before it there; what both moved
+stays where ours has it. New ones of theirs follow what is before them in theirs, after those that ours put there.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ def table_of(
     Raises
     ------
     TableError
-        The bytes are no table.
+        The bytes are not a table.
     """
     source: AnySource
     source, columns = read_parquet(raw, file) if raw.startswith(PARQUET) else read_csv(raw, file)

@@ -26,7 +26,7 @@ class Shared:
 
     @classmethod
     def of(cls, columns: Sequence[TextColumn | None]) -> Shared:
-        """Read columns together; one that is not there has no rows."""
+        """Read columns together; one that is missing has no rows."""
         known: dict[str, int] = {}
         codes = [_codes(column, known) for column in columns]
         return cls(tuple(known), tuple(codes))
@@ -42,7 +42,7 @@ class Shared:
         return np.array([text.strip().casefold() in ANY_WORDS for text in self.texts], np.bool_)
 
     def at(self, column: int, rows: CameFrom) -> NDArray[np.int64]:
-        """The codes of a column in some rows; -1 where the row is -1 or the column is not there."""
+        """The codes of a column in some rows; -1 where the row is -1 or the column is missing."""
         codes = self.codes[column]
         return np.append(codes, -1)[rows] if len(codes) else np.full(len(rows), -1)
 

@@ -23,7 +23,7 @@ MOST_CHANGES = 3
 def merge_rows(
     base: TableData, ours: TableData, theirs: TableData, of_ours: Alignment, of_theirs: Alignment, decided: Decided
 ) -> tuple[Origins, list[Conflict]]:
-    """Which rows stand in the merge; a conflict for each that one side took away and the other changed."""
+    """Which rows are in the merge; a conflict for each that one side took away and the other changed."""
     twins = row_twins(ours, theirs, np.flatnonzero(of_ours.rows < 0), np.flatnonzero(of_theirs.rows < 0))
     sides = Sides(base.n_rows, of_ours.rows, of_theirs.rows, twins)
     gone = np.flatnonzero(sides.gone_from_theirs), np.flatnonzero(sides.gone_from_ours)
@@ -67,7 +67,7 @@ def _placed(conflict: Conflict, row: int) -> Conflict:
 def merge_columns(
     base: TableData, ours: TableData, theirs: TableData, of_ours: Alignment, of_theirs: Alignment, decided: Decided
 ) -> tuple[Origins, list[str], list[Conflict]]:
-    """Which columns stand in the merge and under which names; a conflict for each that one side took away and the other changed, or
+    """Which columns are in the merge and under which names; a conflict for each that one side took away and the other changed, or
     that has two names."""
     sides = Sides(len(base.columns), of_ours.columns, of_theirs.columns, _column_twins(ours, theirs, of_ours, of_theirs))
     gone = [

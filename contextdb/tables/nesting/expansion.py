@@ -1,7 +1,7 @@
-"""The rows of a table with the rows of its inner tables in place of those that stand for them.
+"""The rows of a table with the rows of its inner tables in place of those that refer to them.
 
-D = depth, n = rows of the flat table. A flat row is a way through the tables: a row of the outer one, and where that stands for a
-table, a row of that one, and so on. The order is that of the files: inner rows stand where the outer row stands.
+D = depth, n = rows of the flat table. A flat row is a way through the tables: a row of the outer one, and where that refers to a
+table, a row of that one, and so on. The order is that of the files: inner rows stand where the outer row is.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from contextdb.tables.nesting.links import inner_rows
 
 Numbers = NDArray[np.int32]
 MOST_ROWS = 1_000_000
-"""A table may have so many rows with its inner tables' rows counted; one that stands in two places counts twice."""
+"""A table may have so many rows with its inner tables' rows counted; one that is in two places counts twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ NO_ROWS = Expansion((), (), np.empty((1, 0), np.int32), np.empty((1, 0), np.int3
 
 
 def expand(tables: Mapping[str, TableData]) -> Expansion:
-    """The flat rows of the first of some sound tables; the others are those that stand in it.
+    """The flat rows of the first of some sound tables; the others are those that are in it.
 
     Raises
     ------

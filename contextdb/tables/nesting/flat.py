@@ -1,4 +1,4 @@
-"""A table with the rows of its inner tables in place of those that stand for them: the table that is compiled and measured.
+"""A table with the rows of its inner tables in place of those that refer to them: the table that is compiled and measured.
 
 Cells of one condition in the tables of a way must all hold; a row is enabled when every row of its way is. Columns of slots and
 rules add up, of other outputs the innermost text counts. Nothing here touches the disk.
@@ -99,7 +99,7 @@ def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
     Raises
     ------
     TableError
-        Inner tables that are not there or cannot be read, cycles, conditions of unlike types, or too many rows; with every fault.
+        Inner tables that are missing or cannot be read, cycles, conditions of unlike types, or too many rows; with every fault.
     """
     last = tables.last if isinstance(tables, Neighbours) and isinstance(tables.last, FlatTable) else None
     expansion = _expansion(require_sound(table, tables), last)
@@ -140,7 +140,7 @@ def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
 
 def _together(fault: Fault) -> Fault:
     """A fault of the rules of a way, each of which can be read alone."""
-    return replace(fault, found=f"the rules of this row and of those that stand for its table, taken together: {fault.found}")
+    return replace(fault, found=f"the rules of this row and of those that refer to its table, combined: {fault.found}")
 
 
 def _expansion(tables: Mapping[str, TableData], last: FlatTable | None) -> Expansion:
@@ -190,7 +190,7 @@ def _unlike(expansion: Expansion, first: int, number: int, name: str, one: Condi
     )
     place = Place(here, None, name)
     mend = "" if one.is_declared and other.is_declared else f"to declare it in contextdb.toml: [conditions.{name}]"
-    accepted = "one type in all tables that stand in each other"
+    accepted = "one type in all tables that contain each other"
     return Fault(f"the condition {found} in {there}.", accepted, mend, place, "unlike-conditions")
 
 

@@ -1,4 +1,4 @@
-"""The columns of a flat table that are no conditions: assets with their paths, outputs, and the rows' own rules."""
+"""The columns of a flat table that are not conditions: assets with their paths, outputs, and the rows' own rules."""
 
 from __future__ import annotations
 

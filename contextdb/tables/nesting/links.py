@@ -1,4 +1,4 @@
-"""Which tables the rows of a table stand for, and what is wrong with that: a table that is not there, tables that come back to
+"""Which tables the rows of a table refer to, and what is wrong with that: a table that is missing, tables that come back to
 themselves. Tables are given as a mapping by name, whose reading may fail; nothing here touches the disk."""
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ Tables = Mapping[str, TableData]
 
 
 class Neighbours(Mapping[str, AnyTable]):
-    """The tables that the rows of one table may stand for, by name, and what was worked out with them last.
+    """The tables that the rows of one table may refer to, by name, and what was worked out with them last.
 
-    The versions of a table that come of edits share it, so that flattening anew costs what changed.
+    The versions of a table that come of edits share it, so that flattening again costs what changed.
     """
 
     def __init__(self, tables: Mapping[str, AnyTable], last: object = None) -> None:
@@ -49,7 +49,7 @@ def is_nested(table: TableData) -> bool:
 
 
 def inner_rows(table: TableData) -> dict[str, list[int]]:
-    """The tables that rows stand for, by name, with those rows."""
+    """The tables that rows refer to, by name, with those rows."""
     if not table.columns:
         return {}
     column = table.text_column(table.asset_column)
@@ -61,12 +61,12 @@ def inner_rows(table: TableData) -> dict[str, list[int]]:
 
 
 def inner_tables(tables: Iterable[TableData]) -> set[str]:
-    """The names of the tables that rows of some tables stand for."""
+    """The names of the tables that rows of some tables refer to."""
     return {name for table in tables for name in inner_rows(table)}
 
 
 def reached(table: TableData, tables: Tables) -> dict[str, TableData]:
-    """The table and all that stand in it, by name, each once; the table itself first. Those that cannot be read are left out."""
+    """The table and all that are in it, by name, each once; the table itself first. Those that cannot be read are left out."""
     found = {table.name: table}
     waiting = [table]
     while waiting:
@@ -78,7 +78,7 @@ def reached(table: TableData, tables: Tables) -> dict[str, TableData]:
 
 
 def nesting_faults(table: TableData, tables: Tables, name: str | None = None) -> list[Fault]:
-    """What is wrong with the rows of one table, known as `name`, that stand for others, in the order of its rows."""
+    """What is wrong with the rows of one table, known as `name`, that refer to others, in the order of its rows."""
     found: list[tuple[int, Fault]] = []
     for inner, rows in inner_rows(table).items():
         if fault := _missing(name or table.name, inner, tables) or _cycle(name or table.name, inner, tables):
@@ -87,12 +87,12 @@ def nesting_faults(table: TableData, tables: Tables, name: str | None = None) ->
 
 
 def require_sound(table: TableData, tables: Tables) -> dict[str, TableData]:
-    """The tables that stand in a table, as `reached`.
+    """The tables that are in a table, as `reached`.
 
     Raises
     ------
     TableError
-        With what is wrong in any of them: files and cells that cannot be read, tables that are not there, cycles.
+        With what is wrong in any of them: files and cells that cannot be read, tables that are missing, cycles.
     """
     found = reached(table, tables)
     faults = dict.fromkeys(_unread(found.values(), tables))
@@ -126,19 +126,19 @@ def _missing(outer: str, name: str, tables: Tables) -> Fault | None:
     near = nearest(name, others)
     known = some(f"{MARK}{other}" for other in others) or "an asset, as there is no other table"
     mend = in_quotes(MARK + near) if near else f'to put an asset of this name in quotes: "{MARK}{name}"' if name else ""
-    found = f"there is no table {in_quotes(name)} to stand here." if name else f'after "{MARK}" the name of a table is missing.'
+    found = f"there is no table {in_quotes(name)}." if name else f'after "{MARK}" the name of a table is missing.'
     return Fault(found, known, mend, rule="no-such-table")
 
 
 def _cycle(outer: str, name: str, tables: Tables) -> Fault | None:
-    """A fault when the table `outer` stands in itself by way of the table `name`; the shortest way is told."""
+    """A fault when the table `outer` is in itself through the table `name`; the shortest way is reported."""
     ways: dict[str, tuple[str, ...]] = {name: (outer, name)}
     waiting = [name]
     while waiting:
         at = waiting.pop(0)
         if at == outer:
             way = " > ".join(ways[at])
-            return Fault(f"the table stands in itself: {way}.", "tables that do not come back to themselves", rule="cyclic-tables")
+            return Fault(f"the table contains itself: {way}.", "tables that do not contain themselves", rule="cyclic-tables")
         inner = _read(at, tables)
         for following in inner_rows(inner) if inner is not None else ():
             if following not in ways:

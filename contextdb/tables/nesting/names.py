@@ -1,8 +1,8 @@
-"""What an asset cell says: an asset, or `@other_table`, which stands for that table's rows.
+"""What an asset cell says: an asset, or `@other_table`, which refers to that table's rows.
 
 MidAir_Dive    the asset MidAir_Dive
 @dive          the rows of the table dive
-"@dive"        the asset @dive: a name that begins with @ stands in double quotes, a quote in it doubled
+"@dive"        the asset @dive: a name that begins with @ is in double quotes, a quote in it doubled
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _QUOTED = re.compile(r'"(@(?:[^"]|"")*)"')
 
 
 def inner_name(text: str) -> str | None:
-    """The name of the table that an asset cell stands for; None for an asset."""
+    """The name of the table that an asset cell refers to; None for an asset."""
     bare = text.strip()
     return bare[len(MARK) :].strip() if bare.startswith(MARK) else None
 

@@ -1,4 +1,4 @@
-"""A flat table as one that could stand in a file, for what compares tables by the texts of their cells.
+"""A flat table as one that could be in a file, for what compares tables by the texts of their cells.
 
 Its rows have the assets with their paths, a cell each for what all cells of a way accept, and no soft cells, which exclude nothing.
 The policies of the tables are left aside: rows of one inner table are ordered among themselves only.

@@ -48,7 +48,7 @@ class Rest:
         self.moved_s = now
 
     def taken(self, now: float) -> None:
-        """The files were read: patience begins anew."""
+        """The files were read: patience begins again."""
         self._restless_since = now
 
     def wait_s(self, now: float) -> float | None:

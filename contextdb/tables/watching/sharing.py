@@ -1,4 +1,4 @@
-"""A table read anew that keeps what its older version had worked out.
+"""A table read again that keeps what its older version had worked out.
 
 Columns are compared by what they say. One that says the same is taken from the older table, with its cells and masks; of one that
 changed, only texts that are new are read. So a reload costs the columns that changed. Nothing here touches the disk.
@@ -29,7 +29,7 @@ def table_like(
     Raises
     ------
     TableError
-        As `Table.build`. Cells that cannot be read stand in the table's `faults`.
+        As `Table.build`. Cells that cannot be read are in the table's `faults`.
     """
     if old is None:
         return Table.build(settings.name, columns, schema, settings, path, source)

@@ -45,7 +45,7 @@ class Snapshot(Unchanging, ByName[CompiledTable]):
     """The tables as their files have them, knowing nothing of each other."""
 
     def __getitem__(self, name: str) -> CompiledTable:
-        """One compiled table; a name that is not there raises NoSuchTable, which is a KeyError too, and names the nearest."""
+        """One compiled table; a name that is missing raises NoSuchTable, which is a KeyError too, and names the nearest."""
         return self.tables[self.project[name].name]
 
     def __iter__(self) -> Iterator[str]:
@@ -63,7 +63,7 @@ def schema_from(folder: Path, contents: Contents, last: Snapshot | None) -> Sche
     FileError
         It was there and is not, or may not be read.
     SchemaError
-        It says something that cannot be meant.
+        It has an invalid setting.
     """
     path = folder / SCHEMA_FILE
     raw = contents.get(path)

@@ -1,6 +1,6 @@
 """What the file system says of a project's files without reading them. An edge: this touches the disk.
 
-A stamp is (inode, size, time of the last write, time of the last change of any kind), or None for a file that is not there or
+A stamp is (inode, size, time of the last write, time of the last change of any kind), or None for a file that is missing or
 cannot be looked at. File systems tell times in steps, the coarsest of them 2 s (FAT), so that equal stamps promise equal bytes
 only when the last write lies longer ago than that.
 """

@@ -1,8 +1,8 @@
-"""Keep the newest good version of a folder of tables at hand while its files change. An edge: this looks at disk and clock.
+"""Keep the newest good version of a folder of tables available while its files change. An edge: this looks at disk and clock.
 
 The files are read when they have rested (`contextdb.tables.watching.rest`), so that half-written ones, rapid saves and editors that
 delete or rename on their way are passed over. A version is swapped in by one assignment: whoever asks in another thread has the old
-one or the new one. A version with a fault is not swapped in; its faults are told once.
+one or the new one. A version with a fault is not swapped in; its faults are reported once.
 
 Equal stamps (`contextdb.tables.watching.stamps`) are believed when the last change lies `COARSEST_TICK_S` back; until then the
 bytes are read and their digests compared.
@@ -54,13 +54,13 @@ def watch(
     on_change : callable, optional
         Called with the new `Snapshot` after each swap.
     on_error : callable, optional
-        Called with a ContextDBError that holds the new faults, each once, when what is on the disk cannot be used; the last good
+        Called with a ContextDBError that holds the new faults, each once, when the files on disk cannot be used; the last good
         version stays. Default: they are logged, to the logger "contextdb".
     poll_s : float or None, optional
         Seconds between two looks at the files, in a thread of the watch, which also makes the calls. None: no thread; call `poll`.
     settle_s : float, optional
-        Seconds for which the files must have rested before they are read. A change is thus swapped in at most `poll_s + settle_s`,
-        and the time that reading takes, after the last write. Where files are replaced without rest, a version is taken about
+        Seconds without a change before the files are read. A change is thus swapped in at most `poll_s + settle_s`,
+        and the time that reading takes, after the last write. Where files are replaced without a pause, a version is taken about
         every second.
     clock : callable, optional
         Seconds from any start, never backwards.
@@ -68,7 +68,7 @@ def watch(
     Raises
     ------
     ContextDBError
-        The files cannot be used as they are now, with every fault: there is no good version to begin with.
+        The files cannot be used as they are now, with every fault: there is no good version to start from.
     """
     require_callable(on_change, "on_change")
     require_callable(on_error, "on_error")
@@ -122,7 +122,7 @@ class Watch(ByName[CompiledTable]):
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """Why what is on the disk is not the version at hand; empty when nothing is wrong with it."""
+        """Why what is on the disk is not the version available; empty when nothing is wrong with it."""
         return self._told
 
     def poll(self) -> bool:
@@ -148,7 +148,7 @@ class Watch(ByName[CompiledTable]):
         self._thread.start()
 
     def close(self) -> None:
-        """Stop looking. The last version stays at hand."""
+        """Stop looking. The last version stays available."""
         self._is_closed.set()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()

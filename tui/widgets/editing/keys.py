@@ -11,17 +11,17 @@ def _key(keys: str, action: str, label: str, show: bool = False) -> Binding:
 
 
 KEYS: list[BindingType] = [
-    _key("enter", "enter", "Take", show=True),
-    _key("shift+enter", "commit(-1, 0)", "Take, go up"),
-    _key("tab", "commit(0, 1)", "Take, go right"),
-    _key("shift+tab", "commit(0, -1)", "Take, go left"),
+    _key("enter", "enter", "OK", show=True),
+    _key("shift+enter", "commit(-1, 0)", "OK, go up"),
+    _key("tab", "commit(0, 1)", "OK, go right"),
+    _key("shift+tab", "commit(0, -1)", "OK, go left"),
     _key("ctrl+j,ctrl+enter", "fill", "Fill the selection", show=True),
-    _key("escape", "cancel", "Leave", show=True),
+    _key("escape", "cancel", "Cancel", show=True),
     _key("f2", "edit_mode", "Move in the text", show=True),
     _key("up", "vertical(-1)", "Up"),
     _key("down", "vertical(1)", "Down"),
-    _key("left", "sideways(-1)", "Take, go left"),
-    _key("right", "sideways(1)", "Take, go right"),
+    _key("left", "sideways(-1)", "OK, go left"),
+    _key("right", "sideways(1)", "OK, go right"),
     _key("pageup", "page(-1)", "A page up; a number: ten steps more"),
     _key("pagedown", "page(1)", "A page down; a number: ten steps less"),
     _key("home", "to_end(0)", "First of the list"),
@@ -33,5 +33,5 @@ KEYS: list[BindingType] = [
     _key("space", "tick", "Tick", show=True),
     _key("plus", "sign('+')", "Has"),
     _key("minus", "sign('-')", "Has not"),
-    _key("ctrl+t", "take", "Take what is offered", show=True),
+    _key("ctrl+t", "take", "Accept suggestion", show=True),
 ]

@@ -1,4 +1,4 @@
-"""What stands under the entry line: the picture of a set of numbers or the list of values, what the text means, and the mend."""
+"""What is under the entry line: the picture of a set of numbers or the list of values, what the text means, and the mend."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Told:
     words: str = ""
     fault: Fault | None = None
     is_refused: bool = False
-    """The text was not taken: the fault is told at length."""
+    """The text was not taken: the fault is reported at length."""
     mend: str = ""
 
 
@@ -127,7 +127,7 @@ class Popup(Vertical):
         self.set_class(told.is_refused, "-refused")
         room = width - DIAL_WIDTH - sum(_DIAL_SIDE) - 2 if is_dial else width
         words = list(_worded(told, max(room, 8)))
-        mend = wrapped(f"Did you mean {in_quotes(told.mend)}? Ctrl+T takes it.", width) if told.mend and told.is_refused else []
+        mend = wrapped(f"Did you mean {in_quotes(told.mend)}? Ctrl+T accepts it.", width) if told.mend and told.is_refused else []
         picture = self._draw(width, words, domain) if domain is not None else []
         below = [] if is_dial else words
         for part, lines in ((self._picture, picture), (self._words, below), (self._mend, _styled(mend, "bold $text-accent"))):
@@ -136,7 +136,7 @@ class Popup(Vertical):
         return len(picture) + len(below) + len(mend)
 
     def _draw(self, width: int, words: Sequence[Content], domain: Domain) -> list[Content]:
-        """The line of the numbers, or the dial with the words beside it; without its filling while the text cannot be read."""
+        """The line of the numbers, or the dial with the words next to it; without its filling while the text cannot be read."""
         if domain.kind != "angle":
             return [_coloured(framed_line(self._cell or NOTHING, domain, width))]
         left, right = _DIAL_SIDE

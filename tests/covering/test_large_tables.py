@@ -1,0 +1,90 @@
+"""Tables that are too large to compare every row: what is left out is said, and what is found holds all the same."""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import or_
+
+import numpy as np
+import pytest
+from contextdb.covering.check_rows import check_rows
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import examples
+
+import contextdb as cdb
+from contextdb import bitmask
+from contextdb.cells import ValueSet
+from contextdb.cells.domains import Domain
+from contextdb.covering import coverage, pairs
+from contextdb.covering.factors import ValueFactor
+from contextdb.covering.space import comparable_rows, weight_of
+from contextdb.errors import TableError
+from contextdb.schema import TableSettings
+
+CELLS = ("True", "False", "Any")
+
+
+def table_of(rows: list[tuple[str, ...]], policy: str = "first") -> cdb.Table:
+    columns = {"Asset": [f"A{r}" for r in range(len(rows))]}
+    columns |= {f"c{i}": [row[i] for row in rows] for i in range(3)}
+    settings = TableSettings("table", policy=policy)  # type: ignore[arg-type]
+    return cdb.Table.from_columns(columns, {f"c{i}": {"type": "bool"} for i in range(3)}, settings)
+
+
+@examples(1)
+@given(st.lists(st.tuples(*[st.sampled_from(CELLS)] * 3), min_size=3, max_size=9), st.sampled_from(["first", "unique"]))
+def test_a_check_of_the_first_rows_finds_what_a_table_of_them_alone_has(rows: list[tuple[str, ...]], policy: str):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("contextdb.covering.space.MOST_COMPARED", 3 * len(rows[:-1]) ** 2)
+        found = check_rows(table_of(rows, policy))
+    alone = check_rows(table_of(rows[:-1], policy))
+    left = [f for f in found if f.rule == "undecided-rows"]
+    assert [(f.rule, f.row, f.by) for f in found if f.row is not None] == [
+        (f.rule, f.row, f.by) for f in alone if f.row is not None
+    ]
+    assert len(left) == 1
+    assert f"the last 1 of {len(rows)} rows" in left[0].message
+
+
+def test_coverage_of_a_large_table_says_that_the_last_rows_are_not_compared(monkeypatch: pytest.MonkeyPatch):
+    table = table_of([("True", "Any", "Any"), ("True", "True", "Any"), ("True", "True", "True")])
+    whole = coverage(table)
+    monkeypatch.setattr("contextdb.covering.space.MOST_COMPARED", 3 * 2**2)
+    cut = coverage(table)
+    assert (whole.covered, whole.findings_complete) == (0.5, True)
+    assert (cut.covered, cut.findings_complete) == (0.5, False)
+    assert {f.row for f in cut.findings} == {None, 1}
+
+
+def test_rows_whose_bits_would_not_fit_are_cut_by_a_check_and_refused_by_coverage(monkeypatch: pytest.MonkeyPatch):
+    table = table_of([("True", "Any", "False")] * 16)
+    monkeypatch.setattr("contextdb.covering.space.MOST_HELD", 24)
+    assert comparable_rows(table.compile()) == 8
+    assert "undecided-rows" in {f.rule for f in check_rows(table)}
+    for measure in (coverage, pairs):
+        with pytest.raises(TableError, match="too large for coverage: 16 rows x 3 different cells"):
+            measure(table)
+
+
+@given(st.sets(st.integers(0, 300)))
+def test_the_bits_of_rows_are_those_rows(rows: set[int]):
+    assert bitmask.int_of(sorted(rows)) == reduce(or_, (1 << row for row in rows), 0)
+
+
+@given(st.sets(st.sampled_from("abcdef")), st.booleans(), st.sampled_from(["enum", "text"]))
+def test_the_classes_of_a_set_are_those_of_the_values_it_holds(values: set[str], is_complement: bool, kind: str):
+    names = ("a", "b", "c", "d")
+    accepts = ValueSet(frozenset(values), is_complement)
+    domain = Domain("enum", names) if kind == "enum" else Domain("text")
+    factor = ValueFactor.of([ValueSet(frozenset(names))], domain)
+    held = {k for k, value in enumerate(factor.values) if accepts.holds(value)}
+    held |= {len(factor.values)} if kind == "text" and is_complement else set()
+    assert factor.classes(accepts) == bitmask.int_of(sorted(held))
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=40), st.data())
+def test_a_weight_is_the_sum_of_its_classes_to_the_last_bit(weights: list[float], data: st.DataObject):
+    factor = ValueFactor(tuple(map(str, range(len(weights)))), False, np.array(weights))
+    side = data.draw(st.integers(0, (1 << len(weights)) - 1))
+    assert weight_of(factor, side) == sum(w for k, w in enumerate(weights) if side >> k & 1)

@@ -36,22 +36,22 @@ if TYPE_CHECKING:
 class CompiledTable(CompiledData):
     """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`.
 
-    It can be pickled at any time. What was pickled answers the same; only which assets were picked last (`pick`) is not pickled.
+    It can be pickled at any time. The copy gives the same answers; only the memory of `pick` is not pickled.
     """
 
     def query(self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None) -> Matches:
-        """Find the rows whose every cell accepts its fact, and whose roles can be filled.
+        """Find the rows whose cells all accept their facts, and whose roles can be filled.
 
         Parameters
         ----------
         context : mapping of str to fact
-            A value for each condition of `asked`; a set of values as `cdb.cell("0 ± 90")`. Facts that the table does not ask for
+            A value for each condition of `asked`; a set of values as `cdb.cell("0 ± 90")`. Facts that the table does not use
             are passed over.
         unknown : {"error", "any", "never"}
-            What a missing fact (absent, None or NaN) does: raises; its condition is ignored; only cells that are Any accept it.
+            How to treat a missing fact (absent, None or NaN): raise; ignore its condition; let only cells that are Any accept it.
         actors : mapping of str to sequence of mapping, optional
             Who may play each role: `{"Defender": [{"id": 7, "DepthChart": "CB"}]}`. `m.casting(row)` then says who plays what.
-            An actor offered for several roles, as one object or with an equal "id", plays one. A role whose facts stand in the
+            An actor offered for several roles, as one object or with an equal "id", plays one. A role whose facts are in the
             context instead is not cast; one with neither has nobody.
         prefer : str, mapping of role to str, or function of role and actor, optional
             The number fact by which actors are preferred, lowest first ("-speed": highest first). The casting with the lowest sum
@@ -97,7 +97,7 @@ class CompiledTable(CompiledData):
         Parameters
         ----------
         contexts : polars DataFrame, or mapping of str to list or array
-            One column for each condition, equally long; others are passed over.
+            One column for each condition, equally long; others are ignored.
         actors : mapping, or sequence of one mapping for each context, optional
             Who may play each role, as in `query`; one mapping is for all contexts. `many[i]` is then the answer of context i.
 
@@ -118,14 +118,14 @@ class CompiledTable(CompiledData):
         return live
 
     def prepare(self, casting: bool = False, batches: bool = False) -> None:
-        """Do now, while the game loads, what is otherwise done when the table is first asked; answers stay the same.
+        """Do the work of the first queries now, while the game loads; answers stay the same.
 
         Parameters
         ----------
         casting : bool
-            Also what the first question with actors does.
+            Also the work of the first query with actors.
         batches : bool
-            Also what the first batches do, small and large: numba is loaded, where it is installed, and the kernels are compiled or
+            Also the work of the first batches: numba is loaded, where it is installed, and the kernels are compiled or
             read from its cache, which takes about a second.
         """
         prepare(self, casting, batches)
@@ -138,7 +138,7 @@ class CompiledTable(CompiledData):
         self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
     ) -> Explanation:
         """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
-        which role cannot be filled, and whose fact is in the way."""
+        which role cannot be filled, and whose fact fails."""
         if actors is not None:
             return explain_with_actors(self, context, actors, prefer, unknown)
         return explain(self, context, unknown)
@@ -150,10 +150,10 @@ class CompiledTable(CompiledData):
         return pick(self, context if isinstance(context, Matches) else self.query(context, unknown), rng, last)
 
     def save(self, path: str | Path) -> None:
-        """Write the artefact for the game: .safetensors, atomic."""
+        """Write the compiled file for the game, a .safetensors file, atomically."""
         save(self, require_path(path))
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
-        """Open an artefact by memory map. A truncated, altered or foreign file is refused with ArtefactError."""
+        """Open a compiled file by memory map. A truncated, altered or foreign file is refused with ArtefactError."""
         return open_artefact(require_path(path), cls)

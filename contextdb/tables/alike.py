@@ -13,7 +13,7 @@ from contextdb.tables.data import TableData
 
 
 def where(table: TableData, row: int, other: int) -> str:
-    """Where a row stands, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
+    """Where a row is, in a sentence about another: its line, else its number; where one is an inner table's with the file."""
     place = table.place(row)
     if place.line is None:
         return row_name(row)

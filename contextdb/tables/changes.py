@@ -187,7 +187,7 @@ class Edit:
         Raises
         ------
         TableError, SchemaError
-            The edit does not fit the table: a row or column that is not there, a name that stands twice.
+            The edit does not fit the table: a row or column that is missing, a name that appears twice.
         """
         for change in self.changes:
             table = change.apply(table)

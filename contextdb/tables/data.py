@@ -71,7 +71,7 @@ class TableData(Unchanging):
         Raises
         ------
         TableError
-            A column that the settings name is not there, or two columns have one name.
+            A column that the settings name is missing, or two columns have one name.
         """
         settings = settings or TableSettings(name=name)
         _require_columns(columns, settings, path)

@@ -123,7 +123,7 @@ class Project(Unchanging, ByName[Table]):
 
 
 def load(path: str | Path, strict: bool = True) -> Table:
-    """Read one table and the contextdb.toml beside it.
+    """Read one table and the contextdb.toml next to it.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def load(path: str | Path, strict: bool = True) -> Table:
     Raises
     ------
     FileError, SchemaError, TableError
-        Each with every fault it found, its place, what is accepted and the nearest mend.
+        Each with every fault, its place, what is accepted and the nearest correction.
     """
     return load_table(require_path(path), strict)
 

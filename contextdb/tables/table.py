@@ -23,10 +23,10 @@ from contextdb.tables.saving import save_table
 
 @dataclass(frozen=True, eq=False)
 class Table(TableData):
-    """Assets against conditions. Get one from `cdb.load`, `Table.from_columns` or a `Project`."""
+    """Assets and their conditions. Get one from `cdb.load`, `Table.from_columns` or a `Project`."""
 
     around: Mapping[str, Table] | None = field(default=None, repr=False)
-    """The tables of its folder by name, for rows that stand for another table; None where they are not known."""
+    """The tables of its folder by name, for rows that refer to another table; None where they are not known."""
 
     @classmethod
     def from_columns(
@@ -43,16 +43,16 @@ class Table(TableData):
         columns : mapping of str to sequence of str
             The cells of each column, equally many; the first column names the assets unless `settings.asset` says otherwise.
         schema : mapping, optional
-            What `[conditions.NAME]` of contextdb.toml would hold: `{"speed": {"type": "number"}}`. Others are inferred.
+            The contents of `[conditions.NAME]` in contextdb.toml: `{"speed": {"type": "number"}}`. Others are inferred.
         settings : contextdb.schema.TableSettings, optional
-            What `[tables.NAME]` of contextdb.toml would hold.
+            The contents of `[tables.NAME]` in contextdb.toml.
         name : str, optional
-            The name of the table. Default: that of the settings, "table" without.
+            The name of the table. Default: that of the settings, or "table".
 
         Raises
         ------
         SchemaError
-            The schema cannot be meant.
+            The schema is invalid.
         TableError
             Columns of unequal length, or cells that cannot be read.
         """
@@ -80,21 +80,21 @@ class Table(TableData):
         return self._in_order(() if self.around is None else nesting_faults(self, self.around))
 
     def save(self, path: str | Path | None = None, overwrite: bool = False) -> Table:
-        """Write the table: atomic, only changed lines differ. Gives the table as it now stands on the disk.
+        """Write the table atomically; only edited lines change. Returns the table as it is on disk.
 
-        What others wrote into its file since it was read is merged, cell by cell. A file that is gone is made anew.
+        Changes that others wrote to its file since it was read are merged, cell by cell. A deleted file is created again.
 
         Parameters
         ----------
         path : str or Path, optional
-            Another file, which is written over whatever it holds. Default: the file that the table was read from.
+            Another file, which is overwritten. Default: the file that the table was read from.
         overwrite : bool
-            Write over what others wrote into its own file, too.
+            Also overwrite what others wrote to the table's own file.
 
         Raises
         ------
         FileError
-            The disk refuses, or others changed the same cells otherwise (rule "merge-conflict", which names them). The old file is
+            The disk refuses, or others changed the same cells differently (rule "merge-conflict", with the cells). The old file is
             then whole.
         """
         target = require_path(path) if path is not None else self.path
@@ -108,7 +108,7 @@ class Table(TableData):
         Parameters
         ----------
         tables : mapping of str to Table, optional
-            The tables that rows `@name` stand for. Default: those of the table's folder.
+            The tables that rows `@name` refer to. Default: those of the table's folder.
 
         Raises
         ------
@@ -119,8 +119,8 @@ class Table(TableData):
         return compile_table(self.flat(tables))
 
     def flat(self, tables: Mapping[str, Table] | None = None) -> Table | FlatTable:
-        """The table with the rows of its inner tables in place of those that stand for them: the rows that a query answers with.
-        The table itself where no row stands for a table. `tables` and what is raised as in `compile`."""
+        """The table with the rows of its inner tables in place of those that refer to them: the rows that a query answers with.
+        The table itself where no row refers to a table. `tables` and what is raised as in `compile`."""
         if tables is not None:
             for table in require_mapping(tables, "tables", "a mapping of names to tables").values():
                 require_kind(table, Table, "a table of tables", "a Table")
@@ -142,7 +142,7 @@ def flat_table(table: Table, tables: Mapping[str, Table] | None) -> FlatTable:
     inner = inner_rows(table)
     if tables is None and inner:
         name, rows = next(iter(inner.items()))
-        found = f"{in_quotes('@' + name)} stands for a table, and no other tables are known."
+        found = f"{in_quotes('@' + name)} refers to a table, but no other tables are given."
         fault = Fault(found, f'compile(tables={{"{name}": ...}}), or a table out of a folder', rule="no-such-table")
         raise TableError(fault.at(table.place(rows[0], table.asset_column)))
     return flatten(table, tables or {})

@@ -13,13 +13,13 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.cells import conditions
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, INT, NUMBER, TEXT, Domain
 from contextdb.cells.grammar import ANY, Cell, NumberSet, parse_cell, reads
 from contextdb.cells.numbers import FEW, NumberCells, are_plain, doubtful, has_soft
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import column_masks
+from contextdb.tables import condition_column
 from contextdb.tables.condition_column import ConditionColumn, infer_condition
 
 PADDING = tuple(f"{i}..{i + 1}" for i in range(1000, 1001 + FEW))
@@ -114,7 +114,7 @@ def test_masks_from_the_ends_are_masks_from_the_cells(kind, data):
 )
 def test_the_type_of_a_column_is_the_same_with_many_texts_and_with_few(texts, n_numbers):
     column = TextColumn.of("x", [*texts, *map(str, range(n_numbers)), *texts, *PADDING[:n_numbers]])
-    with mock.patch.object(conditions, "are_plain", return_value=None):
+    with mock.patch.object(condition_column, "are_plain", return_value=None):
         expected = infer_condition(column)
     with mock.patch("contextdb.cells.numbers.FEW", 0):
         assert infer_condition(column) == expected

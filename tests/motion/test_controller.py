@@ -404,7 +404,7 @@ def test_variation_keeps_to_what_is_under_the_threshold_that_let_its_database_wi
 
 
 def test_variation_without_a_generator_is_refused():
-    with pytest.raises(MotionError, match=r"the settings ask for variation, and there is no generator\. Accepted: rng="):
+    with pytest.raises(MotionError, match=r"the settings request variation, but there is no generator\. Accepted: rng="):
         controller(line(p=[0.0]), variation=Variation(0.1))
 
 

@@ -357,7 +357,7 @@ def test_features_and_ranges_that_do_not_fit_are_refused(features, starts, stops
 
 def test_a_miss_has_no_time_and_no_costs():
     miss = LOCO.search(np.zeros(19), matches())
-    with pytest.raises(QueryError, match="there is no time to tell"):
+    with pytest.raises(QueryError, match="there is no time to return"):
         LOCO.time_s(miss)
     with pytest.raises(QueryError, match="the frame is -1"):
         LOCO.channel_costs(miss, np.zeros(19))

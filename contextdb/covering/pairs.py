@@ -18,13 +18,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.compiled import CompiledTable
 from contextdb.covering.assumed import opened
-from contextdb.covering.parts import Sides, flags_of, parts_of
+from contextdb.covering.parts import parts_of
 from contextdb.covering.progress import Progress, Stops, Tell
-from contextdb.covering.sample import Codes, Sampler, lookup
+from contextdb.covering.sample import Codes, Sampler, affordable, lookup
 from contextdb.covering.shares import wilson
-from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
+from contextdb.covering.space import CellBox, Sides, Space, WeightsOf, require_counts
 from contextdb.table import Table
 
 SAMPLES = 50_000
@@ -180,6 +181,7 @@ def pairs(
     watcher = Progress(progress, should_stop).within("Comparing conditions", 0.0, 1.0)
     found = opened(table, impossible, weights, assume, watcher)
     space = found.space
+    samples = affordable(samples, space)
     rules = () if found.ruled is None else found.ruled.rules
     shown = [at for at, condition in enumerate(space.conditions) if condition.name not in rules]
     parts = [parts_of(space, at) for at in shown]
@@ -220,7 +222,7 @@ class _Tally:
     def __init__(self, space: Space, sides: Sequence[Sides]) -> None:
         self.inside, self.valid = np.zeros((len(sides), len(sides))), np.zeros((len(sides), len(sides)))
         self.total, self.n_contexts = 0.0, 0
-        self._members = [[(f, flags_of(side, len(space.factors[f].weights))) for f, side in part.items()] for part in sides]
+        self._members = [[(f, bitmask.flags_of(side, len(space.factors[f].weights))) for f, side in part.items()] for part in sides]
 
     def add(self, codes: Codes, weights: NDArray[np.float64] | None, counts: NDArray[np.int64]) -> None:
         """More contexts: the classes of each, its weight, and how many rows are valid in it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from importlib import import_module
 from pathlib import Path
 
@@ -73,7 +74,6 @@ def test_pairs_of_too_many_conditions_are_left_out_and_that_is_said(form: str, m
     said = "Pairs of conditions are not compared: the table has 2 conditions, and at most 1 are."
     assert said not in run("coverage", str(tmp_path / "t.csv"), "--format", form).out
     monkeypatch.setattr(import_module("contextdb.covering.pairs"), "MOST_CONDITIONS", 1)
-    monkeypatch.setattr("contextdb.report.coverage_results.MOST_CONDITIONS", 1)
     assert said in " ".join(run("coverage", str(tmp_path / "t.csv"), "--format", form).out.split())
 
 
@@ -83,3 +83,15 @@ def test_a_check_says_once_that_its_loops_are_compiled(is_ready: bool, monkeypat
     monkeypatch.setattr("contextdb.covering.judge.is_prepared", lambda: is_ready)
     (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
     assert run("check", str(tmp_path / "t.csv")).err.count(PREPARING) == (0 if is_ready else 1)
+
+
+def test_the_json_tells_pairs_that_are_left_out_from_pairs_that_are_all_covered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    (tmp_path / "t.csv").write_text("Asset,up,down\na,Any,Any\n", encoding="utf-8")
+
+    def pairs_of() -> tuple[object, object]:
+        entry = json.loads(run("coverage", str(tmp_path / "t.csv"), "--format", "json").out)["tables"][0]
+        return entry["pairs"], entry["pairs_left_out"]
+
+    assert pairs_of() == ([], False)
+    monkeypatch.setattr(import_module("contextdb.covering.pairs"), "MOST_CONDITIONS", 1)
+    assert pairs_of() == ([], True)

@@ -188,9 +188,9 @@ def measure(arguments: argparse.Namespace, table: Table) -> Measured:
 def _pairs(arguments: argparse.Namespace, table: Table) -> PairTable | None:
     """The coverage of pairs of conditions; None where the conditions are too many."""
     from contextdb.covering import pairs
-    from contextdb.covering.pairs import MOST_CONDITIONS, SAMPLES
+    from contextdb.covering.pairs import SAMPLES, left_out
 
-    if len(table.conditions) > MOST_CONDITIONS:
+    if left_out(len(table.conditions)):
         return None
     n_cells = table.n_rows * len(table.conditions)
     with coverage_telemetry.bar(f"comparing conditions of {printable(table.name)}", n_cells) as told:

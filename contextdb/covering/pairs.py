@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
 from typing import Literal
 
 import numpy as np
@@ -26,6 +28,7 @@ from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.sample import Codes, Sampler, affordable, lookup
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Sides, Space, WeightsOf, require_counts
+from contextdb.errors import plural
 from contextdb.table import Table
 
 SAMPLES = 50_000
@@ -103,7 +106,11 @@ class PairTable:
 
     def first(self, condition: int) -> int:
         """The number of a condition's first part."""
-        return sum(len(parts) for parts in self.parts[:condition])
+        return self._firsts[condition]
+
+    @cached_property
+    def _firsts(self) -> list[int]:
+        return list(accumulate((len(parts) for parts in self.parts), initial=0))
 
     def slice(self, one: int, other: int, i: int, j: int) -> Slice:
         """Part `i` of condition number `one` with part `j` of condition number `other`; the same part where they are the same."""
@@ -158,6 +165,14 @@ class PairTable:
         n = int(self.counts[p, q])
         n_covered = round(float(self.covered[p, q]) * self.n_samples)
         return (None, 0.0, 1.0) if not n else (n_covered / n, *wilson(n_covered, n))
+
+
+def left_out(n_conditions: int) -> str:
+    """That a report compares no pairs of so many conditions, as a sentence; "" where it compares them."""
+    if n_conditions <= MOST_CONDITIONS:
+        return ""
+    found = f"the table has {plural(n_conditions, 'condition')}, and at most {MOST_CONDITIONS} are"
+    return f"Pairs of conditions are not compared: {found}."
 
 
 def pairs(

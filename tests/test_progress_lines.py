@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from running import run
 
-from contextdb.commands.coverage_telemetry import MANY_CELLS, log_of
+from contextdb.commands.coverage_telemetry import log_of
 from contextdb.covering import count, coverage
 from contextdb.covering.progress import PREPARING
 from contextdb.table import Table
 
 
 def test_a_log_gets_one_line_for_each_tenth(capsys: pytest.CaptureFixture[str]):
-    log = log_of("measuring t", MANY_CELLS)
+    log = log_of("measuring t", True)
     assert log is not None
     for done in range(1001):
         log(done, 1000, "Counting contexts")
@@ -25,7 +25,7 @@ def test_a_log_gets_one_line_for_each_tenth(capsys: pytest.CaptureFixture[str]):
 
 
 def test_of_a_small_table_only_the_preparing_is_told(capsys: pytest.CaptureFixture[str]):
-    log = log_of("measuring t", MANY_CELLS - 1)
+    log = log_of("measuring t", False)
     assert log is not None
     log(10, 1000, PREPARING)
     log(10, 1000, "Counting contexts")
@@ -95,3 +95,19 @@ def test_the_json_tells_pairs_that_are_left_out_from_pairs_that_are_all_covered(
     assert pairs_of() == ([], False)
     monkeypatch.setattr(import_module("contextdb.covering.pairs"), "MOST_CONDITIONS", 1)
     assert pairs_of() == ([], True)
+
+
+@pytest.mark.parametrize("command", [("coverage", "t.csv", "--telemetry", "seen*.csv"), ("evaluate", "t.csv", "seen*.csv")])
+def test_a_log_is_told_of_long_recordings(command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
+    for name in ("seen1.csv", "seen2.csv"):
+        (tmp_path / name).write_text("up,down\nTrue,False\n", encoding="utf-8")
+    label = "reading telemetry for t" if command[0] == "coverage" else "evaluating"
+    size = sum((tmp_path / name).stat().st_size for name in ("seen1.csv", "seen2.csv"))
+    for least, is_told in ((size, True), (size + 1, False)):
+        monkeypatch.setattr("contextdb.commands.coverage_telemetry.MANY_BYTES", least)
+        lines = [line for line in run(*command).err.splitlines() if line.startswith(f"contextdb: {label}: ")]
+        assert (lines[-1:] == [f"contextdb: {label}: 100 %"]) is is_told
+        assert (f"contextdb: {label}: 50 %" in lines) is is_told
+        assert len(lines) == len(set(lines))

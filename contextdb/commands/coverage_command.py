@@ -168,8 +168,7 @@ def measure(arguments: argparse.Namespace, table: Table) -> Measured:
     from contextdb.report.coverage_results import Measured
 
     with _placed(table):
-        n_cells = table.n_rows * len(table.conditions)
-        with coverage_telemetry.bar(f"measuring {printable(table.name)}", n_cells) as told:
+        with coverage_telemetry.bar(f"measuring {printable(table.name)}", coverage_telemetry.has_many_cells(table)) as told:
             report = coverage(
                 table,
                 seed=arguments.seed,
@@ -192,8 +191,8 @@ def _pairs(arguments: argparse.Namespace, table: Table) -> PairTable | None:
 
     if left_out(len(table.conditions)):
         return None
-    n_cells = table.n_rows * len(table.conditions)
-    with coverage_telemetry.bar(f"comparing conditions of {printable(table.name)}", n_cells) as told:
+    label = f"comparing conditions of {printable(table.name)}"
+    with coverage_telemetry.bar(label, coverage_telemetry.has_many_cells(table)) as told:
         return pairs(table, seed=arguments.seed, samples=min(arguments.samples, SAMPLES), progress=_tell(told))
 
 

@@ -72,6 +72,11 @@ def from_int(bits: int, n_rows: int) -> Words:
     return read_only(np.frombuffer(octets, "<u8").astype(np.uint64, copy=False))
 
 
+def flags_of(bits: int, n_rows: int) -> Flags:
+    """Flags of one mask as a Python integer whose bits are all below `n_rows`: bool [n_rows], read-only."""
+    return unpack(from_int(bits, n_rows), n_rows)
+
+
 def int_of(row_numbers: Sequence[int]) -> int:
     """One mask as a Python integer from the numbers of its rows, ascending; it costs what the last of them is, once."""
     octets = bytearray((row_numbers[-1] >> 3) + 1 if row_numbers else 0)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 from running import run
 
-from contextdb.commands.coverage_telemetry import MANY_CELLS, log_of
+from contextdb.commands.coverage_telemetry import log_of
 from contextdb.covering import count, coverage
 from contextdb.covering.progress import PREPARING
 from contextdb.tables.table import Table
 
 
 def test_a_log_gets_one_line_for_each_tenth(capsys: pytest.CaptureFixture[str]):
-    log = log_of("measuring t", MANY_CELLS)
+    log = log_of("measuring t", True)
     assert log is not None
     for done in range(1001):
         log(done, 1000, "Counting contexts")
@@ -24,7 +25,7 @@ def test_a_log_gets_one_line_for_each_tenth(capsys: pytest.CaptureFixture[str]):
 
 
 def test_of_a_small_table_only_the_preparing_is_told(capsys: pytest.CaptureFixture[str]):
-    log = log_of("measuring t", MANY_CELLS - 1)
+    log = log_of("measuring t", False)
     assert log is not None
     log(10, 1000, PREPARING)
     log(10, 1000, "Counting contexts")
@@ -73,7 +74,6 @@ def test_pairs_of_too_many_conditions_are_left_out_and_that_is_said(form: str, m
     said = "Pairs of conditions are not compared: the table has 2 conditions, and at most 1 are."
     assert said not in run("coverage", str(tmp_path / "t.csv"), "--format", form).out
     monkeypatch.setattr(import_module("contextdb.covering.pairs"), "MOST_CONDITIONS", 1)
-    monkeypatch.setattr("contextdb.report.coverage_results.MOST_CONDITIONS", 1)
     assert said in " ".join(run("coverage", str(tmp_path / "t.csv"), "--format", form).out.split())
 
 
@@ -83,3 +83,31 @@ def test_a_check_says_once_that_its_loops_are_compiled(is_ready: bool, monkeypat
     monkeypatch.setattr("contextdb.covering.judge.is_prepared", lambda: is_ready)
     (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
     assert run("check", str(tmp_path / "t.csv")).err.count(PREPARING) == (0 if is_ready else 1)
+
+
+def test_the_json_tells_pairs_that_are_left_out_from_pairs_that_are_all_covered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    (tmp_path / "t.csv").write_text("Asset,up,down\na,Any,Any\n", encoding="utf-8")
+
+    def pairs_of() -> tuple[object, object]:
+        entry = json.loads(run("coverage", str(tmp_path / "t.csv"), "--format", "json").out)["tables"][0]
+        return entry["pairs"], entry["pairs_left_out"]
+
+    assert pairs_of() == ([], False)
+    monkeypatch.setattr(import_module("contextdb.covering.pairs"), "MOST_CONDITIONS", 1)
+    assert pairs_of() == ([], True)
+
+
+@pytest.mark.parametrize("command", [("coverage", "t.csv", "--telemetry", "seen*.csv"), ("evaluate", "t.csv", "seen*.csv")])
+def test_a_log_is_told_of_long_recordings(command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
+    for name in ("seen1.csv", "seen2.csv"):
+        (tmp_path / name).write_text("up,down\nTrue,False\n", encoding="utf-8")
+    label = "reading telemetry for t" if command[0] == "coverage" else "evaluating"
+    size = sum((tmp_path / name).stat().st_size for name in ("seen1.csv", "seen2.csv"))
+    for least, is_told in ((size, True), (size + 1, False)):
+        monkeypatch.setattr("contextdb.commands.coverage_telemetry.MANY_BYTES", least)
+        lines = [line for line in run(*command).err.splitlines() if line.startswith(f"contextdb: {label}: ")]
+        assert (lines[-1:] == [f"contextdb: {label}: 100 %"]) is is_told
+        assert (f"contextdb: {label}: 50 %" in lines) is is_told
+        assert len(lines) == len(set(lines))

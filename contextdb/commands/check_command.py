@@ -20,7 +20,7 @@ from contextdb import report
 from contextdb.checks.cases import check_cases, read_cases
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
-from contextdb.commands.coverage_telemetry import Bar, log_of
+from contextdb.commands.coverage_telemetry import Bar, has_many_cells, log_of
 from contextdb.console import ExitCode, output, printable, progress, terminal_width, wants_colour
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
@@ -125,7 +125,7 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         tables.append(TableSummary(table.name, str(path), table.n_rows, len(table.conditions)))
         read.append(table)
         findings += check(table)
-        log = log_of(f"checking {printable(table.name)}", table.n_rows * len(table.conditions))
+        log = log_of(f"checking {printable(table.name)}", has_many_cells(table))
         findings += check_rows(table, progress=None if log is None else partial(_tell, log))
         findings += _check_cases(table, cases_path(path))
     if schema is not None and len(read) == len(files):

@@ -164,8 +164,7 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     from contextdb.report.coverage_results import Measured
 
     with _placed(table):
-        n_cells = table.n_rows * len(table.conditions)
-        with coverage_telemetry.bar(f"measuring {printable(table.name)}", n_cells) as told:
+        with coverage_telemetry.bar(f"measuring {printable(table.name)}", coverage_telemetry.has_many_cells(table)) as told:
             report = coverage(
                 table,
                 seed=arguments.seed,
@@ -184,12 +183,12 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
 def _pairs(arguments: argparse.Namespace, table: EitherTable) -> PairTable | None:
     """The coverage of pairs of conditions; None where the conditions are too many."""
     from contextdb.covering import pairs
-    from contextdb.covering.pairs import MOST_CONDITIONS, SAMPLES
+    from contextdb.covering.pairs import SAMPLES, left_out
 
-    if len(table.conditions) > MOST_CONDITIONS:
+    if left_out(len(table.conditions)):
         return None
-    n_cells = table.n_rows * len(table.conditions)
-    with coverage_telemetry.bar(f"comparing conditions of {printable(table.name)}", n_cells) as told:
+    label = f"comparing conditions of {printable(table.name)}"
+    with coverage_telemetry.bar(label, coverage_telemetry.has_many_cells(table)) as told:
         return pairs(table, seed=arguments.seed, samples=min(arguments.samples, SAMPLES), progress=_tell(told))
 
 

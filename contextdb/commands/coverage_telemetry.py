@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Protocol
 
 from contextdb.console import printable
@@ -16,11 +18,14 @@ from contextdb.errors import ContextError, Fault
 from contextdb.report.coverage_results import Measured
 from contextdb.tables.table import EitherTable
 from contextdb.telemetry import Observed
+from contextdb.telemetry.contexts import context_files
 
 ENGINES = ("local", "dask")
 
 MANY_CELLS = 20_000
-"""From so many cells on a log is told of the work."""
+"""From so many cells of a table on a log is told of the work."""
+MANY_BYTES = 10_000_000
+"""From so many bytes of recorded contexts on a log is told of the work."""
 
 
 class Bar(Protocol):
@@ -76,7 +81,8 @@ def observed(arguments: argparse.Namespace, table: EitherTable, known: Sequence[
         return None
     from contextdb.telemetry import observe
 
-    with bar(f"reading telemetry for {printable(table.name)}") as tell:
+    files = [file for pattern in arguments.telemetry for file in context_files(pattern)]
+    with bar(f"reading telemetry for {printable(table.name)}", has_many_bytes(files)) as tell:
         found = observe(
             table,
             arguments.telemetry,
@@ -104,11 +110,21 @@ def ranked(arguments: argparse.Namespace, measured: Measured, table: EitherTable
     return replace(measured, report=report)
 
 
+def has_many_cells(table: EitherTable) -> bool:
+    """Whether a table is so large that a log is told of the work."""
+    return table.n_rows * len(table.conditions) >= MANY_CELLS
+
+
+def has_many_bytes(files: Sequence[Path]) -> bool:
+    """Whether files of recorded contexts are so large that a log is told of the work."""
+    return sum(os.path.getsize(file) for file in files if os.path.exists(file)) >= MANY_BYTES
+
+
 @contextmanager
-def bar(label: str, n_cells: int = 0) -> Iterator[Bar | None]:
+def bar(label: str, is_long: bool) -> Iterator[Bar | None]:
     """Shows on standard error what is being done and how much of it is: a bar on a terminal, else lines as `log_of` has them."""
     if not sys.stderr.isatty():
-        yield log_of(label, n_cells)
+        yield log_of(label, is_long)
         return
     from rich.console import Console
     from rich.progress import Progress
@@ -120,9 +136,9 @@ def bar(label: str, n_cells: int = 0) -> Iterator[Bar | None]:
         )
 
 
-def log_of(label: str, n_cells: int) -> Bar | None:
-    """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal. Where cells are not
-    very many it tells only that loops are compiled."""
+def log_of(label: str, is_long: bool) -> Bar | None:
+    """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal. Where the work is
+    not long it tells only that loops are compiled."""
     if sys.stderr.isatty():
         return None
     told: set[object] = set()
@@ -130,7 +146,7 @@ def log_of(label: str, n_cells: int) -> Bar | None:
     def tell(done: float, total: int, part: str = "") -> None:
         tenth = int(10 * done / total) if total else 0
         mark = part if part == PREPARING else tenth
-        if mark not in told and (mark == PREPARING or n_cells >= MANY_CELLS):
+        if mark not in told and (mark == PREPARING or is_long):
             told.add(mark)
             print(f"contextdb: {label}: {10 * tenth} % {part}".rstrip(), file=sys.stderr, flush=True)
 

@@ -28,7 +28,7 @@ import polars as pl
 from contextdb.bitmask import Rows
 from contextdb.cells.facts import UNKNOWN_MODES
 from contextdb.commands import missing_facts_by_option
-from contextdb.commands.coverage_telemetry import ENGINES, bar
+from contextdb.commands.coverage_telemetry import ENGINES, bar, has_many_bytes
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, output, printable, styled, wants_colour
 from contextdb.disk import is_stream, path_in_quotes, refused_writing, write_atomic
@@ -92,7 +92,7 @@ def _answered(
 
     question = Question(compiled, arguments.unknown, folder)
     found: dict[Path, Answered] = {}
-    with bar("evaluating") as tell:
+    with bar("evaluating", has_many_bytes(files)) as tell:
 
         def tell_share(share: float) -> None:
             if tell is not None:

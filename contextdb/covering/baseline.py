@@ -155,7 +155,7 @@ def compared(ready: Opened, report: CoverageReport, earlier: Earlier) -> Change:
     """What became of a table; `report` is that of the table that `ready` holds."""
     now, before = [gap.cells for gap in report.gaps], [gap.cells for gap in earlier.gaps]
     exact = replace(ready.space, is_strict=True)
-    excluded = [exact.cells(box) for box in ready.space.impossible]
+    excluded = [exact.cells(exact.sides_of(box)) for box in ready.space.impossible]
     space, boxes = _boxes(ready, [*excluded, *now, *before])
     impossible = [box for box in boxes[: len(excluded)] if box is not None]
     now_boxes, before_boxes = boxes[len(excluded) :][: len(now)], boxes[len(excluded) + len(now) :]

@@ -7,8 +7,10 @@ that no context of any measure is left. The budget counts steps, never time: the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
+from operator import and_
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -16,8 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.space import Box, Space, runs_of, used_factors
+from contextdb.covering.space import Box, Sides, Space, runs_of
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 
 ROUNDING = 1e-12
@@ -55,47 +58,68 @@ class Bounds:
         return self.lower == self.upper
 
 
-def uncovered_share(
-    space: Space, boxes: Sequence[Box], work: int, within: Box | None = None, progress: Progress = SILENT
-) -> Bounds:
-    """The share of the space, or of the box `within`, that none of the boxes holds."""
-    weights = [_within(f.weights, None if within is None else within[i]) for i, f in enumerate(space.factors)]
-    if within is not None:
-        boxes = [tuple(a & b for a, b in zip(box, within, strict=True)) for box in boxes]
-        boxes = [box for box in boxes if 0 not in box]
-    full = space.full if within is None else within
-    used = used_factors(boxes, full)
-    boxes = list(dict.fromkeys(boxes))
-    if not boxes:
+def uncovered_share(space: Space, boxes: Sequence[Box], work: int, progress: Progress = SILENT) -> Bounds:
+    """The share of the space that none of the boxes holds."""
+    return uncovered_within(space, [space.sides_of(box) for box in boxes], {}, work, progress)
+
+
+def uncovered_within(space: Space, boxes: Sequence[Sides], within: Sides, work: int, progress: Progress = SILENT) -> Bounds:
+    """The share of the box `within` that none of the others holds."""
+    inside = (_inside(space, box, within) for box in boxes)
+    kept = [dict(items) for items in dict.fromkeys(tuple(box.items()) for box in inside if box is not None)]
+    if not kept:
         return Bounds(1.0, 1.0)
-    if full in boxes:
+    if {} in kept:
         return Bounds(0.0, 0.0)
-    sides = [tuple(box[f] for f in used) for box in boxes]
-    own_full, own_weights = tuple(full[f] for f in used), [weights[f] for f in used]
+    used = sorted({f for box in kept for f in box})
+    full = {f: within.get(f, space.full[f]) for f in used}
+    weights = {f: _within(space.factors[f].weights, full[f]) if within else space.factors[f].weights for f in used}
     if len(used) <= MANY_FACTORS:
-        return _count(sides, own_full, own_weights, work, progress)
-    return _product(sides, own_full, own_weights, work, progress)
+        return _count(*_of_factors(used, kept, full, weights), work, progress)
+    return _product(kept, full, weights, work, progress)
 
 
-def _product(boxes: list[Box], full: Box, weights: list[NDArray[np.float64]], work: int, progress: Progress) -> Bounds:
+def _inside(space: Space, box: Sides, within: Sides) -> Sides | None:
+    """What a box is within another, by the factors of which it does not hold all there; None where it holds nothing."""
+    sides = {f: side & within.get(f, side) for f, side in box.items()}
+    return None if 0 in sides.values() else {f: side for f, side in sides.items() if side != within.get(f, space.full[f])}
+
+
+def _of_factors(
+    factors: Sequence[int], boxes: Sequence[Sides], full: Sides, weights: Mapping[int, NDArray[np.float64]]
+) -> tuple[list[Box], Box, list[NDArray[np.float64]]]:
+    """Boxes, the whole and weights with a place for each of some factors."""
+    whole = tuple(full[f] for f in factors)
+    place = {f: i for i, f in enumerate(factors)}
+    sides = []
+    for box in boxes:
+        own = list(whole)
+        for f, side in box.items():
+            own[place[f]] = side
+        sides.append(tuple(own))
+    return sides, whole, [weights[f] for f in factors]
+
+
+def _product(
+    boxes: Sequence[Sides], full: Sides, weights: Mapping[int, NDArray[np.float64]], work: int, progress: Progress
+) -> Bounds:
     """The count of each group of boxes that share no factor with the others; their shares multiply."""
     lower = upper = 1.0
     done = 0
-    for factors, own in _independent(boxes, full):
+    for factors, own in _independent(boxes):
         progress.check()
-        sides, own_weights = [tuple(box[f] for f in factors) for box in own], [weights[f] for f in factors]
         if len(own) == 1:
-            share = 1.0 - math.prod(_share(side, parts) for side, parts in zip(sides[0], own_weights, strict=True))
+            share = 1.0 - math.prod(_share(own[0][f], weights[f]) for f in factors)
             found = Bounds(share, share, 1)
         else:
-            found = _count(sides, tuple(full[f] for f in factors), own_weights, max(0, work - done), progress)
+            found = _count(*_of_factors(factors, own, full, weights), max(0, work - done), progress)
         lower, upper, done = lower * found.lower, upper * found.upper, done + found.work
     return Bounds(lower, upper, done)
 
 
-def _independent(boxes: list[Box], full: Box) -> list[tuple[list[int], list[Box]]]:
-    """The boxes in groups that share no factor, each with its factors."""
-    group = list(range(len(full)))
+def _independent(boxes: Sequence[Sides]) -> list[tuple[list[int], list[Sides]]]:
+    """The boxes in groups that share no factor, each with its factors, ascending."""
+    group = {f: f for f in sorted({f for box in boxes for f in box})}
 
     def head(f: int) -> int:
         while group[f] != f:
@@ -103,23 +127,21 @@ def _independent(boxes: list[Box], full: Box) -> list[tuple[list[int], list[Box]
             f = group[f]
         return f
 
-    limited = [[f for f, side in enumerate(box) if side != full[f]] for box in boxes]
-    for own in limited:
-        for f in own[1:]:
-            group[head(f)] = head(own[0])
+    for box in boxes:
+        first, *others = box
+        for f in others:
+            group[head(f)] = head(first)
     factors: dict[int, list[int]] = {}
-    for f in range(len(full)):
+    for f in group:
         factors.setdefault(head(f), []).append(f)
-    members: dict[int, list[Box]] = {}
-    for box, own in zip(boxes, limited, strict=True):
-        members.setdefault(head(own[0]), []).append(box)
+    members: dict[int, list[Sides]] = {}
+    for box in boxes:
+        members.setdefault(head(next(iter(box))), []).append(box)
     return [(factors[one], found) for one, found in members.items()]
 
 
-def _within(weights: NDArray[np.float64], side: int | None) -> NDArray[np.float64]:
-    if side is None:
-        return weights
-    flags = np.array([side >> k & 1 for k in range(len(weights))], np.bool_)
+def _within(weights: NDArray[np.float64], side: int) -> NDArray[np.float64]:
+    flags = bitmask.flags_of(side, len(weights))
     inside = np.where(flags, weights, 0.0)
     total = inside.sum()
     return inside / total if total > 0.0 else np.where(flags, 1.0 / flags.sum(), 0.0)
@@ -150,7 +172,7 @@ def _tiny(
     progress: Progress,
 ) -> Bounds:
     """Whether a share that may come from roundings is 0: an open context of some measure shows that it is not."""
-    within = tuple(sum(1 << k for k, w in enumerate(own.tolist()) if w > 0.0) for own in weights)
+    within = tuple(_weighing(own) for own in weights)
     rows = BoxSet.of(full, boxes, progress)
     try:
         point = rows.outside(rows.all, within, Steps(LEAST_STEPS + work // STEP, progress))
@@ -187,7 +209,7 @@ def prepare(progress: Progress) -> None:
 
 
 def _share(side: int, weights: NDArray[np.float64]) -> float:
-    return float(sum(w for k, w in enumerate(weights.tolist()) if side >> k & 1))
+    return float(sum(compress(weights.tolist(), bitmask.flags_of(side, len(weights)).tolist())))
 
 
 def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int]) -> tuple[NDArray[Any], ...]:
@@ -209,8 +231,13 @@ def table_of(boxes: Sequence[Box], full: Box, n_classes: Sequence[int]) -> tuple
 
 def _has_measure(boxes: Sequence[Box], weights: Sequence[NDArray[np.float64]]) -> list[bool]:
     """Whether each box holds a class of some weight of every factor."""
-    some = [sum(1 << k for k, w in enumerate(own.tolist()) if w > 0.0) for own in weights]
-    return [all(side & own for side, own in zip(box, some, strict=True)) for box in boxes]
+    some = [_weighing(own) for own in weights]
+    return [all(map(and_, box, some)) for box in boxes]
+
+
+def _weighing(weights: NDArray[np.float64]) -> int:
+    """The classes of some weight."""
+    return bitmask.int_of(np.flatnonzero(weights > 0.0).tolist())
 
 
 def _run(

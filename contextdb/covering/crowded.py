@@ -64,11 +64,11 @@ def _swept(space: Space, rows: BoxSet, impossible: BoxSet, point: list[int], n_v
         if rows.restricts[f]:
             others, ruled_out = before & behind[f + 1], ruled_before & ruled_behind[f + 1]
             for k, weight in enumerate(space.factors[f].weights.tolist()):
-                n = (others & rows.accepts[f][k]).bit_count()
-                if n > n_valid and weight > 0.0 and not ruled_out & impossible.accepts[f][k]:
+                n = (others & ~rows.rejects[f][k]).bit_count()
+                if n > n_valid and weight > 0.0 and not ruled_out & ~impossible.rejects[f][k]:
                     point[f], n_valid = k, n
-        before &= rows.accepts[f][point[f]]
-        ruled_before &= impossible.accepts[f][point[f]]
+        before &= ~rows.rejects[f][point[f]]
+        ruled_before &= ~impossible.rejects[f][point[f]]
     return n_valid
 
 

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import NUMERIC
 from contextdb.cells.grammar import covers
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor
-from contextdb.covering.parts import flags_of
 from contextdb.covering.space import Box, Space, factors_of
 from contextdb.expressions import Derivation, Expression
 
@@ -71,7 +71,7 @@ class Drawer:
         kept = self._compute(columns, codes, n)
         for f, side in enumerate(within or ()):
             if side != self.space.full[f]:
-                kept &= flags_of(side, len(self.space.factors[f].weights))[codes[:, f]]
+                kept &= bitmask.flags_of(side, len(self.space.factors[f].weights))[codes[:, f]]
         return codes[kept]
 
     def may_happen(self, box: Box, rng: np.random.Generator, n_tries: int = 4096) -> bool:
@@ -90,8 +90,8 @@ class Drawer:
         factor = factors_of((), condition)[0] if numbers is None else self.space.factors[numbers[0]]
         weights = factor.weights
         if numbers is not None and within is not None:
-            inside = np.where(flags_of(within[numbers[0]], len(weights)), weights, 0.0)
-            weights = inside if inside.sum() > 0.0 else flags_of(within[numbers[0]], len(weights)).astype(np.float64)
+            inside = np.where(bitmask.flags_of(within[numbers[0]], len(weights)), weights, 0.0)
+            weights = inside if inside.sum() > 0.0 else bitmask.flags_of(within[numbers[0]], len(weights)).astype(np.float64)
         drawn = rng.choice(len(weights), n, p=weights / weights.sum())
         uniform = rng.random(n)
         if numbers is not None:

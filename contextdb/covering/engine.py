@@ -20,7 +20,7 @@ from contextdb.covering.gaps import SHARE_WORK, Measure, described, find_gaps, s
 from contextdb.covering.judge import Judge
 from contextdb.covering.progress import PREPARING, Progress, Stops, Tell
 from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
-from contextdb.covering.sample import LITTLE, Counts, Sampler
+from contextdb.covering.sample import LITTLE, Counts, Sampler, affordable
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_counts
@@ -67,7 +67,8 @@ def coverage(
     work : int
         Steps of the exact count, and in proportion of the searches for gaps and findings. 0: bounds only.
     samples : int
-        Random contexts, for the estimate where the count is not finished and for overlap. 0: none.
+        Random contexts, for the estimate where the count is not finished and for overlap; of a table of more than 500 conditions
+        as many fewer as it has more. 0: none. The report says how many there were.
     max_gaps : int
         The report names at most this many gaps, the largest.
     impossible : sequence of mapping of str to Cell or cell text
@@ -108,11 +109,12 @@ def coverage(
 
 def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, watcher: Progress) -> CoverageReport:
     space, compiled, drawer = opened.space, opened.compiled, opened.drawer
+    samples = affordable(samples, space)
     if space.boxes and not is_prepared():
         prepare(watcher.within(PREPARING, COUNT_AT, COUNT_AT))
-    possible = uncovered_share(space, space.impossible, work, None, watcher.within("Counting contexts", COUNT_AT, COUNT_AT))
+    possible = uncovered_share(space, space.impossible, work, watcher.within("Counting contexts", COUNT_AT, COUNT_AT))
     counting = watcher.within("Counting contexts", COUNT_AT, SAMPLES_AT)
-    left = uncovered_share(space, space.boxes + space.impossible, work, None, counting)
+    left = uncovered_share(space, space.boxes + space.impossible, work, counting)
     sampler = Sampler(space, watcher.within("Trying random contexts", SAMPLES_AT, GAPS_AT), drawer)
     rng = np.random.default_rng(seed)
     whole = sampler.all_contexts()
@@ -180,7 +182,8 @@ def _measure(opened: Opened, possible: Bounds, work: int, samples: int, seed: in
     if opened.drawer is not None:
         return SampledShares.of(Sampler(opened.space, drawer=opened.drawer), samples, np.random.default_rng(seed))
     space, most = opened.space, min(work, SHARE_WORK)
-    return lambda box, without: share_of(space, box, [*space.impossible, *without], possible, most)
+    impossible = [space.sides_of(box) for box in space.impossible]
+    return lambda box, without: share_of(space, box, [*impossible, *without], possible, most)
 
 
 def _certain(space: Space, possible: Bounds, left: Bounds, is_sampled: bool) -> Bounds:
@@ -191,7 +194,7 @@ def _certain(space: Space, possible: Bounds, left: Bounds, is_sampled: bool) -> 
         return Bounds(0.0, 1.0)
     lower = 1.0 - min(1.0, left.upper / possible.lower) if possible.lower > 0.0 else 0.0
     upper = 1.0 - min(1.0, left.lower / possible.upper)
-    least = 0.0 if space.impossible else max((space.volume(box) for box in space.boxes), default=0.0)
+    least = 0.0 if space.impossible else max((space.volume(space.sides_of(box)) for box in space.boxes), default=0.0)
     most = math.nextafter(1.0, 0.0) if left.lower > 0.0 else 1.0
     lower, upper = (min(max(share, least), most) for share in (lower, upper))
     if possible.is_exact and left.is_exact:
@@ -228,13 +231,14 @@ def _crowded(space: Space, counts: Counts, measure: Measure, progress: Progress)
     crowds = []
     for found in find_crowds(space, counts.fullest, progress=progress):
         rows = tuple(row for i, row in enumerate(space.rows) if found.held_by >> i & 1)
-        crowds.append(Crowd(rows, measure(found.box, ())[0], space.cells(found.box, is_label=True)))
+        sides = space.sides_of(found.box)
+        crowds.append(Crowd(rows, measure(sides, ())[0], space.cells(sides, is_label=True)))
     return tuple(crowd for crowd in crowds if crowd.share > 0.0 or not isinstance(measure, SampledShares))
 
 
 def _hits(space: Space, counts: Counts, is_sampled: bool) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     if not space.impossible and not is_sampled:
-        return np.array([space.volume(box) for box in space.boxes])
+        return np.array([space.volume(space.sides_of(box)) for box in space.boxes])
     total = counts.histogram.sum()
     return counts.hits / total if total else np.zeros(len(space.boxes))
 

@@ -19,6 +19,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
+from itertools import compress
 from operator import and_
 
 import numpy as np
@@ -68,9 +69,9 @@ class ValueFactor:
 
     def accepts(self, classes: int) -> Accepted:
         """The values of some classes."""
-        if self.has_others and classes >> len(self.values) & 1:
-            return ValueSet(frozenset(v for k, v in enumerate(self.values) if not classes >> k & 1), True)
-        return ValueSet(frozenset(v for k, v in enumerate(self.values) if classes >> k & 1))
+        flags = bitmask.flags_of(classes, len(self.weights))
+        is_complement = self.has_others and bool(flags[-1])
+        return ValueSet(frozenset(compress(self.values, (flags != is_complement).tolist())), is_complement)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +113,7 @@ class NumberFactor:
 
     def accepts(self, classes: int) -> Accepted:
         """The numbers of some classes."""
-        spans = [span for k, span in enumerate(self.spans) if classes >> k & 1]
+        spans = list(compress(self.spans, bitmask.flags_of(classes, len(self.spans)).tolist()))
         return NumberSet(intervals.whole(tuple(spans)) if self.kind == "int" else intervals.union(spans), self.kind == "angle")
 
 
@@ -231,7 +232,7 @@ def weighted(factor: Factor, parts: Mapping[int, float]) -> Factor:
     """The factor with other weights: each set of classes gets a weight, spread over it as before."""
     weights = np.zeros(len(factor.weights))
     for classes, weight in parts.items():
-        flags = np.array([classes >> k & 1 for k in range(len(weights))], np.bool_)
+        flags = bitmask.flags_of(classes, len(weights))
         inside = np.where(flags, factor.weights, 0.0)
         spread = inside if inside.sum() > 0.0 else flags.astype(np.float64)
         weights += weight * spread / spread.sum()

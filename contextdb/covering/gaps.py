@@ -9,23 +9,27 @@ from __future__ import annotations
 
 import hashlib
 import json
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.bitmask import Flags
 from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, format_cell
 from contextdb.cells.intervals import union
 from contextdb.compiled.table import CompiledTable
-from contextdb.covering.count import Bounds, uncovered_share
+from contextdb.covering.count import Bounds, uncovered_within
 from contextdb.covering.factors import TagFactor
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.report import Gap, Nearest
-from contextdb.covering.space import Box, Space
+from contextdb.covering.space import Box, Sides, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Point, Steps
 
-Measure = Callable[[Box, Sequence[Box]], tuple[float, bool]]
+Measure = Callable[[Sides, Sequence[Sides]], tuple[float, bool]]
 """Tells which share of the possible contexts is in a box and in none of some others, and whether it is exact."""
 SHARE_WORK = 200_000
 """Steps for the share of one gap; one that needs more is the middle of its bounds, and not `is_exact`."""
@@ -45,12 +49,14 @@ def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progr
     seen = BoxSet.of(space.full, space.boxes + space.impossible, progress)
     order = _rarest_first(rows)
     found: list[Box] = []
+    sides: list[Sides] = []
     for point in seeds:
         if len(found) >= most // 2:
             break
         progress.at(len(found) / most)
-        if not any(all(side >> k & 1 for side, k in zip(box, point, strict=True)) for box in found):
+        if not any(all(side >> point[f] & 1 for f, side in box.items()) for box in sides):
             found.append(_add(seen, widened(space, rows, point, order)))
+            sides.append(space.sides_of(found[-1]))
     left = Steps(steps, progress)
     is_complete = True
     try:
@@ -67,16 +73,21 @@ def find_gaps(space: Space, seeds: Iterable[Point], most: int, steps: int, progr
 
 def widened(space: Space, rows: BoxSet, point: Point, order: Sequence[int]) -> Box:
     """The widest box round a context that meets no row, one factor after the other in the given order."""
-    box = [1 << k for k in point]
+    box = list(space.full)
     behind = rows.behind(point, order)
     before = rows.all
-    for at, f in enumerate(order):
-        others = before & behind[at + 1]
-        allowed = sum(1 << k for k, bits in enumerate(rows.accepts[f]) if not bits & others)
+    for at in range(_n_free(behind), len(order)):
+        f, others = order[at], before & behind[at + 1]
+        allowed = sum(1 << k for k, bits in enumerate(rows.rejects[f]) if not others & ~bits)
         factor = space.factors[f]
         box[f] = factor.widest(point[f], allowed) if isinstance(factor, TagFactor) else allowed
         before &= rows.meeting(f, box[f])
     return tuple(box)
+
+
+def _n_free(behind: Sequence[int]) -> int:
+    """How many factors, from the first on, may take every class, as no box holds a point's classes of all that come after."""
+    return max(0, bisect_left(behind, True, key=bool) - 1)
 
 
 def _rarest_first(rows: BoxSet) -> list[int]:
@@ -98,28 +109,28 @@ def described(
 ) -> list[Gap]:
     """The gaps with their shares of the possible contexts, largest first."""
     sized = []
-    for box in found:
+    for sides in map(space.sides_of, found):
         progress.check()
-        sized.append((measure(box, ()), space.cells(box), box))
+        sized.append((measure(sides, ()), space.cells(sides), sides))
     sized.sort(key=lambda item: (-item[0][0], json.dumps(item[1], ensure_ascii=False)))
     gaps: list[Gap] = []
-    earlier: list[Box] = []
-    rows = BoxSet.of(space.full, space.boxes, progress)
-    for (share, is_exact), cells, box in sized[:most]:
+    earlier: list[Sides] = []
+    rows = NearRows(space, compiled, BoxSet.of(space.full, space.boxes, progress))
+    for (share, is_exact), cells, sides in sized[:most]:
         progress.at(len(gaps) / min(len(sized), most))
-        new_share, is_new_exact = measure(box, earlier)
-        nearest = nearest_row(space, compiled, rows, box)
+        new_share, is_new_exact = measure(sides, earlier)
+        nearest = rows.nearest(sides)
         gaps.append(Gap(gap_id(cells), share, min(share, new_share), cells, nearest, is_exact and is_new_exact))
-        earlier.append(box)
+        earlier.append(sides)
     return gaps
 
 
-def share_of(space: Space, box: Box, without: Sequence[Box], possible: Bounds, work: int) -> tuple[float, bool]:
+def share_of(space: Space, box: Sides, without: Sequence[Sides], possible: Bounds, work: int) -> tuple[float, bool]:
     """The share of the possible contexts that a box holds and others do not, and whether it is exact or a middle of bounds."""
     volume, whole = space.volume(box), (possible.lower + possible.upper) / 2.0
     if volume == 0.0 or whole == 0.0:
         return 0.0, possible.is_exact or volume == 0.0
-    left = uncovered_share(space, without, work, box)
+    left = uncovered_within(space, without, box, work)
     return min(1.0, volume * (left.lower + left.upper) / 2.0 / whole), left.is_exact and possible.is_exact
 
 
@@ -129,26 +140,49 @@ def gap_id(cells: dict[str, str]) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:12]
 
 
-def nearest_row(space: Space, compiled: CompiledTable, rows: BoxSet, gap: Box) -> Nearest | None:
-    """The row with fewest cells to change so that it holds the gap, the first of these, and the first cell to change."""
-    if not space.boxes:
-        return None
-    n_failing = np.zeros(len(space.boxes), np.int64)
-    failing: list[int] = []
-    for own in space.of_condition:
-        held = rows.all
-        for f in own:
-            held &= rows.holding(f, gap[f])
-        failing.append(rows.all & ~held)
-        n_failing += bitmask.unpack(bitmask.from_int(failing[-1], rows.n_boxes), rows.n_boxes)
-    i = int(n_failing.argmin())
-    at = next(at for at, bits in enumerate(failing) if bits >> i & 1)
-    n_changes, row, condition = int(n_failing[i]), space.rows[i], space.conditions[at]
-    now = compiled.cells(at)[int(compiled.texts[at].codes[row])]
-    return Nearest(row, compiled.assets[row], n_changes, condition.name, _joined(now, space, at, gap))
+@dataclass(frozen=True, eq=False)
+class NearRows:
+    """The rows of a table, to be asked which of them is nearest to a gap."""
+
+    space: Space
+    compiled: CompiledTable
+    rows: BoxSet
+
+    def nearest(self, gap: Sides) -> Nearest | None:
+        """The row with fewest cells to change so that it holds the gap, the first of these, and the first cell to change."""
+        space, compiled = self.space, self.compiled
+        if not space.boxes:
+            return None
+        n_failing = self._n_limited.copy()
+        for at in dict.fromkeys(space.condition_of[f] for f in gap):
+            n_failing += self._flags(self._failing(at, gap))
+            n_failing -= self._flags(self._failing(at, {}))
+        i = int(n_failing.argmin())
+        at = next(at for at in range(len(space.conditions)) if self._failing(at, gap) >> i & 1)
+        n_changes, row, condition = int(n_failing[i]), space.rows[i], space.conditions[at]
+        now = compiled.cells(at)[int(compiled.texts[at].codes[row])]
+        return Nearest(row, compiled.assets[row], n_changes, condition.name, _joined(now, space, at, gap))
+
+    @cached_property
+    def _n_limited(self) -> NDArray[np.int64]:
+        """For each row how many conditions it restricts."""
+        n_limited = np.zeros(self.rows.n_boxes, np.int64)
+        for at in range(len(self.space.conditions)):
+            n_limited += self._flags(self._failing(at, {}))
+        return n_limited
+
+    def _failing(self, at: int, gap: Sides) -> int:
+        """The rows whose cell of condition number `at` does not hold all of a gap."""
+        held = self.rows.all
+        for f in self.space.of_condition[at]:
+            held &= self.rows.holding(f, gap.get(f, self.space.full[f]))
+        return self.rows.all & ~held
+
+    def _flags(self, rows: int) -> Flags:
+        return bitmask.flags_of(rows, self.rows.n_boxes)
 
 
-def _joined(cell: Cell, space: Space, at: int, gap: Box) -> str:
+def _joined(cell: Cell, space: Space, at: int, gap: Sides) -> str:
     """The cell that holds what it held and the gap's contexts too."""
     more, domain = space.accepted(at, gap), space.conditions[at].domain
     old = cell.accepts
@@ -164,7 +198,7 @@ def _joined(cell: Cell, space: Space, at: int, gap: Box) -> str:
     return "Any"
 
 
-def _values_joined(old: ValueSet, more: ValueSet, space: Space, at: int, gap: Box) -> str:
+def _values_joined(old: ValueSet, more: ValueSet, space: Space, at: int, gap: Sides) -> str:
     f = space.of_condition[at][0]
     side = space.factors[f].classes(old) | gap[f]
     if side == space.full[f]:

@@ -197,7 +197,7 @@ class Judge:
             self._asked_of = i
             others = list(islice(self._joint(i, _bits(self._meeting(box) & ((1 << i) - 1))), MOST_JOINT))
             if others:
-                cells = self.space.cells(self._shared(i, others[0]), is_label=True)
+                cells = self.space.cells(self.space.sides_of(self._shared(i, others[0])), is_label=True)
                 told = ", ".join(f"{name}: {cell}" for name, cell in cells.items()) or "every context"
                 message = f'the policy is "unique", and {self._named(others[0], i)} can be valid at the same time: {told}.'
                 yield self._at(i, "policy-overlap", "error", message, bitmask.int_of(others))

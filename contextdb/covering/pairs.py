@@ -13,18 +13,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
-from contextdb.covering.parts import Sides, flags_of, parts_of
+from contextdb.covering.parts import parts_of
 from contextdb.covering.progress import Progress, Stops, Tell
-from contextdb.covering.sample import Codes, Sampler, lookup
+from contextdb.covering.sample import Codes, Sampler, affordable, lookup
 from contextdb.covering.shares import wilson
-from contextdb.covering.space import CellBox, Space, WeightsOf, require_counts
+from contextdb.covering.space import CellBox, Sides, Space, WeightsOf, require_counts
+from contextdb.errors import plural
 from contextdb.tables.table import EitherTable
 
 SAMPLES = 50_000
@@ -102,7 +106,11 @@ class PairTable:
 
     def first(self, condition: int) -> int:
         """The number of a condition's first part."""
-        return sum(len(parts) for parts in self.parts[:condition])
+        return self._firsts[condition]
+
+    @cached_property
+    def _firsts(self) -> list[int]:
+        return list(accumulate((len(parts) for parts in self.parts), initial=0))
 
     def slice(self, one: int, other: int, i: int, j: int) -> Slice:
         """Part `i` of condition number `one` with part `j` of condition number `other`; the same part where they are the same."""
@@ -159,6 +167,14 @@ class PairTable:
         return (None, 0.0, 1.0) if not n else (n_covered / n, *wilson(n_covered, n))
 
 
+def left_out(n_conditions: int) -> str:
+    """That a report compares no pairs of so many conditions, as a sentence; "" where it compares them."""
+    if n_conditions <= MOST_CONDITIONS:
+        return ""
+    found = f"the table has {plural(n_conditions, 'condition')}, and at most {MOST_CONDITIONS} are"
+    return f"Pairs of conditions are not compared: {found}."
+
+
 def pairs(
     table: EitherTable | CompiledTable,
     *,
@@ -180,6 +196,7 @@ def pairs(
     watcher = Progress(progress, should_stop).within("Comparing conditions", 0.0, 1.0)
     found = opened(table, impossible, weights, assume, watcher)
     space = found.space
+    samples = affordable(samples, space)
     rules = () if found.ruled is None else found.ruled.rules
     shown = [at for at, condition in enumerate(space.conditions) if condition.name not in rules]
     parts = [parts_of(space, at) for at in shown]
@@ -220,7 +237,7 @@ class _Tally:
     def __init__(self, space: Space, sides: Sequence[Sides]) -> None:
         self.inside, self.valid = np.zeros((len(sides), len(sides))), np.zeros((len(sides), len(sides)))
         self.total, self.n_contexts = 0.0, 0
-        self._members = [[(f, flags_of(side, len(space.factors[f].weights))) for f, side in part.items()] for part in sides]
+        self._members = [[(f, bitmask.flags_of(side, len(space.factors[f].weights))) for f, side in part.items()] for part in sides]
 
     def add(self, codes: Codes, weights: NDArray[np.float64] | None, counts: NDArray[np.int64]) -> None:
         """More contexts: the classes of each, its weight, and how many rows are valid in it."""

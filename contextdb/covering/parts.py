@@ -11,15 +11,13 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.cells.grammar import Cell, TagSet, format_cell
 from contextdb.covering.factors import TagFactor, ValueFactor
-from contextdb.covering.space import Space, runs_of
+from contextdb.covering.space import Sides, Space
 
 MOST_PARTS = 8
 """A condition has so many parts at most."""
-
-Sides = dict[int, int]
-"""For some factors the classes of a part; it holds every class of the others."""
 
 
 def parts_of(space: Space, at: int) -> list[tuple[str, Sides]]:
@@ -41,7 +39,7 @@ def _value_sides(space: Space, f: int) -> list[int]:
     named = np.zeros(n, np.int64)
     for side, n_boxes in Counter(box[f] for box in space.boxes).items():
         if side != space.full[f]:
-            named += n_boxes * flags_of(side, n)
+            named += n_boxes * bitmask.flags_of(side, n)
     chosen = sorted(np.argsort(-named, kind="stable")[: MOST_PARTS - 1].tolist())
     sides = [1 << k for k in chosen]
     return [*sides, space.full[f] & ~sum(sides)]
@@ -76,11 +74,3 @@ def _tag_parts(space: Space, at: int) -> list[tuple[str, Sides]]:
         parts.append((format_cell(Cell(TagSet(frozenset((tag,)), frozenset())), domain), with_it))
         parts.append((format_cell(Cell(TagSet(frozenset(), frozenset((tag,)))), domain), without))
     return [(text, sides) for text, sides in parts if all(sides.values())]
-
-
-def flags_of(side: int, n: int) -> NDArray[np.bool_]:
-    """Which of `n` classes a set of classes holds."""
-    flags = np.zeros(n, np.bool_)
-    for first, stop in runs_of(side):
-        flags[first:stop] = True
-    return flags

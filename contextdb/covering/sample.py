@@ -32,6 +32,8 @@ MOST_SEEDS = 2000
 MOST_FULL = 200
 LITTLE = 0.1
 """Below this covered share contexts are drawn out of the rows."""
+MANY_FACTORS = 500
+"""From so many factors on a sample is so dear that fewer are drawn."""
 MOST_CONTEXTS = 100_000
 """A space of so few classes is gone through whole, instead of sampled, for the overlap."""
 
@@ -144,7 +146,7 @@ class Sampler:
 
     def out_of_rows(self, n_samples: int, rng: np.random.Generator) -> tuple[float, float, float]:
         """The covered and possible share of the whole space and its 99 % interval, by contexts drawn out of the rows."""
-        volumes = np.array([self.space.volume(box) for box in self.space.boxes])
+        volumes = np.array([self.space.volume(self.space.sides_of(box)) for box in self.space.boxes])
         total = float(volumes.sum())
         if total == 0.0:
             return 0.0, 0.0, 0.0
@@ -168,9 +170,14 @@ class Sampler:
             of_box, sides = self.sides[f]
             for number in np.unique(of_box[drawn]).tolist():
                 members = np.flatnonzero(of_box[drawn] == number)
-                inside = np.where(_flags(sides[number], len(factor.weights)), factor.weights, 0.0)
+                inside = np.where(bitmask.flags_of(sides[number], len(factor.weights)), factor.weights, 0.0)
                 codes[members, f] = _drawn(np.cumsum(inside), uniform[members])
         return codes
+
+
+def affordable(samples: int, space: Space) -> int:
+    """How many of so many samples are drawn: all, but where factors are very many as many less as each takes longer."""
+    return samples if len(space.factors) <= MANY_FACTORS else samples * MANY_FACTORS // len(space.factors)
 
 
 def lookup(
@@ -251,7 +258,3 @@ def _first_box(words: Words) -> NDArray[np.int64]:
     word = words[np.arange(len(words)), at]
     lowest = word & (~word + np.uint64(1))
     return np.asarray(at * 64 + np.bitwise_count(lowest - np.uint64(1)), np.int64)
-
-
-def _flags(side: int, n: int) -> NDArray[np.bool_]:
-    return np.array([side >> k & 1 for k in range(n)], np.bool_)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.covering.parts import flags_of
+from contextdb import bitmask
 from contextdb.covering.sample import Codes, Sampler
-from contextdb.covering.space import Box, Space
+from contextdb.covering.space import Sides, Space
 
 
 @dataclass(eq=False)
@@ -33,7 +33,7 @@ class SampledShares:
         empty = np.zeros((0, len(sampler.space.factors)), np.int32)
         return cls(sampler.space, np.concatenate([empty, *chunks]))
 
-    def __call__(self, box: Box, without: Sequence[Box]) -> tuple[float, bool]:
+    def __call__(self, box: Sides, without: Sequence[Sides]) -> tuple[float, bool]:
         """The share; the boxes of `without` may only grow in number from one call to the next, unless there are none."""
         held = self._held(box)
         if without:
@@ -43,9 +43,8 @@ class SampledShares:
             held = held & ~self._taken
         return (float(held.mean()) if len(held) else 0.0), False
 
-    def _held(self, box: Box) -> NDArray[np.bool_]:
+    def _held(self, box: Sides) -> NDArray[np.bool_]:
         flags = np.ones(len(self.codes), np.bool_)
-        for f, side in enumerate(box):
-            if side != self.space.full[f]:
-                flags &= flags_of(side, len(self.space.factors[f].weights))[self.codes[:, f]]
+        for f, side in box.items():
+            flags &= bitmask.flags_of(side, len(self.space.factors[f].weights))[self.codes[:, f]]
         return flags

@@ -14,7 +14,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
+from itertools import chain, compress
+from operator import ne
 
 import numpy as np
 
@@ -37,8 +38,12 @@ MOST_COMPARED = 1 << 37
 """Rows × rows × conditions of a table all of whose rows are compared with each other: seconds."""
 MOST_HELD = 1 << 31
 """Rows × the different cells of all columns, of a table that fits into memory: a bit for each."""
+SMALLEST = math.ulp(0.0)
 
 Box = tuple[int, ...]
+Sides = Mapping[int, int]
+"""A box by the factors that it restricts, ascending: of each the set of classes that it accepts. It accepts every class of the
+others, so that it costs what it says and not what the table has columns."""
 CellBox = Mapping[str, Cell | str]
 WeightsOf = Mapping[str, Mapping[object, float]]
 
@@ -188,9 +193,19 @@ class Space:
             sides += own
         return tuple(sides)
 
-    def cells(self, box: Box, is_label: bool = False) -> dict[str, str]:
+    def sides_of(self, box: Box) -> Sides:
+        """A box by the factors that it restricts."""
+        return {f: box[f] for f in compress(range(len(box)), map(ne, box, self.full))}
+
+    @cached_property
+    def condition_of(self) -> tuple[int, ...]:
+        """For each factor the number of its condition."""
+        return tuple(at for at, numbers in enumerate(self.of_condition) for _ in numbers)
+
+    def cells(self, sides: Sides, is_label: bool = False) -> dict[str, str]:
         """A box as cells, without the conditions that it does not restrict; see `written`."""
-        accepted = ((at, self.accepted(at, box)) for at in range(len(self.conditions)))
+        limited = dict.fromkeys(self.condition_of[f] for f in sides)
+        accepted = ((at, self.accepted(at, sides)) for at in limited)
         return {self.conditions[at].name: self.written(at, accepts, is_label) for at, accepts in accepted if accepts is not None}
 
     def written(self, at: int, accepts: Accepted, is_label: bool = False) -> str:
@@ -204,26 +219,25 @@ class Space:
             accepts = plain(accepts, factor.cuts, keeps_all=not is_label)
         return format_cell(Cell(accepts), self.conditions[at].domain)
 
-    def accepted(self, at: int, box: Box) -> Accepted | None:
+    def accepted(self, at: int, sides: Sides) -> Accepted | None:
         """What a box accepts of condition number `at`; None for everything."""
-        limited = [f for f in self.of_condition[at] if box[f] != self.full[f]]
+        limited = [f for f in self.of_condition[at] if f in sides]
         if not limited:
             return None
         if self.conditions[at].domain.kind != "tags":
-            return self.factors[limited[0]].accepts(box[limited[0]])
-        parts = [self.factors[f].accepts(box[f]) for f in limited]
+            return self.factors[limited[0]].accepts(sides[limited[0]])
+        parts = [self.factors[f].accepts(sides[f]) for f in limited]
         tags = [p for p in parts if isinstance(p, TagSet)]
         return TagSet(frozenset().union(*(p.needs for p in tags)), frozenset().union(*(p.bans for p in tags)))
 
-    def volume(self, box: Box) -> float:
-        """The measure of a box."""
+    def volume(self, sides: Sides) -> float:
+        """The measure of a box; the smallest number there is, where it is less than that and not 0."""
         share = 1.0
-        for f, (full, side) in enumerate(zip(self.full, box, strict=True)):
-            if side != full:
-                if (f, side) not in self._weights:
-                    self._weights[f, side] = weight_of(self.factors[f], side)
-                share *= self._weights[f, side]
-        return share
+        for f, side in sides.items():
+            if (f, side) not in self._weights:
+                self._weights[f, side] = weight_of(self.factors[f], side)
+            share *= self._weights[f, side]
+        return share or (SMALLEST if all(self._weights[side] for side in sides.items()) else 0.0)
 
     @cached_property
     def _weights(self) -> dict[tuple[int, int], float]:

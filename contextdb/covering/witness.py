@@ -1,14 +1,17 @@
 """Questions of yes or no about boxes, answered by search: is there a context in none of them, and which?
 
-Boxes are bits of Python integers: `accepts[f][k]` holds the boxes whose side of factor f has class k. The search fixes one factor
-at a time. A box with one free factor left decides that factor; of the classes only those are tried that keep fewest boxes open, as
-one that keeps open what another does and more can do nothing better. Exact whatever the measure: single points count.
+Boxes are bits of Python integers: `rejects[f][k]` holds the boxes whose side of factor f does not have class k. The search fixes
+one factor at a time. A box with one free factor left decides that factor; of the classes only those are tried that keep fewest
+boxes open, as one that keeps open what another does and more can do nothing better. Exact whatever the measure: single points
+count.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import compress
+from operator import ne
 
 from contextdb import bitmask
 from contextdb.covering.progress import SILENT, Progress
@@ -61,8 +64,8 @@ class BoxSet:
     """Boxes as bits, to be asked; more can be added."""
 
     full: Box
-    accepts: list[list[int]] = field(default_factory=list)
-    """For each factor and class the boxes that accept the class."""
+    rejects: list[list[int]] = field(default_factory=list)
+    """For each factor and class the boxes that do not accept the class."""
     restricts: list[int] = field(default_factory=list)
     """For each factor the boxes that do not accept every class."""
     n_boxes: int = 0
@@ -70,8 +73,7 @@ class BoxSet:
     @classmethod
     def of(cls, full: Box, boxes: Sequence[Box], progress: Progress = SILENT) -> BoxSet:
         """The boxes in their order: bit i is box i."""
-        everything = (1 << len(boxes)) - 1
-        accepts, restricts = [], []
+        rejects, restricts = [], []
         for f, side_full in enumerate(full):
             progress.check()
             sides: dict[int, list[int]] = {}
@@ -86,23 +88,22 @@ class BoxSet:
                 for first, stop in runs_of(side):
                     turns[first] ^= bits
                     turns[stop] ^= bits
-            own, so_far = [], everything & ~restricted
+            own, so_far = [], restricted
             for turn in turns[:-1]:
                 so_far ^= turn
                 own.append(so_far)
-            accepts.append(own)
+            rejects.append(own)
             restricts.append(restricted)
-        return cls(full, accepts, restricts, len(boxes))
+        return cls(full, rejects, restricts, len(boxes))
 
     def add(self, box: Box) -> None:
         """One more box, with the next bit."""
         bit = 1 << self.n_boxes
         self.n_boxes += 1
-        for f, side in enumerate(box):
-            if side != self.full[f]:
-                self.restricts[f] |= bit
-            own = self.accepts[f]
-            for first, stop in runs_of(side):
+        for f in compress(range(len(box)), map(ne, box, self.full)):
+            self.restricts[f] |= bit
+            own = self.rejects[f]
+            for first, stop in runs_of(self.full[f] & ~box[f]):
                 for k in range(first, stop):
                     own[k] |= bit
 
@@ -115,28 +116,28 @@ class BoxSet:
         """The boxes that share a class of the factor with a side."""
         if side == self.full[f]:
             return self.all
-        found = 0
+        missed = self.all
         for first, stop in runs_of(side):
-            for bits in self.accepts[f][first:stop]:
-                found |= bits
-        return found
+            for bits in self.rejects[f][first:stop]:
+                missed &= bits
+        return self.all & ~missed
 
     def holding(self, f: int, side: int) -> int:
         """The boxes that accept every class of a side of the factor."""
         if side == self.full[f]:
             return self.all & ~self.restricts[f]
-        found = self.all
+        missed = 0
         for first, stop in runs_of(side):
-            for bits in self.accepts[f][first:stop]:
-                found &= bits
-        return found
+            for bits in self.rejects[f][first:stop]:
+                missed |= bits
+        return self.all & ~missed
 
     def behind(self, point: Sequence[int], order: Sequence[int] | None = None) -> list[int]:
         """The boxes that accept a point's classes of all factors in an order from each place on; the last are all boxes."""
         order = range(len(point)) if order is None else order
         found = [self.all]
         for f in reversed(order):
-            found.append(found[-1] & self.accepts[f][point[f]])
+            found.append(found[-1] & ~self.rejects[f][point[f]])
         return found[::-1]
 
     def outside(self, open_boxes: int, within: Box, steps: Steps) -> Point | None:
@@ -148,7 +149,7 @@ class BoxSet:
             if open_boxes and side != self.full[f]:
                 open_boxes &= self.meeting(f, side)
         point = self._search(open_boxes, within, list(range(len(within))), steps)
-        return None if point is None else tuple(point.get(f, _first(side)) for f, side in enumerate(within))
+        return None if point is None else _completed(point, list(map(_first, within)))
 
     def points(self, within: Box, steps: Steps) -> Iterator[Point]:
         """Contexts of `within` that are in no box, one after the other, until there is none.
@@ -160,8 +161,9 @@ class BoxSet:
         for f, side in enumerate(within):
             if side != self.full[f]:
                 open_boxes &= self.meeting(f, side)
+        firsts = list(map(_first, within))
         for point in self._points(open_boxes, within, list(range(len(within))), steps):
-            yield tuple(point.get(f, _first(side)) for f, side in enumerate(within))
+            yield _completed(point, firsts)
 
     def _points(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> Iterator[dict[int, int]]:
         fixed: dict[int, int] = {}
@@ -199,7 +201,7 @@ class BoxSet:
         """Open boxes, and those of the boxes from number `known` on that hold what is fixed."""
         added = (self.all >> known) << known
         for f, k in fixed.items():
-            added &= self.accepts[f][k]
+            added &= ~self.rejects[f][k]
         return open_boxes | added
 
     def _search(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> dict[int, int] | None:
@@ -244,17 +246,25 @@ class BoxSet:
 
     def _choices(self, open_boxes: int, factor: int, side: int, searched: Collection[int] = ()) -> list[tuple[int, int]]:
         """What each class that is worth trying keeps open, and the class: fewest first. Of equal classes a searched one counts."""
-        own = self.accepts[factor]
-        kept = {own[k] & open_boxes: k for k in searched}
+        own = self.rejects[factor]
+        kept = {open_boxes & ~own[k]: k for k in searched}
         for first, stop in runs_of(side):
             for k in range(first, stop):
-                kept.setdefault(own[k] & open_boxes, k)
+                kept.setdefault(open_boxes & ~own[k], k)
         ordered = sorted(kept.items(), key=lambda item: (item[0].bit_count(), item[1]))
         best: list[tuple[int, int]] = []
         for bits, k in ordered:
             if not any(fewer & ~bits == 0 for fewer, _ in best):
                 best.append((bits, k))
         return best
+
+
+def _completed(point: dict[int, int], firsts: Sequence[int]) -> Point:
+    """The classes of a point, of the factors that it leaves open the first."""
+    found = list(firsts)
+    for f, k in point.items():
+        found[f] = k
+    return tuple(found)
 
 
 def _first(side: int) -> int:

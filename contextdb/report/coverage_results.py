@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
 from contextdb.covering.baseline import Change, digest_of
-from contextdb.covering.pairs import MOST_CONDITIONS
+from contextdb.covering.pairs import left_out
 from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.findings import Finding
@@ -74,18 +75,19 @@ class Measured:
     @property
     def left_out(self) -> str:
         """What was not measured as the table is too large for it, as a sentence; "" where nothing was left out."""
-        if self.pairs is not None or self.report.n_conditions <= MOST_CONDITIONS:
-            return ""
-        n_conditions = plural(self.report.n_conditions, "condition")
-        return f"Pairs of conditions are not compared: the table has {n_conditions}, and at most {MOST_CONDITIONS} are."
+        return left_out(self.report.n_conditions) if self.pairs is None else ""
 
     def worst_pairs(self, most: int) -> list[Slice]:
         """Of each pair of conditions the combination that is covered least; the worst of these, the largest of equals first."""
+        return self._worst_pairs[:most]
+
+    @cached_property
+    def _worst_pairs(self) -> list[Slice]:
         if self.pairs is None:
             return []
         worst = [self.pairs.worst(i, j) for i, j in self.pairs.pairs()]
         measured = [s for s in worst if s is not None and s.covered is not None and s.covered < 1.0 and s.share > 0.0]
-        return sorted(measured, key=lambda s: (*s.rank, *s.cells.items()))[:most]
+        return sorted(measured, key=lambda s: (*s.rank, *s.cells.items()))
 
     def to_json(self) -> dict[str, object]:
         """One entry of `tables` in the JSON document."""
@@ -95,6 +97,7 @@ class Measured:
             "file": self.file,
             "hits": list(self.report.hits),
             "pairs": shown,
+            "pairs_left_out": bool(self.left_out),
             "telemetry": None if self.telemetry is None else self.telemetry.to_json(),
             "baseline": None if self.change is None else self.change.to_json(),
             "gates": [gate.to_json() for gate in self.gates],

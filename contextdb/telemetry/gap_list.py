@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,14 +11,12 @@ import numpy as np
 from contextdb.cells.grammar import parse_cell
 from contextdb.covering.assumed import Opened
 from contextdb.covering.count import uncovered_share
-from contextdb.covering.gaps import SHARE_WORK, share_of
+from contextdb.covering.gaps import SHARE_WORK, Measure, share_of
 from contextdb.covering.report import CoverageReport, Gap
-from contextdb.covering.sample import Sampler
+from contextdb.covering.sample import Sampler, affordable
 from contextdb.covering.sampled_shares import SampledShares
-from contextdb.covering.space import Box, Space
+from contextdb.covering.space import Box, Sides, Space
 from contextdb.telemetry.observed import Observed
-
-Measure = Callable[[Box, Sequence[Box]], tuple[float, bool]]
 
 
 def ranked(report: CoverageReport, ready: Opened, seen: Observed, work: int, samples: int) -> CoverageReport:
@@ -39,22 +37,23 @@ def ranked(report: CoverageReport, ready: Opened, seen: Observed, work: int, sam
     for gap in seen.gaps:
         box = boxes[gap.id]
         if gap.id not in known and box is not None:
-            share, is_exact = measure(box, ())
+            share, is_exact = measure(ready.space.sides_of(box), ())
             listed.append(Gap(gap.id, share, share, gap.cells, gap.nearest, is_exact, gap.share))
     listed.sort(key=lambda gap: (-(gap.telemetry or 0.0), -gap.share, json.dumps(gap.cells, ensure_ascii=False)))
-    return replace(report, gaps=tuple(_renewed(listed, boxes, measure)))
+    return replace(report, gaps=tuple(_renewed(ready.space, listed, boxes, measure)))
 
 
-def _renewed(gaps: Sequence[Gap], boxes: Mapping[str, Box | None], measure: Measure) -> list[Gap]:
+def _renewed(space: Space, gaps: Sequence[Gap], boxes: Mapping[str, Box | None], measure: Measure) -> list[Gap]:
     """The gaps with what none before them holds."""
     found: list[Gap] = []
-    earlier: list[Box] = []
+    earlier: list[Sides] = []
     for gap in gaps:
         box = boxes[gap.id]
         if box is not None:
-            new_share, is_exact = measure(box, earlier)
+            sides = space.sides_of(box)
+            new_share, is_exact = measure(sides, earlier)
             gap = replace(gap, new_share=min(gap.share, new_share), is_exact=gap.is_exact and is_exact)
-            earlier.append(box)
+            earlier.append(sides)
         found.append(gap)
     return found
 
@@ -63,9 +62,10 @@ def _measure(ready: Opened, work: int, samples: int, seed: int) -> Measure:
     """What tells the share of a box, as in the report."""
     space = ready.space
     if ready.drawer is not None:
-        return SampledShares.of(Sampler(space, drawer=ready.drawer), samples, np.random.default_rng(seed))
+        return SampledShares.of(Sampler(space, drawer=ready.drawer), affordable(samples, space), np.random.default_rng(seed))
     possible = uncovered_share(space, space.impossible, work)
-    return lambda box, without: share_of(space, box, [*space.impossible, *without], possible, min(work, SHARE_WORK))
+    impossible = [space.sides_of(box) for box in space.impossible]
+    return lambda box, without: share_of(space, box, [*impossible, *without], possible, min(work, SHARE_WORK))
 
 
 def box_of(space: Space, cells: Mapping[str, str]) -> Box | None:
@@ -74,4 +74,4 @@ def box_of(space: Space, cells: Mapping[str, str]) -> Box | None:
     if not cells.keys() <= domains.keys():
         return None
     box = space.box({name: parse_cell(text, domains[name], wants_mend=False) for name, text in cells.items()})
-    return box if box is not None and space.cells(box) == cells else None
+    return box if box is not None and space.cells(space.sides_of(box)) == cells else None

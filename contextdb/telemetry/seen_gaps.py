@@ -15,7 +15,7 @@ from contextdb.bitmask import Flags
 from contextdb.compiled.classes import TagMasks, ValueMasks
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.factors import Factor, NumberFactor, ValueFactor
-from contextdb.covering.gaps import gap_id, nearest_row, widened
+from contextdb.covering.gaps import NearRows, gap_id, widened
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet
 from contextdb.telemetry.observed import SeenGap
@@ -47,6 +47,7 @@ def seen_gaps(space: Space, compiled: CompiledTable, part: Part, most: int, know
     elsewhere = int(part.open_moments[~is_placed].sum())
     moments = part.open_moments[is_placed]
     rows = BoxSet.of(space.full, space.boxes)
+    near = NearRows(space, compiled, rows)
     held = [(box, _inside(box, points[is_placed])) for box in dict.fromkeys(known)]
     boxes = [(box, inside) for box, inside in held if inside.any()]
     boxes += _boxes(space, rows, points[is_placed], moments, most * TRIED, boxes)
@@ -55,7 +56,8 @@ def seen_gaps(space: Space, compiled: CompiledTable, part: Part, most: int, know
     for box, inside in found:
         n, n_new = int(moments[inside].sum()), int(moments[inside & ~before].sum())
         before |= inside
-        cells, nearest = space.cells(box), nearest_row(space, compiled, rows, box)
+        sides = space.sides_of(box)
+        cells, nearest = space.cells(sides), near.nearest(sides)
         sizes = _scaled(n, scale, part), n * scale / part.moments, n_new * scale / part.moments
         gaps.append(SeenGap(gap_id(cells), *sizes, cells, nearest, part.has_all_open))
     return SeenGaps(tuple(gaps), _scaled(elsewhere, scale, part))
@@ -94,7 +96,7 @@ def _inside(box: Box, points: Points) -> Flags:
 def _ranked(
     space: Space, boxes: Sequence[tuple[Box, Flags]], points: Points, moments: NDArray[np.int64]
 ) -> list[tuple[Box, Flags]]:
-    key = [(-int(moments[inside].sum()), json.dumps(space.cells(box), ensure_ascii=False)) for box, inside in boxes]
+    key = [(-int(moments[inside].sum()), json.dumps(space.cells(space.sides_of(box)), ensure_ascii=False)) for box, inside in boxes]
     return [boxes[i] for i in sorted(range(len(boxes)), key=key.__getitem__)]
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import random
 from functools import reduce
 from operator import or_
 
 import numpy as np
 import pytest
-from contextdb.covering.check_rows import check_rows
+from brute import random_boxes, random_table
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
@@ -16,9 +17,12 @@ import contextdb as cdb
 from contextdb import bitmask
 from contextdb.cells import ValueSet
 from contextdb.cells.domains import Domain
+from contextdb.checks.rows import check_rows
 from contextdb.covering import coverage, pairs
 from contextdb.covering.factors import ValueFactor
-from contextdb.covering.space import comparable_rows, weight_of
+from contextdb.covering.gaps import NearRows, find_gaps
+from contextdb.covering.space import SMALLEST, Space, comparable_rows, weight_of
+from contextdb.covering.witness import BoxSet
 from contextdb.errors import TableError
 from contextdb.schema import TableSettings
 
@@ -88,3 +92,52 @@ def test_a_weight_is_the_sum_of_its_classes_to_the_last_bit(weights: list[float]
     factor = ValueFactor(tuple(map(str, range(len(weights)))), False, np.array(weights))
     side = data.draw(st.integers(0, (1 << len(weights)) - 1))
     assert weight_of(factor, side) == sum(w for k, w in enumerate(weights) if side >> k & 1)
+
+
+@given(st.integers(0, 300), st.data())
+def test_the_flags_of_bits_are_those_bits(n_rows: int, data: st.DataObject):
+    bits = data.draw(st.integers(0, (1 << n_rows) - 1))
+    assert bitmask.flags_of(bits, n_rows).tolist() == [bool(bits >> row & 1) for row in range(n_rows)]
+
+
+@given(st.integers(0, 2**32))
+def test_boxes_added_one_by_one_answer_as_those_given_at_once(seed: int):
+    space = Space.of(random_table(random.Random(seed)).compile())
+    at_once, one_by_one = BoxSet.of(space.full, space.boxes), BoxSet.of(space.full, ())
+    for box in space.boxes:
+        one_by_one.add(box)
+    assert (one_by_one.rejects, one_by_one.restricts, one_by_one.n_boxes) == (at_once.rejects, at_once.restricts, at_once.n_boxes)
+
+
+@examples(2)
+@given(st.integers(0, 2**32))
+def test_the_nearest_row_has_fewest_cells_that_do_not_hold_the_gap(seed: int):
+    rng = random.Random(seed)
+    table = random_table(rng)
+    compiled = table.compile()
+    space = Space.of(compiled, random_boxes(rng, table))
+    near = NearRows(space, compiled, BoxSet.of(space.full, space.boxes))
+    for box in find_gaps(space, (), 20, 1000).boxes:
+        failing = [[at for at, own in enumerate(space.of_condition) if any(box[f] & ~row[f] for f in own)] for row in space.boxes]
+        nearest = near.nearest(space.sides_of(box))
+        assert (nearest is None) == (not failing)
+        if nearest is not None:
+            best = min(failing, key=len)
+            assert (nearest.n_changes, nearest.row) == (len(best), space.rows[failing.index(best)])
+            assert nearest.condition == space.conditions[best[0]].name
+
+
+def test_a_table_of_very_many_conditions_is_measured_and_says_how_many_samples_it_drew():
+    n = 2000
+    columns = {f"c{i}": ["True", "False" if i == 7 else "Any"] for i in range(n)}
+    table = cdb.Table.from_columns({"Asset": ["A", "B"], **columns}, {f"c{i}": {"type": "bool"} for i in range(n)})
+    report = coverage(table, samples=1000, max_gaps=3)
+    assert (report.covered, report.n_samples) == (0.5, 250)
+    assert [(gap.share, gap.new_share, gap.is_exact) for gap in report.gaps] == [
+        (0.25, 0.25, True),
+        (0.25, 0.125, True),
+        (0.25, 0.0625, True),
+    ]
+    assert all(gap.cells["c7"] == "True" and "False" in gap.cells.values() and len(gap.cells) == 2 for gap in report.gaps)
+    assert {(gap.nearest.row, gap.nearest.n_changes) for gap in report.gaps if gap.nearest} == {(1, 1)}
+    assert report.hits == (SMALLEST, 0.5)

@@ -98,9 +98,9 @@ def test_a_written_gap_holds_the_classes_of_the_gap_and_no_other_number_that_peo
     table = table_of(cells, schema, policy)
     space = Space.of(table.compile())
     for box in find_gaps(space, (), 20, 1000).boxes:
-        exact = space.accepted(0, box)
+        exact = space.accepted(0, space.sides_of(box))
         assert isinstance(exact, NumberSet)
-        text = space.cells(box)["speed"]
+        text = space.cells(space.sides_of(box))["speed"]
         written = spans_of(text, schema)
         assert space.box({"speed": parse_cell(text, space.conditions[0].domain)}) == box
         for low, high in exact.spans:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
+from importlib import import_module
 from threading import Event
 from typing import Any
 
@@ -379,3 +380,13 @@ def test_the_cursor_is_seen_without_colour():
     app, screen = shown(keys=("down", "down"))
     assert app.gap == 2
     assert [line[:1] for line in screen.splitlines()[5:8]] == [" ", " ", "▸"]
+
+
+def test_pairs_of_too_many_conditions_are_left_out_and_the_tab_says_what_the_command_says(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(import_module("contextdb.covering.pairs"), "MOST_CONDITIONS", 2)
+    said = "Pairs of conditions are not compared: the table has 3 conditions, and at most 2 are."
+    for section in ("2", "5"):
+        app, screen = shown(keys=(section,), size=(100, 30))
+        assert said in screen
+        assert app.run_.result is not None
+        assert app.run_.result.pairs is None

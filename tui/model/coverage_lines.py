@@ -198,8 +198,11 @@ def about_text(result: Result) -> str:
     lines.append(f"Rows valid at once: {report.overlap.mean:.3g} on average ({report.overlap.method}).")
     lines += [f"  {n:>3}   {format_percent(share)}" for n, share in enumerate(report.overlap.histogram) if share > 0.0]
     lines.append("")
-    tried = "all contexts" if pairs.method == "exact" else f"{pairs.n_samples:,} random contexts (seed {pairs.seed})"
-    lines.append(f"Pairs of conditions: from {tried}.")
+    if pairs is None:
+        lines.append(result.left_out)
+    else:
+        tried = "all contexts" if pairs.method == "exact" else f"{pairs.n_samples:,} random contexts (seed {pairs.seed})"
+        lines.append(f"Pairs of conditions: from {tried}.")
     if not report.findings_complete:
         lines.append("Not every row could be compared within the work allowed: some findings may be missing.")
     return "\n".join(lines)

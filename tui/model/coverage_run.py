@@ -17,6 +17,7 @@ from threading import Event, Lock, Thread
 from typing import Literal
 
 from contextdb.covering import Cancelled, CoverageReport, PairTable, coverage, pairs
+from contextdb.covering.pairs import left_out
 from contextdb.covering.progress import Stops, Tell
 from contextdb.errors import ContextDBError, plural, shown
 from contextdb.tables.nesting.flat import FlatTable
@@ -35,7 +36,13 @@ class Result:
     """What a run gives."""
 
     report: CoverageReport
-    pairs: PairTable
+    pairs: PairTable | None
+    """None where the conditions are too many to compare them."""
+
+    @property
+    def left_out(self) -> str:
+        """That pairs are not compared, as the report of the command says it; "" where they are."""
+        return left_out(self.report.n_conditions) if self.pairs is None else ""
 
 
 Measure = Callable[[Table, Tell, Stops], Result]
@@ -44,6 +51,8 @@ Measure = Callable[[Table, Tell, Stops], Result]
 def measured(table: Table, tell: Tell, should_stop: Stops) -> Result:
     """The coverage of a table and of its pairs of conditions, in the contexts that its assumptions leave."""
     report = coverage(table, max_gaps=MOST_GAPS, progress=lambda part, share: tell(part, share * PAIRS_AT), should_stop=should_stop)
+    if left_out(len(table.flat().conditions)):
+        return Result(with_rows_of_file(report, table), None)
     compared = pairs(table, progress=lambda part, share: tell(part, PAIRS_AT + share * (1.0 - PAIRS_AT)), should_stop=should_stop)
     return Result(with_rows_of_file(report, table), compared)
 

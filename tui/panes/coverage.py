@@ -172,7 +172,7 @@ class CoveragePane(Pane):
     def _fill(self, result: Result) -> None:
         report = result.report
         self.query_one("#gaps", LineList).show(len(report.gaps), lambda at: _gap_line(report, at))
-        self.query_one(PairMap).show_pairs(result.pairs)
+        self.query_one(PairMap).show_pairs(result.pairs, result.left_out)
         self.query_one("#crowded", LineList).show(len(report.crowded), lambda at: _crowd_line(report, at))
         self.query_one("#rows", LineList).show(len(report.findings), lambda at: _finding_line(report, at))
         self.query_one("#about-text", Static).update(lines.about_text(result))

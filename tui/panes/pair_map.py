@@ -34,13 +34,14 @@ class PairMap(HeatMap):
         self.pairs: PairTable | None = None
         self.pair: tuple[int, int] | None = None
         """The pair that is shown, that with more parts first; None: all of them."""
+        self._left_out = ""
         self._opened_at = (0, 1)
         self._worst: dict[tuple[int, int], Slice | None] = {}
 
-    def show_pairs(self, pairs: PairTable) -> None:
-        """Show these; the pair that is open stays so where it is still there."""
-        before, self.pairs, self._worst = self.pairs, pairs, {}
-        if self.pair and (before is None or before.conditions != pairs.conditions):
+    def show_pairs(self, pairs: PairTable | None, left_out: str = "") -> None:
+        """Show these, or say why there are none; the pair that is open stays so where it is still there."""
+        before, self.pairs, self._worst, self._left_out = self.pairs, pairs, {}, left_out
+        if self.pair and (before is None or pairs is None or before.conditions != pairs.conditions):
             self.pair = None
         self._show(self.place if before is not None else (0, 1))
 
@@ -78,7 +79,7 @@ class PairMap(HeatMap):
         """Choose a square, and say what it means."""
         super().go(row, column)
         if self.pairs is None or not self.rows:
-            self.post_message(self.Said(""))
+            self.post_message(self.Said(self._left_out))
         elif self.pair is None:
             self.post_message(self.Said(lines.pair_text(self.pairs, *self.place)))
         else:
@@ -86,8 +87,10 @@ class PairMap(HeatMap):
             self.post_message(self.Said("" if found is None else lines.slice_text(found)))
 
     def _show(self, place: tuple[int, int]) -> None:
-        assert self.pairs is not None
         self.refresh_bindings()
+        if self.pairs is None:
+            self.show([], [], self._overview_square, (0, 0))
+            return
         if self.pair is None:
             names = self.pairs.conditions
             rows = [f"{at + 1} {name}" for at, name in enumerate(names)]

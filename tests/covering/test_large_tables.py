@@ -15,8 +15,8 @@ from strategies import examples
 
 import contextdb as cdb
 from contextdb import bitmask
-from contextdb.cells import ValueSet
 from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import ValueSet
 from contextdb.checks.rows import check_rows
 from contextdb.covering import coverage, pairs
 from contextdb.covering.factors import ValueFactor

@@ -24,7 +24,7 @@ if __package__ in (None, ""):
 import contextdb as cdb
 from benchmarks import timing
 from benchmarks.sections import print_aligned
-from contextdb.cells.grammar import Cell
+from contextdb.cells.sets import Cell
 from contextdb.compiled.table import CompiledTable
 
 N_ROWS, N_ACTORS = 1_000, 22

@@ -13,7 +13,7 @@ from typing import Any
 import polars as pl
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.grammar import NumberSet, ValueSet
+from contextdb.cells.sets import NumberSet, ValueSet
 from contextdb.tables.table import Table
 
 

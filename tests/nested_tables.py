@@ -10,7 +10,7 @@ import strategies
 from hypothesis import strategies as st
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import KINDS
+from contextdb.cells.kinds import KINDS
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.table import Table
 
@@ -78,7 +78,7 @@ def cost_of(way: Way, context: Mapping[str, object], unknown: str) -> float:
 
 
 @st.composite
-def nests(draw: st.DrawFn, kinds: tuple[str, ...] = KINDS, most_rows: int = 6, least_conditions: int = 1) -> Nest:
+def nests(draw: st.DrawFn, kinds: tuple[str, ...] = tuple(KINDS), most_rows: int = 6, least_conditions: int = 1) -> Nest:
     """Up to three tables inside each other, with conditions that all or some of them have."""
     conditions = {
         name: Condition(name, draw(strategies.domains(kinds)))

@@ -9,6 +9,7 @@ values of a set-valued fact.
 
 from __future__ import annotations
 
+import datetime
 import itertools
 import math
 import re
@@ -25,6 +26,11 @@ Interval = tuple[float, bool, float, bool]
 SOFT = re.compile(r"(.*)~\s*([\d.eE+-]+)\s*", re.DOTALL)
 WORD = re.compile(r'([+-]?)(?:"((?:[^"]|"")*)"|(\S+))')
 NUMBER = re.compile(r"(?:inf|\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?)", re.IGNORECASE)
+
+
+DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
+EPOCH = datetime.date(1970, 1, 1)
+FIRST_DAY, LAST_DAY = ((day - EPOCH).days for day in (datetime.date.min, datetime.date.max))
 
 
 # ---- one cell
@@ -74,7 +80,7 @@ def is_any_word(body: str) -> bool:
 
 
 def is_in_domain(fact: Plain, domain: Domain) -> bool:
-    return domain.kind not in ("int", "number") or domain.minimum <= fact <= domain.maximum
+    return domain.kind not in ("int", "number", "date") or domain.minimum <= fact <= domain.maximum
 
 
 # ---- the kinds
@@ -100,7 +106,17 @@ def read_tags(body: str, domain: Domain, fact: frozenset[str]) -> bool:
     return all(has(tag, fact) is (sign == "+") for sign, tag in words(body))
 
 
+def read_dates(body: str, domain: Domain, fact: float) -> bool:
+    return read_numbers(with_days(body), domain, fact)
+
+
+def with_days(text: str) -> str:
+    """A text with the number of days since 1970-01-01 for each date in it."""
+    return DATE.sub(lambda found: str((datetime.date.fromisoformat(found[0]) - EPOCH).days), text)
+
+
 READERS = {
+    "date": read_dates,
     "bool": read_bool,
     "int": read_numbers,
     "number": read_numbers,
@@ -215,6 +231,10 @@ def representatives(texts: Sequence[str], domain: Domain) -> list[Plain]:
     """Facts of which one lies in every part of the domain that cells of these texts can tell apart."""
     if domain.kind == "bool":
         return [False, True]
+    if domain.kind == "date":
+        days = numbers_in(map(with_days, texts))
+        near = _numbers_near([*days, domain.minimum, domain.maximum, 0.0, FIRST_DAY, LAST_DAY], domain)
+        return [day for day in near if FIRST_DAY <= day <= LAST_DAY]
     if domain.kind in ("int", "number", "angle"):
         return _numbers_near([*numbers_in(texts), domain.minimum, domain.maximum, 0.0], domain)
     if domain.kind == "enum":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -15,8 +16,9 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import KINDS, Domain
+from contextdb.cells.domains import Domain
 from contextdb.cells.facts import cell
+from contextdb.cells.kinds import KINDS
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.table import Table
 
@@ -30,12 +32,14 @@ NUMBERS = [0.0, -0.0, 0.1, 0.2, 0.1 + 0.2, 0.3, 1.0, 5.0, 9.99, 10.0, 20.0, 29.9
 WHOLE = [0.0, 1.0, 2.0, 3.0, 5.0, 10.0, 2.0**53 - 1, 2.0**53, 2.0**53 + 2, 1e300, math.inf]
 ANGLES = [0.0, -0.0, 0.1, 5.0, 90.0, 179.99999999999997, 180.0, 185.0, 190.0, 350.0, 360.0, 365.0, 540.0, 725.0]
 
+DATES = ["0001-01-01", "0001-01-02", "1969-12-31", "1970-01-01", "2024-02-29", "2026-01-01", "2026-03-31", "9999-12-31"]
+
 ANY_TEXTS = st.sampled_from(["Any", "-", "", " any "])
 ANY_SETS = st.sampled_from(["Any", "-", " any "])
 INDEX = st.integers(0, 59)
 BOOLEANS = st.booleans()
 ON_CIRCLE = st.sampled_from([-180.0, -90.0, 0.0, 90.0, 180.0]) | st.floats(-180.0, 180.0)
-NOTHING = {"int": "5..3", "number": "5..3", "angle": "(5..5)", "tags": "+Move.Run -Move"}
+NOTHING = {"int": "5..3", "date": "2026-02-02..2026-02-01", "number": "5..3", "angle": "(5..5)", "tags": "+Move.Run -Move"}
 """Cells that no fact matches, though each part of them could."""
 
 
@@ -71,13 +75,15 @@ def _one_of(values: Sequence[object]) -> st.SearchStrategy:
 
 @cache
 @st.composite
-def domains(draw: st.DrawFn, kinds: tuple[str, ...] = KINDS) -> Domain:
+def domains(draw: st.DrawFn, kinds: tuple[str, ...] = tuple(KINDS)) -> Domain:
     """A domain of any kind, with declared values or bounds where the kind can have them."""
     kind = draw(st.sampled_from(kinds))
     if kind == "enum":
         return Domain(kind, tuple(draw(st.lists(st.sampled_from(NAMES), min_size=1, max_size=5, unique=True))))
     if kind == "tags":
         return Domain(kind, draw(st.none() | st.just(tuple(TAGS))))
+    if kind == "date":
+        return Domain(kind, None, draw(one_of(-math.inf, 20454.0)), draw(one_of(math.inf, 20543.0)))  # 2026-01-01, 2026-03-31
     if kind in ("int", "number"):
         return Domain(kind, None, draw(one_of(-math.inf, -5.0, 0.0, 0.5)), draw(one_of(math.inf, 10.0, 2.5)))
     return Domain(kind)
@@ -100,6 +106,8 @@ def numbers(kind: str) -> st.SearchStrategy[float]:
 @st.composite
 def number_texts(draw: st.DrawFn, kind: str, is_finite: bool = False) -> str:
     """A number in one of the ways to write it."""
+    if kind == "date":
+        return draw(st.sampled_from(DATES) | st.dates(datetime.date(2025, 12, 28), datetime.date(2026, 4, 5)).map(str))
     value = draw(numbers(kind))
     if is_finite and math.isinf(value):
         value = 7.0
@@ -115,7 +123,7 @@ def intervals(draw: st.DrawFn, kind: str) -> str:
     form = draw(INDEX) % 5
     if form == 0:
         mark = draw(one_of(", ", ",", " ± ", "±", " +- "))
-        tolerance = abs(float(draw(number_texts(kind, is_finite=True))))
+        tolerance = abs(float(draw(number_texts("number" if kind == "date" else kind, is_finite=True))))
         return draw(number_texts(kind, is_finite=True)) + mark + repr(tolerance)
     if form == 1:
         return draw(one_of("", "=", "= ")) + draw(number_texts(kind))
@@ -202,7 +210,7 @@ def bytes_of(length: int) -> st.SearchStrategy[bytes]:
 
 
 @st.composite
-def tables(draw: st.DrawFn, kinds: tuple[str, ...] = KINDS, most_conditions: int = 4, least_conditions: int = 0) -> Table:
+def tables(draw: st.DrawFn, kinds: tuple[str, ...] = tuple(KINDS), most_conditions: int = 4, least_conditions: int = 0) -> Table:
     """A table of any size round the edges of words, from 0 conditions on; some have rows that are not enabled."""
     n_rows = draw(one_of(*N_ROWS))
     names = CONDITIONS[: draw(st.integers(least_conditions, most_conditions))]
@@ -239,6 +247,10 @@ def near(texts: tuple[str, ...], domain: Domain) -> st.SearchStrategy[oracles.Pl
 @st.composite
 def plain_facts(draw: st.DrawFn, domain: Domain, texts: tuple[str, ...] = ()) -> Fact:
     """One value, most often near one that a cell of these texts names, in one of the types that Python has for it."""
+    if domain.kind == "date":
+        day = draw(near(texts, domain))
+        date = oracles.EPOCH + datetime.timedelta(days=day)
+        return Fact(draw(one_of(date, date.isoformat(), np.datetime64(date), day)), day)
     if domain.kind in ("int", "number", "angle"):
         return draw(number_facts(domain, texts))
     more = ("+" + known_tags(domain)[0],) if domain.kind == "tags" else ()
@@ -273,7 +285,7 @@ def set_facts(draw: st.DrawFn, domain: Domain, texts: tuple[str, ...] = ()) -> F
     held = [v for v in oracles.representatives([*texts, text], domain) if oracles.accepts(text, domain, v)]
     if not held:
         text, held = "Any", oracles.representatives(texts, domain)
-    is_plain_text_read = domain.kind in ("int", "number", "angle")
+    is_plain_text_read = domain.type.is_numeric
     return Fact(text if is_plain_text_read and draw(BOOLEANS) else cell(text), held)
 
 

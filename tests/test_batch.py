@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 import contextdb
 from contextdb import bitmask
-from contextdb.cells.domains import NUMERIC, Domain
+from contextdb.cells.domains import Domain
 from contextdb.compiled import batch, kernels
 from contextdb.compiled.batch import ManyMatches
 from contextdb.compiled.classes import FLAT_BYTES
@@ -66,7 +66,7 @@ def as_list(facts: list[strategies.Fact], domain: Domain) -> object:
 
 def as_array(facts: list[strategies.Fact], domain: Domain) -> object:
     plain = [fact.plain for fact in facts]
-    if domain.kind in NUMERIC:
+    if domain.type.is_numeric:
         return np.array([math.nan if value is None else value for value in plain], np.float64)
     if domain.kind == "tags" or None in plain:
         objects = np.empty(len(plain), np.object_)
@@ -77,8 +77,9 @@ def as_array(facts: list[strategies.Fact], domain: Domain) -> object:
 
 def as_series(facts: list[strategies.Fact], domain: Domain) -> pl.Series:
     plain = [sorted(fact.plain) if isinstance(fact.plain, frozenset) else fact.plain for fact in facts]
-    dtype = {"bool": pl.Boolean, "tags": pl.List(pl.String)}.get(domain.kind, pl.Float64 if domain.kind in NUMERIC else pl.String)
-    return pl.Series(plain, dtype=dtype)
+    if domain.kind == "date":
+        return pl.Series(plain, dtype=pl.Float64).cast(pl.Int32).cast(pl.Date)
+    return pl.Series(plain, dtype=domain.type.dtype)
 
 
 def as_narrow_series(facts: list[strategies.Fact], domain: Domain) -> pl.Series:
@@ -86,7 +87,7 @@ def as_narrow_series(facts: list[strategies.Fact], domain: Domain) -> pl.Series:
     series = as_series(facts, domain)
     if domain.kind in ("enum", "text"):
         return series.cast(pl.Categorical)
-    if domain.kind in NUMERIC and series.null_count() < len(series):
+    if domain.type.is_decimal and series.null_count() < len(series):
         for dtype in (pl.Int16, pl.Int64, pl.Float32):
             narrow = series.cast(dtype, strict=False)
             if narrow.cast(pl.Float64).equals(series, null_equal=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import math
 import random
@@ -21,8 +22,9 @@ from hypothesis import strategies as st
 from nested_tables import Nest, nests
 from strategies import IS_FULL, contexts, examples, tables
 
+from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import KINDS, wrap_angle
+from contextdb.cells.kinds import KINDS
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.c_header.face import choices_of, face_of, names_left
 from contextdb.compiled.c_header.spelling import Names
@@ -41,6 +43,7 @@ SCHEMA: dict[str, dict[str, object]] = {
     "n": {"type": "int"},
     "speed": {"type": "number"},
     "heading": {"type": "angle"},
+    "day": {"type": "date"},
     "state": {"type": "enum", "values": ["A", "B", "C"]},
     "word": {"type": "text"},
     "Defender.Tags": {"type": "tags", "values": ["Move.Run", "InAir", *(f"T{i}" for i in range(70))]},
@@ -51,6 +54,7 @@ CELLS = {
     "n": ["1..3", "not 2", "Any", "<2", "2 | 4"],
     "speed": ["20, 9.99", "5.. ~2", "1 | 3", "Any", "(1..3]", "not 3", "..10"],
     "heading": ["170, 20", "Any", "0..90", "not -180..0", "(90..180)"],
+    "day": ["2026-01-01..2026-03-31", "Any", "not 1970-01-01", "<=2024-02-29 ~2", "0001-01-01 | 9999-12-31.."],
     "state": ["A", "B C", "not A", "Any"],
     "word": ["a b", "not a", "Any", "Größe", '"x y"', '"say ""no"""'],
     "Defender.Tags": ["+Move -InAir", "not +InAir", "Any", "not +Move -InAir", "+T69", "not not Any", "+Move.Run"],
@@ -77,6 +81,7 @@ FACTS: dict[str, list[object]] = {
         -1e18,
         359.99999999999994,
     ],
+    "day": [-719162.0, -1.0, 0.0, 19782.0, 19783.0, 20453.0, 20454.0, 20543.0, 20544.0, 2932896.0],
     "state": ["A", "B", "C"],
     "word": ["a", "b", "", "Größe", "x y", 'say "no"', "ab"],
     "Defender.Tags": [frozenset(), {"Move"}, {"Move.Run", "InAir"}, {"InAir"}, {"T69", "T0"}, {"Move", "T69"}],
@@ -118,7 +123,7 @@ def schema_bytes(conditions: Sequence[Condition]) -> bytes:
     parts = [packed(len(conditions))]
     for condition in conditions:
         values = values_in_c(condition)
-        parts += [text(condition.name), packed(KINDS.index(condition.domain.kind)), text(condition.expr), packed(len(values))]
+        parts += [text(condition.name), packed(list(KINDS).index(condition.domain.kind)), text(condition.expr), packed(len(values))]
         parts += map(text, values)
     return b"".join(parts)
 
@@ -128,7 +133,7 @@ def fact_bytes(condition: Condition, fact: object) -> bytes:
     kind, values = condition.domain.kind, values_in_c(condition)
     if kind in ("number", "angle"):
         return struct.pack("<d", math.nan if fact is None else fact)
-    if kind == "int":
+    if kind in ("int", "date"):
         return packed(-(2**63) if fact is None else int(fact))  # type: ignore[call-overload]
     if kind == "bool":
         return packed(-1 if fact is None else bool(fact))
@@ -396,6 +401,9 @@ def set_fact(compiled: CompiledTable, condition: Condition, field: str, fact: ob
         return f'facts.{field} = strtod("{number}", NULL);'
     if kind in ("bool", "int"):
         return f"facts.{field} = {int(fact)};"  # type: ignore[call-overload]
+    if kind == "date":
+        day = datetime.date(1970, 1, 1) + datetime.timedelta(days=fact)  # type: ignore[arg-type]
+        return f"facts.{field} = cdb_date({day.year}, {day.month}, {day.day});"
     if kind == "enum":
         return f"facts.{field} = {names[f'{condition.name}={fact}']};"
     if kind == "text":

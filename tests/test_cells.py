@@ -13,9 +13,11 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.cells.domains import ANGLE, BOOL, INT, KINDS, NUMBER, TAGS, TEXT, Domain
-from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, format_cell, parse_cell
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.grammar import format_cell, parse_cell
 from contextdb.cells.intervals import CIRCLE, arc, complement, union
+from contextdb.cells.kinds import KINDS
+from contextdb.cells.sets import Cell, NumberSet, TagSet, ValueSet
 from contextdb.errors import CellError, Fault, in_quotes
 
 CELLS = Path(__file__).with_name("cells.csv")
@@ -48,8 +50,8 @@ def parts(text: str) -> list[str]:
 def domain_of(line: Line) -> Domain:
     """What the column `declared` says: values with semicolons between, or bounds such as `min=0 max=10`."""
     kind, declared = line["type"], line["declared"]
-    if kind in ("int", "number"):
-        bounds = dict(word.split("=") for word in declared.split())
+    if kind in ("int", "number", "date"):
+        bounds = dict(word.split("=") for word in oracles.with_days(declared).split())
         return Domain(kind, None, float(bounds.get("min", "-inf")), float(bounds.get("max", "inf")))
     return Domain(kind, tuple(parts(declared)) or None)
 
@@ -58,8 +60,8 @@ def fact_of(text: str, kind: str) -> object:
     """One of the facts in the columns `matches` and `fails`."""
     if kind == "bool":
         return {"True": True, "False": False}[text]
-    if kind in ("int", "number", "angle"):
-        return float(text)
+    if kind in ("int", "number", "angle", "date"):
+        return float(oracles.with_days(text))
     if kind == "tags":
         return frozenset(() if text == "(none)" else shlex.split(text))
     return text[1:-1] if text[0] == text[-1] == '"' else text

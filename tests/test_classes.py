@@ -15,7 +15,8 @@ from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.facts import cell, read_fact
-from contextdb.cells.grammar import Cell, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import Cell
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks, column_masks
 
 DEPTH = Domain("enum", ("CB", "FS", "SS"))

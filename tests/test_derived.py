@@ -20,7 +20,7 @@ from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL, NUMBER
 from contextdb.cells.facts import Fact
-from contextdb.cells.grammar import ANY
+from contextdb.cells.sets import ANY
 from contextdb.checks.cases import Case, judge
 from contextdb.cli import main
 from contextdb.compiled.table import CompiledTable

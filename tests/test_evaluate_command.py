@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from running import ROOT, Result, run
 
+from contextdb.cells.domains import Domain
 from contextdb.cells.facts import describe
 from contextdb.commands.evaluate_command import share
 from contextdb.errors import ContextError
@@ -249,7 +250,7 @@ def test_each_context_of_a_file_is_answered_as_when_it_is_asked_alone(
         columns = {n: [sorted(f[n]) if isinstance(f[n], frozenset) else f[n] for f in facts] for n in compiled.places}
         pl.DataFrame(columns).with_columns(frame=pl.lit(1)).write_parquet(path)
     else:
-        texts = {n: [_as_text(f[n]) for f in facts] for n in compiled.places}
+        texts = {n: [_as_text(f[n], compiled.asked[n].domain) for f in facts] for n in compiled.places}
         pl.DataFrame(texts, schema=dict.fromkeys(texts, pl.String)).with_columns(frame=pl.lit("1")).write_csv(path)
         facts = [{n: None if f == frozenset() else f for n, f in fact.items()} for fact in facts]
     many = read_contexts(path, compiled).ask(compiled, unknown)
@@ -259,13 +260,13 @@ def test_each_context_of_a_file_is_answered_as_when_it_is_asked_alone(
     assert many.hits.tolist() == [sum(row in rows for rows in alone) for row in range(table.n_rows)]
 
 
-def _as_text(fact: object) -> str:
+def _as_text(fact: object, domain: Domain) -> str:
     """A fact as a file of contexts has it; no text says "no tags"."""
     if fact is None:
         return ""
     if isinstance(fact, frozenset):
         return " ".join('"' + tag + '"' for tag in sorted(fact))
-    return '"' + fact.replace('"', '""') + '"' if isinstance(fact, str) else describe(fact)  # type: ignore[arg-type]
+    return '"' + fact.replace('"', '""') + '"' if isinstance(fact, str) else describe(fact, domain)  # type: ignore[arg-type]
 
 
 # ---- missing facts

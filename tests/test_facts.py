@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.facts import cell, check_mode, describe, missing_error, misspelt, read_fact, read_fact_text
-from contextdb.cells.grammar import Cell, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError
 
 DEPTH = Domain("enum", ("CB", "FS", "Half Back", "5"))
@@ -316,17 +317,17 @@ def test_a_set_as_text_is_the_cell_it_says(text, domain):
 def test_a_fact_is_described_in_a_text_that_reads_as_the_same_fact(domain, data):
     fact = read_fact(data.draw(strategies.plain_facts(domain)).given, Condition("x", domain))
     if domain.kind not in ("enum", "text", "tags"):
-        assert read_fact_text(describe(fact), Condition("x", domain)) == fact
+        assert read_fact_text(describe(fact, domain), Condition("x", domain)) == fact
 
 
 def test_facts_are_described_as_people_write_them():
-    assert describe(None) == "(missing)"
-    assert describe(frozenset()) == "(no tags)"
-    assert describe(frozenset(("Stunned", "InAir"))) == "InAir Stunned"
-    assert describe(True) == "True"
-    assert describe(0.1) == "0.1"
-    assert describe(5.0) == "5"
-    assert describe("CB") == "CB"
+    assert describe(None, TEXT) == "(missing)"
+    assert describe(frozenset(), TAGS) == "(no tags)"
+    assert describe(frozenset(("Stunned", "InAir")), TAGS) == "InAir Stunned"
+    assert describe(True, BOOL) == "True"
+    assert describe(0.1, NUMBER) == "0.1"
+    assert describe(5.0, NUMBER) == "5"
+    assert describe("CB", TEXT) == "CB"
 
 
 # ---- words for what is missing

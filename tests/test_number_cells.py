@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, INT, NUMBER, TEXT, Domain
-from contextdb.cells.grammar import ANY, Cell, NumberSet, parse_cell, reads
+from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.numbers import FEW, NumberCells, are_plain, doubtful, has_soft
+from contextdb.cells.sets import ANY, Cell, NumberSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import column_masks
 from contextdb.tables import condition_column

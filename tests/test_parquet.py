@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from datetime import date
+from datetime import time
 from decimal import Decimal
 
 import numpy as np
@@ -105,10 +105,10 @@ def test_columns_whose_names_look_like_patterns_are_read():
 
 def test_every_column_of_a_type_that_no_cell_has_is_refused_with_what_it_is():
     messages = faults_of(
-        parquet({"a": ["x"], "when": [date(2024, 1, 1)], "who": [{"n": 1}], "raw": [b"x"], "list": [[1, 2]], "deep": [[["x"]]]})
+        parquet({"a": ["x"], "when": [time(12)], "who": [{"n": 1}], "raw": [b"x"], "list": [[1, 2]], "deep": [[["x"]]]})
     )
-    accepted = "Accepted: strings, categories, bools, numbers, and lists of strings. Try to write it as strings."
-    assert messages[0] == f't.parquet, column "when": the column is of type Date. {accepted}'
+    accepted = "Accepted: strings, categories, bools, numbers, dates, and lists of strings. Try to write it as strings."
+    assert messages[0] == f't.parquet, column "when": the column is of type Time. {accepted}'
     assert [m.split('"')[1] for m in messages] == ["when", "who", "raw", "list", "deep"]
 
 

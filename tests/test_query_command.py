@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from running import Result, run
 
+from contextdb.cells.domains import Domain
 from contextdb.cells.facts import describe, read_fact
-from contextdb.cells.grammar import Cell
+from contextdb.cells.sets import Cell
 from contextdb.commands.query_command import read_facts
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
@@ -311,12 +312,12 @@ def test_a_fact_written_as_text_is_the_fact(table: Table, data: st.DataObject):
     context, _ = data.draw(strategies.contexts(table))
     facts = {c.name: read_fact(context.get(c.name), c) for c in compiled.conditions}
     said = {name: fact for name, fact in facts.items() if not isinstance(fact, (Cell, frozenset))}
-    texts = [f"{name}={_as_text(fact)}" for name, fact in said.items()]
+    texts = [f"{name}={_as_text(fact, compiled.asked[name].domain)}" for name, fact in said.items()]
     assert read_facts(texts, compiled) == said
 
 
-def _as_text(fact: object) -> str:
-    return '"' + fact.replace('"', '""') + '"' if isinstance(fact, str) else describe(fact)  # type: ignore[arg-type]
+def _as_text(fact: object, domain: Domain) -> str:
+    return '"' + fact.replace('"', '""') + '"' if isinstance(fact, str) else describe(fact, domain)  # type: ignore[arg-type]
 
 
 @given(st.lists(st.text(max_size=20), max_size=4))

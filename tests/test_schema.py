@@ -7,12 +7,14 @@ import math
 import pickle
 from dataclasses import fields
 
+import oracles
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import KINDS, Domain
+from contextdb.cells.domains import Domain
+from contextdb.cells.kinds import KINDS
 from contextdb.errors import Fault, SchemaError
 from contextdb.expressions.tokens import written_text
 from contextdb.schema.sections import condition_to_dict
@@ -159,7 +161,7 @@ def test_a_table_is_found_by_its_file():
 
 # ---- faults of one value: section and line, what was found, what is accepted, and the mend
 
-KINDS_SAID = '"bool", "int", "number", "angle", "enum", "text", "tags"'
+KINDS_SAID = '"bool", "int", "number", "angle", "date", "enum", "text", "tags"'
 NAMES_SAID = 'a list of different names, such as ["A", "B"]'
 FILE_SAID = "a .csv or .parquet file in the folder of contextdb.toml or below it"
 A_NUMBER = "a number, such as -1.5"
@@ -244,12 +246,12 @@ def test_a_type_of_another_language_is_mended(found: str, mend: str):
         (
             "type = 'angle'\nmin = -180",
             "line 3: [conditions.x] min = -180 has no place here: an angle wraps around, so it has no ends and no list. "
-            "Accepted: min in a condition of type int or number. Try to leave it out.",
+            "Accepted: min in a condition of type int or number or date. Try to leave it out.",
         ),
         (
             "type = 'enum'\nmax = 3\nvalues = ['A']",
             "line 3: [conditions.x] max = 3 has no place here: names have no order. "
-            "Accepted: max in a condition of type int or number. Try to leave it out.",
+            "Accepted: max in a condition of type int or number or date. Try to leave it out.",
         ),
         (
             "type = 'text'\nvalues = ['A']",
@@ -486,16 +488,18 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
 ASSUMED = st.lists(st.sampled_from(["True", "not `of no table`", "1 < 2"]), unique=True)
-CONSTANTS = {"bool": "1 < 2", "int": "2 ** 3", "number": "0.5", "angle": "wrap_angle(270)"}
+CONSTANTS = {"bool": "1 < 2", "int": "2 ** 3", "number": "0.5", "angle": "wrap_angle(270)", "date": 'date("2026-01-31")'}
 
 
 @st.composite
 def condition_sections(draw: st.DrawFn) -> dict[str, object]:
-    kind = draw(st.sampled_from(KINDS))
+    kind = draw(st.sampled_from(list(KINDS)))
     section: dict[str, object] = {"type": kind, "description": draw(TEXTS), "unit": draw(TEXTS)}
     if kind in ("int", "number"):
         numbers = st.integers(-(2**53), 2**53) if kind == "int" else FINITE
         section["min"], section["max"] = sorted((draw(numbers), draw(numbers)))
+    elif kind == "date":
+        section["min"], section["max"] = sorted((draw(st.dates()).isoformat(), draw(st.dates()).isoformat()))
     elif kind in ("enum", "tags"):
         section["values"] = draw(WORD_LISTS.filter(bool))
     if kind != "tags" and draw(st.booleans()):
@@ -552,7 +556,8 @@ def as_list(value: object) -> object:
 def assert_says(condition: Condition, section: dict[str, object]) -> None:
     domain = condition.domain
     assert domain.kind == section["type"]
-    assert (domain.minimum, domain.maximum) == (section.get("min", -math.inf), section.get("max", math.inf))
+    ends = (section.get("min", -math.inf), section.get("max", math.inf))
+    assert (domain.minimum, domain.maximum) == tuple(float(oracles.with_days(str(end))) for end in ends)
     assert as_list(domain.values) == section.get("values")
     assert (condition.unit, condition.description, condition.expr) == (section["unit"], section["description"], section.get("expr"))
     assert condition.is_declared

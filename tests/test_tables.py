@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from contextdb.cells.grammar import Cell, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import Cell
 from contextdb.commands.demo_command import make_sample
 from contextdb.motion.made import recipes as made
 from contextdb.motion.search.database import MotionDatabase

@@ -11,16 +11,16 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from decimal import Decimal
-from numbers import Real
 from typing import Literal
 
 import numpy as np
 
+from contextdb.cells.angles import wrap_angle
 from contextdb.cells.arguments import require_text
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC, wrap_angle
-from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, covers, format_number, parse_cell, parse_tags
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import parse_cell, parse_tags
+from contextdb.cells.sets import SET_OF, Cell, NumberSet, ValueSet, covers
 from contextdb.cells.words import truth_of
 from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, in_quotes, nearest, plural, shown, some
 
@@ -30,15 +30,6 @@ Context = Mapping[str, object]
 
 NAMES = "the names of the table's conditions"
 UNKNOWN_MODES = ("error", "any", "never")
-_EXPECTED = {
-    "bool": "True or False",
-    "int": "a whole number",
-    "number": "a number",
-    "angle": "a finite number of degrees",
-    "enum": "one of its declared values",
-    "text": "a text",
-    "tags": "a set of tags",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,29 +102,29 @@ def read_fact(value: object, condition: Condition) -> Fact:
         return _read_set(value.text, condition)
     if isinstance(value, Cell):
         return _checked_set(value, condition)
-    kind = condition.domain.kind
-    if kind in NUMERIC:
+    kind = condition.domain.type
+    if kind.is_numeric:
         return _read_number(value, condition)
-    if kind == "bool":
+    if kind.is_truth:
         return _read_bool(value, condition)
-    return _read_tags(value, condition) if kind == "tags" else _read_value(value, condition)
+    return _read_tags(value, condition) if kind.is_tags else _read_value(value, condition)
 
 
 def read_fact_text(text: str, condition: Condition) -> Fact:
     """Bring a fact written as text (command line, CSV) into canonical form: a plain value, or a set written as a cell."""
     body = text.strip()
-    kind = condition.domain.kind
+    kind = condition.domain.type
     if not body:
         return None
-    if kind == "bool":
+    if kind.is_truth:
         truth = truth_of(body)
         return truth if truth is not None else _read_set(body, condition)
-    if kind in ("enum", "text"):
+    if kind.is_named:
         is_plain = (
-            body in condition.domain.known if kind == "enum" else " " not in body and '"' not in body and body.casefold() != "any"
+            " " not in body and '"' not in body and body.casefold() != "any" if kind.is_open else body in condition.domain.known
         )
         return body if is_plain else _plain_if_single(_read_set(body, condition))
-    if kind == "tags":
+    if kind.is_tags:
         return _read_tags(body, condition)
     return _plain_if_single(_read_set(body, condition)) if body.casefold() != "nan" else None
 
@@ -174,7 +165,7 @@ def _is_slip(name: str, near: str) -> bool:
 
 def _fault(value: object, condition: Condition, mend: str = "", accepted: str = "") -> ContextError:
     what = f"{type(value).__name__} {in_quotes(_text_of(value))}"
-    expected = accepted or _EXPECTED[condition.domain.kind]
+    expected = accepted or condition.domain.type.facts
     place = Place(column=condition.name)
     return ContextError(Fault(f"{what} is not a fact of type {condition.domain.kind}.", expected, mend, place, "wrong-fact"))
 
@@ -188,11 +179,10 @@ def _text_of(value: object) -> str:
 
 def _checked_set(found: Cell, condition: Condition) -> Cell:
     """A set of values that was read before, if it is one of the condition's own kind."""
-    kind = condition.domain.kind
-    accepts = NumberSet if kind in NUMERIC else TagSet if kind == "tags" else ValueSet
+    accepts = SET_OF[condition.domain.type.family]
     if found.accepts is None or (isinstance(found.accepts, accepts) and not found.is_soft and not found.is_empty):
         return found
-    raise _fault(found, condition, accepted=f"a set of values of type {kind}")
+    raise _fault(found, condition, accepted=f"a set of values of type {condition.domain.kind}")
 
 
 def _read_set(text: str, condition: Condition) -> Cell:
@@ -220,20 +210,20 @@ def _plain_if_single(found: Cell) -> Fact:
 def _read_number(value: object, condition: Condition) -> Fact:
     if isinstance(value, str):
         return _plain_if_single(_read_set(value, condition)) if value.strip() else None
-    if not isinstance(value, (Real, Decimal, np.integer, np.floating, np.bool_)):
-        raise _fault(value, condition)
+    kind = condition.domain.type
     try:
-        number = float(value) + 0.0
-    except (OverflowError, ValueError):
-        raise _fault(value, condition, accepted="a number that a double can hold") from None
-    kind = condition.domain.kind
-    if math.isnan(number):
+        number = kind.from_python(value)
+    except TypeError:
+        raise _fault(value, condition) from None
+    except ValueError as error:
+        raise _fault(value, condition, accepted=str(error)) from None
+    if number is None:
         return None
-    if kind == "angle":
+    if kind.is_circular:
         if math.isinf(number):
             raise _fault(value, condition)
         return wrap_angle(number)
-    if kind == "int" and not (number.is_integer() or math.isinf(number)):
+    if kind.is_whole and not (number.is_integer() or math.isinf(number)):
         raise _fault(value, condition, mend=f"{round(number)}")
     return number
 
@@ -255,7 +245,7 @@ def _read_value(value: object, condition: Condition) -> Fact:
 def _read_one_value(value: object, condition: Condition) -> str:
     if not isinstance(value, str):
         raise _fault(value, condition)
-    if condition.domain.kind == "enum" and value not in condition.domain.known:
+    if not condition.domain.type.is_open and value not in condition.domain.known:
         raise _unknown(value, condition)
     return str(value)
 
@@ -290,12 +280,12 @@ def _not_a_tag(value: object, condition: Condition) -> str:
     raise _fault(value, condition, accepted="a set of texts")
 
 
-def describe(fact: Fact) -> str:
-    """A canonical fact as people write it."""
+def describe(fact: Fact, domain: Domain) -> str:
+    """A canonical fact of a domain as people write it."""
     if fact is None:
         return "(missing)"
     if isinstance(fact, frozenset):
         return " ".join(sorted(fact)) or "(no tags)"
     if isinstance(fact, bool) or not isinstance(fact, (int, float)):
         return shown(str(fact))
-    return format_number(fact)
+    return domain.type.spelling.write(180.0 if fact == -180.0 and domain.type.is_circular else fact)

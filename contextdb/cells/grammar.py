@@ -19,142 +19,39 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from contextdb.cells import intervals
-from contextdb.cells.domains import NUMERIC, TAGS, Domain, wrap_angle
-from contextdb.cells.intervals import EVERYTHING, Spans
+from contextdb.cells.domains import TAGS, Domain
+from contextdb.cells.intervals import Spans
 from contextdb.cells.mends import candidates
-from contextdb.cells.words import NUMBER_TEXT, is_name, is_reserved, quoted, truth_of
+from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, complement, covers
+from contextdb.cells.words import NUMBER_TEXT, format_number, is_name, is_reserved, quoted, says_any, truth_of
 from contextdb.errors import CellError, Fault, in_quotes, shown, some
 
 _NUMBER = re.compile(NUMBER_TEXT)
-_CENTRE = re.compile(rf"({NUMBER_TEXT})\s*(?:,|±|\+-)\s*({NUMBER_TEXT})")
-_INTERVAL = re.compile(rf"([\[(]?)\s*({NUMBER_TEXT})?\s*\.\.\s*({NUMBER_TEXT})?\s*([\])]?)")
-_COMPARE = re.compile(rf"(<=|>=|<|>|=)?\s*({NUMBER_TEXT})")
 _TOKEN = re.compile(r'([+-]?)(?:"((?:[^"]|"")*)"|([^\s"]+))(?=\s|$)\s*')
 _NOT = re.compile(r"not(?=\s|$)\s*", re.IGNORECASE)
 
-ACCEPTED = {
-    "bool": '"True", "False", "Any"',
-    "int": '"20, 9" (centre, tolerance), "10..30", "<=5", "0..5 | 10..15", "Any"',
-    "number": '"20, 9.99" (centre, tolerance), "10..30", "<=5", "0..5 | 10..15", "Any"',
-    "angle": '"20, 9.99" (centre, tolerance), "10..30", "170..-170" (through 180), "Any"',
-    "enum": 'one or more declared values with spaces between, "not CB", "Any"',
-    "text": 'one or more words with spaces between, others in double quotes, "Any"',
-    "tags": '"+InAir -Stunned" (has, has not), "Any"',
-}
-
 
 @dataclass(frozen=True, slots=True)
-class NumberSet:
-    """Numbers, as spans; angles are wrapped before they are looked up."""
+class _Patterns:
+    """The shapes of number cells, for one spelling of numbers."""
 
-    spans: Spans
-    is_circular: bool = False
-
-    def holds(self, value: float) -> bool:
-        """Whether the number is in the set."""
-        return intervals.holds(self.spans, wrap_angle(value) if self.is_circular else value)
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no number is in the set."""
-        return not self.spans
+    centre: re.Pattern[str]
+    interval: re.Pattern[str]
+    compare: re.Pattern[str]
 
 
-@dataclass(frozen=True, slots=True)
-class ValueSet:
-    """Some of the values of a bool, enum or text, or (for text) all but some."""
-
-    values: frozenset[bool | str]
-    is_complement: bool = False
-
-    def holds(self, value: bool | str) -> bool:
-        """Whether the value is in the set."""
-        return (value in self.values) is not self.is_complement
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no value is in the set."""
-        return not self.values and not self.is_complement
-
-
-@dataclass(frozen=True, slots=True)
-class TagSet:
-    """The sets of tags that have all of `needs` and none of `bans`, or (complement) all other sets."""
-
-    needs: frozenset[str]
-    bans: frozenset[str] = frozenset()
-    is_complement: bool = False
-
-    def holds(self, tags: frozenset[str]) -> bool:
-        """Whether a set of tags is among them."""
-        covered = covered_by(tags)
-        return (self.needs <= covered and self.bans.isdisjoint(covered)) is not self.is_complement
-
-    @property
-    def is_contradiction(self) -> bool:
-        """Whether a needed tag is under a banned one, so that no set of tags can have all `needs` and no `bans`."""
-        return not self.bans.isdisjoint(covered_by(self.needs))
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no set of tags is among them."""
-        return not (self.needs or self.bans) if self.is_complement else self.is_contradiction
-
-
-Accepted = NumberSet | ValueSet | TagSet
-
-
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """What a row accepts for a condition: `accepts` is None for Any. `penalty` makes the cell soft."""
-
-    accepts: Accepted | None = None
-    penalty: float | None = None
-
-    @property
-    def is_any(self) -> bool:
-        """Whether the cell says Any."""
-        return self.accepts is None
-
-    @property
-    def is_soft(self) -> bool:
-        """Whether a row that does not match is kept, at a cost."""
-        return self.penalty is not None
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no value at all matches."""
-        return self.accepts is not None and self.accepts.is_empty
-
-    def holds(self, value: object) -> bool:
-        """Whether the value, of the cell's own kind, is accepted; a penalty changes nothing here."""
-        return self.accepts is None or self.accepts.holds(value)  # type: ignore[arg-type]
-
-
-ANY = Cell()
-
-
-def covers(tag: str, tags: frozenset[str]) -> bool:
-    """Whether a set of tags has `tag`, itself or through a tag under it: Move covers Move.Run."""
-    return tag in tags or any(t.startswith(tag + ".") for t in tags)
-
-
-def covered_by(tags: Iterable[str]) -> frozenset[str]:
-    """Every tag that a set of tags has: its own, and those above them."""
-    return frozenset(above for tag in tags for above in tags_above(tag))
-
-
-def tags_above(tag: str) -> Iterator[str]:
-    """A tag and those above it: Move.Run and Move."""
-    yield tag
-    at = tag.rfind(".")
-    while at > 0:
-        yield tag[:at]
-        at = tag.rfind(".", 0, at)
+@lru_cache
+def _patterns(number: str, step: str) -> _Patterns:
+    return _Patterns(
+        re.compile(rf"({number})\s*(?:,|±|\+-)\s*({step})"),
+        re.compile(rf"([\[(]?)\s*({number})?\s*\.\.\s*({number})?\s*([\])]?)"),
+        re.compile(rf"(<=|>=|<|>|=)?\s*({number})"),
+    )
 
 
 def parse_cell(text: str, domain: Domain, wants_mend: bool = True) -> Cell:
@@ -220,39 +117,18 @@ def _read_set(text: str, domain: Domain) -> Accepted | None:
         raise _unreadable(text, domain, 'after "not" a value is missing')
     accepts = _read_plain_set(text[at:], domain)
     for _ in range(n_negations):
-        accepts = _negated(accepts, domain)
+        accepts = complement(accepts, domain)
     return accepts
 
 
 def _read_plain_set(text: str, domain: Domain) -> Accepted | None:
-    if text == "-" or text.casefold() == "any":
+    if says_any(text):
         return None
-    if domain.kind in NUMERIC:
+    if domain.type.is_numeric:
         return _read_numbers(text, domain)
-    if domain.kind == "bool":
+    if domain.type.is_truth:
         return _read_truth(text, domain)
-    return _read_tags(text, domain) if domain.kind == "tags" else _read_names(text, domain)
-
-
-def _negated(accepts: Accepted | None, domain: Domain) -> Accepted:
-    if domain.kind in NUMERIC:
-        spans = EVERYTHING if accepts is None else accepts.spans  # type: ignore[union-attr]
-        return NumberSet(_number_complement(spans, domain), domain.kind == "angle")
-    if domain.kind == "tags":
-        tags = accepts if isinstance(accepts, TagSet) else TagSet(frozenset())
-        return TagSet(tags.needs, tags.bans, not tags.is_complement)
-    inner = accepts if isinstance(accepts, ValueSet) else ValueSet(frozenset(), True)
-    everything = frozenset((False, True)) if domain.kind == "bool" else domain.values
-    if everything is None:
-        return ValueSet(inner.values, not inner.is_complement)
-    return ValueSet(frozenset(v for v in everything if not inner.holds(v)))
-
-
-def _number_complement(spans: Spans, domain: Domain) -> Spans:
-    if domain.kind == "angle":
-        return intervals.complement(spans, *intervals.CIRCLE)
-    rest = intervals.complement(spans, domain.minimum, domain.maximum)
-    return intervals.whole(rest) if domain.kind == "int" else rest
+    return _read_tags(text, domain) if domain.type.is_tags else _read_names(text, domain)
 
 
 def _read_truth(text: str, domain: Domain) -> ValueSet:
@@ -265,20 +141,21 @@ def _read_truth(text: str, domain: Domain) -> ValueSet:
 def _read_numbers(text: str, domain: Domain) -> NumberSet:
     spans = [span for part in text.split("|") for span in _read_spans(part.strip(), text, domain)]
     joined = intervals.union(spans)
-    return NumberSet(intervals.whole(joined) if domain.kind == "int" else joined, domain.kind == "angle")
+    return NumberSet(domain.type.fitted(joined), domain.type.is_circular)
 
 
 def _read_spans(part: str, text: str, domain: Domain) -> Spans:
-    if found := _CENTRE.fullmatch(part):
-        return _centred(_number(found[1], text, domain), _number(found[2], text, domain), text, domain)
-    if found := _INTERVAL.fullmatch(part):
+    patterns = _patterns(domain.type.spelling.number, domain.type.spelling.step)
+    if found := patterns.centre.fullmatch(part):
+        return _centred(_number(found[1], text, domain), float(found[2]), text, domain)
+    if found := patterns.interval.fullmatch(part):
         left, low, high, right = found.groups()
         if low is None and high is None:
             raise _unreadable(text, domain, '".." needs a number before or after it')
         if (left and left not in "[(") or (low is None and left == "[") or (high is None and right == "]"):
             raise _unreadable(text, domain, "a bracket is at a missing end")
         return _between(_end(low, text, domain), _end(high, text, domain), left == "(", right == ")", text, domain)
-    if found := _COMPARE.fullmatch(part):
+    if found := patterns.compare.fullmatch(part):
         return _compared(found[1] or "=", _number(found[2], text, domain), text, domain)
     raise _unreadable(text, domain)
 
@@ -288,8 +165,11 @@ def _end(found: str | None, text: str, domain: Domain) -> float | None:
 
 
 def _number(found: str, text: str, domain: Domain) -> float:
-    value = float(found)
-    if math.isinf(value) and ("inf" not in found.casefold() or domain.kind == "angle"):
+    try:
+        value = domain.type.spelling.read(found)
+    except ValueError as error:
+        raise _unreadable(text, domain, str(error)) from None
+    if math.isinf(value) and ("inf" not in found.casefold() or domain.type.is_circular):
         raise _unreadable(text, domain, f'"{shown(found)}" is too large for a number')
     return value + 0.0
 
@@ -298,13 +178,13 @@ def _centred(centre: float, tolerance: float, text: str, domain: Domain) -> Span
     if tolerance < 0.0 or math.isinf(centre) or math.isinf(tolerance):
         raise _unreadable(text, domain, "a centre is a finite number and a tolerance one from 0 up")
     low, high = centre - tolerance, centre + tolerance
-    if domain.kind != "angle":
+    if not domain.type.is_circular:
         return ((low, high),)
     return (intervals.CIRCLE,) if tolerance >= 180.0 else intervals.arc(low, high)
 
 
 def _between(low: float | None, high: float | None, is_low_open: bool, is_high_open: bool, text: str, domain: Domain) -> Spans:
-    if domain.kind == "angle":
+    if domain.type.is_circular:
         return _angles_between(low, high, is_low_open, is_high_open, text, domain)
     if (is_low_open and low == math.inf) or (is_high_open and high == -math.inf):
         return ()
@@ -325,7 +205,7 @@ def _angles_between(
 
 def _compared(sign: str, value: float, text: str, domain: Domain) -> Spans:
     if sign == "=":
-        return intervals.arc(value, value) if domain.kind == "angle" else ((value, value),)
+        return intervals.arc(value, value) if domain.type.is_circular else ((value, value),)
     is_open = sign in ("<", ">")
     low, high = (None, value) if sign[0] == "<" else (value, None)
     return _between(low, high, is_open, is_open, text, domain)
@@ -341,7 +221,7 @@ def _tokens(text: str, domain: Domain) -> Iterator[tuple[str, str]]:
         sign, in_quotes, bare = token.groups()
         if in_quotes is not None:
             yield sign, in_quotes.replace('""', '"')
-        elif domain.kind == "tags":
+        elif domain.type.is_tags:
             yield sign, _bare(bare, text, domain)
         else:
             yield "", _bare(sign + bare, text, domain)
@@ -379,28 +259,20 @@ def _read_tags(text: str, domain: Domain) -> TagSet:
 
 
 def _unknown_value(name: str, text: str, domain: Domain, known: tuple[str, ...]) -> CellError:
-    what = "tag" if domain.kind == "tags" else "value"
+    what = "tag" if domain.type.is_tags else "value"
     return CellError(Fault(f"{in_quotes(name)} is not a declared {what}.", some(known), rule="unknown-value"))
 
 
 def _unreadable(text: str, domain: Domain, why: str = "") -> CellError:
-    article = "an" if domain.kind in ("int", "angle", "enum") else "a"
-    kind = "tags" if domain.kind == "tags" else f"{article} {domain.kind}"
     reason = f": {why}." if why else "."
-    return CellError(Fault(f"cannot read {in_quotes(text)} as {kind}{reason}", ACCEPTED[domain.kind], rule="unreadable-cell"))
+    found = f"cannot read {in_quotes(text)} as {domain.type.noun}{reason}"
+    return CellError(Fault(found, domain.type.cells, rule="unreadable-cell"))
 
 
 def format_cell(cell: Cell, domain: Domain) -> str:
     """The shortest common way to write a cell; reading it gives an equal cell."""
     body = "Any" if cell.accepts is None else _format_set(cell.accepts, domain)
     return body if cell.penalty is None else f"{body} ~{format_number(cell.penalty)}"
-
-
-def format_number(value: float) -> str:
-    """A double in the fewest digits that read back as the same double."""
-    value += 0.0  # -0.0 is 0
-    short = f"{value:.15g}"
-    return short if float(short) == value and "e" not in short else repr(value).removesuffix(".0")
 
 
 def _format_set(accepts: Accepted, domain: Domain) -> str:
@@ -410,7 +282,7 @@ def _format_set(accepts: Accepted, domain: Domain) -> str:
         return "not Any"
     if isinstance(accepts, NumberSet):
         return _format_spans(accepts.spans, domain)
-    if domain.kind == "bool":
+    if domain.type.is_truth:
         return "not not Any" if len(accepts.values) == 2 else str(next(iter(accepts.values)))
     order = domain.values if domain.values is not None else sorted(str(v) for v in accepts.values)
     names = " ".join(quoted(v) for v in order if v in accepts.values)
@@ -425,8 +297,8 @@ def _format_tags(tags: TagSet) -> str:
 
 
 def _format_spans(spans: Spans, domain: Domain) -> str:
-    if domain.kind != "angle":
-        return " | ".join(_format_span(low, high) for low, high in spans)
+    if not domain.type.is_circular:
+        return " | ".join(_format_span(low, high, domain.type.spelling.write) for low, high in spans)
     if spans == (intervals.CIRCLE,):
         return "-180..180"
     rest = intervals.complement(spans, *intervals.CIRCLE)
@@ -436,7 +308,8 @@ def _format_spans(spans: Spans, domain: Domain) -> str:
     if len(spans) > 1 and first[0] == -180.0 and last[1] == intervals.CIRCLE[1]:
         spans = (*spans[1:-1], (last[0], _shown_end(first[1])))
     return " | ".join(
-        _format_span(_shown_end(low) if low == high else low, _shown_end(high) if low == high else high) for low, high in spans
+        _format_span(_shown_end(low) if low == high else low, _shown_end(high) if low == high else high, format_number)
+        for low, high in spans
     )
 
 
@@ -445,12 +318,12 @@ def _shown_end(degrees: float) -> float:
     return 180.0 if degrees == -180.0 else degrees
 
 
-def _format_span(low: float, high: float) -> str:
+def _format_span(low: float, high: float, write: Callable[[float], str]) -> str:
     if low == high:
-        return format_number(low)
+        return write(low)
     opened, closed = _is_rung_after(low, intervals.below), _is_rung_after(high, intervals.above)
-    first = "" if low == -math.inf else format_number(intervals.below(low) if opened else low)
-    last = "" if high == math.inf else format_number(intervals.above(high) if closed else high)
+    first = "" if low == -math.inf else write(intervals.below(low) if opened else low)
+    last = "" if high == math.inf else write(intervals.above(high) if closed else high)
     if not first and not last:
         return "-inf..inf"
     left = "(" if opened else "[" if closed and first else ""

@@ -12,7 +12,7 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from fractions import Fraction
 
-from contextdb.cells.domains import wrap_angle
+from contextdb.cells.angles import wrap_angle
 
 Span = tuple[float, float]
 Spans = tuple[Span, ...]

@@ -8,9 +8,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from difflib import SequenceMatcher
+from functools import lru_cache
 
-from contextdb.cells.domains import NUMERIC, Domain
-from contextdb.cells.words import NUMBER_TEXT, quoted
+from contextdb.cells.domains import Domain
+from contextdb.cells.kinds import Spelling
+from contextdb.cells.words import quoted
 from contextdb.errors import nearest
 
 CLOSE = 0.85
@@ -29,21 +31,28 @@ def _as_interval(found: re.Match[str]) -> str:
     return f"{first}..{last}" if is_closed else f"{'[' if len(low) == 2 else '('}{first}..{last}{']' if len(high) == 2 else ')'}"
 
 
-_NUMBER_MENDS: _Mends = (
-    (r"[−–—]", "-"),
-    (r"\s*;\s*", ", "),
-    (r"≤|=<", "<="),
-    (r"≥|=>", ">="),
-    (r"\+\s*/\s*-|±\s*-", "±"),
-    (r"\.{3,}|…", ".."),
-    (rf"(>=?)\s*({NUMBER_TEXT})\s*(?:,|&&?|and)?\s*(<=?)\s*({NUMBER_TEXT})", _as_interval),
-    (r"\b(?:or|OR)\b|/|\|\|", "|"),
-    (r"!=\s*|<>\s*|≠\s*", "not "),
-    (r"°|\b(?:deg|degrees|m/s|m|s|cm|km/h)\b", ""),
-    (rf"(?<!\d)({NUMBER_TEXT})\s*(?:-|to|:)\s*({NUMBER_TEXT})", r"\1..\2"),
-    (r"^\*$|^(?i:all|every|none|null|n/a)$", "Any"),
-    (r"[\[\](){}\"']", ""),
-)
+@lru_cache
+def _number_mends(spelling: Spelling) -> _Mends:
+    """What people write for cells of numbers."""
+    number = spelling.number
+    return (
+        *spelling.mends,
+        (r"[−–—]", "-"),
+        (r"\s*;\s*", ", "),
+        (r"≤|=<", "<="),
+        (r"≥|=>", ">="),
+        (r"\+\s*/\s*-|±\s*-", "±"),
+        (r"\.{3,}|…", ".."),
+        (rf"(>=?)\s*({number})\s*(?:,|&&?|and)?\s*(<=?)\s*({number})", _as_interval),
+        (r"\b(?:or|OR)\b|/|\|\|", "|"),
+        (r"!=\s*|<>\s*|≠\s*", "not "),
+        (r"°|\b(?:deg|degrees|m/s|m|s|cm|km/h)\b", ""),
+        (rf"(?<!\d)({number})\s*(?:-|to|:)\s*({number})", r"\1..\2"),
+        (r"^\*$|^(?i:all|every|none|null|n/a)$", "Any"),
+        (r"[\[\](){}\"']", ""),
+    )
+
+
 _WORD_MENDS: _Mends = (
     (r"\s*[,;|/]\s*", " "),
     (r"\b(?:or|OR|and|AND)\b\s*", ""),
@@ -62,14 +71,14 @@ _TRUTH_MENDS: _Mends = (
 
 def candidates(text: str, domain: Domain) -> Iterator[str]:
     """Texts near to one that cannot be read, the likeliest first; whether one reads is for the caller to try."""
-    rules = _NUMBER_MENDS if domain.kind in NUMERIC else _TRUTH_MENDS if domain.kind == "bool" else _WORD_MENDS
+    rules = _number_mends(domain.type.spelling) if domain.type.is_numeric else _TRUTH_MENDS if domain.type.is_truth else _WORD_MENDS
     for pattern, replacement in rules:
         yield re.sub(pattern, replacement, text).strip()
     changed = text
     for pattern, replacement in rules:
         changed = re.sub(pattern, replacement, changed).strip()
         yield changed
-    if domain.kind in ("enum", "text", "tags") and "~" not in text:
+    if (domain.type.is_named or domain.type.is_tags) and "~" not in text:
         yield from _word_mends(text, domain)
 
 
@@ -94,8 +103,8 @@ def _word_mends(text: str, domain: Domain) -> Iterator[str]:
 
 
 def _signed(word: str, domain: Domain) -> tuple[str, str]:
-    return (_sign(word, domain), word.strip("+-!")) if domain.kind == "tags" else ("", word.strip("+!"))
+    return (_sign(word, domain), word.strip("+-!")) if domain.type.is_tags else ("", word.strip("+!"))
 
 
 def _sign(word: str, domain: Domain) -> str:
-    return "" if domain.kind != "tags" else "-" if word[:1] in ("-", "!") else "+"
+    return "" if not domain.type.is_tags else "-" if word[:1] in ("-", "!") else "+"

@@ -17,14 +17,12 @@ from dataclasses import replace
 from functools import lru_cache
 
 from contextdb.cells import intervals
+from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition, Mirror, Swaps
-from contextdb.cells.domains import NUMERIC, Domain, wrap_angle
+from contextdb.cells.domains import Domain
 from contextdb.cells.facts import Fact, read_fact
-from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, ValueSet
+from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet
 from contextdb.errors import ContextError, in_quotes
-
-NEGATED_KINDS = ("bool", "int", "number", "angle")
-SWAPPED_KINDS = ("enum", "text", "tags")
 
 SIDES = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
 """How names of the two sides differ."""
@@ -38,7 +36,7 @@ def way_of(condition: Condition) -> Mirror:
         return "none"
     if condition.mirror is not None:
         return condition.mirror
-    return "negate" if condition.domain.kind == "angle" else "none"
+    return "negate" if condition.domain.type.is_circular else "none"
 
 
 def changed_in_mirror(conditions: Iterable[Condition]) -> dict[str, Condition]:
@@ -69,7 +67,7 @@ def mirrored_facts(facts: Mapping[str, object], conditions: Conditions) -> dict[
     found = dict(facts)
     for name, condition in conditions.items():
         fact = found.get(name)
-        if type(fact) is float and condition.domain.kind in NUMERIC:  # the usual fact; an angle is wrapped when it is read
+        if type(fact) is float and condition.domain.type.is_numeric:  # the usual fact; an angle is wrapped when it is read
             found[name] = 0.0 - fact
         elif fact is not None:
             found[name] = mirrored_fact(read_fact(fact, condition), condition)
@@ -91,7 +89,7 @@ def in_mirror(error: ContextError) -> ContextError:
     return ContextError(*(replace(fault, found=f"with mirrored facts {fault.found}") for fault in error.faults))
 
 
-def swap_faults(swaps: Mapping[str, str], kind: str) -> Iterator[tuple[str, str]]:
+def swap_faults(swaps: Mapping[str, str], is_tags: bool) -> Iterator[tuple[str, str]]:
     """What is wrong with names that change places, whatever the names are: a name, and why it cannot."""
     partners: dict[str, str] = {}
     for left, right in swaps.items():
@@ -99,7 +97,7 @@ def swap_faults(swaps: Mapping[str, str], kind: str) -> Iterator[tuple[str, str]
             yield left, "it changes places with itself"
         elif partners.setdefault(left, right) != right or partners.setdefault(right, left) != left:
             yield left if partners[left] != right else right, "it has two partners"
-    for name in partners if kind == "tags" else ():
+    for name in partners if is_tags else ():
         for above in partners:
             if name.startswith(above + "."):
                 yield name, f"it is below {in_quotes(above)}, with which it is exchanged anyway"
@@ -143,13 +141,13 @@ def _mirrored_set(found: Cell, way: Mirror, domain: Domain) -> Accepted | None:
 
 
 def _negated(value: float, domain: Domain) -> float:
-    return wrap_angle(-value) if domain.kind == "angle" else 0.0 - value
+    return wrap_angle(-value) if domain.type.is_circular else 0.0 - value
 
 
 def _negated_spans(spans: intervals.Spans, domain: Domain) -> intervals.Spans:
     low, high = intervals.CIRCLE
     negated = [(-last, -first) for first, last in spans]
-    if domain.kind == "angle" and any(last == -low for _, last in negated):  # -180 and 180 are one angle, its own mirror image
+    if domain.type.is_circular and any(last == -low for _, last in negated):  # -180 and 180 are one angle, its own mirror image
         negated = [(first, min(last, high)) for first, last in negated] + [(low, low)]
     return intervals.union(negated)
 

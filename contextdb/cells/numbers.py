@@ -19,9 +19,11 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from contextdb.cells.domains import NUMERIC, Domain
-from contextdb.cells.grammar import Cell, NumberSet, parse_cell
+from contextdb.cells.angles import wrap_angles
+from contextdb.cells.domains import Domain
+from contextdb.cells.grammar import parse_cell
 from contextdb.cells.intervals import CIRCLE, Spans
+from contextdb.cells.sets import Cell, NumberSet
 
 FEW = 64
 """So many texts are read one by one: it takes no longer."""
@@ -94,7 +96,7 @@ class NumberCells(Sequence[Cell]):
 
     def _cell(self, lows: list[float], highs: list[float]) -> Cell:
         spans: Spans = tuple((low, high) for low, high in zip(lows, highs, strict=True) if low == low)
-        return Cell(NumberSet(spans, self.domain.kind == "angle"))
+        return Cell(NumberSet(spans, self.domain.type.is_circular))
 
     def followed_by(self, texts: Sequence[str], cells: Sequence[Cell]) -> NumberCells:
         """These cells and, behind them, some more."""
@@ -151,10 +153,10 @@ def are_plain(texts: Sequence[str]) -> Flags | None:
 
 def doubtful(texts: Sequence[str], domain: Domain) -> Numbers | None:
     """The texts that may not be read as a domain of numbers: int64. None where they are few, or the domain is another."""
-    series = _series(texts) if domain.kind in NUMERIC else None
+    series = _series(texts) if domain.type.is_decimal else None
     if series is None:
         return None
-    if domain.kind == "angle":  # an end that is left away may be refused
+    if domain.type.is_circular:  # an end that is left away may be refused
         return _plain_ends(series, domain)[2]
     return np.flatnonzero(~series.str.contains(_SURE).to_numpy())
 
@@ -164,7 +166,7 @@ def _plain_ends(series: pl.Series, domain: Domain) -> tuple[Floats, Floats, Numb
     lows, highs = np.full((2, 2, len(series)), np.nan)
     rest = _read_pairs(series, domain, np.arange(len(series)), lows, highs)
     rest = _read_singles(series.gather(rest), domain, rest, lows, highs)
-    n_layers = 2 if domain.kind == "angle" else 1
+    n_layers = 2 if domain.type.is_circular else 1
     return lows[:n_layers], highs[:n_layers], rest
 
 
@@ -197,7 +199,7 @@ def _read_pairs(series: pl.Series, domain: Domain, at: Numbers, lows: Floats, hi
     is_bare = ((left == "") & (right == "")).to_numpy()
     low, high = np.where(is_interval, a, a - b), np.where(is_interval, b, a + b)
     is_read = is_interval | (is_bare & (b >= 0.0))
-    if domain.kind == "angle":
+    if domain.type.is_circular:
         is_whole = ~is_interval & (b >= 180.0)
         is_read = is_read & is_bare & _set_arcs(lows, highs, at[found], low, high, is_whole)
     else:
@@ -215,7 +217,7 @@ def _read_singles(series: pl.Series, domain: Domain, at: Numbers, lows: Floats, 
     has_low = is_from | sign.is_in(["", "=", ">", ">="]).to_numpy()
     has_high = ~is_from & sign.is_in(["", "=", "<", "<=", ".."]).to_numpy()
     is_read = ~is_from | (sign == "").to_numpy()
-    if domain.kind == "angle":  # without an end an angle may be refused
+    if domain.type.is_circular:  # without an end an angle may be refused
         is_read &= has_low & has_high & _set_arcs(lows, highs, at[found], value, value, np.zeros(len(value), np.bool_))
     else:
         low = np.where(has_low, np.where((sign == ">").to_numpy(), np.nextafter(value, np.inf), value), -np.inf)
@@ -235,7 +237,7 @@ def _left_over(at: Numbers, found: Numbers, is_read: Flags, lows: Floats, highs:
 
 def _set_spans(lows: Floats, highs: Floats, at: Numbers, low: Floats, high: Floats, domain: Domain) -> Flags:
     """Keep spans of the line; gives which of them hold anything."""
-    if domain.kind == "int":
+    if domain.type.is_whole:
         low, high = np.ceil(low), np.floor(high)
     lows[0, at], highs[0, at] = low + 0.0, high + 0.0
     return low <= high
@@ -244,16 +246,10 @@ def _set_spans(lows: Floats, highs: Floats, at: Numbers, low: Floats, high: Floa
 def _set_arcs(lows: Floats, highs: Floats, at: Numbers, low: Floats, high: Floats, is_whole: Flags) -> Flags:
     """Keep arcs of the circle, both ends inside; gives which of them doubles tell without doubt."""
     turn = high - low
-    first, last = _wrapped(low), _wrapped(high)
+    first, last = wrap_angles(low) + 0.0, wrap_angles(high) + 0.0
     is_whole = is_whole | (turn > 360.0)
     is_split = (first > last) & ~is_whole
     lows[0, at] = np.where(is_whole | is_split, CIRCLE[0], first)
     highs[0, at] = np.where(is_whole, CIRCLE[1], last)
     lows[1, at], highs[1, at] = np.where(is_split, first, np.nan), np.where(is_split, CIRCLE[1], np.nan)
     return (np.abs(turn - 360.0) >= 1.0) & ~(is_split & (first <= np.nextafter(last, np.inf)))
-
-
-def _wrapped(degrees: Floats) -> Floats:
-    """As `domains.wrap_angle`."""
-    rest = np.fmod(degrees, 360.0)
-    return np.where(rest >= 180.0, rest - 360.0, np.where(rest < -180.0, rest + 360.0, rest + 0.0))

@@ -13,8 +13,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
 from contextdb.cells import intervals
-from contextdb.cells.grammar import Accepted, NumberSet
 from contextdb.cells.intervals import Span
+from contextdb.cells.sets import Accepted, NumberSet
 
 DIGITS = 15
 """So many digits of a decimal come back out of a double."""

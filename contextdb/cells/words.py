@@ -7,8 +7,7 @@ from functools import lru_cache
 
 NUMBER_TEXT = r"[+-]?(?:inf|(?:\d+(?:\.(?!\.)\d*)?|(?<!\.)\.\d+)(?:[eE][+-]?\d+)?)"
 
-ANY_WORDS = frozenset(("", "-", "any"))
-"""What a cell that accepts every value says, in any case."""
+_ANY_WORDS = frozenset(("", "-", "any"))
 
 MARK = "@"
 """What an asset cell begins with that stands for another table."""
@@ -17,6 +16,11 @@ _NAME = re.compile(r"[\w.:/\-]+")
 _RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)
 _SLOT = re.compile(r'"((?:[^"]|"")*)"|[^\s,;|"]+')
 _TRUTH = {"true": True, "t": True, "yes": True, "1": True, "false": False, "f": False, "no": False, "0": False}
+
+
+def says_any(text: str) -> bool:
+    """Whether a text says nothing: Any, in any case, a hyphen, or nothing at all."""
+    return text.strip().casefold() in _ANY_WORDS
 
 
 @lru_cache(maxsize=1 << 12)  # the cells of a column repeat its words
@@ -33,6 +37,13 @@ def is_reserved(text: str) -> bool:
 def quoted(text: str) -> str:
     """A value as a cell writes it: bare where it can be, else in double quotes."""
     return text if is_name(text) else '"' + text.replace('"', '""') + '"'
+
+
+def format_number(value: float) -> str:
+    """A double in the fewest digits that read back as the same double."""
+    value += 0.0  # -0.0 is 0
+    short = f"{value:.15g}"
+    return short if float(short) == value and "e" not in short else repr(value).removesuffix(".0")
 
 
 def truth_of(text: str) -> bool | None:

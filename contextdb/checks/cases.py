@@ -22,7 +22,8 @@ import numpy as np
 
 from contextdb.cells.domains import TAGS, TEXT
 from contextdb.cells.facts import Fact, no_condition, read_fact_text
-from contextdb.cells.grammar import TagSet, ValueSet, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import TagSet, ValueSet
 from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.compiled.table import CompiledTable

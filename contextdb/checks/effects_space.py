@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC, Domain
+from contextdb.cells.domains import Domain
 from contextdb.cells.facts import cell
-from contextdb.cells.grammar import Cell, NumberSet, ValueSet, format_cell, format_number, parse_cell
+from contextdb.cells.grammar import format_cell, parse_cell
+from contextdb.cells.sets import Cell, NumberSet, ValueSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, Place, TableError, in_quotes
@@ -165,18 +166,18 @@ def _widened(domain: Domain, other: Domain) -> Domain:
 
 
 def _is_loose(domain: Domain) -> bool:
-    if domain.kind in NUMERIC and domain.kind != "angle":
+    if domain.type.is_bounded:
         return not (np.isfinite(domain.minimum) and np.isfinite(domain.maximum))
-    return domain.kind in ("text", "tags", "enum") and domain.values is None
+    return not domain.type.is_numeric and domain.everything is None
 
 
 def _spanning(texts: Sequence[str], domain: Domain) -> list[str]:
     """Few texts with the same values or bounds as many."""
     sets = [cell.accepts for cell in (parse_cell(text, domain) for text in texts)]
-    if domain.kind in NUMERIC:
+    if domain.type.is_numeric:
         ends = [end for found in sets if isinstance(found, NumberSet) for span in found.spans for end in span if np.isfinite(end)]
-        return [format_number(end) for end in sorted({min(ends), max(ends)})] if ends else []
-    if domain.kind == "tags":
+        return [domain.type.spelling.write(end) for end in sorted({min(ends), max(ends)})] if ends else []
+    if domain.type.is_tags:
         return list(texts[:MOST_SPAN])
     values = frozenset(value for found in sets if isinstance(found, ValueSet) for value in found.values)
     return [format_cell(Cell(ValueSet(values)), domain)] if values else []

@@ -11,8 +11,9 @@ import math
 from collections.abc import Iterator
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.grammar import Cell, TagSet, ValueSet, format_number
-from contextdb.cells.mirroring import SWAPPED_KINDS, sided_pairs, way_of
+from contextdb.cells.mirroring import sided_pairs, way_of
+from contextdb.cells.sets import Cell, TagSet, ValueSet
+from contextdb.cells.words import format_number
 from contextdb.errors import some
 from contextdb.findings import Finding
 from contextdb.schema.toml_values import as_toml
@@ -68,7 +69,7 @@ def _mirroring_databases(table: Table) -> list[str]:
 
 def _sides(condition: Condition, column: ConditionColumn | None) -> dict[str, str]:
     """The pairs of names of a condition that differ by their side alone."""
-    if condition.domain.kind not in SWAPPED_KINDS:
+    if not condition.domain.type.is_swapped:
         return {}
     if condition.domain.values is not None or column is None:
         return sided_pairs(condition.domain.values or ())
@@ -84,7 +85,7 @@ def _names(cell: Cell) -> frozenset[str]:
 
 def _is_uneven(condition: Condition) -> bool:
     domain = condition.domain
-    return condition.mirror == "negate" and domain.kind in ("int", "number") and domain.minimum != -domain.maximum
+    return condition.mirror == "negate" and domain.type.is_bounded and domain.minimum != -domain.maximum
 
 
 def _uneven(condition: Condition) -> str:

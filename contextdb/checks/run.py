@@ -12,7 +12,7 @@ import numpy as np
 
 from contextdb import bitmask
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import Cell, NumberSet, format_number
+from contextdb.cells.sets import Cell, NumberSet
 from contextdb.checks.mirrored import check_mirroring
 from contextdb.checks.nested import check_nesting
 from contextdb.errors import in_quotes, nearest
@@ -101,11 +101,11 @@ def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
     if cell.is_empty:
         so = "its penalty always counts" if cell.is_soft else "the row never matches"
         return "empty-cell", "error", f"accepts no value at all, so {so}."
-    if not isinstance(cell.accepts, NumberSet) or domain.kind == "angle":
+    if not isinstance(cell.accepts, NumberSet) or domain.type.is_circular:
         return None
     low, high = domain.minimum, domain.maximum
     spans = cell.accepts.spans
-    bounds = _declared(low, high)
+    bounds = _declared(domain)
     if spans[-1][1] < low or spans[0][0] > high:
         return "outside-domain", "warning", f"is wholly outside {bounds}, so the row matches no expected value."
     ends = [e for span in spans for e in span if np.isfinite(e)]
@@ -114,14 +114,11 @@ def _verdict(cell: Cell, domain: Domain) -> tuple[str, Level, str] | None:
     return None
 
 
-def _declared(low: float, high: float) -> str:
-    if np.isinf(high):
-        return f"the declared min {format_number(low)}"
-    return (
-        f"the declared max {format_number(high)}"
-        if np.isinf(low)
-        else f"the declared {format_number(low)} to {format_number(high)}"
-    )
+def _declared(domain: Domain) -> str:
+    low, high = map(domain.type.spelling.write, domain.ends)
+    if np.isinf(domain.maximum):
+        return f"the declared min {low}"
+    return f"the declared max {high}" if np.isinf(domain.minimum) else f"the declared {low} to {high}"
 
 
 def _constant_rules(table: Table) -> Iterator[Finding]:

@@ -17,7 +17,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from contextdb.cells.domains import KINDS
+from contextdb.cells.kinds import KINDS
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest, plural, row_name

@@ -42,8 +42,7 @@ from typing import Any, TypeVar
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import TagSet
-from contextdb.cells.nesting_cells import TagMeet
+from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData, SoftMasks

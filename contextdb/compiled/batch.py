@@ -22,10 +22,12 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
+from contextdb.cells.angles import wrap_angles
 from contextdb.cells.arguments import require_place
+from contextdb.cells.fact_columns import plain_numbers
 from contextdb.cells.facts import Unknown, check_mode, missing_error, misspelt, read_fact
-from contextdb.cells.grammar import Cell
 from contextdb.cells.mirroring import in_mirror
+from contextdb.cells.sets import Cell
 from contextdb.compiled.batch_columns import (
     Codes,
     Contexts,
@@ -34,9 +36,7 @@ from contextdb.compiled.batch_columns import (
     kept_columns,
     listed,
     mirrored_columns,
-    plain_numbers,
     plain_values,
-    wrapped,
 )
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData
@@ -375,11 +375,11 @@ class _Encoder:
         condition = self.compiled.conditions[at]
         first = 0 if isinstance(masks, WideMasks) else self.compiled.stack.starts[at]
         missing = first + masks.codes(None)[0]
-        facts = np.full(self.n_contexts, np.nan) if given is None else plain_numbers(given, condition.domain.kind)
+        facts = np.full(self.n_contexts, np.nan) if given is None else plain_numbers(given, condition.domain.type)
         if facts is None:
             facts = np.array([np.nan if f is None else f for f in self._read_each(at, given)], np.float64)
-        elif condition.domain.kind == "angle":
-            facts = wrapped(facts)
+        elif condition.domain.type.is_circular:
+            facts = wrap_angles(facts)
         if self.unknown == "error":
             self._refuse_missing(self.compiled.conditions[at].name, np.flatnonzero(np.isnan(facts)))
         self.facts.append(facts)

@@ -10,7 +10,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
+from contextdb.cells.fact_columns import as_series, plain_numbers
 from contextdb.cells.facts import read_fact
 from contextdb.cells.mirroring import kept_fact, mirrored_fact
 from contextdb.compiled.classes import ValueMasks
@@ -45,27 +45,6 @@ def common_length(columns: Mapping[str, Any]) -> int:
     return next(iter(lengths.values()), 0)
 
 
-def plain_numbers(given: Any, kind: str) -> NDArray[np.float64] | None:
-    """A column of plain numbers as doubles, NaN where missing; None when it must be read fact by fact."""
-    series = _as_series(given, pl.Float64)
-    if series is None or not (series.dtype.is_numeric() and not series.dtype.is_decimal()):
-        return None
-    facts = series.cast(pl.Float64).to_numpy(writable=False)
-    if series.null_count():
-        facts = series.cast(pl.Float64).fill_null(np.nan).to_numpy()
-    if kind == "int" and not series.dtype.is_integer() and not (np.isnan(facts) | (facts == np.trunc(facts))).all():
-        return None
-    return None if kind == "angle" and np.isinf(facts).any() else facts
-
-
-def wrapped(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angles in [-180, 180), exactly, as `domains.wrap_angle` does one."""
-    if not ((degrees < -180.0) | (degrees >= 180.0)).any():
-        return degrees
-    rest = np.fmod(degrees, 360.0)
-    return np.where(rest >= 180.0, rest - 360.0, np.where(rest < -180.0, rest + 360.0, rest))
-
-
 def listed(given: Any) -> list[Any]:
     """A column as a list of Python's own values."""
     return given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
@@ -73,13 +52,13 @@ def listed(given: Any) -> list[Any]:
 
 def kept_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condition]) -> dict[str, Any]:
     """The columns of some conditions as they are now, whatever the caller writes into them later."""
-    return {name: _kept(given, conditions[name].domain.kind) for name, given in columns.items() if name in conditions}
+    return {name: _kept(given, conditions[name].domain.type.is_tags) for name, given in columns.items() if name in conditions}
 
 
-def _kept(given: Any, kind: str) -> Any:
+def _kept(given: Any, is_tags: bool) -> Any:
     if isinstance(given, np.ndarray):
         return given.copy()
-    if isinstance(given, (list, tuple)) and kind == "tags":  # of which each fact is a set
+    if isinstance(given, (list, tuple)) and is_tags:  # of which each fact is a set
         return [kept_fact(fact) for fact in given]
     return list(given) if isinstance(given, list) else given
 
@@ -91,8 +70,8 @@ def mirrored_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condit
 
 def mirrored_column(given: Any, condition: Condition) -> Any:
     """One column of facts as a mirror shows them."""
-    kind = condition.domain.kind
-    numbers = plain_numbers(given, kind) if kind in NUMERIC else None
+    kind = condition.domain.type
+    numbers = plain_numbers(given, kind) if kind.is_numeric else None
     if numbers is not None:
         return 0.0 - numbers
     return [mirrored_fact(read_fact(value, condition), condition) for value in listed(given)]
@@ -101,7 +80,7 @@ def mirrored_column(given: Any, condition: Condition) -> Any:
 def plain_values(given: Any, masks: ValueMasks) -> Codes | None:
     """Class numbers int32 [1, N] of a column of plain values, -1 where missing; None when it must be read fact by fact."""
     is_truth = masks.values == (False, True)
-    series = _as_series(given, pl.Boolean if is_truth else pl.String)
+    series = as_series(given, pl.Boolean() if is_truth else pl.String())
     if series is None:
         return None
     if is_truth:
@@ -123,19 +102,3 @@ def plain_values(given: Any, masks: ValueMasks) -> Codes | None:
 
 def _codes_of(classes: pl.Series) -> Codes:
     return (classes.fill_null(-1) if classes.null_count() else classes).to_numpy()[None]
-
-
-def _as_series(given: Any, listed: type[pl.DataType]) -> pl.Series | None:
-    """A column as a polars series, or None when it has no single plain type.
-
-    What is listed must be of the type `listed`: left to itself polars takes a list after its first items for float32 or for truth.
-    """
-    if isinstance(given, pl.Series):
-        return given
-    is_typed = isinstance(given, np.ndarray) and given.dtype.kind in "biuf"
-    try:
-        if is_typed:
-            return pl.Series(given, nan_to_null=False)
-        return pl.Series(list(given), dtype=listed, strict=True, nan_to_null=False) if len(given) else None
-    except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
-        return None

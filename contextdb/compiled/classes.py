@@ -28,10 +28,19 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
-from contextdb.cells.domains import NUMERIC, Domain
-from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, ValueSet, covered_by, tags_above
-from contextdb.cells.nesting_cells import TagMeet
+from contextdb.cells.domains import Domain
 from contextdb.cells.numbers import CellSpans, spans_of
+from contextdb.cells.sets import (
+    Accepted,
+    Cell,
+    NumberSet,
+    TagMeet,
+    TagSet,
+    ValueSet,
+    covered_by,
+    is_banned,
+    plain_parts,
+)
 from contextdb.columns import Codes
 
 FLAT_BYTES = 2 << 20
@@ -190,7 +199,7 @@ class TagMasks:
     def set_bits(self, accepts: Accepted) -> tuple[int, int]:
         """Rows that accept some, and rows that accept all, of a set of tag sets."""
         assert isinstance(accepts, TagSet)
-        pairs = [self._conjunction_bits(part) for part in _conjunctions(accepts)]
+        pairs = [self._conjunction_bits(part) for part in plain_parts(accepts)]
         return reduce(or_, (some for some, _ in pairs)), reduce(and_, (all_ for _, all_ in pairs))
 
     def _conjunction_bits(self, part: TagSet) -> tuple[int, int]:
@@ -205,12 +214,12 @@ class TagMasks:
         """For each slot, whether some fact of the part answers no, and whether one answers yes."""
         needed = covered_by(part.needs)
         for tag in self.tags:
-            yield tag not in needed, not _is_banned(tag, part)
+            yield tag not in needed, not is_banned(tag, part)
         for cell in self.negated:
             if isinstance(cell, TagMeet):
                 yield not cell.holds_all_of(part), cell.meets(part)
                 continue
-            entails = cell.needs <= needed and all(_is_banned(t, part) for t in cell.bans)
+            entails = cell.needs <= needed and all(is_banned(t, part) for t in cell.bans)
             joint = TagSet(part.needs | cell.needs, part.bans | cell.bans)
             yield not joint.is_contradiction, not entails
 
@@ -220,10 +229,10 @@ ColumnMasks = ValueMasks | NumberMasks | WideMasks | TagMasks
 
 def column_masks(cells: Sequence[Cell], codes: Codes, domain: Domain) -> ColumnMasks:
     """Compile one column: row r holds `cells[codes[r]]`. Soft cells accept every value."""
-    if domain.kind in NUMERIC:
+    if domain.type.is_numeric:
         return _number_masks(cells, codes, domain)
     hard = [None if c.is_soft else c.accepts for c in cells]
-    return _tag_masks(hard, codes) if domain.kind == "tags" else _value_masks(hard, codes, domain)
+    return _tag_masks(hard, codes) if domain.type.is_tags else _value_masks(hard, codes, domain)
 
 
 def _some_and_all(ints: list[int], held: Sequence[int]) -> tuple[int, int]:
@@ -235,20 +244,6 @@ def _classes_in(accepts: NumberSet, bounds: list[float]) -> list[int]:
     """The classes that share a number with the set."""
     held = {k for low, high in accepts.spans for k in range(bisect_right(bounds, low), bisect_right(bounds, high) + 1)}
     return sorted(held)
-
-
-def _is_banned(tag: str, part: TagSet) -> bool:
-    """Whether no fact of the part can have the tag: the tag, or one above it, is banned."""
-    return any(above in part.bans for above in tags_above(tag))
-
-
-def _conjunctions(accepts: TagSet) -> list[TagSet]:
-    """A set of tag sets as a union of plain ones, none of them empty."""
-    if not accepts.is_complement:
-        return [accepts]
-    lacks = [TagSet(frozenset(), frozenset((t,))) for t in sorted(accepts.needs)]
-    has = [TagSet(frozenset((t,))) for t in sorted(accepts.bans)]
-    return lacks + has
 
 
 def _any_rows(cells: Sequence[Accepted | None], codes: Codes) -> Words:
@@ -285,8 +280,8 @@ def _scatter(mask_numbers: Pairs, rows: Pairs, n_masks: int, n_rows: int) -> Wor
 
 
 def _value_masks(cells: Sequence[Accepted | None], codes: Codes, domain: Domain) -> ValueMasks:
-    has_others = domain.kind == "text"
-    values: tuple[Value, ...] = (False, True) if domain.kind == "bool" else tuple(domain.values or _named(cells))
+    has_others = domain.type.is_open
+    values: tuple[Value, ...] = domain.everything or tuple(_named(cells))
     class_of = {v: i for i, v in enumerate(values)}
     n_classes = len(values) + has_others
     pairs = [(i, class_of[v]) for i, c in enumerate(cells) if isinstance(c, ValueSet) for v in c.values if v in class_of]
@@ -304,9 +299,9 @@ def _named(cells: Sequence[Accepted | None]) -> list[Value]:
 
 def _number_masks(cells: Sequence[Cell], codes: Codes, domain: Domain) -> NumberMasks | WideMasks:
     spans = spans_of(cells)
-    ends = _ends(spans.highs, 1.0 if domain.kind == "int" else 0.0)
-    bottom = -180.0 if domain.kind == "angle" else -np.inf
-    top = 180.0 if domain.kind == "angle" else np.inf
+    ends = _ends(spans.highs, 1.0 if domain.type.is_whole else 0.0)
+    bottom = -180.0 if domain.type.is_circular else -np.inf
+    top = 180.0 if domain.type.is_circular else np.inf
     has_end = ends <= top if top == np.inf else ends < top
     has_end &= ~np.isnan(ends)
     bounds = np.unique(np.concatenate([spans.lows[spans.lows > bottom], ends[has_end]]))

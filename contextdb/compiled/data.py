@@ -25,8 +25,9 @@ from contextdb.bitmask import Words, read_only
 from contextdb.cells.arguments import require_row
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
-from contextdb.cells.grammar import ANY, Cell, parse_cell, reads
+from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.mirroring import changed_in_mirror, in_mirror, kept_facts, mirrored_facts
+from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks
 from contextdb.compiled.lookup import Ask, SingleLookup, build_ask, ruled_ask, single_lookup
@@ -207,7 +208,7 @@ class CompiledData(Unchanging):
     @cached_property
     def keep(self) -> Callable[[Context], dict[str, object]]:
         """What copies a context, so that it stays as it is now."""
-        return kept_facts if any(c.domain.kind == "tags" for c in self.asked.values()) else dict
+        return kept_facts if any(c.domain.type.is_tags for c in self.asked.values()) else dict
 
     @cached_property
     def is_soft(self) -> bool:

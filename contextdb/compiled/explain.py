@@ -22,18 +22,8 @@ from contextdb.cells.arguments import require_place, require_row, require_text, 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import Context, Fact, Unknown, describe
-from contextdb.cells.grammar import (
-    Accepted,
-    Cell,
-    NumberSet,
-    TagSet,
-    ValueSet,
-    covers,
-    format_cell,
-    format_number,
-    parse_cell,
-    reads,
-)
+from contextdb.cells.grammar import format_cell, parse_cell, reads
+from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, union
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks, column_masks
@@ -311,7 +301,7 @@ def describe_fact(fact: Fact, condition: Condition) -> str:
     """A fact in canonical form as people write it; a set as a cell."""
     if isinstance(fact, Cell):
         return format_cell(fact, condition.domain)
-    return describe(180.0 if fact == -180.0 and condition.domain.kind == "angle" else fact)
+    return describe(fact, condition.domain)
 
 
 def mended(text: str, fact: Fact, domain: Domain) -> str:
@@ -322,7 +312,8 @@ def mended(text: str, fact: Fact, domain: Domain) -> str:
     if not (isinstance(accepts, NumberSet) and isinstance(fact, float)) or _most_digits(mend) <= FEW_DIGITS:
         return mend
     low, high = (end if end == fact else _shortened(end, accepts) for end in _stretch(accepts, fact))
-    in_old_words = f"{text} | {format_number(low)}..{format_number(high)}"
+    write = domain.type.spelling.write
+    in_old_words = f"{text} | {write(low)}..{write(high)}"
     is_same = reads(in_old_words, domain) and parse_cell(in_old_words, domain).accepts == wider
     return min((mend, in_old_words), key=_most_digits) if is_same else mend
 
@@ -346,15 +337,10 @@ def widened(accepts: Accepted | None, fact: Fact) -> Accepted | None:
 
 def _joined(one: Accepted | None, other: Accepted | None) -> Accepted | None:
     """The values of both sets; None (Any) where they are all values, or no set that a cell can say."""
-    if isinstance(one, NumberSet) and isinstance(other, NumberSet):
-        return NumberSet(intervals.union([*one.spans, *other.spans]), one.is_circular)
-    if not (isinstance(one, ValueSet) and isinstance(other, ValueSet)):
+    if one is None or other is None or isinstance(one, TagSet) or isinstance(other, TagSet):
         return None
-    named = one.values | other.values
-    if not (one.is_complement or other.is_complement):
-        return None if named == {False, True} else ValueSet(named)
-    left_out = frozenset(v for v in named if not (one.holds(v) or other.holds(v)))
-    return ValueSet(left_out, True) if left_out else None
+    both = union(one, other)
+    return None if both in (ValueSet(frozenset(), True), ValueSet(frozenset((False, True)))) else both
 
 
 def _stretch(accepts: NumberSet, fact: float) -> intervals.Span:
@@ -384,7 +370,7 @@ def _gap(end: float, fact: float, is_circular: bool) -> float:
 def _width(condition: Condition, masks: ColumnMasks) -> float:
     """What a number's distance is measured by: its domain, else the spread of the column's bounds."""
     domain = condition.domain
-    if domain.kind == "angle":
+    if domain.type.is_circular:
         return 180.0
     if np.isfinite(domain.maximum - domain.minimum):
         return domain.maximum - domain.minimum or 1.0

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import Cell, parse_cell
-from contextdb.cells.nesting_cells import meet
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import Cell, meet
 from contextdb.columns import TextColumn
 
 Numbers = NDArray[np.int32]

@@ -16,11 +16,12 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
-from operator import index, itemgetter
+from operator import itemgetter
 from typing import Any
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import read_fact
+from contextdb.cells.kinds import Kind
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.groups import groups_of
 from contextdb.compiled.matches import Answering, Matches
@@ -52,7 +53,7 @@ def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, kee
     With `keep`, which copies a context, the answer knows the facts it was asked with, for the answer in a mirror.
     """
     n_rows = len(answering.assets)
-    names: dict[str, Any] = {"bisect_right": bisect_right, "index": index, "ldexp": math.ldexp}
+    names: dict[str, Any] = {"bisect_right": bisect_right, "ldexp": math.ldexp}
     names |= {"new": object.__new__, "Matches": Matches, "answering": answering}
     values = _value_terms([(c, m) for c, m in columns if isinstance(m, ValueMasks)], n_rows, names)
     numbers = [_term(i, c, m, names) for i, (c, m) in enumerate(columns) if not isinstance(m, ValueMasks)]
@@ -107,7 +108,7 @@ def _term(i: int, condition: Condition, masks: NumberMasks | WideMasks | TagMask
         names[f"f{i}"] = _careful_lookup(condition, masks)
         return f"f{i}({fact})"
     names[f"b{i}"], names[f"m{i}"] = _straight(condition, masks)
-    return f"m{i}[bisect_right(b{i}, {f'index({fact})' if condition.domain.kind == 'int' else f'ldexp({fact}, 0)'})]"
+    return f"m{i}[bisect_right(b{i}, {_exact(i, condition.domain.type, fact, names)})]"
 
 
 def single_lookup(condition: Condition, masks: ColumnMasks) -> SingleLookup:
@@ -119,10 +120,17 @@ def single_lookup(condition: Condition, masks: ColumnMasks) -> SingleLookup:
         return None, _leaves(masks, masks.ints)
     if isinstance(masks, NumberMasks):
         bounds, ints = _straight(condition, masks)
-        if condition.domain.kind != "int":
-            return bounds, ints
-        return None, _Asked(lambda fact: ints[bisect_right(bounds, index(fact))])
+        exact = condition.domain.type.exact
+        return (bounds, ints) if exact is None else (None, _Asked(lambda fact: ints[bisect_right(bounds, exact(fact))]))
     return None, _Asked(_careful_lookup(condition, masks))
+
+
+def _exact(i: int, kind: Kind, fact: str, names: dict[str, Any]) -> str:
+    """The term that makes a double of a fact, or raises."""
+    if kind.exact is None:
+        return f"ldexp({fact}, 0)"
+    names[f"e{i}"] = kind.exact
+    return f"e{i}({fact})"
 
 
 class _Asked:
@@ -183,7 +191,7 @@ def _straight(condition: Condition, masks: NumberMasks) -> tuple[list[float], li
     Angles are laid out three times round the circle, so that -540 up to 540 need no wrapping: the shifts by 360 are exact there.
     """
     inner = masks.ints[:-1]
-    if condition.domain.kind == "angle":
+    if condition.domain.type.is_circular:
         turns = [b for base in (-360.0, 0.0, 360.0) for b in (base - 180.0, *(_shifted(b, base) for b in masks.bound_list))]
         return [*turns, 540.0], [None, *inner, *inner, *inner, None]
     bounds = masks.bound_list
@@ -201,12 +209,16 @@ def _shifted(bound: float, turn: float) -> float:
     return near
 
 
+def _double(fact: Any) -> float:
+    return math.ldexp(fact, 0)
+
+
 def _wide_lookup(condition: Condition, masks: WideMasks) -> Callable[[Any], int]:
-    bounds, is_int, is_angle = masks.bound_list, condition.domain.kind == "int", condition.domain.kind == "angle"
-    low, high = (-180.0, 180.0) if is_angle else (-EXACT, EXACT)
+    bounds, exact = masks.bound_list, condition.domain.type.exact or _double
+    low, high = (-180.0, 180.0) if condition.domain.type.is_circular else (-EXACT, EXACT)
 
     def lookup(fact: Any) -> int:
-        value = index(fact) if is_int else math.ldexp(fact, 0)
+        value = exact(fact)
         if not low <= value < high:
             raise ValueError
         return masks.bits(bisect_right(bounds, value))

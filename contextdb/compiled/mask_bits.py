@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from contextdb.cells.facts import Fact
-from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet
 from contextdb.cells.intervals import EVERYTHING
+from contextdb.cells.sets import Cell, NumberSet, TagSet, ValueSet
 from contextdb.compiled.classes import ColumnMasks, TagMasks, ValueMasks, WideMasks
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from unicodedata import normalize
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.grammar import format_number
+from contextdb.cells.domains import Domain
 from contextdb.compiled.data import CompiledData
 from contextdb.errors import shown
 
@@ -22,10 +22,8 @@ _HEAD = '''"""The facts that each table asks for, as types. Written by `contextd
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias, TypedDict
+{imports}from typing import Literal, TypeAlias, TypedDict
 '''
-_PLAIN = {"bool": "bool", "int": "int", "number": "float", "angle": "float"}
-_UNITS = {"angle": "degrees"}
 
 
 def stubs_of(tables: Mapping[str, CompiledData]) -> str:
@@ -39,7 +37,9 @@ def stubs_of(tables: Mapping[str, CompiledData]) -> str:
                 literals[condition] = names.of(condition.name)
                 parts.append(_literal(literals[condition], condition))
         parts.append(_facts(names.of(f"{table.name} facts"), table, literals))
-    return _HEAD + "".join(f"\n{part}" for part in parts)
+    modules = {c.domain.type.annotation.rpartition(".")[0] for table in tables.values() for c in table.asked.values()}
+    imports = "".join(f"import {module}\n" for module in sorted(modules - {""}))
+    return _HEAD.format(imports=imports) + "".join(f"\n{part}" for part in parts)
 
 
 @dataclass
@@ -62,7 +62,7 @@ class _Names:
 
 def _literal(name: str, condition: Condition) -> str:
     values = condition.domain.values or ()
-    if condition.domain.kind == "tags":
+    if condition.domain.type.is_tags:
         values = tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
     listed = "".join(f"    {value!r},\n" for value in values)
     return f"# {shown(condition.name, 200)}\n{name}: TypeAlias = Literal[\n{listed}]\n"
@@ -80,22 +80,21 @@ def _facts(name: str, table: CompiledData, literals: Mapping[Condition, str]) ->
 
 
 def _type(condition: Condition, literal: str | None) -> str:
-    kind = condition.domain.kind
-    if kind == "tags":
+    if condition.domain.type.is_tags:
         tag = literal or "str"
         return f"set[{tag}] | frozenset[{tag}] | list[{tag}] | tuple[{tag}, ...]"
-    return _PLAIN.get(kind) or literal or "str"
+    return literal or condition.domain.type.annotation
 
 
 def _comment(condition: Condition) -> str:
     """Bounds, unit and description, as far as they are declared, on one line."""
     low, high = condition.domain.minimum, condition.domain.maximum
-    bounds = f"{_end(low)}..{_end(high)}" if math.isfinite(low) or math.isfinite(high) else ""
-    unit = condition.unit or _UNITS.get(condition.domain.kind, "")
+    bounds = f"{_end(low, condition.domain)}..{_end(high, condition.domain)}" if math.isfinite(low) or math.isfinite(high) else ""
+    unit = condition.unit or condition.domain.type.unit
     parts = [" ".join(part for part in (bounds, unit) if part), condition.description]
     said = shown(": ".join(part for part in parts if part), 200)
     return f"  # {said}" if said else ""
 
 
-def _end(bound: float) -> str:
-    return format_number(bound) if math.isfinite(bound) else ""
+def _end(bound: float, domain: Domain) -> str:
+    return domain.type.spelling.write(bound) if math.isfinite(bound) else ""

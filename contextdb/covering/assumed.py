@@ -130,7 +130,7 @@ def assumptions_of(table: EitherTable) -> Assumptions:
     """
     conditions = [column.condition for column in table.conditions]
     assumed = read_assumptions(table.settings.assume, conditions, table.schema.conditions)
-    derived = [_definition(c, table.schema.conditions) for c in conditions if c.expr and c.domain.kind == "bool"]
+    derived = [_definition(c, table.schema.conditions) for c in conditions if c.expr and c.domain.type.is_truth]
     return replace(assumed, derived=tuple(e for e in derived if e is not None and e.as_boxes(False) is not None))
 
 

@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import Cell, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import Cell
 from contextdb.covering.assumed import Opened
 from contextdb.covering.report import CoverageReport, Gap
 from contextdb.covering.space import Box, Space

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
-from contextdb.cells.grammar import covers
+from contextdb.cells.sets import covers
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor
 from contextdb.covering.space import Box, Space, factors_of
 from contextdb.expressions import Derivation, Expression
@@ -62,7 +61,7 @@ class Drawer:
         columns: dict[str, Any] = {}
         for name, condition in self.given.items():
             numbers = self.space.of_condition[self._at[name]] if name in self._at else None
-            if condition.domain.kind == "tags":
+            if condition.domain.type.is_tags:
                 values = self._draw_tags(condition, numbers, n, rng, codes)
             else:
                 values = self._draw_values(condition, numbers, n, rng, codes, within)
@@ -140,7 +139,7 @@ class Drawer:
     def _encode(self, at: int, column: Any, codes: Codes) -> NDArray[np.bool_]:
         """Write the classes of derived facts; say which of them are known and inside the domain."""
         domain, numbers = self.space.conditions[at].domain, self.space.of_condition[at]
-        if domain.kind in NUMERIC:
+        if domain.type.is_numeric:
             values = np.asarray(column, np.float64)
             factor = self.space.factors[numbers[0]]
             assert isinstance(factor, NumberFactor)
@@ -150,7 +149,7 @@ class Drawer:
             codes[:, numbers[0]] = np.clip(np.searchsorted(lows, values, "right") - 1, 0, len(lows) - 1)
             return np.asarray(known, np.bool_)
         listed = column if isinstance(column, list) else column.to_list()
-        if domain.kind == "tags":
+        if domain.type.is_tags:
             listed = [None if value is None else frozenset(value) for value in listed]
         for f in numbers:
             classes = {value: 0 if value is None else _class_of(self.space.factors[f], value) for value in set(listed)}
@@ -169,7 +168,7 @@ def _numbers(factor: NumberFactor, drawn: NDArray[np.int64], uniform: NDArray[np
     """A number in the drawn class of each context, all of a class alike; beyond the last ends as far as the factor measures."""
     ends = np.array([_ends(span, factor) for span in factor.spans])
     low, high = ends[drawn, 0], ends[drawn, 1]
-    if factor.kind == "int":
+    if factor.kind.is_whole:
         return np.asarray(np.clip(np.floor(low + uniform * (high - low + 1.0)), low, high))
     return np.asarray(np.clip(low + uniform * (high - low), low, high))
 

@@ -28,9 +28,11 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.cells import intervals
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, ValueSet, format_cell, format_number, tags_above
+from contextdb.cells.grammar import format_cell
 from contextdb.cells.intervals import Span
-from contextdb.cells.nesting_cells import TagMeet
+from contextdb.cells.kinds import Kind
+from contextdb.cells.sets import Accepted, Cell, NumberSet, TagMeet, TagSet, ValueSet, tags_above
+from contextdb.cells.words import format_number
 from contextdb.compiled.classes import Value
 from contextdb.errors import Fault, TableError, plural
 
@@ -51,8 +53,8 @@ class ValueFactor:
     @classmethod
     def of(cls, accepted: Iterable[Accepted], domain: Domain) -> ValueFactor:
         """The declared values; for text those that cells name, and one class for all others."""
-        values: tuple[Value, ...] = (False, True) if domain.kind == "bool" else tuple(domain.values or _named(accepted))
-        has_others = domain.kind == "text"
+        values: tuple[Value, ...] = domain.everything or tuple(_named(accepted))
+        has_others = domain.type.is_open
         n_classes = max(1, len(values) + has_others)
         assumed = f"{plural(len(values), 'text')} that cells name and any other text count the same" if has_others else ""
         return cls(values, has_others, np.full(n_classes, 1.0 / n_classes), assumed)
@@ -79,7 +81,7 @@ class NumberFactor:
     """Spans of doubles, ascending and without a hole, that make up the domain; for int of whole numbers."""
 
     spans: tuple[Span, ...]
-    kind: str
+    kind: Kind
     weights: Weights
     assumed: str = ""
 
@@ -87,10 +89,10 @@ class NumberFactor:
     def of(cls, accepted: Iterable[Accepted], domain: Domain) -> NumberFactor:
         """Cut the domain at every end of the sets."""
         spans = _cut([s for a in accepted if isinstance(a, NumberSet) for s in a.spans], domain)
-        lengths, assumed = _measures(spans, domain.kind)
+        lengths, assumed = _measures(spans, domain.type)
         total = math.fsum(lengths)
         weights = np.array(lengths) / total if total > 0.0 else np.full(len(spans), 1.0 / len(spans))
-        return cls(tuple(spans), domain.kind, weights, assumed)
+        return cls(tuple(spans), domain.type, weights, assumed)
 
     @property
     def cuts(self) -> list[float]:
@@ -114,7 +116,7 @@ class NumberFactor:
     def accepts(self, classes: int) -> Accepted:
         """The numbers of some classes."""
         spans = list(compress(self.spans, bitmask.flags_of(classes, len(self.spans)).tolist()))
-        return NumberSet(intervals.whole(tuple(spans)) if self.kind == "int" else intervals.union(spans), self.kind == "angle")
+        return NumberSet(self.kind.fitted(intervals.union(spans)), self.kind.is_circular)
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,18 +250,17 @@ def _named(accepted: Iterable[Accepted]) -> list[Value]:
 
 
 def _whole_domain(domain: Domain) -> Span:
-    if domain.kind == "angle":
-        return intervals.CIRCLE
-    span = (domain.minimum, domain.maximum)
-    whole = intervals.whole((span,)) if domain.kind == "int" else (span,)
+    span = domain.ends
+    whole = domain.type.fitted((span,))
     if not whole or span[0] > span[1]:
-        raise TableError(Fault(f"no {domain.kind} is between min {span[0]:g} and max {span[1]:g}.", "a domain that is not empty"))
+        low, high = map(domain.type.spelling.write, span)
+        raise TableError(Fault(f"no {domain.kind} is between min {low} and max {high}.", "a domain that is not empty"))
     return whole[0]
 
 
 def _cut(spans: Sequence[Span], domain: Domain) -> list[Span]:
     first, last = _whole_domain(domain)
-    is_int = domain.kind == "int"
+    is_int = domain.type.is_whole
     starts = {first}
     for low, high in spans:
         after = math.inf if high == math.inf else intervals.above(high)
@@ -270,31 +271,31 @@ def _cut(spans: Sequence[Span], domain: Domain) -> list[Span]:
     return list(zip(ordered, [*ends, last], strict=True))
 
 
-def _measures(spans: Sequence[Span], kind: str) -> tuple[list[float], str]:
+def _measures(spans: Sequence[Span], kind: Kind) -> tuple[list[float], str]:
     """How much each span counts, and what was assumed for that."""
     if len(spans) == 1:
         return [1.0], ""
     low = spans[1][0] if spans[0][0] == -math.inf else spans[0][0]
     high = spans[-2][1] if spans[-1][1] == math.inf else spans[-1][1]
     margin = max(1.0, min((high - low) / 2.0, 1e300))
-    margin = float(math.floor(margin)) if kind == "int" else margin
+    margin = float(math.floor(margin)) if kind.is_whole else margin
     lengths = [_length(spans, at, kind, margin) for at in range(len(spans))]
     endless = [s for s in (spans[0], spans[-1]) if math.inf in map(abs, s) and s[0] != s[1]]
-    texts = [format_cell(Cell(NumberSet((s,))), Domain("int" if kind == "int" else "number")) for s in endless]
+    texts = [format_cell(Cell(NumberSet((s,))), Domain(kind.name)) for s in endless]
     return lengths, ", ".join(f"{text} counts {format_number(margin)}" for text in texts)
 
 
-def _length(spans: Sequence[Span], at: int, kind: str, margin: float) -> float:
+def _length(spans: Sequence[Span], at: int, kind: Kind, margin: float) -> float:
     low, high = spans[at]
     if math.isinf(low) or math.isinf(high):
         return 0.0 if low == high else margin
-    if kind == "int":
+    if kind.is_whole:
         return high - low + 1.0
     if low == high:
         return 0.0
     if at + 1 < len(spans):
         high = spans[at + 1][0]
-    elif kind == "angle":
+    elif kind.is_circular:
         high = 180.0
     if at > 0 and spans[at - 1][0] == spans[at - 1][1]:
         low = spans[at - 1][0]

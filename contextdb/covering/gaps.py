@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Flags
-from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, format_cell
-from contextdb.cells.intervals import union
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.sets import Cell, NumberSet, TagSet, ValueSet, union
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.count import Bounds, uncovered_within
 from contextdb.covering.factors import TagFactor
@@ -189,7 +189,7 @@ def _joined(cell: Cell, space: Space, at: int, gap: Sides) -> str:
     if more is None or old is None:
         return "Any"
     if isinstance(old, NumberSet) and isinstance(more, NumberSet):
-        return space.written(at, NumberSet(union([*old.spans, *more.spans]), old.is_circular))
+        return space.written(at, union(old, more))
     if isinstance(old, ValueSet) and isinstance(more, ValueSet):
         return _values_joined(old, more, space, at, gap)
     if isinstance(old, TagSet) and isinstance(more, TagSet) and not old.is_complement:

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import Cell, NumberSet, TagSet, ValueSet, format_number, parse_cell
+from contextdb.cells.grammar import parse_cell
 from contextdb.cells.intervals import Span
+from contextdb.cells.sets import Cell, NumberSet, TagSet, ValueSet
 from contextdb.cells.words import quoted
 
 
@@ -35,7 +36,7 @@ def _fact(cell: Cell, domain: Domain) -> str | None:
     if accepts is None or accepts.is_empty:
         return None
     if isinstance(accepts, NumberSet):
-        return format_number(_round_number(max(accepts.spans, key=_length), domain))
+        return domain.type.spelling.write(_round_number(max(accepts.spans, key=_length), domain))
     return _tags(accepts) if isinstance(accepts, TagSet) else _value(accepts, domain)
 
 
@@ -59,10 +60,10 @@ def _round_number(span: Span, domain: Domain) -> float:
 
 
 def _value(accepts: ValueSet, domain: Domain) -> str:
-    known = (False, True) if domain.kind == "bool" else domain.values or tuple(sorted(map(str, accepts.values)))
+    known = domain.everything or tuple(sorted(map(str, accepts.values)))
     for value in known:
         if accepts.holds(value):
-            return str(value) if domain.kind == "bool" else quoted(str(value))
+            return str(value) if domain.type.is_truth else quoted(str(value))
     name = "other"
     while not accepts.holds(name):
         name += "_"

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.cells.grammar import Cell, TagSet, format_cell
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.sets import Cell, TagSet
 from contextdb.covering.factors import TagFactor, ValueFactor
 from contextdb.covering.space import Sides, Space
 
@@ -23,7 +24,7 @@ MOST_PARTS = 8
 def parts_of(space: Space, at: int) -> list[tuple[str, Sides]]:
     """The parts of a condition: each as a cell, and as classes of its factors."""
     numbers = space.of_condition[at]
-    if space.conditions[at].domain.kind == "tags":
+    if space.conditions[at].domain.type.is_tags:
         return _tag_parts(space, at)
     f = numbers[0]
     factor = space.factors[f]

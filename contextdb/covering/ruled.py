@@ -13,12 +13,13 @@ from dataclasses import dataclass, field, replace
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL
-from contextdb.cells.grammar import Accepted, Cell, TagSet, format_cell
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.sets import Accepted, Cell, TagSet, meet_plainly
 from contextdb.columns import TextColumn
 from contextdb.covering.report import CoverageReport, Nearest
 from contextdb.errors import shown
 from contextdb.expressions import constant_truth
-from contextdb.expressions.boxes import Box, shared
+from contextdb.expressions.boxes import Box
 from contextdb.expressions.rules import Rule, WhenRules
 from contextdb.expressions.tokens import written_name, written_text
 from contextdb.findings import Finding
@@ -77,7 +78,7 @@ class RuledTable:
     def _part(self, name: str, text: str) -> str:
         if name in self.rules:
             return f"({self.rules[name]})" if text == "True" else f"not ({self.rules[name]})"
-        if self.others[name].domain.kind == "bool":
+        if self.others[name].domain.type.is_truth:
             return written_name(name) if text == "True" else f"not {written_name(name)}"
         return f"{written_name(name)} in {written_text(text)}"
 
@@ -180,4 +181,4 @@ class _Folder:
 
 
 def _common(a: Accepted | None, b: Accepted | None) -> Accepted | None:
-    return b if a is None else a if b is None else shared(a, b)
+    return b if a is None else a if b is None else meet_plainly(a, b)

@@ -22,9 +22,9 @@ import numpy as np
 from contextdb import bitmask
 from contextdb.cells.arguments import require_many, require_mapping, require_text
 from contextdb.cells.conditions import Condition
-from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, format_cell, parse_cell
-from contextdb.cells.nesting_cells import TagMeet
+from contextdb.cells.grammar import format_cell, parse_cell
 from contextdb.cells.plain_ends import plain
+from contextdb.cells.sets import Accepted, Cell, NumberSet, TagMeet, TagSet
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
 from contextdb.covering.progress import SILENT, Progress
@@ -85,7 +85,7 @@ class Space:
         of_condition: list[tuple[int, ...]] = []
         for at, condition in enumerate(compiled.conditions):
             progress.check()
-            is_text = condition.domain.kind == "text"  # its values are those that cells name, soft ones too
+            is_text = condition.domain.type.is_open  # its values are those that cells name, soft ones too
             cells = [compiled.cells(at)[code] for code in _codes_of(compiled, at, most_rows)]
             accepted = [c.accepts for c in cells if c.accepts is not None and (is_text or not c.is_soft)]
             accepted += [cell.accepts for box in excluded for name, cell in box.items() if name == condition.name and cell.accepts]
@@ -173,7 +173,7 @@ class Space:
         return {
             at: {tag: f for f in numbers for tag in self.factors[f].tags}  # type: ignore[union-attr]
             for at, numbers in enumerate(self.of_condition)
-            if self.conditions[at].domain.kind == "tags"
+            if self.conditions[at].domain.type.is_tags
         }
 
     def _side(self, f: int, accepts: Accepted) -> int:
@@ -224,7 +224,7 @@ class Space:
         limited = [f for f in self.of_condition[at] if f in sides]
         if not limited:
             return None
-        if self.conditions[at].domain.kind != "tags":
+        if not self.conditions[at].domain.type.is_tags:
             return self.factors[limited[0]].accepts(sides[limited[0]])
         parts = [self.factors[f].accepts(sides[f]) for f in limited]
         tags = [p for p in parts if isinstance(p, TagSet)]
@@ -307,10 +307,9 @@ def weight_of(factor: Factor, side: int) -> float:
 def factors_of(accepted: Sequence[Accepted], condition: Condition, parts: Mapping[Cell, float] | None = None) -> list[Factor]:
     """The factors of a condition, cut so that the sets are sets of classes; weighed by parts where they are given."""
     domain = condition.domain
-    if domain.kind == "tags":
+    if domain.type.is_tags:
         return list(tag_factors(accepted, domain))
-    is_number = domain.kind in ("int", "number", "angle")
-    factor: Factor = NumberFactor.of(accepted, domain) if is_number else ValueFactor.of(accepted, domain)
+    factor: Factor = NumberFactor.of(accepted, domain) if domain.type.is_numeric else ValueFactor.of(accepted, domain)
     if parts is None:
         return [factor]
     full = (1 << len(factor.weights)) - 1
@@ -344,7 +343,7 @@ def _read_box(box: CellBox, conditions: Sequence[Condition]) -> dict[str, Cell]:
 def _read_weights(name: str, parts: Mapping[object, float], conditions: Sequence[Condition]) -> dict[Cell, float]:
     condition = _condition(name, conditions)
     place = Place(column=name)
-    if condition.domain.kind == "tags":
+    if condition.domain.type.is_tags:
         raise ContextError(Fault("tags do not accept weights.", "a condition of another type", place=place))
     read: dict[Cell, float] = {}
     for text, weight in require_mapping(parts, f"weights of {in_quotes(name)}", _WEIGHTS).items():

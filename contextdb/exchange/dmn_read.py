@@ -280,7 +280,7 @@ class Rules:
         kind = self.types.of_input(None, name)
         domain, _ = domain_of(replace(kind, allowed=""), [], "")
         if domain is None:
-            domain = TEXT if kind.kind == "string" or like.domain.kind in ("enum", "text") else Domain(like.domain.kind)
+            domain = TEXT if kind.kind == "string" or like.domain.type.is_named else Domain(like.domain.kind)
         return Condition(name, domain)
 
     def column(self, taken: Sequence[str]) -> list[TextColumn]:

@@ -15,25 +15,29 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 
-from contextdb.cells.domains import BOOL, TEXT, Domain, Kind
+from contextdb.cells.domains import BOOL, INT, NUMBER, TEXT, Domain
+from contextdb.cells.kinds import KINDS
 from contextdb.errors import in_quotes
-from contextdb.exchange.feel import STRINGS, strings_of
+from contextdb.exchange.feel import STRINGS, number_in, strings_of
 from contextdb.exchange.reading import Remark
 
 MOST_LINKS = 20
 """How many item definitions may stand for one another, and how deep the parts of a structure are looked at."""
 
 Element = ElementTree.Element
-_NUMBER = r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = r"(?:[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?|\w+\(\s*\"[^\"]*\"\s*\)|@\"[^\"]*\")"
+"""A number, or what FEEL writes as a function of a text."""
 _BOUNDS = (
     re.compile(rf"\[\s*(?P<low>{_NUMBER})\s*\.\.\s*(?P<high>{_NUMBER})\s*\]"),
     re.compile(rf">=\s*(?P<low>{_NUMBER})"),
     re.compile(rf"<=\s*(?P<high>{_NUMBER})"),
 )
-_NUMBERS: dict[str, Kind] = {"number": "number", "double": "number", "decimal": "number", "integer": "int", "long": "int"}
+_NUMBERS = {"number": NUMBER, "double": NUMBER, "decimal": NUMBER, "integer": INT, "long": INT} | {
+    name: Domain(name) for name, kind in KINDS.items() if kind.is_spelt
+}
 
 
 @dataclass(frozen=True)
@@ -141,15 +145,25 @@ def _is_string_test(test: str) -> bool:
     return test in ("", "-") or bool(re.fullmatch(r"not\s*\((.*)\)", test, re.DOTALL) or STRINGS.fullmatch(test))
 
 
-def _bounded(kind: Kind, allowed: str, place: str) -> tuple[Domain, list[Remark]]:
+def _bounded(domain: Domain, allowed: str, place: str) -> tuple[Domain, list[Remark]]:
     """A domain of numbers, with the bounds that allowed values give where they are closed."""
     ends = next((found for pattern in _BOUNDS if (found := pattern.fullmatch(allowed))), None)
     if ends is not None:
-        low, high = (None if end is None else float(end) for end in map(ends.groupdict().get, ("low", "high")))
-        is_sound = (low is None or high is None or low < high) and not (kind == "int" and any(e and e % 1 for e in (low, high)))
+        low, high = (None if end is None else _read(end, domain) for end in map(ends.groupdict().get, ("low", "high")))
+        is_fitting = not any(end is not None and (end != end or (domain.type.is_whole and end % 1)) for end in (low, high))
+        is_sound = (low is None or high is None or low < high) and is_fitting
         if is_sound:
-            return Domain(kind, None, -math.inf if low is None else low, math.inf if high is None else high), []
-    return Domain(kind), [_unkept(allowed, place)] if allowed not in ("", "-") else []
+            return replace(domain, minimum=-math.inf if low is None else low, maximum=math.inf if high is None else high), []
+    return domain, [_unkept(allowed, place)] if allowed not in ("", "-") else []
+
+
+def _read(end: str, domain: Domain) -> float:
+    """The number of a bound; NaN where it is none of the type."""
+    text, spelling = number_in(end), domain.type.spelling
+    try:
+        return spelling.read(text) if re.fullmatch(spelling.number, text) else math.nan
+    except ValueError:
+        return math.nan
 
 
 def _unkept(allowed: str, place: str) -> Remark:

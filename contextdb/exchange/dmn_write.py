@@ -12,10 +12,9 @@ from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape
 
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import format_number
 from contextdb.console import printable
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
-from contextdb.exchange.feel import literal, unary_tests
+from contextdb.exchange.feel import feel_number, feel_type, literal, unary_tests
 from contextdb.exchange.reading import Remark, capped
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.table import Table
@@ -25,7 +24,6 @@ _HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
 _NEVER = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 """Characters that XML cannot hold."""
 _POLICIES = {"unique": "UNIQUE", "first": "FIRST", "collect": "COLLECT", "priority": "PRIORITY"}
-_TYPES = {"bool": "boolean", "int": "number", "number": "number", "angle": "number", "enum": "string", "text": "string"}
 
 
 def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
@@ -38,8 +36,8 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
     """
     table.require_readable()
     _require_xml(table)
-    inputs = [column for column in table.conditions if column.condition.domain.kind != "tags"]
-    tags = [column for column in table.conditions if column.condition.domain.kind == "tags"]
+    inputs = [column for column in table.conditions if not column.condition.domain.type.is_tags]
+    tags = [column for column in table.conditions if column.condition.domain.type.is_tags]
     rows, remarks = _rows(table, inputs)
     outputs = [table.asset_column, *(name for name in _plain(table) if name != table.asset_column)]
     parts = [
@@ -86,7 +84,7 @@ def _rows(table: Table, inputs: Sequence[ConditionColumn]) -> tuple[list[int], t
         remarks += [
             Remark(f"{in_quotes(c.texts[row])} becomes -: DMN has {why}.", f"{place}, column {in_quotes(c.condition.name)}", True)
             for c in inputs
-            if unary_tests(c.cell(row)) is None
+            if unary_tests(c.cell(row), c.condition.domain) is None
             for why in ("no penalties" if c.cell(row).is_soft else "no infinite numbers",)
         ]
     return rows, capped(remarks, "losses")
@@ -101,13 +99,13 @@ def _input(column: ConditionColumn) -> str:
     name, domain = _attribute(column.condition.name), column.condition.domain
     values = ",".join(map(literal, domain.values)) if domain.values else _bounds(domain)
     allowed = f"<inputValues><text>{_attribute(values)}</text></inputValues>" if values else ""
-    expression = f'<inputExpression typeRef="{_TYPES[domain.kind]}"><text>{name}</text></inputExpression>'
+    expression = f'<inputExpression typeRef="{feel_type(domain.type)}"><text>{name}</text></inputExpression>'
     return f'<input label="{name}">{expression}{allowed}</input>'
 
 
 def _bounds(domain: Domain) -> str:
     """The bounds of numbers as a unary test; nothing where there are none."""
-    low, high = (None if math.isinf(end) else format_number(end) for end in (domain.minimum, domain.maximum))
+    low, high = (None if math.isinf(end) else feel_number(end, domain.type) for end in (domain.minimum, domain.maximum))
     if low is None or high is None:
         return f">= {low}" if low is not None else f"<= {high}" if high is not None else ""
     return f"[{low}..{high}]"
@@ -121,7 +119,7 @@ def _output(number: int, name: str, default: str | None) -> str:
 def _rule(
     table: Table, row: int, inputs: Sequence[ConditionColumn], outputs: Sequence[str], tags: Sequence[ConditionColumn]
 ) -> str:
-    entries = [("inputEntry", unary_tests(column.cell(row)) or "-") for column in inputs]
+    entries = [("inputEntry", unary_tests(column.cell(row), column.condition.domain) or "-") for column in inputs]
     entries += [("outputEntry", literal(table.text(row, name))) for name in outputs]
     entries += [("annotationEntry", column.texts[row]) for column in tags]
     return f"<rule>{''.join(f'<{tag}><text>{_attribute(text)}</text></{tag}>' for tag, text in entries)}</rule>"
@@ -132,7 +130,7 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
     for column in tags:
         said = "tags become an annotation, which excludes nothing: DMN has no tests of sets."
         yield Remark(said, f"column {in_quotes(column.condition.name)}", True)
-    if any(_is_angle(column.condition.domain) for column in table.conditions):
+    if any(column.condition.domain.type.is_circular for column in table.conditions):
         yield Remark("angles are written from -180 to 180; give the decision angles in this range.")
     if table.settings.policy == "priority":
         yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
@@ -141,7 +139,3 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
         yield Remark(said, f"column {in_quotes(table.settings.when)}", True)
     if table.settings.assume:
         yield Remark("assume is not kept: a decision table has no equivalent.", is_loss=True)
-
-
-def _is_angle(domain: Domain) -> bool:
-    return domain.kind == "angle"

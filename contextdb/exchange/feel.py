@@ -7,8 +7,9 @@
     (10..30)  0..5 | 7      (10..30)  [0..5],7
     CB "Half Back"          "CB","Half Back"
     not CB                  not("CB")
+    2026-01-01..            >= date("2026-01-01")
 
-An angle is told by its numbers from -180 to 180. What has no counterpart (tags and soft cells here; functions, variables and dates
+An angle is told by its numbers from -180 to 180. What has no counterpart (tags and soft cells here; functions, variables and times
 there) is told by the callers with its place.
 
 Source: OMG, Decision Model and Notation 1.5, chapters 9 (S-FEEL) and 10.
@@ -19,8 +20,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from contextdb.cells.domains import NUMBER
-from contextdb.cells.grammar import Cell, NumberSet, ValueSet, format_cell
+from contextdb.cells.domains import NUMBER, Domain
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.kinds import KINDS, Kind
+from contextdb.cells.sets import Cell, NumberSet, ValueSet
 from contextdb.cells.words import NUMBER_TEXT, quoted
 
 _PART = re.compile(r'"(?:[^"\\]|\\.)*"?|[^,"]+|,', re.DOTALL)
@@ -32,9 +35,11 @@ STRINGS = re.compile(rf"\s*{STRING.pattern}\s*(?:,\s*{STRING.pattern}\s*)*", re.
 _ESCAPE = re.compile(r"\\(u[0-9A-Fa-f]{4}|U(?:0[0-9A-Fa-f]|10)[0-9A-Fa-f]{4}|.)", re.DOTALL)
 _ESCAPED = {"n": "\n", "r": "\r", "t": "\t"}
 _NOT = re.compile(r"not\s*\((.*)\)", re.DOTALL)
-_RANGE = re.compile(rf"([\[\](])\s*({NUMBER_TEXT})\s*\.\.\s*({NUMBER_TEXT})\s*([\[\])])")
-_COMPARED = re.compile(rf"(?:\?\s*(?=[<>=]))?(<=|>=|<|>|=)?\s*({NUMBER_TEXT})")
-_OURS = re.compile(rf"([\[(]?)({NUMBER_TEXT})?\.\.({NUMBER_TEXT})?([\])]?)")
+_SPELT = [rf'(?:{k.name}\(\s*"{k.spelling.number}"\s*\)|@"{k.spelling.number}")' for k in KINDS.values() if k.is_spelt]
+_LITERAL = "|".join([*_SPELT, NUMBER_TEXT])
+"""A number of FEEL, or what it writes as date("2026-01-31") or @"2026-01-31"."""
+_RANGE = re.compile(rf"([\[\](])\s*({_LITERAL})\s*\.\.\s*({_LITERAL})\s*([\[\])])")
+_COMPARED = re.compile(rf"(?:\?\s*(?=[<>=]))?(<=|>=|<|>|=)?\s*({_LITERAL})")
 
 
 MOST_NOTS = 8
@@ -86,13 +91,32 @@ def _number_part(part: str) -> str | None:
     if "inf" in part.casefold():  # a name like any other to FEEL
         return None
     if found := _COMPARED.fullmatch(part):
-        return f"{found[1] or ''}{found[2]}"
+        return f"{found[1] or ''}{number_in(found[2])}"
     found = _RANGE.fullmatch(part)
-    if not found or float(found[2]) > float(found[3]):
+    if not found:
+        return None
+    low, high = number_in(found[2]), number_in(found[3])
+    if any(_is_descending(low, high, kind) for kind in KINDS.values() if kind.is_numeric):
         return None
     left, right = "[" if found[1] == "[" else "(", "]" if found[4] == "]" else ")"
-    body = f"{found[2]}..{found[3]}"
+    body = f"{low}..{high}"
     return body if (left, right) == ("[", "]") else f"{left}{body}{right}"
+
+
+def number_in(literal: str) -> str:
+    """A number of FEEL as a cell writes it: without what stands round a date."""
+    return next(iter(re.findall(r'"(.*?)"', literal)), literal)
+
+
+def _is_descending(low: str, high: str, kind: Kind) -> bool:
+    """Whether two numbers are such of a type, and the first is above the second."""
+    spelling = kind.spelling
+    if not (re.fullmatch(spelling.number, low) and re.fullmatch(spelling.number, high)):
+        return False
+    try:
+        return spelling.read(low) > spelling.read(high)
+    except ValueError:
+        return False
 
 
 def string_of(literal: str) -> str:
@@ -120,23 +144,40 @@ def value_of(expression: str) -> str | None:
 # ---- to FEEL
 
 
-def unary_tests(cell: Cell) -> str | None:
+def feel_type(kind: Kind) -> str:
+    """The type of FEEL that facts of a type have."""
+    return kind.name if kind.is_spelt else "number" if kind.is_numeric else "boolean" if kind.is_truth else "string"
+
+
+def unary_tests(cell: Cell, domain: Domain) -> str | None:
     """The unary tests that mean the same as a cell; None for what they cannot say: tags, penalties, cells that nothing matches."""
     if cell.is_any:
         return "-"
     if cell.is_soft or cell.is_empty:
         return None
     if isinstance(cell.accepts, NumberSet):
-        parts = [_number_test(part) for part in format_cell(Cell(NumberSet(cell.accepts.spans)), NUMBER).split(" | ")]
+        line = NUMBER if domain.type.is_circular else domain
+        written = format_cell(Cell(NumberSet(cell.accepts.spans)), line).split(" | ")
+        parts = [_number_test(part, line.type) for part in written]
         return None if None in parts else ",".join(part for part in parts if part is not None)
     return _values_test(cell.accepts) if isinstance(cell.accepts, ValueSet) else None
 
 
-def _number_test(part: str) -> str | None:
-    found = _OURS.fullmatch(part)
+def feel_number(number: float, kind: Kind) -> str:
+    """A number as FEEL writes it."""
+    return _written(kind.spelling.write(number), kind)
+
+
+def _written(text: str, kind: Kind) -> str:
+    return f"{kind.name}({literal(text)})" if kind.is_spelt else text
+
+
+def _number_test(part: str, kind: Kind) -> str | None:
+    number = kind.spelling.number
+    found = re.fullmatch(rf"([\[(]?)({number})?\.\.({number})?([\])]?)", part)
     if not found:
-        return part if re.fullmatch(NUMBER_TEXT, part) and "inf" not in part else None
-    left, low, high, right = found.groups()
+        return _written(part, kind) if re.fullmatch(number, part) and "inf" not in part else None
+    left, low, high, right = found[1], *(text and _written(text, kind) for text in (found[2], found[3])), found[4]
     if "inf" in part:
         return None
     if low is None or high is None:

@@ -10,8 +10,9 @@ from typing import Literal
 import numpy as np
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC, Domain
+from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import reads
+from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, plural, some
@@ -121,12 +122,14 @@ def as_type(mapped: Mapped, column: TextColumn, kind: str) -> Mapped:
         An enum is wanted, and no cell holds a name.
     """
     declared: dict[str, object] = {"type": kind}
-    cells = mapped.names if kind in ("enum", "text") else None
+    cells = mapped.names if KINDS[kind].is_named else None
     column = cells or column
-    if kind == "enum":
+    if KINDS[kind].needs_values:
         declared["values"] = names_of(column)
         if not declared["values"]:
-            raise ContextDBError(Fault(f"{in_quotes(column.name)} cannot be an enum: no cell holds a name.", "any other type"))
+            raise ContextDBError(
+                Fault(f"{in_quotes(column.name)} cannot be {KINDS[kind].noun}: no cell holds a name.", "any other type")
+            )
     domain = conditions_from_dict({"x": declared})["x"].domain
     n_wrong = n_unreadable(column, domain)[0]
     return replace(mapped, job="condition", declared=declared, is_new=True, why="chosen", n_unreadable=n_wrong, cells=cells)
@@ -271,12 +274,11 @@ def _condition(column: TextColumn, name: str, reading: Reading, known: _Known) -
 
 
 def _as_declared(column: TextColumn, condition: Condition, why: str, names: TextColumn | None) -> Mapped:
-    cells = _fitting(column, names, condition.domain) if names and condition.domain.kind in ("enum", "text") else None
+    cells = _fitting(column, names, condition.domain) if names and condition.domain.type.is_named else None
     n_wrong, example = n_unreadable(cells or column, condition.domain)
-    kind = condition.domain.kind
     if n_wrong:
-        why = f"{why}; {plural(n_wrong, 'cell')} cannot be read as {kind}, such as {in_quotes(example)}"
-    if kind in NUMERIC:
+        why = f"{why}; {plural(n_wrong, 'cell')} cannot be read as {condition.domain.kind}, such as {in_quotes(example)}"
+    if condition.domain.type.is_decimal:
         why += pair_in(column.texts)
     return Mapped(column.name, condition.name, "condition", why, None, False, n_wrong, names=names, cells=cells)
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
-from contextdb.cells.grammar import Cell, TagSet, ValueSet, parse_cell, reads
+from contextdb.cells.domains import ANGLE, BOOL, DATE, INT, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.numbers import doubtful
-from contextdb.cells.words import ANY_WORDS
+from contextdb.cells.sets import Cell, TagSet, ValueSet
+from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import CellError, in_quotes, plural
 from contextdb.exchange.reading import ERRORS, listed
@@ -61,7 +62,7 @@ class _Said:
     @classmethod
     def by(cls, column: TextColumn) -> _Said:
         counts = np.bincount(column.codes, minlength=len(column.texts)).tolist()
-        said = [(t, n) for t, n in zip(column.texts, counts, strict=True) if n and t.strip().casefold() not in ANY_WORDS]
+        said = [(t, n) for t, n in zip(column.texts, counts, strict=True) if n and not says_any(t)]
         n_errors = sum(n for t, n in said if t.strip() in ERRORS)
         said = sorted((item for item in said if item[0].strip() not in ERRORS), key=lambda item: -item[1])
         return cls([t for t, _ in said], [n for _, n in said], sum(n for _, n in said), n_errors)
@@ -114,24 +115,27 @@ def propose_type(column: TextColumn, names: TextColumn | None = None) -> Proposa
     """
     said = _Said.by(column)
     if not said.texts:
-        return _with_unread({"type": "text"}, "no cell says anything but Any", said, TEXT)
+        return _with_unread("no cell says anything but Any", said, TEXT)
     if all(text.strip() in ("0", "1") for text in said.texts):
         if _is_measure(column.name):
             return _number(column.name, said)
-        return _with_unread({"type": "int"}, "the cells are 0 and 1; bool, if they mean False and True", said, INT)
+        return _with_unread("the cells are 0 and 1; bool, if they mean False and True", said, INT)
     if said.mostly(BOOL):
-        return _with_unread({"type": "bool"}, f"{plural(said.n_rows, 'cell')} of True and False", said, BOOL)
+        return _with_unread(f"{plural(said.n_rows, 'cell')} of True and False", said, BOOL)
     if said.mostly(NUMBER) or said.is_numeric:
         return _number(column.name, said)
+    if said.mostly(DATE):
+        return _with_unread(f"{plural(said.n_rows, 'cell')} of dates", said, DATE)
     if said.mostly(TAGS):
-        return _with_unread(_tags(said), "every word has a + or a - before it", said, TAGS)
+        return _with_unread("every word has a + or a - before it", said, _tags(said))
     if names is None:
         return _names(said, said.mostly(TEXT))
     proposal = _names(_Said.by(names), said.are_mostly(_is_short))
     return proposal if proposal.declared is None else replace(proposal, are_names=True)
 
 
-def _with_unread(declared: Mapping[str, object], why: str, said: _Said, domain: Domain) -> Proposal:
+def _with_unread(why: str, said: _Said, domain: Domain) -> Proposal:
+    declared: dict[str, object] = {"type": domain.kind} | ({} if domain.values is None else {"values": list(domain.values)})
     n_unread = said.n_unread(domain)
     return Proposal(declared, f"{why}; {plural(n_unread, 'cell')} cannot be read so" if n_unread else why, n_unread)
 
@@ -147,11 +151,11 @@ def _number_type(name: str, said: _Said) -> Proposal:
     is_angle = _ANGLE_NAME.search(name) is not None or backwards is not None
     if is_angle and all(_is_within_turn(text) and reads(text, ANGLE) for text in texts):
         why = f'"{backwards}" runs through 180' if backwards else "the name suggests an angle, and no number is above 360"
-        return _with_unread({"type": "angle"}, why, said, ANGLE)
+        return _with_unread(why, said, ANGLE)
     measured = _measured(name, texts)
     if measured is None:
-        return _with_unread({"type": "int"}, "whole numbers alone, as counts are", said, INT)
-    return _with_unread({"type": "number"}, measured, said, NUMBER)
+        return _with_unread("whole numbers alone, as counts are", said, INT)
+    return _with_unread(measured, said, NUMBER)
 
 
 def _measured(name: str, texts: Sequence[str]) -> str | None:
@@ -182,12 +186,12 @@ def _is_within_turn(text: str) -> bool:
     return all(abs(float(number)) <= 360 for number in re.findall(r"\d+(?:\.\d+)?", text))
 
 
-def _tags(said: _Said) -> dict[str, object]:
+def _tags(said: _Said) -> Domain:
     found: dict[str, None] = {}
     for cell in _cells(said, TAGS):
         if isinstance(cell.accepts, TagSet):
             found |= dict.fromkeys(sorted(cell.accepts.needs | cell.accepts.bans))
-    return {"type": "tags", "values": sorted(found)} if found and _can_be_declared(found) else {"type": "tags"}
+    return replace(TAGS, values=tuple(sorted(found))) if found and _can_be_declared(found) else TAGS
 
 
 def _can_be_declared(names: Iterable[str]) -> bool:
@@ -210,10 +214,10 @@ def _names(said: _Said, are_names: bool) -> Proposal:
             names |= dict.fromkeys(_in_order(cell.accepts))
     if len(names) <= MOST_ENUM_VALUES and _can_be_declared(names) and (len(names) < said.n_rows or said.n_rows < FEW_ROWS):
         why = f"{plural(len(names), 'name')} in {plural(said.n_rows, 'cell')}: {listed(list(names), 4)}"
-        return _with_unread({"type": "enum", "values": list(names)}, why, said, Domain("enum", tuple(names)))
+        return _with_unread(why, said, Domain("enum", tuple(names)))
     if len(names) == said.n_rows:
         return Proposal(None, "every row has a different name: data for the game, or a note")
-    return _with_unread({"type": "text"}, f"{plural(len(names), 'different name')}", said, TEXT)
+    return _with_unread(f"{plural(len(names), 'different name')}", said, TEXT)
 
 
 def _in_order(accepts: ValueSet) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.words import ANY_WORDS, quoted
+from contextdb.cells.words import quoted, says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import TableError, shown
 from contextdb.files.texts import AnySource
@@ -105,7 +105,7 @@ class Reading:
 def _whole_name(text: str) -> str:
     """A text of another program as a cell that accepts this one name; what says Any stays, and so does an error of Excel."""
     name = text.strip()
-    return text if name.casefold() in ANY_WORDS or name in ERRORS or quoted(name) == name else quoted(name)
+    return text if says_any(name) or name in ERRORS or quoted(name) == name else quoted(name)
 
 
 def capped(remarks: Sequence[Remark], what: str) -> tuple[Remark, ...]:

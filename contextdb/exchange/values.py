@@ -5,8 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 
-from contextdb.cells.grammar import format_number
-from contextdb.cells.words import quoted
+from contextdb.cells.words import format_number, quoted
 
 DATES = (datetime.date, datetime.time, datetime.datetime, datetime.timedelta)
 
@@ -14,7 +13,8 @@ DATES = (datetime.date, datetime.time, datetime.datetime, datetime.timedelta)
 def text_of_value(value: object) -> str:
     """The text of a value: a string as it is, a bool True or False, a number in the fewest digits, a list its names, None empty.
 
-    Dates become ISO texts; NaN, which no cell can mean, is empty. What is nested deeper becomes its Python text.
+    Dates become ISO texts, at midnight without a time; NaN, which no cell can mean, is empty. What is nested deeper becomes its
+    Python text.
     """
     if isinstance(value, str):
         return value
@@ -26,6 +26,8 @@ def text_of_value(value: object) -> str:
         return str(value)
     if isinstance(value, float):
         return format_number(value)
+    if isinstance(value, datetime.datetime) and value.time() == datetime.time():
+        return value.date().isoformat()
     if isinstance(value, (datetime.date, datetime.time)):
         return value.isoformat()
     if isinstance(value, (list, tuple)):

@@ -209,7 +209,7 @@ def _dates(values: Sequence[Sequence[Any]]) -> Sequence[Remark]:
 
 
 def _date(value: object, row: int, column: int) -> Remark:
-    told = f"a date, {text_of_value(value)}, as Excel makes of texts such as 1-2; write it as text there."
+    told = f"a date, {text_of_value(value)}, as Excel makes of texts such as 1-2; write it as text there, unless a day is meant."
     return Remark(told, f"cell {column_letters(column)}{row}", is_loss=True)
 
 

@@ -190,9 +190,9 @@ def _lists(table: Table) -> Lists:
     lists: Lists = {table.settings.enabled: ("True", "False")} if table.settings.enabled else {}
     for column in table.conditions:
         domain = column.condition.domain
-        if domain.kind == "bool":
+        if domain.type.is_truth:
             lists[column.condition.name] = ("True", "False", "Any")
-        elif domain.kind == "enum" and domain.values:
+        elif domain.type.needs_values and domain.values:
             lists[column.condition.name] = (*map(quoted, domain.values), "Any")
     return lists
 

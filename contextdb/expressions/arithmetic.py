@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from contextdb.cells.domains import wrap_angle
+from contextdb.cells.angles import wrap_angle, wrap_angles
 from contextdb.expressions import trigonometry
 from contextdb.expressions.trigonometry import Doubles, Value
 
@@ -133,12 +133,6 @@ def wrapped(degrees: float) -> float:
     return wrap_angle(degrees) if math.isfinite(degrees) else math.nan
 
 
-def all_wrapped(degrees: Doubles) -> Doubles:
-    """The same angles in [-180, 180)."""
-    rest = np.fmod(degrees, 360.0)
-    return np.where(rest >= 180.0, rest - 360.0, np.where(rest < -180.0, rest + 360.0, rest))
-
-
 def heading(y: float, x: float) -> float:
     """The direction of the vector (x, y), in [-180, 180)."""
     return wrapped(trigonometry.direction(y, x))
@@ -146,4 +140,4 @@ def heading(y: float, x: float) -> float:
 
 def headings(y: Doubles, x: Doubles) -> Doubles:
     """The direction of each vector."""
-    return all_wrapped(trigonometry.directions(y, x))
+    return wrap_angles(trigonometry.directions(y, x))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL
-from contextdb.cells.grammar import NumberSet, ValueSet
+from contextdb.cells.sets import NumberSet, ValueSet
 from contextdb.errors import Fault, in_quotes
 from contextdb.expressions.boxes import Box, NoBoxes, Sets, all_of
 from contextdb.expressions.expression import Expression, read_expression
@@ -129,9 +129,9 @@ def _domain_box(conditions: Mapping[str, Condition]) -> Sets:
     box: Sets = {}
     for name, condition in conditions.items():
         domain = condition.domain
-        if domain.kind in ("int", "number"):
+        if domain.type.is_bounded:
             box[name] = NumberSet(((domain.minimum, domain.maximum),))
-        elif domain.kind == "enum":
+        elif domain.type.needs_values:
             box[name] = ValueSet(frozenset(domain.known))
     return box
 

@@ -11,11 +11,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import chain, islice, product
 
-from contextdb.cells import intervals
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import Domain, Kind
+from contextdb.cells.domains import ANGLE, NUMBER, Domain
 from contextdb.cells.facts import Fact
-from contextdb.cells.grammar import Accepted, Cell, NumberSet, TagSet, ValueSet, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.kinds import Kind
+from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, complement, meet_plainly, plain_parts, union
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
 from contextdb.expressions.scalar import runner
 
@@ -57,7 +58,7 @@ def _meets(accepts: Accepted | None, fact: Fact) -> bool:
     own = fact.accepts
     if accepts is None or own is None or (isinstance(own, TagSet) and own.is_complement):
         return True
-    return not shared(accepts, own).is_empty
+    return not meet_plainly(accepts, own).is_empty
 
 
 class _Boxes:
@@ -109,7 +110,7 @@ class _Boxes:
         if not (isinstance(left, Given) and isinstance(right, Const)):
             raise NoBoxes
         is_on_circle = link.is_wrapped or link.left_is_high or link.right_is_high
-        if is_on_circle and left.kind != "angle":
+        if is_on_circle and not left.kind.is_circular:
             raise NoBoxes
         accepts, is_other = _compared(left.kind, link.sign, right.value)
         return _alternatives(left.name, accepts, self.conditions[left.name].domain, truth is not is_other)
@@ -119,7 +120,7 @@ def _is_truth(plan: Part) -> bool:
     if isinstance(plan, Select):
         return _is_truth(plan.then)
     if isinstance(plan, (Const, Given)):
-        return isinstance(plan.value, bool) if isinstance(plan, Const) else plan.kind == "bool"
+        return isinstance(plan.value, bool) if isinstance(plan, Const) else plan.kind.is_truth
     return not isinstance(plan, Apply)
 
 
@@ -127,36 +128,17 @@ def _compared(kind: Kind, sign: str, value: float | str | bool) -> tuple[Accepte
     """The values that a comparison accepts, or (True) those that it does not."""
     if isinstance(value, (str, bool)):
         return ValueSet(frozenset((value,))), sign == "!="
-    accepts = parse_cell(f"{_OF_CELLS.get(sign, sign)}{value!r}", Domain(kind)).accepts
-    assert accepts is not None
-    return accepts, sign == "!="
+    accepts = parse_cell(f"{_OF_CELLS.get(sign, sign)}{value!r}", ANGLE if kind.is_circular else NUMBER).accepts
+    assert isinstance(accepts, NumberSet)
+    return NumberSet(kind.fitted(accepts.spans), kind.is_circular), sign == "!="
 
 
 def _alternatives(name: str, accepts: Accepted, domain: Domain, truth: bool) -> list[Sets]:
     """The boxes that hold what a set of one condition accepts, or what it does not."""
     if isinstance(accepts, TagSet):
-        return [{name: tags} for tags in _tag_sets(accepts, truth) if not tags.is_empty]
-    found = accepts if truth else _complement(accepts, domain)
+        return [{name: tags} for tags in plain_parts(accepts, truth) if not tags.is_empty]
+    found = accepts if truth else complement(accepts, domain, is_bounded=False)
     return [] if found.is_empty else [{name: found}]
-
-
-def _tag_sets(tags: TagSet, truth: bool) -> list[TagSet]:
-    if tags.is_complement is not truth:
-        return [TagSet(tags.needs, tags.bans)]
-    none: frozenset[str] = frozenset()
-    lacking = [TagSet(none, frozenset((need,))) for need in sorted(tags.needs)]
-    return lacking + [TagSet(frozenset((ban,))) for ban in sorted(tags.bans)]
-
-
-def _complement(accepts: NumberSet | ValueSet, domain: Domain) -> NumberSet | ValueSet:
-    if isinstance(accepts, NumberSet):
-        low, high = intervals.CIRCLE if domain.kind == "angle" else intervals.EVERYTHING[0]
-        rest = intervals.complement(accepts.spans, low, high)
-        return NumberSet(intervals.whole(rest) if domain.kind == "int" else rest, accepts.is_circular)
-    everything = (False, True) if domain.kind == "bool" else domain.values
-    if everything is None:
-        return ValueSet(accepts.values, not accepts.is_complement)
-    return ValueSet(frozenset(v for v in everything if not accepts.holds(v)))
 
 
 def all_of(found: Iterable[list[Sets]]) -> list[Sets]:
@@ -172,7 +154,7 @@ def all_of(found: Iterable[list[Sets]]) -> list[Sets]:
 
 def any_of(found: Iterable[list[Sets]]) -> list[Sets]:
     """The boxes of some lists together; those on the same single condition are joined where one set can tell them."""
-    single: dict[str, Accepted] = {}
+    single: dict[str, NumberSet | ValueSet] = {}
     others: dict[tuple[tuple[str, Accepted], ...], Sets] = {}
     for box in chain.from_iterable(found):
         if not box:
@@ -181,10 +163,11 @@ def any_of(found: Iterable[list[Sets]]) -> list[Sets]:
         if more or isinstance(accepts, TagSet):
             others.setdefault(((name, accepts), *more), box)
         else:
-            single[name] = _union(single[name], accepts) if name in single else accepts
+            single[name] = union(single[name], accepts) if name in single else accepts
     if len(single) + len(others) > MOST_BOXES:
         raise NoBoxes
-    return [*({name: accepts} for name, accepts in single.items()), *others.values()]
+    joined: list[Sets] = [{name: accepts} for name, accepts in single.items()]
+    return [*joined, *others.values()]
 
 
 def _first(pair: tuple[str, Accepted]) -> str:
@@ -195,36 +178,7 @@ def _intersection(a: Sets, b: Sets) -> Sets | None:
     """What two boxes share; None where that is nothing."""
     both = dict(a)
     for name, accepts in b.items():
-        both[name] = shared(both[name], accepts) if name in both else accepts
+        both[name] = meet_plainly(both[name], accepts) if name in both else accepts
         if both[name].is_empty:
             return None
     return both
-
-
-def shared(a: Accepted, b: Accepted) -> Accepted:
-    """What two sets of one condition have in common; a set of tags must not be a complement."""
-    if isinstance(a, NumberSet) and isinstance(b, NumberSet):
-        spans = intervals.union((max(low, first), min(high, last)) for low, high in a.spans for first, last in b.spans)
-        return NumberSet(spans, a.is_circular)
-    if isinstance(a, TagSet) and isinstance(b, TagSet):
-        return TagSet(a.needs | b.needs, a.bans | b.bans)
-    assert isinstance(a, ValueSet)
-    assert isinstance(b, ValueSet)
-    if a.is_complement and b.is_complement:
-        return ValueSet(a.values | b.values, True)
-    if a.is_complement:
-        a, b = b, a
-    return ValueSet(frozenset(v for v in a.values if b.holds(v)))
-
-
-def _union(a: Accepted, b: Accepted) -> Accepted:
-    if isinstance(a, NumberSet) and isinstance(b, NumberSet):
-        spans = intervals.union((*a.spans, *b.spans))
-        return NumberSet(spans, a.is_circular)
-    assert isinstance(a, ValueSet)
-    assert isinstance(b, ValueSet)
-    if not (a.is_complement or b.is_complement):
-        return ValueSet(a.values | b.values)
-    rest = shared(*(ValueSet(s.values, not s.is_complement) for s in (a, b)))
-    assert isinstance(rest, ValueSet)
-    return ValueSet(rest.values, not rest.is_complement)

@@ -10,12 +10,13 @@ from collections.abc import Mapping
 from functools import singledispatchmethod
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import Kind
-from contextdb.cells.grammar import format_number
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT
+from contextdb.cells.kinds import Kind
+from contextdb.cells.words import format_number
 from contextdb.errors import in_quotes, nearest, plural, some
 from contextdb.expressions.faults import Refusal, UnknownName
 from contextdb.expressions.functions import FUNCTIONS, MOST_POWER, NEGATIVE, OPERATORS, Function, power_of
-from contextdb.expressions.membership import holding, require_value, said
+from contextdb.expressions.membership import SPELT, holding, require_value, spelt, spelt_alike
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Link, Logic, Negation, Part, Select, Type
 from contextdb.expressions.scalar import constant
 from contextdb.expressions.tokens import written_name, written_text
@@ -38,7 +39,7 @@ from contextdb.expressions.tree import (
 
 Checked = tuple[Part, Type]
 
-_TRUTH = Type("bool")
+_TRUTH = Type(BOOL.type)
 
 
 class Checker:
@@ -62,11 +63,11 @@ class Checker:
 
     @check.register
     def _(self, node: Number) -> Checked:
-        return Const(node.value), Type("int" if node.value.is_integer() else "number")
+        return Const(node.value), Type(INT.type if node.value.is_integer() else NUMBER.type)
 
     @check.register
     def _(self, node: Text) -> Checked:
-        return Const(node.value), Type("text", frozenset((node.value,)))
+        return Const(node.value), Type(TEXT.type, frozenset((node.value,)))
 
     @check.register
     def _(self, node: Truth) -> Checked:
@@ -80,9 +81,9 @@ class Checker:
         if node.name not in self.names:
             self.names.append(node.name)
         domain = condition.domain
-        unit = condition.unit if condition.unit and domain.kind in ("int", "number") else None
-        values = domain.known if domain.kind == "enum" else None
-        return Given(node.name, domain.kind), Type(domain.kind, values, unit)
+        unit = condition.unit if condition.unit and domain.type.has_unit else None
+        values = domain.known if domain.type.needs_values else None
+        return Given(node.name, domain.type), Type(domain.type, values, unit)
 
     @check.register
     def _(self, node: Unary) -> Checked:
@@ -91,7 +92,7 @@ class Checker:
             self._need_truth(node.part, found, '"not"')
             return self._folded(node, Negation(part)), _TRUTH
         self._need_number(node.part, found, in_quotes(node.sign))
-        kind = "number" if found.kind == "angle" else found.kind
+        kind = INT.type if found.kind.is_whole else NUMBER.type
         plan = part if node.sign == "+" else self._folded(node, Apply(NEGATIVE, (part,)))
         return plan, Type(kind, None, found.unit)
 
@@ -109,6 +110,8 @@ class Checker:
 
     @check.register
     def _(self, node: Call) -> Checked:
+        if node.name in SPELT:
+            return self._literal(node, SPELT[node.name])
         function = FUNCTIONS.get(node.name)
         if function is None:
             raise self._no_function(node)
@@ -121,6 +124,13 @@ class Checker:
             self._need_number(part, found, in_quotes(node.name))
         return self._applied(node, function, parts)
 
+    def _literal(self, node: Call, kind: Kind) -> Checked:
+        """A number that is spelt as a text: date("2026-01-31")."""
+        text = node.arguments[0] if len(node.arguments) == 1 else None
+        if not isinstance(text, Text):
+            raise Refusal(node.start, node.stop, f"{in_quotes(kind.name)} takes one text in quotes", kind.result)
+        return spelt(text, kind)
+
     @check.register
     def _(self, node: LogicNode) -> Checked:
         plans = []
@@ -132,7 +142,7 @@ class Checker:
 
     @check.register
     def _(self, node: Comparison) -> Checked:
-        parts = [self.check(part) for part in node.operands]
+        parts = spelt_alike([(part, *self.check(part)) for part in node.operands])
         links = []
         for i, sign in enumerate(node.signs):
             links.append(self._link(sign, node.operands[i], parts[i], node.operands[i + 1], parts[i + 1]))
@@ -152,7 +162,7 @@ class Checker:
         (then, a), (otherwise, b) = self.check(node.then), self.check(node.otherwise)
         kind = _common_kind(a, b)
         if kind is None:
-            why = f'before "if" is {said(a)}, after "else" {said(b)}'
+            why = f'before "if" is {a.kind.value}, after "else" {b.kind.value}'
             raise Refusal(node.start, node.stop, why, "two values of one type")
         values = a.values | b.values if a.values is not None and b.values is not None else None
         result = Type(kind, values, self._common_unit(node, [a, b]))
@@ -187,18 +197,20 @@ class Checker:
         if found.is_number:
             return
         meant = None
-        if found.kind == "bool" and isinstance(node, Name):
+        if found.kind.is_truth and isinstance(node, Name):
             meant = f"(1 if {written_name(node.name)} else 0)"
         elif isinstance(node, Text) and node.value in self.conditions:
             meant = written_name(node.value)
-        raise Refusal(node.start, node.stop, f"{who} takes numbers, and this is {said(found)}", "a number", meant)
+        raise Refusal(node.start, node.stop, f"{who} takes numbers, and this is {found.kind.value}", "a number", meant)
 
     def _need_truth(self, node: Node, found: Type, who: str) -> None:
-        if found.kind == "bool":
+        if found.kind.is_truth:
             return
         meant = {Number: {0.0: "False", 1.0: "True"}.get(node.value)} if isinstance(node, Number) else {}
         accepted = 'True or False: a bool, a comparison such as speed > 0, or such as "InAir" in Tags'
-        raise Refusal(node.start, node.stop, f"{who} takes True or False, and this is {said(found)}", accepted, meant.get(Number))
+        raise Refusal(
+            node.start, node.stop, f"{who} takes True or False, and this is {found.kind.value}", accepted, meant.get(Number)
+        )
 
     def _common_unit(self, node: Node, found: list[Type]) -> str | None:
         units = list(dict.fromkeys(t.unit for t in found if t.unit))
@@ -210,10 +222,10 @@ class Checker:
     def _applied(self, node: Node, function: Function, parts: list[Checked]) -> Checked:
         types = [found for _, found in parts]
         unit = self._common_unit(node, types) if function.keeps_unit else None
-        is_whole = all(t.kind == "int" for t in types)
-        kind: Kind = "angle" if function.gives == "angle" else "number"
+        is_whole = all(t.kind.is_whole for t in types)
+        kind = ANGLE.type if function.gives == "angle" else NUMBER.type
         if function.gives == "whole" or (function.gives == "whole if whole" and is_whole):
-            kind = "int"
+            kind = INT.type
         return self._folded(node, Apply(function, tuple(plan for plan, _ in parts))), Type(kind, None, unit)
 
     def _power(self, node: Arithmetic) -> Checked:
@@ -241,7 +253,7 @@ class Checker:
         if a[1].is_number and b[1].is_number:
             return self._number_link(sign, left, a, right, b)
         for node, (_, found) in ((left, a), (right, b)):
-            if found.kind == "tags":
+            if found.kind.is_tags:
                 accepted = '"InAir" in Tags, or Tags in "+InAir -Stunned"'
                 raise Refusal(node.start, node.stop, f"a set of tags is not compared with {in_quotes(sign)}", accepted)
         if a[1].is_number or b[1].is_number or a[1].is_text is not b[1].is_text:
@@ -257,13 +269,13 @@ class Checker:
     def _two_kinds(self, left: Node, a: Type, right: Node, b: Type) -> Refusal:
         for node in (left, right):
             if isinstance(node, Text) and node.value in self.conditions:
-                why = f"{said(a)} is compared with {said(b)}"
+                why = f"{a.kind.value} is compared with {b.kind.value}"
                 return Refusal(node.start, node.stop, why, "two values of one type", written_name(node.value))
-        return Refusal(left.start, right.stop, f"{said(a)} is compared with {said(b)}", "two values of one type")
+        return Refusal(left.start, right.stop, f"{a.kind.value} is compared with {b.kind.value}", "two values of one type")
 
     def _number_link(self, sign: str, left: Node, a: Checked, right: Node, b: Checked) -> Link:
         self._common_unit_of_link(left, right, a[1], b[1])
-        n_angles = (a[1].kind == "angle") + (b[1].kind == "angle")
+        n_angles = a[1].kind.is_circular + b[1].kind.is_circular
         if sign in ("==", "!="):
             return Link(sign, is_wrapped=n_angles > 0)
         if n_angles == 2:
@@ -278,15 +290,15 @@ class Checker:
                     node.start, node.stop, f"an angle is from -180 to 180, and {told} is outside", 'heading in "170..190"'
                 )
         is_upper = sign in (">", ">=")
-        return Link(sign, left_is_high=is_upper and a[1].kind == "angle", right_is_high=not is_upper and b[1].kind == "angle")
+        return Link(sign, left_is_high=is_upper and a[1].kind.is_circular, right_is_high=not is_upper and b[1].kind.is_circular)
 
     def _common_unit_of_link(self, left: Node, right: Node, a: Type, b: Type) -> None:
         self._common_unit(Node(left.start, right.stop), [a, b])
 
 
 def _common_kind(a: Type, b: Type) -> Kind | None:
-    if a.kind == b.kind:
+    if a.kind is b.kind:
         return a.kind
     if a.is_number and b.is_number:
-        return "number"
-    return "text" if a.is_text and b.is_text else None
+        return INT.type if a.kind.is_whole and b.kind.is_whole else NUMBER.type
+    return TEXT.type if a.is_text and b.is_text else None

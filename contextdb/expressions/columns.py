@@ -17,12 +17,13 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from contextdb.cells.angles import wrap_angles
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC, Kind
+from contextdb.cells.fact_columns import as_series, plain_numbers
 from contextdb.cells.facts import read_fact
-from contextdb.cells.grammar import Cell
+from contextdb.cells.kinds import Kind
+from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError, Fault, Place
-from contextdb.expressions.arithmetic import all_wrapped
 
 Doubles = NDArray[np.float64]
 Truths = NDArray[np.int8]
@@ -54,36 +55,29 @@ def read_column(given: Any, condition: Condition, n_contexts: int) -> Column:
     ContextError
         A fact is of the wrong type, outside the domain, or a set of values; names its row.
     """
-    kind = condition.domain.kind
+    kind = condition.domain.type
     if given is None:
         return _all_missing(kind, n_contexts)
-    plain = _plain_numbers(given, kind) if kind in NUMERIC else _plain_truths(given) if kind == "bool" else None
-    if plain is None and kind in ("enum", "text"):
+    plain = _plain_numbers(given, kind) if kind.is_numeric else _plain_truths(given) if kind.is_truth else None
+    if plain is None and kind.is_named:
         return _texts(given, condition)
     return plain if plain is not None else _column_of(*_read_each(given, condition), kind)
 
 
 def _all_missing(kind: Kind, n_contexts: int) -> Column:
-    if kind in NUMERIC:
+    if kind.is_numeric:
         return np.full(n_contexts, np.nan)
-    return np.full(n_contexts, UNKNOWN) if kind == "bool" else Coded(np.full(n_contexts, -1, np.int32), ())
+    return np.full(n_contexts, UNKNOWN) if kind.is_truth else Coded(np.full(n_contexts, -1, np.int32), ())
 
 
 def _plain_numbers(given: Any, kind: Kind) -> Doubles | None:
     """A column of plain numbers; None when it must be read fact by fact."""
-    series = _series(given, pl.Float64)
-    if series is None or not series.dtype.is_numeric() or series.dtype.is_decimal():
-        return None
-    facts = series.cast(pl.Float64).fill_null(np.nan).to_numpy() + 0.0
-    if kind == "int" and not series.dtype.is_integer() and not (np.isnan(facts) | (facts == np.trunc(facts))).all():
-        return None
-    if kind == "angle":
-        return None if np.isinf(facts).any() else all_wrapped(facts) + 0.0
-    return facts
+    facts = plain_numbers(given, kind)
+    return None if facts is None else (wrap_angles(facts) if kind.is_circular else facts) + 0.0
 
 
 def _plain_truths(given: Any) -> Truths | None:
-    series = _series(given, pl.Boolean)
+    series = as_series(given, pl.Boolean())
     if series is None or series.dtype != pl.Boolean:
         return None
     truths: Truths = (series.cast(pl.Int8) * 2).fill_null(int(UNKNOWN)).to_numpy()
@@ -92,7 +86,7 @@ def _plain_truths(given: Any) -> Truths | None:
 
 def _texts(given: Any, condition: Condition) -> Coded:
     """A column of texts; only the distinct ones are read."""
-    series = _series(given, pl.String)
+    series = as_series(given, pl.String())
     if series is not None and isinstance(series.dtype, (pl.Categorical, pl.Enum)):
         series = series.cast(pl.String)
     if series is None or series.dtype != pl.String:
@@ -107,18 +101,6 @@ def _texts(given: Any, condition: Condition) -> Coded:
             raise _placed(error, row or 0, condition) from None
     codes = series.cast(pl.Enum(distinct)).to_physical().cast(pl.Int32).fill_null(-1)
     return Coded(codes.to_numpy(), tuple(listed))
-
-
-def _series(given: Any, listed: type[pl.DataType]) -> pl.Series | None:
-    """A column as a polars series; None when it has no single plain type. What is listed must be of the type `listed`."""
-    if isinstance(given, pl.Series):
-        return given
-    try:
-        if isinstance(given, np.ndarray) and given.dtype.kind in "biuf":
-            return pl.Series(given, nan_to_null=False)
-        return pl.Series(list(given), dtype=listed, strict=True, nan_to_null=False)
-    except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
-        return None
 
 
 def _read_each(given: Any, condition: Condition) -> tuple[list[int], list[Any]]:
@@ -155,9 +137,9 @@ def _placed(error: Exception, row: int, condition: Condition) -> ContextError:
 
 def _column_of(codes: list[int], values: list[Any], kind: Kind) -> Column:
     coded = _coded(codes, values)
-    if kind in NUMERIC:
+    if kind.is_numeric:
         return coded.looked_up(coded.values, np.nan, np.float64)
-    return coded.looked_up([YES if v else NO for v in coded.values], UNKNOWN, np.int8) if kind == "bool" else coded
+    return coded.looked_up([YES if v else NO for v in coded.values], UNKNOWN, np.int8) if kind.is_truth else coded
 
 
 def _coded(codes: list[int], values: list[Any]) -> Coded:

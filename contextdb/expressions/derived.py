@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cells.angles import wrap_angles
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
 from contextdb.cells.facts import describe, read_fact
-from contextdb.cells.grammar import ANY, Cell
+from contextdb.cells.sets import ANY, Cell
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, shown, some
-from contextdb.expressions.arithmetic import all_wrapped, settled, wrapped
+from contextdb.expressions.arithmetic import settled, wrapped
 from contextdb.expressions.columns import Coded, Column, as_facts, is_missing_in, read_column
 from contextdb.expressions.expression import Expression, check_length, read_expression
 from contextdb.expressions.faults import ExpressionError
@@ -102,7 +102,7 @@ class Derivation:
         for name, condition, run, needs in self._running:
             value = values[name] = _fitted(run(values), condition)
             if not is_missing(value):
-                found[name] = _as_whole(value) if condition.domain.kind == "int" else value
+                found[name] = condition.domain.type.given(value) if isinstance(value, float) else value
             elif open_names and _is_open(needs, values, open_names):
                 open_names.add(name)
                 found[name] = ANY
@@ -117,8 +117,7 @@ class Derivation:
     @cached_property
     def _reading(self) -> tuple[tuple[str, Condition, type | None, Value], ...]:
         """Each input, the type of which any value is in canonical form already, and its replacement where it is missing."""
-        usual = {"number": float, "bool": bool, "text": str}
-        return tuple((c.name, c, usual.get(c.domain.kind), NAN if c.domain.kind in NUMERIC else None) for c in self.inputs)
+        return tuple((c.name, c, c.domain.type.python, NAN if c.domain.type.is_numeric else None) for c in self.inputs)
 
     @cached_property
     def _running(self) -> tuple[tuple[str, Condition, Any, tuple[str, ...]], ...]:
@@ -158,7 +157,7 @@ class Derivation:
             return ContextError(Fault(found, _GIVE, rule="missing-fact"))
         used = self.only([name]).steps[-1].expression
         known = {**facts, **self.compute(facts)}
-        told = ", ".join(f"{c.name} = {describe(read_fact(known.get(c.name), c))}" for c in used.conditions[:6])
+        told = ", ".join(f"{c.name} = {describe(read_fact(known.get(c.name), c), c.domain)}" for c in used.conditions[:6])
         found += f": {in_quotes(used.text)} has no finite value with {told}."
         return ContextError(Fault(found, _GIVE_OTHERS, rule="missing-fact"))
 
@@ -188,22 +187,24 @@ def _is_open(needs: Iterable[str], values: Mapping[str, Value], open_names: set[
     return bool(absent) and absent <= open_names
 
 
-def _as_whole(value: Value) -> object:
-    return int(value) if isinstance(value, float) and math.isfinite(value) else value
-
-
 def _fitted(value: Value, condition: Condition) -> Value:
     """A value as a fact of its condition: an angle wrapped."""
-    if condition.domain.kind == "angle" and isinstance(value, float):
+    kind = condition.domain.type
+    if kind.is_circular and isinstance(value, float):
         return settled(wrapped(value))
-    return value
+    low, high = kind.limits
+    return NAN if isinstance(value, float) and not low <= value <= high else value
 
 
 def _all_fitted(column: Column, condition: Condition) -> Column:
-    if condition.domain.kind != "angle" or isinstance(column, Coded):
+    kind = condition.domain.type
+    low, high = kind.limits
+    if math.isfinite(low) and not isinstance(column, Coded):
+        return np.where((column >= low) & (column <= high), column, np.nan)
+    if not kind.is_circular or isinstance(column, Coded):
         return column
     with np.errstate(invalid="ignore"):
-        return settled(all_wrapped(column.astype(np.float64)))
+        return settled(wrap_angles(column.astype(np.float64)))
 
 
 def derive(conditions: Mapping[str, Condition]) -> Derivation:

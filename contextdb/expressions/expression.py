@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC, Kind
 from contextdb.cells.facts import read_fact
-from contextdb.cells.grammar import Cell
+from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.expressions.boxes import Box, boxes_of
 from contextdb.expressions.check import Checker
@@ -48,9 +47,9 @@ class Expression:
         return tuple(condition.name for condition in self.conditions)
 
     @property
-    def kind(self) -> Kind:
-        """The kind of its values: bool, int, number, angle, enum, text or tags."""
-        return self.type.kind
+    def kind(self) -> str:
+        """The name of the type of its values."""
+        return self.type.kind.name
 
     def evaluate(self, facts: Mapping[str, object]) -> float | bool | str | frozenset[str] | None:
         """The value in one context; None where it is missing.
@@ -91,7 +90,7 @@ class Expression:
         """Whether a bool expression holds in each context: bool [N]; `missing` where that is not known."""
         truths = self.run_frame(columns, n_contexts)
         assert isinstance(truths, np.ndarray)
-        assert self.kind == "bool"
+        assert self.type.kind.is_truth
         return truths >= UNKNOWN if missing else truths == YES
 
     def as_boxes(self, truth: bool = False) -> list[Box] | None:
@@ -101,7 +100,7 @@ class Expression:
         from -inf to inf, whatever the condition's bounds. None where a comparison mixes conditions or computes with one, or where
         more than `boxes.MOST_BOXES` would be needed.
         """
-        return boxes_of(self.plan, {c.name: c for c in self.conditions}, truth) if self.kind == "bool" else None
+        return boxes_of(self.plan, {c.name: c for c in self.conditions}, truth) if self.type.kind.is_truth else None
 
     @cached_property
     def run(self) -> Run:
@@ -157,11 +156,11 @@ def read_expression(
 
 def canonical(value: object, condition: Condition) -> Value:
     """A fact as plans take it: NaN for a missing number, None for any other missing fact or a set of values."""
-    if type(value) is float and condition.domain.kind == "number":
+    if type(value) is float and condition.domain.type.python is float:
         return value + 0.0
     fact = read_fact(value, condition)
     if fact is None or isinstance(fact, Cell):
-        return NAN if condition.domain.kind in NUMERIC else None
+        return NAN if condition.domain.type.is_numeric else None
     return fact
 
 

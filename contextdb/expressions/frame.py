@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.grammar import Cell, NumberSet
-from contextdb.expressions.arithmetic import all_wrapped, settled
+from contextdb.cells.angles import wrap_angles
+from contextdb.cells.sets import Cell, NumberSet
+from contextdb.expressions.arithmetic import settled
 from contextdb.expressions.columns import NO, UNKNOWN, YES, Coded, Column, Doubles, Truths
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
 
@@ -104,7 +105,7 @@ def _linked(link: Link, left: Any, right: Any) -> Truths:
 
 def _angles(link: Link, left: Doubles, right: Doubles) -> tuple[Doubles, Doubles]:
     if link.is_wrapped:
-        return all_wrapped(left), all_wrapped(right)
+        return wrap_angles(left), wrap_angles(right)
     return _high(left) if link.left_is_high else left, _high(right) if link.right_is_high else right
 
 

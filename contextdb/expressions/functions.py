@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from contextdb.cells.angles import wrap_angles
 from contextdb.expressions import arithmetic
 
 Gives = Literal["whole if whole", "whole", "number", "angle"]
@@ -60,7 +61,7 @@ FUNCTIONS = {
     "ceil": Function("ceil(x)", arithmetic.ceiled, np.ceil, 1, 1, "whole", True),
     "round": Function("round(x)", arithmetic.rounded, np.rint, 1, 1, "whole", True),
     "atan2": Function("atan2(y, x)", arithmetic.heading, arithmetic.headings, 2, 2, "angle", False),
-    "wrap_angle": Function("wrap_angle(degrees)", arithmetic.wrapped, arithmetic.all_wrapped, 1, 1, "angle", False),
+    "wrap_angle": Function("wrap_angle(degrees)", arithmetic.wrapped, wrap_angles, 1, 1, "angle", False),
 }
 
 

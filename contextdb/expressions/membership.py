@@ -8,9 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from contextdb.cells import intervals
+from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import Domain, wrap_angle
-from contextdb.cells.grammar import ACCEPTED, Accepted, Cell, NumberSet, TagSet, ValueSet, covers, parse_cell
+from contextdb.cells.domains import TEXT, Domain
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.kinds import KINDS, Kind
+from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, covers
 from contextdb.errors import CellError, in_quotes, nearest, some
 from contextdb.expressions.faults import Refusal
 from contextdb.expressions.plan import Const, Given, Held, Part, Type
@@ -19,21 +22,14 @@ from contextdb.expressions.tree import Membership, Node, Text
 
 Choice = tuple[Node, Part, Type]
 
-_SAID = {
-    "bool": "True or False", "int": "a number", "number": "a number", "angle": "an angle", "enum": "a value of an enum",
-    "text": "a text", "tags": "a set of tags",
-}  # fmt: skip
+SPELT = {name: kind for name, kind in KINDS.items() if kind.is_spelt}
+"""The types that spell their numbers as texts: each is a function that makes a number of a text."""
 _AFTER_IN = 'a list such as ["Walk", "Run"], a fact of type tags, or a cell such as "0..5"'
-
-
-def said(found: Type) -> str:
-    """What a part gives, for a message."""
-    return _SAID[found.kind]
 
 
 def require_value(node: Node, other: Type) -> None:
     """Raise Refusal when a text is compared with an enum that has no such value."""
-    if not isinstance(node, Text) or other.kind != "enum" or other.values is None or node.value in other.values:
+    if not isinstance(node, Text) or not other.kind.needs_values or other.values is None or node.value in other.values:
         return
     raise _undeclared(node, node.value, sorted(other.values), "value")
 
@@ -49,33 +45,52 @@ def holding(node: Membership, item: tuple[Part, Type], choices: Sequence[Choice]
     if isinstance(node.choices, tuple):
         return Held(item[0], Cell(_listed(node, item[1], choices)))
     choice, plan, found = choices[0]
-    if found.kind == "tags":
+    if found.kind.is_tags:
         return Held(plan, Cell(_tag(node.item, item[0], plan, conditions)))
     if not isinstance(choice, Text):
-        raise Refusal(choice.start, choice.stop, f'after "in" is {said(found)}', _AFTER_IN)
+        raise Refusal(choice.start, choice.stop, f'after "in" is {found.kind.value}', _AFTER_IN)
     if isinstance(item[0], Const):
         raise Refusal(node.start, node.stop, 'there is no fact before or after "in"', 'a fact: speed in "0..5", "InAir" in Tags')
     return Held(item[0], _cell(choice, _domain(*item, conditions)))
 
 
+def spelt(node: Text, kind: Kind) -> tuple[Part, Type]:
+    """A text as the number of a type that spells its numbers as texts."""
+    cell = _cell(node, Domain(kind.name))
+    spans = cell.accepts.spans if isinstance(cell.accepts, NumberSet) else ()
+    if len(spans) != 1 or spans[0][0] != spans[0][1]:
+        raise Refusal(node.start, node.stop, f"{in_quotes(node.value)} is not {kind.value}", kind.result)
+    return Const(spans[0][0]), Type(kind)
+
+
+def spelt_alike(parts: Sequence[Choice]) -> list[tuple[Part, Type]]:
+    """Parts that are compared; texts beside numbers that are spelt as texts become numbers."""
+    kind = next((found.kind for _, _, found in parts if found.kind.is_spelt), None)
+    return [spelt(n, kind) if kind and isinstance(n, Text) else (plan, found) for n, plan, found in parts]
+
+
 def _listed(node: Membership, item: Type, choices: Sequence[Choice]) -> Accepted:
-    if item.kind == "tags" or not choices:
+    if item.kind.is_spelt:
+        choices = [(n, *(spelt(n, item.kind) if isinstance(n, Text) else (plan, found))) for n, plan, found in choices]
+    if item.kind.is_tags or not choices:
         what = "a set of tags is in no list" if choices else "the list is empty"
         raise Refusal(node.start, node.stop, what, '"InAir" in Tags' if choices else 'gait in ["Walk", "Run"]')
     values = [_constant(item, *choice) for choice in choices]
     if not item.is_number:
         return ValueSet(frozenset(v for v in values if isinstance(v, (str, bool))))
     numbers = [float(v) for v in values]
-    if item.kind == "angle":
+    if item.kind.is_circular:
         numbers = [wrap_angle(v) for v in numbers]
     spans = intervals.union((v, v) for v in numbers)
-    return NumberSet(intervals.whole(spans) if item.kind == "int" else spans, item.kind == "angle")
+    return NumberSet(item.kind.fitted(spans), item.kind.is_circular)
 
 
 def _constant(item: Type, choice: Node, plan: Part, found: Type) -> float | str | bool:
-    is_alike = (item.is_number and found.is_number) or (item.is_text and found.is_text) or item.kind == found.kind
+    is_alike = (item.is_number and found.is_number) or (item.is_text and found.is_text) or item.kind is found.kind
     if not is_alike:
-        raise Refusal(choice.start, choice.stop, f"{said(item)} is looked for, and this is {said(found)}", said(item))
+        raise Refusal(
+            choice.start, choice.stop, f"{item.kind.value} is looked for, and this is {found.kind.value}", item.kind.value
+        )
     if not isinstance(plan, Const):
         raise Refusal(choice.start, choice.stop, "a list holds constants", "a == b or a == c for facts")
     require_value(choice, item)
@@ -100,7 +115,7 @@ def _undeclared(node: Node, value: str, known: Sequence[str], what: str) -> Refu
 def _domain(item: Part, found: Type, conditions: Mapping[str, Condition]) -> Domain:
     if isinstance(item, Given):
         return conditions[item.name].domain
-    return Domain("text" if found.is_text else found.kind)
+    return TEXT if found.is_text else Domain(found.kind.name)
 
 
 def _cell(node: Text, domain: Domain) -> Cell:
@@ -111,5 +126,5 @@ def _cell(node: Text, domain: Domain) -> Cell:
         raise Refusal(node.start, node.stop, fault.found.rstrip("."), fault.accepted, fault.mend or None) from None
     if cell.is_soft or cell.is_empty:
         why = "a cell here has no penalty" if cell.is_soft else "no value is in this cell"
-        raise Refusal(node.start, node.stop, why, ACCEPTED[domain.kind])
+        raise Refusal(node.start, node.stop, why, domain.type.cells)
     return cell

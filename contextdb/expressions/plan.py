@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from contextdb.cells.domains import NUMERIC, Kind
-from contextdb.cells.grammar import Cell
+from contextdb.cells.kinds import Kind
+from contextdb.cells.sets import Cell
 from contextdb.expressions.functions import Function
 
 
@@ -24,13 +24,13 @@ class Type:
 
     @property
     def is_number(self) -> bool:
-        """Whether it is an int, a number or an angle."""
-        return self.kind in NUMERIC
+        """Whether it is a number of some type."""
+        return self.kind.is_numeric
 
     @property
     def is_text(self) -> bool:
         """Whether it is an enum or a text."""
-        return self.kind in ("enum", "text")
+        return self.kind.is_named
 
 
 @dataclass(frozen=True)

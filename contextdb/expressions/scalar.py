@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from functools import singledispatch
 from typing import Any
 
-from contextdb.cells.domains import wrap_angle
+from contextdb.cells.angles import wrap_angle
 from contextdb.expressions.plan import Apply, Compare, Const, Given, Held, Link, Logic, Negation, Part, Select
 
 Value = float | bool | str | frozenset[str] | None
@@ -171,4 +171,4 @@ def is_number(plan: Part) -> bool:
         return is_number(plan.then)
     if isinstance(plan, Const):
         return isinstance(plan.value, float)
-    return isinstance(plan, Apply) or (isinstance(plan, Given) and plan.kind in ("int", "number", "angle"))
+    return isinstance(plan, Apply) or (isinstance(plan, Given) and plan.kind.is_numeric)

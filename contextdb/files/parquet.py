@@ -8,6 +8,7 @@ the digest of its bytes. Nothing here touches the disk.
 
 from __future__ import annotations
 
+import datetime
 import io
 import re
 from collections.abc import Iterator, Sequence
@@ -19,7 +20,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
-from contextdb.cells.words import NUMBER_TEXT, quoted, truth_of
+from contextdb.cells.words import NUMBER_TEXT, quoted, says_any, truth_of
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, row_name, shown
 from contextdb.files.csv_faults import MOST_CHARACTERS
@@ -28,11 +29,10 @@ from contextdb.files.csv_source import name_faults, text_columns
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, require_whole, sealed
 from contextdb.files.strangers import seems_to_be
 
-_ACCEPTED = "strings, categories, bools, numbers, and lists of strings"
+_ACCEPTED = "strings, categories, bools, numbers, dates, and lists of strings"
 _WHOLE = re.compile(r"[+-]?\d{1,40}")
 _NUMBER = re.compile(NUMBER_TEXT)
 _NAME = re.compile(r'(?:"((?:[^"]|"")*)"|([^\s"]+))(?:\s+|\Z)')
-_ANY = ("any", "-", "")
 _UNFIT = object()
 """What stands for a text that has no value in a type."""
 _STRINGS = (pl.String, pl.Categorical, pl.Enum)
@@ -157,7 +157,7 @@ def _type_faults(series: pl.Series) -> Iterator[Fault]:
             yield Fault("a list without names in it, which would match nothing.", "null for Any, or at least one name")
         if series.list.eval(pl.element().is_null()).list.any().any():
             yield Fault("a list with a null in it.", "names only")
-    elif not (isinstance(dtype, (*_STRINGS, pl.Boolean, pl.Null)) or dtype.is_integer() or dtype.is_float()):
+    elif not (isinstance(dtype, (*_STRINGS, pl.Boolean, pl.Date, pl.Null)) or dtype.is_integer() or dtype.is_float()):
         yield Fault(f"the column is of type {dtype}.", _ACCEPTED, "to write it as strings")
 
 
@@ -236,16 +236,27 @@ def _value(text: str, old: pl.Series) -> object:
         return None if not text and old.null_count() else text
     if isinstance(dtype, pl.Enum):
         return text if text in dtype.categories else _UNFIT if text else None
-    if text.strip().casefold() in _ANY:
+    if says_any(text):
         return None
     if isinstance(dtype, pl.List):
         return _names(text)
     if isinstance(dtype, pl.Boolean):
         truth = truth_of(text)
         return _UNFIT if truth is None else truth
+    if isinstance(dtype, pl.Date):
+        return _date(text)
     if dtype.is_integer():
         return int(text) if _WHOLE.fullmatch(text) else _UNFIT
     return _float(text, dtype) if dtype.is_float() else _UNFIT
+
+
+def _date(text: str) -> object:
+    """The day that a text means."""
+    try:
+        day = datetime.date.fromisoformat(text)
+    except ValueError:
+        return _UNFIT
+    return day if str(day) == text else _UNFIT
 
 
 def _float(text: str, dtype: pl.DataType) -> object:

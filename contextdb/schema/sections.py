@@ -11,8 +11,9 @@ from dataclasses import fields, replace
 from typing import Any
 
 from contextdb.cells.conditions import Condition
+from contextdb.cells.domains import Domain
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
-from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
+from contextdb.schema.settings import KINDS_WITH, Schema, TableSettings, conditions_from_dict
 from contextdb.schema.shapes import NAMES, SECTIONS, as_toml, wrong_name
 
 Part = dict[str, object]
@@ -25,10 +26,9 @@ EDITED_SECTIONS = ("conditions", "blueprints", "selectors")
 def condition_to_dict(condition: Condition) -> Part:
     """What `[conditions.NAME]` says of a condition."""
     domain = condition.domain
-    as_said = int if domain.kind == "int" else float
     bounds = {"min": domain.minimum, "max": domain.maximum}
     said: Part = {"type": domain.kind}
-    said |= {key: as_said(bound) for key, bound in bounds.items() if math.isfinite(bound)}
+    said |= {key: _bound(bound, domain) for key, bound in bounds.items() if math.isfinite(bound)}
     if domain.values is not None:
         said["values"] = list(domain.values)
     texts = {"unit": condition.unit, "description": condition.description, "expr": condition.expr}
@@ -38,9 +38,13 @@ def condition_to_dict(condition: Condition) -> Part:
     return said
 
 
+def _bound(bound: float, domain: Domain) -> object:
+    return domain.type.spelling.write(bound) if domain.type.is_spelt else domain.type.given(bound)
+
+
 def has_place(key: str, kind: object) -> bool:
     """Whether a key of a condition has a place under a type."""
-    return kind in {"min": ("int", "number"), "max": ("int", "number"), "values": ("enum", "tags")}.get(key, (kind,))
+    return kind in KINDS_WITH.get(key, (kind,))
 
 
 def settings_to_dict(settings: TableSettings) -> Part:

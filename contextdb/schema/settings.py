@@ -7,7 +7,9 @@ kept as plain data, for `contextdb.motion` to read. Nothing here reads a file.
 
 from __future__ import annotations
 
+import datetime
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,14 +17,15 @@ from pathlib import PurePosixPath
 from typing import Any, cast
 
 from contextdb.cells.conditions import Condition, Mirror
-from contextdb.cells.domains import KINDS, Domain
-from contextdb.cells.grammar import covers
-from contextdb.cells.mirroring import NEGATED_KINDS, SWAPPED_KINDS, sided_pairs, swap_faults, swapped_tag
+from contextdb.cells.domains import NUMBER, Domain
+from contextdb.cells.kinds import KINDS, Kind, names_where
+from contextdb.cells.mirroring import sided_pairs, swap_faults, swapped_tag
+from contextdb.cells.sets import covers
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
 from contextdb.expressions import Derivation, assumption_faults, derivation_faults, derive
 from contextdb.files.file_names import alike, composed
-from contextdb.schema import toml_values
+from contextdb.schema import shapes, toml_values
 from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
 from contextdb.schema.toml_lines import Path, key_lines, line_of, read_toml
 
@@ -30,17 +33,10 @@ Found = tuple[Path, Fault]
 Section = Mapping[str, Any]
 
 _HEADERS = {name: "[project]" if name == "project" else f"[{name}.NAME]" for name in SECTIONS}
-_BOUNDED = ("int", "number")
 _EACH_ONCE = 'each name in one pair, such as { Left = "Right" }'
-_KINDS_WITH = {"min": _BOUNDED, "max": _BOUNDED, "values": ("enum", "tags")}
-_HAS_NO_PLACE = {
-    "angle": "an angle wraps around, so it has no ends and no list",
-    "bool": "a bool is True or False",
-    "enum": "names have no order",
-    "tags": "tags have no order",
-    "int": "a number is declared by min and max",
-    "number": "a number is declared by min and max",
-    "text": "a text can be anything",
+KINDS_WITH = {
+    **dict.fromkeys(("min", "max"), names_where(lambda kind: kind.is_bounded)),
+    "values": names_where(lambda kind: kind.has_values),
 }
 
 
@@ -270,68 +266,108 @@ def _condition_faults(path: Path, part: Section) -> Iterator[Found]:
     if "type" not in meant and not any(isinstance(v, Mapping) for k, v in part.items() if k != "mirror"):
         guess = 'type = "enum"' if "values" in part else 'type = "number"' if {"min", "max"} & part.keys() else ""
         yield path, Fault(f"{_header(path)} has no type.", _shapes("conditions")["type"].accepted, guess)
-    if kind == "enum" and "values" not in meant:
+    if kind in KINDS and KINDS[kind].needs_values and "values" not in meant:
         mend = 'type = "text", whose values are not declared'
-        yield path, Fault(f"{_header(path)} is an enum without values.", 'values = ["A", "B"]', mend)
-    for key, kinds in _KINDS_WITH.items():
+        yield path, Fault(f"{_header(path)} is {KINDS[kind].noun} without values.", 'values = ["A", "B"]', mend)
+    for key, kinds in KINDS_WITH.items():
         if key in fitting and kind and kind not in kinds:
             yield (*path, key), _no_place(path, key, fitting)
-    if kind in _BOUNDED:
-        yield from _bound_faults(path, fitting)
+    of = KINDS.get(cast("str", kind), NUMBER.type)
+    if of.is_bounded:
+        bounds: Section = {key: fitting[key] for key in ("min", "max") if key in fitting}
+        unread = {found[-1]: fault for found, fault in _unread_bounds(path, of, bounds)}
+        yield from (((*path, key), fault) for key, fault in unread.items())
+        if kind in KINDS:
+            yield from _bound_faults(path, of, {key: bound for key, bound in bounds.items() if key not in unread})
     if kind in KINDS and "mirror" in fitting:
         yield from _mirror_faults(path, fitting)
 
 
 def _no_place(path: Path, key: str, fitting: Section) -> Fault:
-    found = f"{_header(path)} {_said(key, fitting[key])} has no place here: {_HAS_NO_PLACE[fitting['type']]}."
-    accepted = f"{key} in a condition of type {' or '.join(_KINDS_WITH[key])}"
+    found = f"{_header(path)} {_said(key, fitting[key])} has no place here: {KINDS[fitting['type']].unbounded}."
+    accepted = f"{key} in a condition of type {' or '.join(KINDS_WITH[key])}"
     return Fault(found, accepted, 'type = "enum"' if key == "values" else "to leave it out")
 
 
-def _bound_faults(path: Path, fitting: Section) -> Iterator[Found]:
-    low, high = fitting.get("min", -math.inf), fitting.get("max", math.inf)
+def _unread_bounds(path: Path, kind: Kind, bounds: Section) -> Iterator[Found]:
+    """Bounds that are no numbers as the type writes them."""
+    for key, bound in bounds.items():
+        said = f"{_header(path)} {_said(key, bound)}"
+        if kind.is_spelt != isinstance(bound, (str, datetime.date)):
+            meant = shapes.NUMBER.mend(bound) if kind.is_decimal else None
+            mend = "" if meant is None else _said(key, meant)
+            yield (*path, key), Fault(f"{said}: this is {what(bound)}, not {kind.value}.", kind.bound, mend)
+        elif kind.is_spelt:
+            try:
+                number_of(kind, bound)
+            except ValueError as error:
+                yield (*path, key), Fault(f"{said}: {error}.", kind.bound)
+
+
+def number_of(kind: Kind, bound: Any) -> float:
+    """A bound of contextdb.toml as a number.
+
+    Raises
+    ------
+    ValueError
+        It is not written as the type writes its numbers.
+    """
+    if kind.is_decimal:
+        return float(bound) + 0.0
+    if not re.fullmatch(kind.spelling.number, str(bound)):
+        raise ValueError(f"this is not {kind.value}")
+    return kind.spelling.read(str(bound))
+
+
+def _bound_faults(path: Path, kind: Kind, bounds: Section) -> Iterator[Found]:
+    ends = {key: number_of(kind, bound) for key, bound in bounds.items()}
+    low, high = ends.get("min", -math.inf), ends.get("max", math.inf)
     if low > high:
-        found = f"{_header(path)} {_said('min', low)} is above {_said('max', high)}."
-        mend = f"{_said('min', high)} and {_said('max', low)}"
+        found = f"{_header(path)} {_said('min', bounds['min'])} is above {_said('max', bounds['max'])}."
+        mend = f"{_said('min', bounds['max'])} and {_said('max', bounds['min'])}"
         yield (*path, "min"), Fault(found, "a min that is not above max", mend)
     for key, bound, is_no_end, nearer in (("min", low, low == math.inf, math.ceil), ("max", high, high == -math.inf, math.floor)):
-        said = f"{_header(path)} {_said(key, bound)}"
+        said = f"{_header(path)} {_said(key, bounds.get(key, bound))}"
         if is_no_end:
             yield (*path, key), Fault(f"{said} leaves no number.", "a finite number", "to leave it out")
-        elif fitting["type"] == "int" and math.isfinite(bound) and bound != math.floor(bound):
-            yield (*path, key), Fault(f"{said}: an int has whole bounds.", "a whole number", _said(key, nearer(bound)))
+        elif kind.is_whole and math.isfinite(bound) and bound != math.floor(bound):
+            yield (*path, key), Fault(f"{said}: {kind.noun} has whole bounds.", "a whole number", _said(key, nearer(bound)))
 
 
 def _mirror_faults(path: Path, fitting: Section) -> Iterator[Found]:
     """Why the facts of a condition cannot change in a mirror as it says."""
-    kind, mirror, values = fitting["type"], fitting["mirror"], fitting.get("values")
+    kind, mirror, values = KINDS[fitting["type"]], fitting["mirror"], fitting.get("values")
     said, key = f"{_header(path)} {_said('mirror', mirror)}", (*path, "mirror")
     if mirror == "none":
         return
     if "expr" in fitting:
         found = f"{said} has no place here: a derived fact is computed from mirrored facts."
         yield key, Fault(found, "mirror in the conditions that it is computed from", "to leave it out")
-    elif mirror == "negate" and kind not in NEGATED_KINDS:
+    elif mirror == "negate" and not kind.is_negated:
         mend = _said("mirror", sided_pairs(values or ()) or {"Left": "Right"})
-        yield key, Fault(f"{said}: a condition of type {kind} has no sign.", 'names that change places, or "none"', mend)
-    elif mirror != "negate" and kind not in SWAPPED_KINDS:
-        yield key, Fault(f"{said}: a condition of type {kind} has no names.", '"negate" or "none"', _said("mirror", "negate"))
+        yield key, Fault(f"{said}: a condition of type {kind.name} has no sign.", 'names that change places, or "none"', mend)
+    elif mirror != "negate" and not kind.is_swapped:
+        yield key, Fault(f"{said}: a condition of type {kind.name} has no names.", '"negate" or "none"', _said("mirror", "negate"))
     elif mirror != "negate":
-        yield from ((key, Fault(f"{said}: {in_quotes(name)}: {why}.", _EACH_ONCE)) for name, why in swap_faults(mirror, kind))
-        yield from ((key, replace(fault, found=f"{said}: {fault.found}")) for fault in _unknown_partners(mirror, kind, values))
+        yield from (
+            (key, Fault(f"{said}: {in_quotes(name)}: {why}.", _EACH_ONCE)) for name, why in swap_faults(mirror, kind.is_tags)
+        )
+        yield from (
+            (key, replace(fault, found=f"{said}: {fault.found}")) for fault in _unknown_partners(mirror, kind.is_tags, values)
+        )
 
 
-def _unknown_partners(mirror: Mapping[str, str], kind: str, values: Sequence[str] | None) -> Iterator[Fault]:
+def _unknown_partners(mirror: Mapping[str, str], is_tags: bool, values: Sequence[str] | None) -> Iterator[Fault]:
     """Faults of names of pairs that are no declared values, and of tags that would change places with one that is none."""
     if values is None:
         return
     known = frozenset(values)
     names = dict.fromkeys(name for pair in mirror.items() for name in pair)
-    unknown = [name for name in names if not (covers(name, known) if kind == "tags" else name in known)]
+    unknown = [name for name in names if not (covers(name, known) if is_tags else name in known)]
     for name in unknown:
         near = nearest(name, values)
         yield Fault(f"there is no value {in_quotes(name)}.", some(values), in_quotes(near) if near else "")
-    for value in values if kind == "tags" and not unknown else ():
+    for value in values if is_tags and not unknown else ():
         image = swapped_tag(value, tuple(mirror.items()))
         if not covers(image, known):
             found = f"{in_quotes(value)} is exchanged with {in_quotes(image)}, which is not a declared value."
@@ -435,7 +471,9 @@ def _schema(document: Section, file: str) -> Schema:
 
 def _condition(name: str, part: Section) -> Condition:
     values = tuple(part["values"]) if "values" in part else None
-    domain = Domain(part["type"], values, float(part.get("min", -math.inf)) + 0.0, float(part.get("max", math.inf)) + 0.0)
+    kind = KINDS[part["type"]]
+    low, high = (number_of(kind, part[key]) if key in part else end for key, end in (("min", -math.inf), ("max", math.inf)))
+    domain = Domain(kind.name, values, low, high)
     return Condition(
         name, domain, part.get("unit", ""), part.get("description", ""), part.get("expr"), mirror=_mirror(part.get("mirror"))
     )

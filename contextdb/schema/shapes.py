@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import math
 import numbers
@@ -14,22 +15,14 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Literal, get_args
 
-from contextdb.cells.domains import KINDS
+from contextdb.cells.kinds import KINDS
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import in_quotes, nearest, some
 
 Policy = Literal["collect", "first", "unique", "priority"]
 POLICIES: tuple[Policy, ...] = get_args(Policy)
 
-KIND_SYNONYMS = {
-    **dict.fromkeys(("boolean", "flag", "logical", "truth"), "bool"),
-    **dict.fromkeys(("integer", "long", "int32", "int64", "whole", "count"), "int"),
-    **dict.fromkeys(("float", "double", "real", "decimal", "numeric", "float32", "float64", "range"), "number"),
-    **dict.fromkeys(("degrees", "degree", "deg", "direction", "heading", "rotation", "yaw"), "angle"),
-    **dict.fromkeys(("choice", "option", "category", "categorical", "enumeration", "list"), "enum"),
-    **dict.fromkeys(("string", "str", "name"), "text"),
-    **dict.fromkeys(("tag", "set", "labels", "gameplaytags", "tagset"), "tags"),
-}
+KIND_SYNONYMS = {synonym: name for name, kind in KINDS.items() for synonym in kind.synonyms}
 POLICY_SYNONYMS = {"all": "collect", "any": "collect", "single": "unique", "highest": "priority"}
 MIRRORS = ("negate", "none")
 MIRROR_SYNONYMS = {
@@ -97,6 +90,10 @@ def _wrong_number(value: object) -> str | None:
     if math.isnan(number):
         return "nothing is above or below it"
     return None if number == value else f"no double is equal to it; the nearest is {number!r}"
+
+
+def _wrong_bound(value: object) -> str | None:
+    return None if isinstance(value, (str, datetime.date)) else _wrong_number(value)
 
 
 def _wrong_list(value: object) -> str | None:
@@ -207,6 +204,8 @@ NAME = Shape('a name, such as "Asset Name"', wrong_name, _meant_text)
 EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wrong_name, _meant_text)
 EXPRESSIONS = Shape('a list of expressions, such as ["not (IsRunning and IsIdle)"]', _wrong_list, _meant_names(r"\A|\Z"))
 NUMBER = Shape("a number, such as -1.5", _wrong_number, _meant_number)
+BOUND = Shape("a number, such as -1.5", _wrong_bound, _meant_number)
+"""A number as its type writes it; whether that fits is for the type to say."""
 NAMES = Shape('a list of different names, such as ["A", "B"]', _wrong_list, _meant_names(","))
 VALUES = Shape('a list of different names, such as ["A", "B"]', _wrong_values, _meant_names(r"[,;|\s]+"))
 FILE = Shape("a .csv or .parquet file in the folder of contextdb.toml or below it", _wrong_file, _meant_file)
@@ -218,9 +217,9 @@ MIRROR = Shape(
 SECTIONS: dict[str, Mapping[str, Shape] | None] = {
     "project": {"name": TEXT},
     "conditions": {
-        "type": _one_of(KINDS, "type", KIND_SYNONYMS),
-        "min": NUMBER,
-        "max": NUMBER,
+        "type": _one_of(tuple(KINDS), "type", KIND_SYNONYMS),
+        "min": BOUND,
+        "max": BOUND,
         "values": VALUES,
         "unit": TEXT,
         "description": TEXT,

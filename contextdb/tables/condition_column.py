@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import BOOL, NUMBER, TAGS, TEXT, Domain
-from contextdb.cells.grammar import ANY, Cell, parse_cell, reads
+from contextdb.cells.domains import BOOL, DATE, NUMBER, TAGS, TEXT, Domain
+from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.numbers import ColumnCells, NumberCells, are_plain, doubtful, has_soft
-from contextdb.cells.words import ANY_WORDS
+from contextdb.cells.sets import ANY, Cell
+from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, column_masks
 from contextdb.errors import CellError, Fault
@@ -102,20 +103,20 @@ def _read_cells(texts: Sequence[str], condition: Condition) -> tuple[ColumnCells
 
 
 def infer_condition(column: TextColumn) -> Condition:
-    """The condition of a column that nobody declared, from its cells: bool, number or tags where they read so, else text."""
+    """The condition of a column that nobody declared, from its cells: bool, number, date or tags where they read so, else text."""
     counts = np.bincount(column.codes, minlength=len(column.texts))
     flags = are_plain(column.texts)
     if flags is not None and _is_number_column(column.texts, counts, flags):
         return Condition(column.name, NUMBER, is_declared=False)
     said = _said(column.texts, counts)
-    domains = [BOOL, NUMBER, TAGS] if {t.strip() for t in said} - _DIGITS else [NUMBER]
+    domains = [BOOL, NUMBER, DATE, TAGS] if {t.strip() for t in said} - _DIGITS else [NUMBER]
     domain = next((d for d in domains if said and _mostly_reads(said, d)), TEXT)
     return Condition(column.name, domain, is_declared=False)
 
 
 def _said(texts: Sequence[str], counts: NDArray[np.int64]) -> dict[str, int]:
     """How many rows say each text that is not Any."""
-    return {t: n for t, n in zip(texts, counts.tolist(), strict=True) if t.strip().casefold() not in ANY_WORDS}
+    return {t: n for t, n in zip(texts, counts.tolist(), strict=True) if not says_any(t)}
 
 
 def _is_number_column(texts: Sequence[str], counts: NDArray[np.int64], are_numbers: NDArray[np.bool_]) -> bool:

@@ -12,9 +12,8 @@ import polars as pl
 from polars.selectors import by_name
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
 from contextdb.cells.facts import Unknown, read_fact_text
-from contextdb.cells.grammar import Cell
+from contextdb.cells.sets import Cell
 from contextdb.compiled.batch import ManyMatches
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
@@ -113,19 +112,24 @@ def read_texts_as(texts: Sequence[str], condition: Condition) -> tuple[list[obje
             fact = read_fact_text(text, condition)
             if isinstance(fact, Cell):
                 raise ContextError(Fault(f"{in_quotes(text)} is a set of values.", ONE, rule="wrong-fact"))
-            values.append(sorted(fact) if isinstance(fact, frozenset) else fact)
+            values.append(as_given(fact, condition))
         except ContextError as error:
             values.append(None)
             faults += [(i, replace(f, accepted=ONE) if f.rule == "unreadable-cell" else f) for f in error.faults]
     return values, faults
 
 
+def as_given(fact: object, condition: Condition) -> object:
+    """A fact in canonical form as Python code has it."""
+    if isinstance(fact, frozenset):
+        return sorted(fact)
+    return condition.domain.type.given(fact) if isinstance(fact, float) else fact
+
+
 def fact_type(condition: Condition) -> pl.DataType:
     """The type of a column of facts."""
-    kind = condition.domain.kind
-    if kind in NUMERIC:
-        return pl.Float64()
-    return pl.Boolean() if kind == "bool" else pl.List(pl.String) if kind == "tags" else pl.String()
+    dtype: pl.DataType = condition.domain.type.dtype
+    return dtype
 
 
 def _read_parquet(path: Path, compiled: CompiledTable) -> pl.DataFrame:

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
-from contextdb.cells.facts import Fact, describe, read_fact, read_fact_text
-from contextdb.cells.grammar import Cell
-from contextdb.errors import ContextError
+from contextdb.cells.facts import Fact, read_fact, read_fact_text
+from contextdb.cells.sets import Cell
+from contextdb.cells.words import format_number
+from contextdb.errors import ContextError, shown
 
 PLAIN_NUMBER = r"^[ \t]*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?[ \t]*$"
 MOST_EXAMPLES = 5
@@ -52,12 +52,12 @@ class FactColumn:
 
 def read_facts(given: pl.Series, condition: Condition, is_text: bool) -> FactColumn:
     """Read one column of a file."""
-    kind = condition.domain.kind
-    if kind in NUMERIC:
+    kind = condition.domain.type
+    if kind.is_numeric:
         return _numbers(given, condition, is_text)
-    if kind == "bool" and given.dtype == pl.Boolean:
+    if kind.is_truth and given.dtype == pl.Boolean:
         return FactColumn(given, _nulls(given), None, given)
-    if kind == "enum" and given.dtype == pl.String and not is_text:
+    if kind.needs_values and given.dtype == pl.String and not is_text:
         return _names(given, condition)
     return _each(given, condition, is_text)
 
@@ -79,12 +79,12 @@ def _names(given: pl.Series, condition: Condition) -> FactColumn:
 
 
 def _numbers(given: pl.Series, condition: Condition, is_text: bool) -> FactColumn:
-    if not is_text and given.dtype.is_numeric() and not given.dtype.is_decimal():
+    if not is_text and condition.domain.type.is_column(given.dtype):
         facts = _doubles(given)
         if _is_inside(facts, condition):
             return FactColumn(facts, None, None, given)
         return _judged(facts.copy(), np.zeros(len(facts), np.bool_), condition, given)
-    if is_text and given.dtype == pl.String:
+    if is_text and given.dtype == pl.String and condition.domain.type.is_decimal:
         facts, read = _number_texts(given, condition)
     else:
         read = _each(given, condition, is_text)
@@ -95,31 +95,31 @@ def _numbers(given: pl.Series, condition: Condition, is_text: bool) -> FactColum
 
 def _doubles(series: pl.Series) -> Doubles:
     """Numbers as float64 [N], NaN where missing; they may be the series' own and are not to be written to."""
-    wide = series.cast(pl.Float64)
+    wide = series.to_physical().cast(pl.Float64)
     return (wide.fill_null(np.nan) if wide.null_count() else wide).to_numpy()
 
 
 def _is_inside(facts: Doubles, condition: Condition) -> bool:
     """Whether no fact is missing or outside the domain, as far as that is quickly said."""
     domain = condition.domain
-    if domain.kind == "int" or not len(facts):
+    if domain.type.is_whole or not len(facts):
         return False
     low, high = facts.min(), facts.max()  # NaN where one of them is
     return bool(
-        np.isfinite(low) and np.isfinite(high) if domain.kind == "angle" else low >= domain.minimum and high <= domain.maximum
+        np.isfinite(low) and np.isfinite(high) if domain.type.is_circular else low >= domain.minimum and high <= domain.maximum
     )
 
 
 def _judged(facts: Doubles, wrong: Flags, condition: Condition, given: pl.Series) -> FactColumn:
     """Numbers, of which some may be known to be no fact."""
     domain = condition.domain
-    if domain.kind == "int":
+    if domain.type.is_whole:
         wrong |= ~np.isnan(facts) & (facts != np.trunc(facts))
-    if domain.kind == "angle":
+    if domain.type.is_circular:
         wrong |= np.isinf(facts)
     facts[wrong] = np.nan
     missing = np.isnan(facts) & ~wrong
-    if domain.kind != "angle":
+    if not domain.type.is_circular:
         wrong = wrong | (facts < domain.minimum) | (facts > domain.maximum)
     return FactColumn(facts, _some(missing), _some(wrong), given)
 
@@ -181,15 +181,14 @@ def _coded(given: pl.Series) -> tuple[NDArray[np.int64], list[object]]:
 
 
 def _dtype(condition: Condition) -> pl.DataType:
-    kind = condition.domain.kind
-    if kind in NUMERIC:
+    kind = condition.domain.type
+    if kind.is_numeric:
         return pl.Float64()
-    if kind == "enum":
-        return pl.Enum(list(condition.domain.values or ()))
-    return pl.Boolean() if kind == "bool" else pl.List(pl.String) if kind == "tags" else pl.String()
+    dtype: pl.DataType = pl.Enum(list(condition.domain.values or ())) if kind.needs_values else kind.dtype
+    return dtype
 
 
 def _shown(value: object) -> str:
-    if isinstance(value, (bool, float, int, str)):
-        return describe(value)
-    return " ".join(sorted(map(str, value))) if isinstance(value, list) else describe(str(value))
+    if isinstance(value, (float, int)) and not isinstance(value, bool):
+        return format_number(value)
+    return " ".join(sorted(map(str, value))) if isinstance(value, list) else shown(str(value))

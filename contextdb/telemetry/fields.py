@@ -17,11 +17,11 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from contextdb.cells.grammar import covers
+from contextdb.cells.angles import wrap_angles
+from contextdb.cells.sets import covers
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.factors import TagFactor
-from contextdb.expressions.arithmetic import all_wrapped
 from contextdb.telemetry.facts_read import FactColumn
 from contextdb.telemetry.keys import KeyWords, add_classes, add_numbers
 from contextdb.telemetry.number_classes import NumberClasses
@@ -115,7 +115,7 @@ class Fields:
                 self._put_tags(slots, column, partial(_answers, masks), out)
             else:
                 facts = np.asarray(column, np.float64)
-                facts = all_wrapped(facts) if condition.domain.kind == "angle" else facts
+                facts = wrap_angles(facts) if condition.domain.type.is_circular else facts
                 word, shift = self.table[slots[0], :2].tolist()
                 add_numbers(facts, self.number_classes[slots[0]], shift, out[word])
         at = compiled.stack.n_codes

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from polars.selectors import by_name
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.grammar import format_number
 from contextdb.cells.words import quoted
 from contextdb.disk import read_bytes
 from contextdb.files.csv_faults import record_faults
@@ -70,10 +69,10 @@ def fact_text(value: object, condition: Condition) -> str:
     if value is None or value != value:  # NaN
         return ""
     if isinstance(value, float):
-        return format_number(value)
+        return condition.domain.type.spelling.write(value)
     if isinstance(value, list):
         return " ".join(_name(str(v)) for v in value) or '""'
-    is_name = isinstance(value, str) and condition.domain.kind in ("enum", "text")
+    is_name = isinstance(value, str) and condition.domain.type.is_named
     return _name(str(value)) if is_name and value not in condition.domain.known else str(value)
 
 

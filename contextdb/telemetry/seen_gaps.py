@@ -135,7 +135,7 @@ def _classes(masks: object, factor: Factor) -> list[int]:
 def _span_of(low: float, stop: float, factor: NumberFactor) -> int:
     """The span that holds the least number of the domain from `low` on, if it is below `stop` (NaN: there is none)."""
     first = max(low, factor.spans[0][0])
-    if factor.kind == "int" and math.isfinite(first):
+    if factor.kind.is_whole and math.isfinite(first):
         first = float(math.ceil(first))
     if first >= stop or first > factor.spans[-1][1]:
         return -1

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.cells.grammar import NumberSet, parse_cell
+from contextdb.cells.grammar import parse_cell
 from contextdb.cells.intervals import above, below, complement
 from contextdb.cells.plain_ends import cuts_of, plain
+from contextdb.cells.sets import NumberSet
 from contextdb.checks.effects import effects
 from contextdb.covering import coverage
 from contextdb.covering.gaps import find_gaps

@@ -58,7 +58,7 @@ TESTS = {
     },
 }
 UNSAYABLE = [
-    'date("2026-01-01")',
+    'time("10:00:00")',
     "speed",
     "> speed",
     "[a..b]",

@@ -15,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
 
-from contextdb.cells.grammar import Cell, NumberSet, ValueSet, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import Cell, NumberSet, ValueSet
 from contextdb.cells.words import truth_of
 from contextdb.errors import CellError
 from contextdb.exchange.formats import ReadOptions, read
@@ -141,6 +142,9 @@ def is_same(value: Value, cell: Cell, kind: str) -> bool:
         number = 1000.0 if wanted == "1e3" else number
         return isinstance(cell.accepts, NumberSet) and number is not None and cell.accepts.spans == ((number, number),)
     text = wanted if isinstance(wanted, str) else read_text(wanted)
+    if kind == "date":
+        day = float((datetime.date.fromisoformat(text) - datetime.date(1970, 1, 1)).days)
+        return cell.accepts == NumberSet(((day, day),))
     return cell.accepts == ValueSet(frozenset((text,)))
 
 

@@ -11,8 +11,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain, wrap_angle
+from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT, Domain
 
 GAITS = ("Walk", "Run", "Idle")
 TAGS = ("InAir", "Move.Run", "Move.Walk")

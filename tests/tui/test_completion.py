@@ -9,7 +9,8 @@ from strategies import cells, domains
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
-from contextdb.cells.grammar import Cell, TagSet, ValueSet, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import Cell, TagSet, ValueSet
 from contextdb.errors import Fault
 from tui.model.chooser import Chooser
 from tui.model.completion import Vocabulary, alone, take_apart, tick_of, toggled, vocabulary

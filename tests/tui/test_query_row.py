@@ -46,7 +46,7 @@ def test_single_values_are_answered_as_a_query_answers_them(table, data):
     query, context = QueryRow(table), {}
     for column in table.conditions:
         name, fact = column.condition.name, read_fact(given_facts[column.condition.name], column.condition)
-        text = quoted(fact, always=True) if isinstance(fact, str) else describe(fact)
+        text = quoted(fact, always=True) if isinstance(fact, str) else describe(fact, column.condition.domain)
         if not isinstance(fact, frozenset) and query.set(name, text) is None:
             context[name] = query.facts[name]
     assert query.bits == table.compile().query(context, unknown="any").bits

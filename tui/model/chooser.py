@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
+from contextdb.cells.words import says_any
 from tui.model.completion import (
     Tick,
     Vocabulary,
@@ -51,16 +51,18 @@ class Chooser:
         self.kind = kind
         self.is_fact = is_fact
         self._known = known
-        self.has_ticks = condition is not None and kind in ("enum", "text", "tags")
+        self._type = condition.domain.type if condition is not None else None
+        self.is_truth = kind == "enabled" or (self._type is not None and self._type.is_truth)
+        self.has_ticks = self._type is not None and self._type.is_swapped
 
     @cached_property
     def values(self) -> Vocabulary:
         """All values there are to choose from."""
-        if self.kind in ("bool", "enabled"):
+        if self.is_truth:
             return Vocabulary(("True", "False"), True)
         if self.condition is None:
             return Vocabulary(tuple(text for text in self._known if text.strip()) if self.kind in ("asset", "output") else ())
-        if self.kind in NUMERIC:
+        if self.condition.domain.type.is_numeric:
             return Vocabulary(())
         return vocabulary(self.condition.domain, self._known)
 
@@ -84,7 +86,7 @@ class Chooser:
         word = words.at(caret)
         taken = {w.name for w in words.words if w is not word}
         if word is not None and word.name and not self._is_complete(word):
-            stem = take_apart(text[word.start : caret], self._has_signs).words
+            stem = take_apart(text[word.start : caret], self.has_signs).words
             return Offer(self.values.matching(stem[0].name if stem else "", taken), word)
         if is_open:
             return Offer([None, *self.values.values])
@@ -101,22 +103,25 @@ class Chooser:
 
     def words(self, text: str) -> Words:
         """The words of a text."""
-        return take_apart(text, self._has_signs, self.values.known if self.is_fact and self.kind == "enum" else ())
+        return take_apart(
+            text, self.has_signs, self.values.known if self.is_fact and self._type is not None and self._type.needs_values else ()
+        )
 
     @property
-    def _has_signs(self) -> bool:
-        return self.kind == "tags"
+    def has_signs(self) -> bool:
+        """Whether words have a sign before them."""
+        return self._type is not None and self._type.is_tags
 
     def _is_complete(self, word: Word) -> bool:
         return word.name in self.values.known and (bool(word.sign) or not self._wants_signs(word))
 
     def _wants_signs(self, word: Word) -> bool:
-        return self._has_signs and not self.is_fact
+        return self.has_signs and not self.is_fact
 
     def _ticks_signs(self, text: str) -> bool:
         """Whether a tick has three states: cells of tags, and facts that are written like them."""
         words = self.words(text)
-        return self._has_signs and (not self.is_fact or words.is_signed or words.n_negations > 0)
+        return self.has_signs and (not self.is_fact or words.is_signed or words.n_negations > 0)
 
     def ticks(self, text: str) -> Callable[[Row], Tick]:
         """What the text says of each row."""
@@ -129,7 +134,7 @@ class Chooser:
     def same(self, text: str, row: Row) -> bool:
         """Whether a text is what picking a row writes; for a bool its first letters are enough."""
         said = text.strip()
-        if self.kind not in ("bool", "enabled"):
+        if not self.is_truth:
             return said == (row or "").strip()
         written = self.any_text if row is None else row
         return written.casefold().startswith(said.casefold()) if said else row is None
@@ -157,7 +162,7 @@ class Chooser:
 
     def typed(self, text: str, typed: str) -> tuple[str, int]:
         """The text when something is typed into the open list, where it begins another word; and where the caret is then."""
-        if not self.has_ticks or text.strip().casefold() in ("", "-", "any"):
+        if not self.has_ticks or says_any(text):
             return typed, len(typed)
         tail = self.words(text).tail
         begun = f"{text[: text.rindex('~')].rstrip() if tail else text.rstrip()} {typed}".lstrip()

@@ -14,8 +14,9 @@ from functools import cached_property
 from typing import Literal
 
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import TagSet, ValueSet, parse_cell, reads
-from contextdb.cells.words import quoted
+from contextdb.cells.grammar import parse_cell, reads
+from contextdb.cells.sets import TagSet, ValueSet
+from contextdb.cells.words import quoted, says_any
 
 Tick = Literal["on", "off", "+", "-"]
 """What a cell says of a value: accepted or not; for tags needed, banned, or "off": not named."""
@@ -23,7 +24,6 @@ Tick = Literal["on", "off", "+", "-"]
 _WORD = re.compile(r'(?P<sign>[+-]?)(?:"(?P<inside>(?:[^"]|"")*)"?|(?P<bare>[^\s"]*))')
 _NOT = re.compile(r"not(?=\s)\s*", re.IGNORECASE)
 _PART = re.compile(r"[\s_.:/\-]+")
-_ANY = ("", "-", "any")
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ def take_apart(text: str, has_signs: bool, whole: Collection[str] = ()) -> Words
     at, n_negations = len(body) - len(body.lstrip()), 0
     while negation := _NOT.match(body, at):
         at, n_negations = negation.end(), n_negations + 1
-    if body[at:].strip().casefold() in _ANY:
+    if says_any(body[at:]):
         return Words(text, (), n_negations, tail)
     return Words(text, tuple(_words(body, at, has_signs)), n_negations, tail)
 
@@ -196,7 +196,7 @@ def _rank(folded: str, sought: str) -> int:
 def vocabulary(domain: Domain, known_texts: Sequence[str] = ()) -> Vocabulary:
     """The declared values of a condition, or those that the cells of its column name; tags with those they are under."""
     values = domain.values if domain.values is not None else _named_in(known_texts, domain)
-    if domain.kind == "tags":
+    if domain.type.is_tags:
         values = _with_parents(values)
     return Vocabulary(tuple(values), domain.values is not None)
 

@@ -8,25 +8,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from contextdb.cells.conditions import Condition, Mirror
-from contextdb.cells.domains import KINDS
-from contextdb.cells.grammar import format_number
-from contextdb.cells.mirroring import SWAPPED_KINDS
+from contextdb.cells.kinds import KINDS
 from contextdb.cells.words import quoted
 from contextdb.errors import Fault, SchemaError
 from contextdb.schema.sections import has_place
 from contextdb.schema.settings import conditions_from_dict
-
-KIND_WORDS = {
-    "bool": "True or False",
-    "int": "whole numbers",
-    "number": "any number",
-    "angle": "degrees, on the circle",
-    "enum": "one of the names below",
-    "text": "any name",
-    "tags": "a set of tags",
-}
-"""What a fact of each type is, in a few words."""
-assert tuple(KIND_WORDS) == KINDS
 
 _NAME = re.compile(r'"((?:[^"]|"")*)"|([^\s,;"]+)')
 
@@ -35,7 +21,7 @@ _NAME = re.compile(r'"((?:[^"]|"")*)"|([^\s,;"]+)')
 class ConditionForm:
     """The fields of a condition, as texts; an empty one says nothing."""
 
-    kind: str = "bool"
+    kind: str = next(iter(KINDS))
     minimum: str = ""
     maximum: str = ""
     unit: str = ""
@@ -49,14 +35,14 @@ class ConditionForm:
     def of(cls, condition: Condition) -> ConditionForm:
         """The form that says what a condition is."""
         domain = condition.domain
-        low, high = (format_number(x) if math.isfinite(x) else "" for x in (domain.minimum, domain.maximum))
+        low, high = (domain.type.spelling.write(x) if math.isfinite(x) else "" for x in (domain.minimum, domain.maximum))
         values = " ".join(quoted(value) for value in domain.values or ())
         return cls(domain.kind, low, high, condition.unit, values, condition.description, _mirror_text(condition.mirror))
 
     def of_kind(self, kind: str) -> ConditionForm:
         """The same for another type, without a mirror that has no place there."""
         has_names = isinstance(_mirror(self.mirror), dict)
-        fits = self.mirror.strip() in ("", "none") or has_names is (kind in SWAPPED_KINDS)
+        fits = self.mirror.strip() in ("", "none") or has_names is KINDS[kind].is_swapped
         return replace(self, kind=kind, mirror=self.mirror if fits else "")
 
     def declared(self) -> tuple[dict[str, object], dict[str, str]]:
@@ -65,7 +51,7 @@ class ConditionForm:
         wrong: dict[str, str] = {}
         for key, text in (("min", self.minimum), ("max", self.maximum)):
             if has_place(key, self.kind) and text.strip():
-                number = _number(text)
+                number = text.strip() if KINDS[self.kind].is_spelt else _number(text)
                 said[key] = number
                 if number is None:
                     wrong[key] = f'"{text.strip()}" is not a number.'

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from contextdb.cells.domains import KINDS
+from contextdb.cells.kinds import KINDS
 from contextdb.columns import TextColumn
 from contextdb.edits.edits import edit_between
 from contextdb.errors import ContextDBError, Fault, TableError, nearest, plural, shown
@@ -154,7 +154,7 @@ class Draft:
             yield Choice(name, f"{self._schema.conditions[name].domain.kind}, {where}{wrong}", found)
         yield from self._other_columns(plain)
         if column.name not in self._names and column.name not in self._schema.conditions:
-            for kind in (kind for kind in KINDS if kind != "enum" or names_of(mapped.names or column)):
+            for kind in (kind for kind in KINDS if not KINDS[kind].needs_values or names_of(mapped.names or column)):
                 found = as_type(plain, column, kind)
                 wrong = f"{plural(found.n_unreadable, 'cell')} cannot be read" if found.n_unreadable else "every cell can be read"
                 yield Choice(f"new condition, {kind}", wrong, found)

@@ -14,8 +14,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import Cell, NumberSet, format_cell, format_number
+from contextdb.cells.grammar import format_cell
 from contextdb.cells.intervals import CIRCLE, EVERYTHING, Span, Spans
+from contextdb.cells.sets import Cell, NumberSet
 
 Run = tuple[str, bool]
 """A piece of a picture, and whether the cell holds any of the values that are there."""
@@ -54,7 +55,7 @@ def spans_of(cell: Cell) -> Spans:
 def pieces(cell: Cell, domain: Domain) -> tuple[Piece, ...]:
     """The intervals of a cell, ascending."""
     spans = spans_of(cell)
-    if domain.kind != "angle" or cell.accepts is None:
+    if not domain.type.is_circular or cell.accepts is None:
         return tuple(_piece(span, domain) for span in spans)
     is_through = len(spans) > 1 and spans[0][0] == CIRCLE[0] and spans[-1][1] == CIRCLE[1]
     found = [_piece(span, domain) for span in spans]
@@ -72,9 +73,9 @@ def _half_turn(degrees: float) -> float:
 def _piece(span: Span, domain: Domain) -> Piece:
     """How the formatter writes a span: it knows which doubles are reported as the open end at their neighbour."""
     low, high = span
-    text = format_cell(Cell(NumberSet((span,), domain.kind == "angle")), domain)
+    text = format_cell(Cell(NumberSet((span,), domain.type.is_circular)), domain)
     is_low_in, is_high_in = not text.startswith("("), not text.endswith(")")
-    if domain.kind == "angle" and low == high:
+    if domain.type.is_circular and low == high:
         return Piece(_half_turn(low), _half_turn(high))
     return Piece(
         low if is_low_in else math.nextafter(low, -math.inf),
@@ -153,14 +154,15 @@ def runs(signs: Iterable[Run]) -> list[Run]:
 def framed_line(cell: Cell, domain: Domain, width: int) -> list[Run]:
     """The line with the ends of its range next to it; a bound of the domain has a stop, an end that is only shown has none."""
     low, high = shown = shown_range(cell, domain)
-    left = format_number(_short(low)) + (" ├" if low == domain.minimum else "  ")
-    right = ("┤ " if high == domain.maximum else "  ") + format_number(_short(high))
+    left = _end(low, domain) + (" ├" if low == domain.minimum else "  ")
+    right = ("┤ " if high == domain.maximum else "  ") + _end(high, domain)
     room = max(width - len(left) - len(right), 8)
     return runs([(left, False), *interval_line(cell, domain, room, shown), (right, False)])
 
 
-def _short(value: float) -> float:
-    return float(f"{value:.6g}")
+def _end(value: float, domain: Domain) -> str:
+    """An end of the line, in few digits."""
+    return domain.type.spelling.write(float(f"{value:.6g}") if domain.type.is_decimal else value)
 
 
 # ---- the dial
@@ -206,21 +208,21 @@ def number_words(cell: Cell, domain: Domain, unit: str = "") -> str:
     """A set of numbers in words: "10.01 to 29.99 degrees, both ends in"."""
     found = pieces(cell, domain)
     if cell.is_any or spans_of(cell) in (EVERYTHING, (CIRCLE,)):
-        return "every angle" if domain.kind == "angle" else "every number"
+        return f"every {domain.type.value.removeprefix('a ').removeprefix('an ')}"
     if not found:
         return "no number: the row never matches"
-    unit = f" {unit or DEGREES}" if domain.kind == "angle" or unit else ""
+    unit = f" {unit or DEGREES}" if domain.type.is_circular or unit else ""
     if len(found) == 1:
-        return _alone(found[0], unit) + _outside(cell, domain)
-    return " or ".join(_among(piece) for piece in found) + unit + _outside(cell, domain)
+        return _alone(found[0], unit, domain) + _outside(cell, domain)
+    return " or ".join(_among(piece, domain) for piece in found) + unit + _outside(cell, domain)
 
 
-def _alone(piece: Piece, unit: str) -> str:
+def _alone(piece: Piece, unit: str, domain: Domain) -> str:
     if piece.is_point and not piece.is_low_in:
-        return f"every angle but {_told(piece.low)}{unit}"
+        return f"every angle but {_told(piece.low, domain)}{unit}"
     if piece.is_point or math.isinf(piece.low) or math.isinf(piece.high):
-        return ("exactly " if piece.is_point else "") + _among(piece) + unit
-    low, high = _ends(piece)
+        return ("exactly " if piece.is_point else "") + _among(piece, domain) + unit
+    low, high = _ends(piece, domain)
     if piece.is_low_in and piece.is_high_in:
         which = "both ends in"
     elif piece.is_low_in or piece.is_high_in:
@@ -230,8 +232,8 @@ def _alone(piece: Piece, unit: str) -> str:
     return f"{low} to {high}{unit}, {which}"
 
 
-def _among(piece: Piece) -> str:
-    low, high = _ends(piece)
+def _among(piece: Piece, domain: Domain) -> str:
+    low, high = _ends(piece, domain)
     if piece.is_point:
         return low
     if math.isinf(piece.low):
@@ -241,14 +243,14 @@ def _among(piece: Piece) -> str:
     return f"{'' if piece.is_low_in else 'above '}{low} to {'' if piece.is_high_in else 'below '}{high}"
 
 
-def _ends(piece: Piece) -> tuple[str, str]:
+def _ends(piece: Piece, domain: Domain) -> tuple[str, str]:
     """The two ends as texts; an angle that runs through half a turn ends behind it."""
-    return _told(piece.low), _told(piece.high)
+    return _told(piece.low, domain), _told(piece.high, domain)
 
 
-def _told(value: float) -> str:
+def _told(value: float, domain: Domain) -> str:
     """A number as a person would say it: the last bit of a sum left out."""
-    return f"{value:.15g}"
+    return f"{value:.15g}" if domain.type.is_decimal else domain.type.spelling.write(value)
 
 
 def _outside(cell: Cell, domain: Domain) -> str:
@@ -256,5 +258,5 @@ def _outside(cell: Cell, domain: Domain) -> str:
     low, high = domain.minimum, domain.maximum
     if any(first <= high and last >= low for first, last in spans_of(cell)):
         return ""
-    within = f"within {_told(low)} to {_told(high)}" if low > -math.inf else f"up to {_told(high)}"
-    return f"; nothing {within}" if high < math.inf else f"; nothing from {_told(low)} up"
+    within = f"within {_told(low, domain)} to {_told(high, domain)}" if low > -math.inf else f"up to {_told(high, domain)}"
+    return f"; nothing {within}" if high < math.inf else f"; nothing from {_told(low, domain)} up"

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC, Domain
+from contextdb.cells.domains import Domain
 from contextdb.cells.facts import describe, read_fact_text
-from contextdb.cells.grammar import Cell, TagSet, ValueSet, format_number, parse_cell, reads
+from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.mends import candidates
+from contextdb.cells.sets import Cell, TagSet, ValueSet
+from contextdb.cells.words import format_number
 from contextdb.errors import CellError, ContextError, Fault, Place, plural, shown
 from tui.model.interval_picture import number_words
 
@@ -46,25 +48,26 @@ def _fact_meaning(text: str, condition: Condition) -> Meaning:
     domain = condition.domain
     if not text.strip():
         return Meaning("not given")
-    if domain.kind != "tags" and not reads(text, domain) and text.strip() not in domain.known:
+    if not domain.type.is_tags and not reads(text, domain) and text.strip() not in domain.known:
         parse_cell(text, domain, wants_mend=False)
     fact = read_fact_text(text, condition)
     if fact is None:
         return Meaning("not given")
     if isinstance(fact, Cell):
         return Meaning(f"may be {set_words(fact, domain, condition.unit)}", cell=fact)
-    if domain.kind in NUMERIC:
-        return Meaning(f"exactly {describe(fact)} {condition.unit}".rstrip(), cell=parse_cell(describe(fact), domain))
-    return Meaning(f"has {describe(fact)}" if isinstance(fact, frozenset) else f"is {describe(fact)}")
+    told = describe(fact, domain)
+    if domain.type.is_numeric:
+        return Meaning(f"exactly {told} {condition.unit}".rstrip(), cell=parse_cell(told, domain))
+    return Meaning(f"has {told}" if isinstance(fact, frozenset) else f"is {told}")
 
 
 def set_words(cell: Cell, domain: Domain, unit: str = "") -> str:
     """A set of values in words."""
-    if domain.kind in NUMERIC:
+    if domain.type.is_numeric:
         return number_words(cell, domain, unit)
     accepts = cell.accepts
     if accepts is None:
-        return "any set of tags" if domain.kind == "tags" else "every value"
+        return "any set of tags" if domain.type.is_tags else "every value"
     if cell.is_empty:
         return "no value: the row never matches"
     if isinstance(accepts, TagSet):
@@ -75,7 +78,7 @@ def set_words(cell: Cell, domain: Domain, unit: str = "") -> str:
 
 def _value_words(accepts: ValueSet, domain: Domain) -> str:
     n_named = len(accepts.values)
-    if domain.kind == "bool":
+    if domain.type.is_truth:
         return "True or False" if n_named != 1 else f"only {next(iter(accepts.values))}"
     if domain.values is None:
         return f"every value but {n_named:,}" if accepts.is_complement else f"{plural(n_named, 'value')}"

@@ -6,8 +6,9 @@ import random
 from collections.abc import Iterator, Mapping
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
-from contextdb.cells.grammar import Cell, format_number, parse_cell
+from contextdb.cells.grammar import parse_cell
+from contextdb.cells.sets import Cell
+from contextdb.cells.words import format_number
 from contextdb.covering.inside import facts_inside
 from contextdb.errors import ContextError, Fault, shown
 from contextdb.telemetry.recordings import fact_text
@@ -56,15 +57,15 @@ def _tries(inputs: tuple[Condition, ...], known: Mapping[str, Cell], given: Mapp
 
 def _drawn(condition: Condition, rng: random.Random) -> object:
     domain = condition.domain
-    if domain.kind in NUMERIC:
-        low, high = (-180.0, 180.0) if domain.kind == "angle" else (max(domain.minimum, -FAR), min(domain.maximum, FAR))
+    if domain.type.is_numeric:
+        low, high = (-180.0, 180.0) if domain.type.is_circular else (max(domain.minimum, -FAR), min(domain.maximum, FAR))
         number = rng.uniform(low, high)
         places = rng.choice((0, 0, 1, 3))
-        return int(number) if domain.kind == "int" else float(format_number(round(number, places)))
-    if domain.kind == "bool":
+        return domain.type.given(round(number)) if domain.type.is_whole else float(format_number(round(number, places)))
+    if domain.type.is_truth:
         return rng.random() < 0.5
     values = list(domain.known) or [""]
-    return sorted(v for v in map(str, values) if rng.random() < 0.5) if domain.kind == "tags" else str(rng.choice(values))
+    return sorted(v for v in map(str, values) if rng.random() < 0.5) if domain.type.is_tags else str(rng.choice(values))
 
 
 def _holds(cell: Cell, name: str, texts: Mapping[str, str], inputs: tuple[Condition, ...]) -> bool:

@@ -9,20 +9,20 @@ import math
 import re
 from dataclasses import replace
 from decimal import Decimal
+from functools import cache
 
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import Cell, NumberSet, format_cell, format_number, parse_cell, reads
-from contextdb.cells.words import NUMBER_TEXT
+from contextdb.cells.grammar import format_cell, parse_cell, reads
+from contextdb.cells.sets import Cell, NumberSet
+from contextdb.cells.words import format_number
 from tui.model.interval_picture import Piece, pieces
 
-_NUMBER = re.compile(rf"(?:(?<=\+)-)?({NUMBER_TEXT})")
-"""The "-" of "20 +-5" is not a sign."""
 _CENTRE_MARK = re.compile(r",|±|\+-")
 
 
 def step_of(domain: Domain, value: float) -> Decimal:
     """By how much a number is moved: 1 for whole numbers and degrees, else a power of ten near a hundredth of the domain."""
-    if domain.kind in ("int", "angle"):
+    if domain.type.is_whole or domain.type.is_circular:
         return Decimal(1)
     width = domain.maximum - domain.minimum
     if math.isfinite(width) and width > 0.0:
@@ -36,8 +36,10 @@ def nudged(text: str, caret: int, domain: Domain, steps: int) -> tuple[str, int]
     The number is the one under the caret, or the last one before it. A number within the bounds of the domain stays within them, an
     angle continues through half a turn. None where there is no number, or the text would not read or hold nothing.
     """
-    found = [m for m in _NUMBER.finditer(text) if math.isfinite(float(m[1]))]
-    if not found or not reads(text, domain):
+    if not reads(text, domain):
+        return None
+    found = [m for m in _numbers(domain.type.spelling.number).finditer(text) if "inf" not in m[1]]
+    if not found:
         return None
     number = next((m for m in found if m.start(1) <= caret <= m.end(1)), None)
     number = number or next((m for m in reversed(found) if m.end(1) < caret), found[0])
@@ -48,13 +50,27 @@ def nudged(text: str, caret: int, domain: Domain, steps: int) -> tuple[str, int]
     return changed, number.start(1) + len(moved)
 
 
+@cache
+def _numbers(number: str) -> re.Pattern[str]:
+    """The numbers in a text; the "-" of "20 +-5" is no sign."""
+    return re.compile(rf"(?:(?<=\+)-)?({number})")
+
+
 def _moved(text: str, domain: Domain, steps: int) -> str:
+    if domain.type.is_spelt:
+        return _next_spelt(text, domain, steps)
     old, value = Decimal(text), float(text)
     new = old + step_of(domain, value) * steps
-    low, high = (Decimal(-180), Decimal(180)) if domain.kind == "angle" else (_bound(domain.minimum), _bound(domain.maximum))
+    low, high = (Decimal(-180), Decimal(180)) if domain.type.is_circular else (_bound(domain.minimum), _bound(domain.maximum))
     if low <= old <= high and not low <= new <= high:
-        new = new + (360 if new < low else -360) if domain.kind == "angle" else max(low, min(new, high))
+        new = new + (360 if new < low else -360) if domain.type.is_circular else max(low, min(new, high))
     return f"{new:f}" if -30 < new.adjusted() < 30 else str(new)
+
+
+def _next_spelt(text: str, domain: Domain, steps: int) -> str:
+    kind, old = domain.type, domain.type.spelling.read(text)
+    first, last = (domain.minimum, domain.maximum) if domain.minimum <= old <= domain.maximum else kind.limits
+    return kind.spelling.write(max(kind.limits[0], first, min(old + steps, last, kind.limits[1])))
 
 
 def _bound(value: float) -> Decimal:
@@ -88,11 +104,11 @@ def _centre_of(piece: Piece, domain: Domain) -> str | None:
     if not (piece.is_low_in and piece.is_high_in and math.isfinite(piece.low) and math.isfinite(piece.high)):
         return None
     low, high = Decimal(f"{piece.low:.15g}"), Decimal(f"{piece.high:.15g}")
-    if domain.kind == "angle" and high < low:
+    if domain.type.is_circular and high < low:
         high += 360
     centre, tolerance = (low + high) / 2, (high - low) / 2
-    if domain.kind == "angle" and centre > 180:
+    if domain.type.is_circular and centre > 180:
         centre -= 360
-    if domain.kind == "int" and not float(centre).is_integer():
+    if domain.type.is_whole and not float(centre).is_integer():
         return None
-    return f"{format_number(float(centre))}, {format_number(float(tolerance))}"
+    return f"{domain.type.spelling.write(float(centre))}, {format_number(float(tolerance))}"

@@ -26,7 +26,7 @@ from contextdb import bitmask
 from contextdb.bitmask import Flags, Rows
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Fact
-from contextdb.cells.grammar import Cell
+from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome

@@ -203,7 +203,8 @@ def _as_json(row: Mapping[str, str], sheet: TeamSheet) -> dict[str, object]:
     for fact, condition in sheet.facts.items():
         if fact in row:
             value = _read(row[fact], condition)
-            is_plain = isinstance(value, (bool, int, float, str)) and condition.domain.kind != "tags"
+            kind = condition.domain.type
+            is_plain = isinstance(value, (bool, int, float, str)) and not (kind.is_tags or kind.is_spelt)
             said[fact] = value if is_plain else row[fact]
     return said
 

@@ -15,7 +15,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags, Rows
-from contextdb.cells.grammar import NumberSet, TagSet, ValueSet
+from contextdb.cells.sets import NumberSet, TagSet, ValueSet
 from contextdb.columns import TextColumn
 from contextdb.tables.changes import CameFrom
 from contextdb.tables.condition_column import ConditionColumn
@@ -165,16 +165,16 @@ def _ranks(table: Table, name: str) -> _Ranks:
 
 def _condition_ranks(column: ConditionColumn) -> _Ranks:
     is_last = np.array([2 if i in column.faults else int(c.is_any) for i, c in enumerate(column.cells)], np.int8)
-    kind = column.condition.domain.kind
-    if kind in ("int", "number", "angle"):
+    domain = column.condition.domain
+    if domain.type.is_numeric:
         ends = [c.accepts.spans for c in column.cells if isinstance(c.accepts, NumberSet)]
         keys = np.zeros((2, len(column.cells)))
         at = [i for i, c in enumerate(column.cells) if isinstance(c.accepts, NumberSet)]
         keys[0, at] = [spans[0][0] if spans else np.inf for spans in ends]
         keys[1, at] = [spans[-1][1] if spans else np.inf for spans in ends]
         return _Ranks(_places_in_order([keys[0], keys[1]]), is_last)
-    if kind in ("bool", "enum"):
-        values: tuple[bool | str, ...] = (False, True) if kind == "bool" else column.condition.domain.values or ()
+    if not (domain.type.is_open or domain.type.is_tags):
+        values: tuple[bool | str, ...] = domain.everything or ()
         declared: dict[bool | str, int] = {v: i for i, v in enumerate(values)}
         tuples = [_declared_places(c.accepts, declared) for c in column.cells]
         order = {t: i for i, t in enumerate(sorted(set(tuples)))}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from contextdb.cells.grammar import Cell
+from contextdb.cells.sets import Cell
 from contextdb.tables.condition_column import ConditionColumn
 from tui.model.shown import ShownTable
 

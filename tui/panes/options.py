@@ -20,7 +20,7 @@ from textual.widget import Widget
 from textual.widgets import Input, Select, Static
 from textual.widgets.selection_list import Selection
 
-from contextdb.cells.domains import KINDS
+from contextdb.cells.kinds import KINDS
 from contextdb.edits import edits
 from contextdb.errors import ContextDBError
 from contextdb.schema.sections import has_place
@@ -28,7 +28,7 @@ from contextdb.schema.shapes import POLICIES
 from contextdb.tables.changes import Edit
 from contextdb.tables.condition_column import ConditionColumn
 from tui.messages import Edited
-from tui.model.condition_form import KIND_WORDS, ConditionForm, plain
+from tui.model.condition_form import ConditionForm, plain
 from tui.model.options import JOBS, OPTIONS, POLICY_WORDS, columns_for, with_expression
 from tui.model.sheet import Sheet
 from tui.panes.pane import Pane
@@ -81,7 +81,7 @@ class OptionsPane(Pane):
                 yield Field(option.label, self._control(option.key), option.meaning, option.key)
         with Vertical(id="options-condition", classes="options--part"):
             yield Static(id="condition-title", classes="options--title")
-            kinds = [(f"{kind:<8}{KIND_WORDS[kind]}", kind) for kind in KINDS]
+            kinds = [(f"{name:<8}{kind.words}", name) for name, kind in KINDS.items()]
             yield Field(
                 "Type", Select(kinds, compact=True, allow_blank=False, id="condition-type"), "What a fact of it is.", "type"
             )
@@ -202,7 +202,7 @@ class OptionsPane(Pane):
         )
         form = ConditionForm.of(column.condition)
         self.query_one("#condition-type", Select).value = form.kind
-        self.query_one("#condition-mirror", Input).placeholder = "negate" if form.kind == "angle" else "none"
+        self.query_one("#condition-mirror", Input).placeholder = "negate" if KINDS[form.kind].is_circular else "none"
         for key, name in _FORM.items():
             self.query_one(f"#condition-{key}", Input).value = getattr(form, name)
             self._field(key).display = has_place(key, form.kind)

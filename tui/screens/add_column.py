@@ -15,13 +15,13 @@ from textual.content import Content
 from textual.widgets import Button, Input, OptionList, Select, Static
 from textual.widgets.option_list import Option
 
-from contextdb.cells.domains import KINDS
+from contextdb.cells.kinds import KINDS
 from contextdb.edits.edits import Job
 from contextdb.errors import shown
 from contextdb.schema.sections import has_place
 from contextdb.tables.table import Table
 from tui.model.column_choices import JOB_WORDS, Choice, Insertion, NewColumnForm, choices, places
-from tui.model.condition_form import KIND_WORDS, ConditionForm
+from tui.model.condition_form import ConditionForm
 from tui.screens.dialog import Dialog
 from tui.widgets.field import Field
 
@@ -73,7 +73,7 @@ class AddColumn(Dialog[Insertion]):
         with Vertical(id="column-form"):
             jobs = [(f"{job:<11}{words}", job) for job, words in JOB_WORDS.items()]
             yield Field("What it is", Select(jobs, compact=True, allow_blank=False, id="column-job"), key="job")
-            kinds = [(f"{kind:<8}{KIND_WORDS[kind]}", kind) for kind in KINDS]
+            kinds = [(f"{name:<8}{kind.words}", name) for name, kind in KINDS.items()]
             yield Field("Type", Select(kinds, compact=True, allow_blank=False, id="column-type"), key="type")
             for key, label in _TYPED.items():
                 placeholder = (

@@ -21,7 +21,6 @@ from textual.widget import Widget
 from textual.widgets import Input
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
 from contextdb.cells.grammar import format_cell, parse_cell, reads
 from contextdb.errors import Fault, plural
 from tui.model.chooser import Chooser, Offer, Row
@@ -129,7 +128,7 @@ class CellEditor(Widget):
     @property
     def is_numeric(self) -> bool:
         """Whether the cell is a set of numbers."""
-        return self.condition is not None and self.kind in NUMERIC
+        return self.condition is not None and self.condition.domain.type.is_numeric
 
     def place(self, cell: Region, screen: Size) -> None:
         """Stand so that the entry line lies on the cell, wider where the text is, and the popup below or above it."""
@@ -256,7 +255,7 @@ class CellEditor(Widget):
             "other_form": self.is_numeric and self._form() is not None,
             "nudge": self.is_numeric,
             "tick": is_open and self._chooser.has_ticks and self._offer.word is None,
-            "sign": is_open and self.kind == "tags" and not self.is_fact and self._offer.word is None,
+            "sign": is_open and self._chooser.has_signs and not self.is_fact and self._offer.word is None,
             "take": bool(self._mend or self._meaning.fault or self._completes),
         }
         return can.get(action, True)
@@ -277,14 +276,14 @@ class CellEditor(Widget):
         text = self.text
         if text == self._began_with or not text.strip():
             return text
-        if self.kind in ("bool", "enabled"):
+        if self._chooser.is_truth:
             begun = [row for row in self._chooser.offer(text, 0, True).rows if self._chooser.same(text, row)]
             if len(begun) == 1:
                 return self._chooser.pick(text, begun[0], None)[0]
         if self.condition is None:
             return text
         domain = self.condition.domain
-        return format_cell(parse_cell(text, domain), domain) if self.kind == "bool" and reads(text, domain) else text.strip()
+        return format_cell(parse_cell(text, domain), domain) if domain.type.is_truth and reads(text, domain) else text.strip()
 
     def action_enter(self) -> None:
         """Take the text, or what is highlighted in the list."""

@@ -14,11 +14,12 @@ from functools import cache
 from importlib.resources import files
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.grammar import format_number
+from contextdb.cells.domains import Domain
+from contextdb.cells.kinds import Kind
 from contextdb.compiled.c_header.spelling import Names, comment, literal
 from contextdb.compiled.data import CompiledData
 
-READER = 1
+READER = 2
 """Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
 
 PARTS = ("types.h", "json.h", "opening.h", "columns.h", "arrays.h", "open.h", "query.h", "files.h")
@@ -49,9 +50,28 @@ _FOOT = """
 #endif /* {guard} */
 """
 _ENDINGS = ("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_open", "_close", "_query")
-_TYPES = {"bool": "int", "int": "int64_t", "number": "double", "angle": "double", "text": "const char *"}
-_MISSING = {"bool": "CDB_MISSING", "int": "CDB_MISSING_INT", "number": "cdb_missing_number()", "angle": "cdb_missing_number()"}
-_MEMBERS = {"number": "number", "angle": "number", "text": "text"}
+
+
+@dataclass(frozen=True)
+class Plain:
+    """How a fact that is no choice of declared values is kept in C: its type, what stands for a missing one, and its member."""
+
+    type: str
+    missing: str
+    member: str
+
+
+_TRUTH = Plain("int", "CDB_MISSING", "whole")
+_WHOLE = Plain("int64_t", "CDB_MISSING_INT", "whole")
+_NUMBER = Plain("double", "cdb_missing_number()", "number")
+_TEXT = Plain("const char *", "NULL", "text")
+
+
+def plain_of(kind: Kind) -> Plain:
+    """How facts of a type are kept in C, where they are no tags and have no declared values."""
+    if kind.is_numeric:
+        return _WHOLE if kind.is_whole else _NUMBER
+    return _TRUTH if kind.is_truth else _TEXT
 
 
 @dataclass(frozen=True)
@@ -132,7 +152,7 @@ def _why_not(table: CompiledData) -> str:
 def choices_of(condition: Condition, names: Names) -> Choices:
     """Names for the declared values of a condition; of tags also those above them, which a fact may hold too."""
     values = condition.domain.values or ()
-    is_tags = condition.domain.kind == "tags"
+    is_tags = condition.domain.type.is_tags
     if is_tags:
         values = tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
     endings = ("", "_set", "_values", "_none", "_add") if is_tags else ("", "_values")
@@ -164,7 +184,7 @@ def face_of(name: str, table: CompiledData, names: Names) -> TableFace:
 
 
 def _choices(condition: Condition, choices: Choices) -> Iterator[str]:
-    is_tags = condition.domain.kind == "tags"
+    is_tags = condition.domain.type.is_tags
     first = 1 if is_tags else 0
     yield comment(f"---- {condition.domain.kind} {condition.name}")
     yield f"typedef enum {choices.type} {{"
@@ -229,24 +249,24 @@ def _facts_struct(table: CompiledData, face: TableFace, choices: Mapping[Conditi
 
 
 def _type(condition: Condition, choices: Choices | None) -> str:
-    if condition.domain.kind == "tags":
+    if condition.domain.type.is_tags:
         return f"{choices.type}_set" if choices else "cdb_texts"
-    return choices.type if choices else _TYPES[condition.domain.kind]
+    return choices.type if choices else plain_of(condition.domain.type).type
 
 
 def _told(condition: Condition) -> str:
     """Type, name, bounds, unit, expression and description of a condition."""
     domain = condition.domain
     low, high = domain.minimum, domain.maximum
-    bounds = f"{_end(low)}..{_end(high)}" if math.isfinite(low) or math.isfinite(high) else ""
-    unit = condition.unit or ("degrees" if domain.kind == "angle" else "")
+    bounds = f"{_end(low, domain)}..{_end(high, domain)}" if math.isfinite(low) or math.isfinite(high) else ""
+    unit = condition.unit or domain.type.unit
     head = " ".join(part for part in (domain.kind, condition.name, bounds, unit) if part)
     derived = f"the game computes it: {condition.expr}" if condition.expr else ""
     return comment("; ".join(part for part in (head, derived, condition.description) if part))
 
 
-def _end(bound: float) -> str:
-    return format_number(bound) if math.isfinite(bound) else ""
+def _end(bound: float, domain: Domain) -> str:
+    return domain.type.spelling.write(bound) if math.isfinite(bound) else ""
 
 
 def _conditions_enum(table: CompiledData, face: TableFace) -> Iterator[str]:
@@ -265,7 +285,7 @@ def _schema(table: CompiledData, face: TableFace, choices: Mapping[Condition, Ch
         yield "    static const cdb_condition conditions[] = {"
         for number, condition in enumerate(table.conditions, 1):
             values = choices.get(condition)
-            n_values = 0 if values is None else len(values.values) + (condition.domain.kind == "tags")
+            n_values = 0 if values is None else len(values.values) + (condition.domain.type.is_tags)
             expr = literal(condition.expr) if condition.expr else "NULL"
             listed = f"{values.type}_values" if values else "NULL"
             ending = "," if number < len(table.conditions) else ""
@@ -285,15 +305,11 @@ def _missing_facts(table: CompiledData, face: TableFace, choices: Mapping[Condit
     yield f"    {face.base}_facts facts;"
     yield "    memset(&facts, 0, sizeof facts);"
     for condition, name in zip(table.conditions, face.fields, strict=True):
-        kind, declared = condition.domain.kind, choices.get(condition)
-        if kind in _MISSING:
-            yield f"    facts.{name} = {_MISSING[kind]};"
-        elif kind == "enum" and declared:
-            yield f"    facts.{name} = {declared.missing};"
-        elif kind == "tags" and not declared:
+        kind, declared = condition.domain.type, choices.get(condition)
+        if not kind.is_tags:
+            yield f"    facts.{name} = {declared.missing if declared else plain_of(kind).missing};"
+        elif not declared:
             yield f"    facts.{name}.count = CDB_MISSING;"
-        elif kind == "text":
-            yield f"    facts.{name} = NULL;"
     yield "    return facts;"
     yield "}"
     yield ""
@@ -330,7 +346,8 @@ def _functions(table: CompiledData, face: TableFace, choices: Mapping[Condition,
 
 
 def _given(number: int, name: str, condition: Condition, declared: Choices | None) -> str:
-    if condition.domain.kind == "tags":
+    if condition.domain.type.is_tags:
         member, of = ("tags", f"{name}.words") if declared else ("texts", name)
         return f"given[{number}].{member} = facts->{of};"
-    return f"given[{number}].{_MEMBERS.get(condition.domain.kind, 'whole')} = facts->{name};"
+    member = "whole" if declared else plain_of(condition.domain.type).member
+    return f"given[{number}].{member} = facts->{name};"

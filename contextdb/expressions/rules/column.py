@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL
+from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, in_quotes, some
 from contextdb.expressions import Expression, ExpressionError, read_expression
 from contextdb.expressions.names import unknown_in
 
-NO_RULE = ("", "-", "any")
-"""What a cell says in any case that has no rule."""
 MOST_MENDS = 20
 """Rules of one column that get a mend when they cannot be read; looking for one is slow."""
 MOST_KNOWN = 1 << 13
@@ -82,7 +81,7 @@ class WhenColumn:
 
 def has_no_rule(text: str) -> bool:
     """Whether a cell says that its row has no rule."""
-    return text.strip().casefold() in NO_RULE
+    return says_any(text)
 
 
 def check_rule(text: str, conditions: Mapping[str, Condition]) -> Fault | None:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import NUMERIC
 from contextdb.cells.facts import Fact, Unknown, describe, read_fact
-from contextdb.cells.grammar import Cell, format_cell
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextError, Fault, Place, in_quotes
 from contextdb.expressions import Expression
@@ -33,7 +33,6 @@ FEW = 4
 MOST_TOLD = 6
 """So many facts of a rule are told in a message."""
 
-_USUAL: Mapping[str, type] = {"number": float, "bool": bool, "text": str}
 """The types of which every value but NaN is in canonical form already."""
 
 
@@ -202,7 +201,7 @@ class WhenRules:
 
     @cached_property
     def _reading(self) -> tuple[tuple[str, Condition, type | None], ...]:
-        return tuple((c.name, c, _USUAL.get(c.domain.kind)) for c in self.conditions)
+        return tuple((c.name, c, c.domain.type.python) for c in self.conditions)
 
 
 def values_of(facts: Mapping[str, Fact], conditions: tuple[Condition, ...]) -> dict[str, Value]:
@@ -212,7 +211,7 @@ def values_of(facts: Mapping[str, Fact], conditions: tuple[Condition, ...]) -> d
 
 def _value(fact: Fact, condition: Condition) -> Value:
     if fact is None or isinstance(fact, Cell):
-        return NAN if condition.domain.kind in NUMERIC else None
+        return NAN if condition.domain.type.is_numeric else None
     return fact + 0.0 if type(fact) is float else fact
 
 
@@ -233,4 +232,4 @@ def told_facts(rule: Expression, facts: Mapping[str, Fact | Value]) -> str:
 def _told(fact: Fact | Value, condition: Condition) -> str:
     if isinstance(fact, Cell):
         return format_cell(fact, condition.domain)
-    return describe(None if fact != fact else 180.0 if fact == -180.0 and condition.domain.kind == "angle" else fact)
+    return describe(None if fact != fact else fact, condition.domain)

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.tables.changes import CameFrom
-
-ANY_WORDS = frozenset(("", "-", "any"))
-"""Texts that say nothing: two rows are not alike because both accept everything."""
 
 Places = NDArray[np.int64]
 
@@ -39,7 +37,7 @@ class Shared:
     @property
     def is_any(self) -> NDArray[np.bool_]:
         """For each text whether it says nothing."""
-        return np.array([text.strip().casefold() in ANY_WORDS for text in self.texts], np.bool_)
+        return np.array([says_any(text) for text in self.texts], np.bool_)
 
     def at(self, column: int, rows: CameFrom) -> NDArray[np.int64]:
         """The codes of a column in some rows; -1 where the row is -1 or the column is missing."""

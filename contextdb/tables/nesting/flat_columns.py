@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.grammar import ANY, Cell, format_cell
-from contextdb.cells.nesting_cells import TagMeet, meet
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.sets import ANY, Cell, TagMeet, meet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, column_masks
 from contextdb.compiled.layers import Layers

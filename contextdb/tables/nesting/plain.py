@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from contextdb.cells.grammar import ANY, Cell, format_cell
-from contextdb.cells.nesting_cells import TagMeet
+from contextdb.cells.grammar import format_cell
+from contextdb.cells.sets import ANY, Cell, TagMeet
 from contextdb.columns import TextColumn
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.flat import FlatTable

@@ -14,7 +14,7 @@ from textual.message import Message
 from textual.widgets import Static
 
 from contextdb.cells.domains import Domain
-from contextdb.cells.grammar import Cell, NumberSet
+from contextdb.cells.sets import Cell, NumberSet
 from contextdb.errors import Fault, in_quotes
 from tui.model.interval_picture import DIAL_HEIGHT, DIAL_WIDTH, Run, dial, framed_line
 from tui.widgets.editing.choice_list import ChoiceList
@@ -96,7 +96,7 @@ class Popup(Vertical):
         """How wide it would like to be."""
         told = WIDEST if self._told.is_refused else cell_len(self._told.words)
         wanted = max(told, cell_len(str(self.border_subtitle or "")) + 2, self.choices.wanted_width) + GUTTER
-        least = NARROWEST if self._domain is None else WIDEST if self._domain.kind == "angle" else OF_NUMBERS
+        least = NARROWEST if self._domain is None else WIDEST if self._domain.type.is_circular else OF_NUMBERS
         return max(least, min(wanted, WIDEST))
 
     def stand(self, entry: Region, screen: Size) -> None:
@@ -123,7 +123,7 @@ class Popup(Vertical):
     def _say(self, width: int) -> int:
         """Fill in picture, words and mend for a width; gives how many lines they take."""
         told, domain = self._told, None if self._told.is_refused else self._domain
-        is_dial = domain is not None and domain.kind == "angle"
+        is_dial = domain is not None and domain.type.is_circular
         self.set_class(told.is_refused, "-refused")
         room = width - DIAL_WIDTH - sum(_DIAL_SIDE) - 2 if is_dial else width
         words = list(_worded(told, max(room, 8)))
@@ -137,7 +137,7 @@ class Popup(Vertical):
 
     def _draw(self, width: int, words: Sequence[Content], domain: Domain) -> list[Content]:
         """The line of the numbers, or the dial with the words next to it; without its filling while the text cannot be read."""
-        if domain.kind != "angle":
+        if not domain.type.is_circular:
             return [_coloured(framed_line(self._cell or NOTHING, domain, width))]
         left, right = _DIAL_SIDE
         middle = " " * (left + DIAL_WIDTH // 2)

@@ -146,7 +146,7 @@ static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cd
 {
     cdb_column *column = &opening->columns[at];
     cdb_type type = opening->schema->conditions[at].type;
-    int kind = cdbi_kind(about), is_number = type == CDB_INT || type == CDB_NUMBER || type == CDB_ANGLE;
+    int kind = cdbi_kind(about), is_number = type == CDB_INT || type == CDB_NUMBER || type == CDB_ANGLE || type == CDB_DATE;
     cdbi_json one = {NULL, NULL, NULL}, other = {NULL, NULL, NULL};
     column->kind = kind;
     if (kind == 0 || is_number != (kind == CDBI_FLAT || kind == CDBI_WIDE) || (type == CDB_TAGS) != (kind == CDBI_SLOTS))
@@ -176,7 +176,7 @@ static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cd
 /* Which condition of the schema this one of the file is, its type and expression the same; n_conditions where it is none. */
 static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *about, size_t file_index)
 {
-    static const char *const types[] = {"bool", "int", "number", "angle", "enum", "text", "tags"};
+    static const char *const types[] = {"bool", "int", "number", "angle", "date", "enum", "text", "tags"};
     const cdb_schema *schema = opening->schema;
     size_t i, at = 0;
     int is_derived;

@@ -85,7 +85,8 @@ static inline int cdbi_is_missing(const cdb_condition *condition, const cdb_fact
     switch (condition->type) {
     case CDB_BOOL:
     case CDB_ENUM: return fact->whole == CDB_MISSING;
-    case CDB_INT: return fact->whole == CDB_MISSING_INT;
+    case CDB_INT:
+    case CDB_DATE: return fact->whole == CDB_MISSING_INT;
     case CDB_NUMBER:
     case CDB_ANGLE: return cdbi_is_nan(fact->number);
     case CDB_TEXT: return fact->text == NULL;
@@ -98,12 +99,13 @@ static inline int cdbi_is_wrong(const cdb_condition *condition, const cdb_fact *
 {
     if (condition->type == CDB_BOOL) return fact->whole < 0 || fact->whole > 1;
     if (condition->type == CDB_ENUM) return fact->whole < 0 || (uint64_t)fact->whole >= condition->n_values;
+    if (condition->type == CDB_DATE) return fact->whole < CDB_FIRST_DATE || fact->whole > CDB_LAST_DATE;
     return condition->type == CDB_ANGLE && cdbi_is_infinite(fact->number);
 }
 
 static inline double cdbi_number(const cdb_condition *condition, const cdb_fact *fact)
 {
-    if (condition->type == CDB_INT) return (double)fact->whole;
+    if (condition->type == CDB_INT || condition->type == CDB_DATE) return (double)fact->whole;
     return condition->type == CDB_ANGLE ? cdbi_wrapped(fact->number) : fact->number;
 }
 
@@ -270,6 +272,14 @@ static inline double cdb_missing_number(void)
     double number;
     memcpy(&number, &bits, sizeof number);
     return number;
+}
+
+/* A date of the calendar as whole days since 1970-01-01: cdb_date(2026, 1, 31). */
+static inline int64_t cdb_date(int year, int month, int day)
+{
+    int64_t since_march = month > 2 ? month - 3 : month + 9, y = (int64_t)year - (month <= 2);
+    int64_t era = (y >= 0 ? y : y - 399) / 400, of_era = y - era * 400;
+    return era * 146097 + of_era * 365 + of_era / 4 - of_era / 100 + (153 * since_march + 2) / 5 + day - 1 - 719468;
 }
 
 /* Put a tag into a set of declared tags, which is then known. */

@@ -38,9 +38,12 @@ typedef char cdbi_doubles_have_8_bytes[sizeof(double) == 8 ? 1 : -1];
 #define CDB_FALSE 0
 #define CDB_TRUE 1
 #define CDB_MISSING (-1)            /* a bool, an enum or a list of tags that is not known */
-#define CDB_MISSING_INT INT64_MIN   /* an int that is not known; a number or an angle: NaN; a text: NULL */
+#define CDB_MISSING_INT INT64_MIN   /* an int or a date that is not known; a number or an angle: NaN; a text: NULL */
 
-typedef enum cdb_type { CDB_BOOL, CDB_INT, CDB_NUMBER, CDB_ANGLE, CDB_ENUM, CDB_TEXT, CDB_TAGS } cdb_type;
+#define CDB_FIRST_DATE (-719162)    /* 0001-01-01 */
+#define CDB_LAST_DATE 2932896       /* 9999-12-31 */
+
+typedef enum cdb_type { CDB_BOOL, CDB_INT, CDB_NUMBER, CDB_ANGLE, CDB_DATE, CDB_ENUM, CDB_TEXT, CDB_TAGS } cdb_type;
 
 typedef enum cdb_unknown {          /* what a missing fact does */
     CDB_UNKNOWN_ERROR,              /* the query fails and names it */
@@ -74,7 +77,7 @@ typedef struct cdb_texts {          /* a fact of a condition of tags whose names
 } cdb_texts;
 
 typedef union cdb_fact {
-    int64_t whole;                  /* bool, int, enum (the number of its value) */
+    int64_t whole;                  /* bool, int, enum (the number of its value), date (days since 1970-01-01: see cdb_date) */
     double number;                  /* number, angle (degrees) */
     const char *text;               /* text, in UTF-8 */
     const uint64_t *tags;           /* declared tags: bit 0 says that they are known, bit i that tag i of the schema is there */

@@ -26,6 +26,17 @@ def test_the_package_names_its_own_version():
     assert contextdb.__version__ == PYPROJECT["project"]["version"]
 
 
+def test_what_contributing_names_is_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    found = re.findall(r"`((?:contextdb|tui|tests|docs)/[\w./]+)`(?:: ((?:`\w+`(?:, )?)+))?", text)
+    assert len(found) >= 8
+    for path, names in found:
+        place = ROOT / path.replace("render_NAME", "render_json")
+        assert place.exists(), path
+        for name in re.findall(r"`(\w+)`", names):
+            assert re.search(rf"^(?:def |class )?{name}\b", place.read_text(encoding="utf-8"), re.M), f"{path}: {name}"
+
+
 def test_the_changelog_has_an_unreleased_section_or_the_version():
     headings = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
     assert {"Unreleased", contextdb.__version__} & set(headings)

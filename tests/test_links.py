@@ -24,6 +24,7 @@ DOMAINS = {
     "Cells of every type": Domain("number"),
     "bool": Domain("bool"),
     "int and number": Domain("number"),
+    "date": Domain("date"),
     "angle": Domain("angle"),
     "enum and text": Domain("enum", ("CB", "FS", "SS", "Half Back")),
     "tags": Domain("tags", ("InAir", "Catching", "Stunned", "Move.Run")),
@@ -40,6 +41,7 @@ FACTS = {
     "gait": "Run",
     "Defender.Tags": {"Move.Run"},
     "Stage Name": "arena",
+    "day": "2026-01-31",
 }
 """What the examples of expressions in docs/format.md are computed from."""
 FACT_TYPES: dict[str, dict[str, object]] = {
@@ -49,6 +51,7 @@ FACT_TYPES: dict[str, dict[str, object]] = {
     "gait": {"type": "enum", "values": ["Walk", "Run"]},
     "Defender.Tags": {"type": "tags", "values": ["Move.Run", "Stunned"]},
     "Stage Name": {"type": "text"},
+    "day": {"type": "date"},
 }
 
 

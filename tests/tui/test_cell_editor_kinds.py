@@ -245,3 +245,25 @@ def test_every_kind_says_what_the_text_means(condition, text, said):
 def test_every_kind_takes_any_and_the_empty_cell(condition):
     assert taken(condition, "Any", "enter") == "Any"
     assert taken(condition, "", "enter") == ""
+
+
+# ---- dates
+
+DAY = Condition("day", Domain("date", None, 20454.0, 20818.0))
+"""Of the year 2026."""
+
+
+def test_a_date_is_typed_and_drawn_on_the_line_of_its_year():
+    assert taken(DAY, "2", *"026-03-01..", "enter", is_typing=True) == "2026-03-01.."
+    screen = press(Desk(DAY, "2026-03-01..2026-05-31"))
+    assert "2026-01-01 ├────●━━━━━●───────────────┤ 2026-12-31" in screen
+    assert "2026-03-01 to 2026-05-31" in screen
+
+
+def test_the_day_under_the_caret_moves_over_the_end_of_a_month():
+    assert taken(DAY, "2026-02-28", "up", "enter") == "2026-03-01"
+    assert taken(DAY, "2026-03-01..2026-05-31", "home", "down", "enter") == "2026-02-28..2026-05-31"
+
+
+def test_a_day_that_the_calendar_does_not_have_stays_in_its_cell_with_the_reason():
+    assert 'cannot read "2026-02-30" as a date' in press(Desk(DAY, "2026-02-30"), "enter")

@@ -39,6 +39,7 @@ from contextdb.cells import Cell
 from contextdb.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.facts import Unknown, check_mode, missing_error, misspelt, read_fact
+from contextdb.loops import announce
 from contextdb.matches import Matches
 from contextdb.mirroring import in_mirror
 from contextdb.unchanging import Unchanging
@@ -275,12 +276,15 @@ class ManyMatches(Unchanging, Answers[Matches]):
 def load_kernels(work: int = MUCH_WORK) -> ModuleType | None:
     """The compiled kernels; None where numba is not installed, or where they are not loaded yet and the work is too little for
     it."""
-    if work < MUCH_WORK and "contextdb.kernels" not in sys.modules:
+    is_loaded = "contextdb.kernels" in sys.modules
+    if work < MUCH_WORK and not is_loaded:
         return None
     try:
         from contextdb import kernels
     except ImportError:
         return None
+    if not is_loaded:
+        announce(kernels.batch)
     return kernels
 
 

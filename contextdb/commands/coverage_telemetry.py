@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from contextdb.console import printable
 from contextdb.contexts import context_files
-from contextdb.covering.progress import PREPARING
 from contextdb.errors import ContextError, Fault
+from contextdb.loops import PREPARING
 
 if TYPE_CHECKING:
     from contextdb.covering import Gap

@@ -18,12 +18,13 @@ from contextdb.covering.count import Bounds, is_prepared, prepare, uncovered_sha
 from contextdb.covering.crowded import find_crowds
 from contextdb.covering.gaps import SHARE_WORK, Measure, described, find_gaps, share_of
 from contextdb.covering.judge import Judge
-from contextdb.covering.progress import PREPARING, Progress, Stops, Tell
+from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
 from contextdb.covering.sample import LITTLE, Counts, Sampler, affordable
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_counts
+from contextdb.loops import PREPARING
 from contextdb.table import Table
 
 WORK = 40_000_000

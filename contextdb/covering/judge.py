@@ -26,12 +26,13 @@ from contextdb import bitmask
 from contextdb.check import identical_rows, named
 from contextdb.compiled import CompiledTable
 from contextdb.covering.draw import Drawer
-from contextdb.covering.progress import PREPARING, SILENT, Progress
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.questions import MANY, Questions, is_prepared
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
 from contextdb.findings import Finding, Level
+from contextdb.loops import PREPARING
 from contextdb.table import Table
 from contextdb.variety import gathered, lets_choose, needless, softened
 

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.covering.count import scratch_of, table_of, was_compiled
+from contextdb.covering.count import scratch_of, table_of
 from contextdb.covering.space import Box, runs_of
+from contextdb.loops import was_compiled
 
 MANY = 1000
 """From so many boxes on the loops are worth loading."""

@@ -8,6 +8,7 @@ Source: Bar-Yossef et al., "Counting distinct elements in a data stream", RANDOM
 
 from __future__ import annotations
 
+import sys
 from types import ModuleType
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
+from contextdb.loops import announce
 from contextdb.telemetry.number_classes import NumberClasses
 
 KeyWords = NDArray[np.uint64]
@@ -97,8 +99,11 @@ def rows_of(masks: Words) -> NDArray[np.int64]:
 
 def load_kernels() -> ModuleType | None:
     """The compiled kernels; None where numba is not installed."""
+    is_loaded = "contextdb.telemetry.kernels" in sys.modules
     try:
         from contextdb.telemetry import kernels
     except ImportError:
         return None
+    if not is_loaded:
+        announce(kernels.evaluate)
     return kernels

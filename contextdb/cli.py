@@ -11,6 +11,7 @@ import sys
 import textwrap
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
@@ -183,8 +184,12 @@ def _run(group: Group, given: Sequence[str]) -> int:
     command = group.command(given[0])
     if hasattr(command, "COMMANDS"):
         return _run(Group((*group.words, given[0]), command.COMMANDS, command.__doc__), given[1:])
+    from contextdb.console import announced
+
     try:
-        return int(command.run(group.parser(given[0], command).parse(given[1:])))
+        takes_screen = group.words == () and given[0] == "edit"
+        with nullcontext() if takes_screen else announced():
+            return int(command.run(group.parser(given[0], command).parse(given[1:])))
     except SystemExit as leaving:  # how argparse ends after --help and after an error
         sys.stdout.flush()
         return int(leaving.code or 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import sys
@@ -9,8 +10,9 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from enum import IntEnum
+from pathlib import Path
 from time import monotonic
-from typing import IO, TypeVar
+from typing import IO, Any, TypeVar
 
 Item = TypeVar("Item")
 
@@ -18,6 +20,11 @@ PATIENCE_S = 0.5
 """Work that is done sooner has no progress bar."""
 
 __version__ = "0.1.0"
+
+PREPARING = "Preparing the loops, for the first time on this machine only"
+"""What is reported while numba compiles loops."""
+LOOPS = logging.getLogger("contextdb.loops")
+"""Where the library reports it: silent by itself; commands show it on standard error."""
 
 STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}
 
@@ -108,3 +115,36 @@ def _with_bar(rest: Iterator[Item], label: str, total: int) -> Iterator[Item]:
     from rich.progress import track
 
     yield from track(rest, label, total, console=Console(stderr=True), transient=True)
+
+
+# ---- loops that numba compiles
+
+
+def was_compiled(loop: Any) -> bool:
+    """Whether a numba function is compiled: in this process, or in numba's cache on this machine."""
+    folder, module = Path(loop.stats.cache_path or ""), loop.py_func.__module__.rpartition(".")[2]
+    return bool(loop.signatures) or any(folder.glob(f"{module}.{loop.py_func.__qualname__}-*.nbi"))
+
+
+def announce(loop: Any) -> None:
+    """Say that the loops are compiled, where this one, the longest of them, is not compiled yet."""
+    if not was_compiled(loop):
+        LOOPS.info(PREPARING)
+
+
+class _OnStandardError(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        print(f"contextdb: {record.getMessage()}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def announced() -> Iterator[None]:
+    """Show on standard error that loops are compiled."""
+    handler, level = _OnStandardError(), LOOPS.level
+    LOOPS.addHandler(handler)
+    LOOPS.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        LOOPS.setLevel(level)
+        LOOPS.removeHandler(handler)

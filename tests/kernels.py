@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 from running import ROOT, run
 
 import contextdb as cdb
@@ -9,5 +12,10 @@ import contextdb as cdb
 if __name__ == "__main__":
     table = ROOT / "tables" / "locomotion.csv"
     cdb.load(table).compile().prepare(casting=True, batches=True)
+    with TemporaryDirectory() as folder:
+        moments = Path(folder) / "moments.csv"
+        moments.write_text("gait,speed,direction,style\nWalk,1.3,0,normal\n", encoding="utf-8")
+        run("evaluate", table, moments)
+        run("coverage", table, "--telemetry", moments)
     for arguments in (("coverage", table), ("demo",)):
         run(*arguments)

@@ -16,8 +16,7 @@ from strategies import some
 import contextdb
 from contextdb import cli
 from contextdb.commands import check_command, query_command
-from contextdb.console import ExitCode
-from contextdb.covering.progress import PREPARING
+from contextdb.console import PREPARING, ExitCode
 
 ESCAPE = "\x1b"
 EXAMPLE = re.compile(r"  (?:\w+ \| |git config [\w.]+ \")?contextdb (\w+) ")

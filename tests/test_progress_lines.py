@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from running import run
+from running import ROOT, run
 
 from contextdb.commands.coverage_telemetry import log_of
+from contextdb.console import LOOPS, PREPARING, announce, announced
 from contextdb.covering import count, coverage
-from contextdb.covering.progress import PREPARING
 from contextdb.tables.table import Table
 
 
@@ -111,3 +114,49 @@ def test_a_log_is_told_of_long_recordings(command: tuple[str, ...], monkeypatch:
         assert (lines[-1:] == [f"contextdb: {label}: 100 %"]) is is_told
         assert (f"contextdb: {label}: 50 %" in lines) is is_told
         assert len(lines) == len(set(lines))
+
+
+class Loop:
+    """A loop as numba has it, compiled or not."""
+
+    def __init__(self, folder: Path, is_compiled: bool) -> None:
+        self.stats, self.signatures, self.py_func = SimpleNamespace(cache_path=str(folder)), (), type(self).turn
+        if is_compiled:
+            (folder / f"{__name__.rpartition('.')[2]}.{type(self).turn.__qualname__}-12.py311.nbi").touch()
+
+    def turn(self) -> None:
+        """What is compiled."""
+
+
+@pytest.mark.parametrize("is_compiled", [True, False])
+def test_commands_say_that_loops_are_compiled_and_the_library_is_silent(
+    is_compiled: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    loop = Loop(tmp_path, is_compiled)
+    announce(loop)
+    assert capsys.readouterr().err == ""
+    with announced():
+        announce(loop)
+    assert capsys.readouterr().err == ("" if is_compiled else f"contextdb: {PREPARING}\n")
+    assert not LOOPS.handlers
+
+
+@pytest.mark.parametrize(
+    ("load", "module", "longest"),
+    [
+        ("contextdb.batch", "contextdb.kernels", "batch"),
+        ("contextdb.telemetry.keys", "contextdb.telemetry.kernels", "evaluate"),
+        ("contextdb.motion.search.searcher", "contextdb.motion.search.kernels", "search"),
+    ],
+)
+def test_whoever_loads_loops_first_says_that_they_are_compiled(load: str, module: str, longest: str):
+    script = f"""
+from importlib import import_module
+loader = import_module({load!r})
+told = []
+loader.announce = told.append
+assert loader.load_kernels() is loader.load_kernels() is import_module({module!r})
+print([loop.py_func.__name__ for loop in told])
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout == f"{[longest]}\n"

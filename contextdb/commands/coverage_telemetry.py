@@ -11,9 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from contextdb.console import printable
+from contextdb.console import PREPARING, printable
 from contextdb.covering import Gap
-from contextdb.covering.progress import PREPARING
 from contextdb.errors import ContextError, Fault
 from contextdb.report.coverage_results import Measured
 from contextdb.tables.table import EitherTable

@@ -42,6 +42,7 @@ from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMa
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.unchanging import Unchanging
+from contextdb.console import announce
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.expressions.rules import ManyRules
 
@@ -172,8 +173,8 @@ class ManyMatches(Unchanging, Answers[Matches]):
     def _codes(self) -> Codes:
         values = self.values
         out = np.empty((len(values.slots) + len(self.numbers.slots), self.n_contexts), np.int32)
-        present = values.classes >= 0
-        out[values.slots] = np.where(present, values.classes + values.starts[:, None], values.absent[:, None])
+        for slot, classes, start, absent in zip(values.slots, values.classes, values.starts, values.absent, strict=True):
+            out[slot] = np.where(classes < 0, absent, classes + start)
         if kernels := load_kernels(self._work):
             kernels.encode(self.numbers.facts, *self.numbers.arrays, self.numbers.slots, out)
         else:
@@ -273,12 +274,15 @@ class ManyMatches(Unchanging, Answers[Matches]):
 def load_kernels(work: int = MUCH_WORK) -> ModuleType | None:
     """The compiled kernels; None where numba is not installed, or where they are not loaded yet and the work is too little for
     it."""
-    if work < MUCH_WORK and "contextdb.compiled.kernels" not in sys.modules:
+    is_loaded = "contextdb.compiled.kernels" in sys.modules
+    if work < MUCH_WORK and not is_loaded:
         return None
     try:
         from contextdb.compiled import kernels
     except ImportError:
         return None
+    if not is_loaded:
+        announce(kernels.batch)
     return kernels
 
 

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
 from operator import and_
-from pathlib import Path
 from threading import Thread
 from typing import Any
 
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
+from contextdb.console import was_compiled
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, Sides, Space, runs_of
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
@@ -194,12 +194,6 @@ def is_prepared() -> bool:
     from contextdb.covering.count_kernels import uncovered
 
     return was_compiled(uncovered)
-
-
-def was_compiled(loop: Any) -> bool:
-    """Whether a numba function is compiled: in this process, or in numba's cache on this machine."""
-    folder, module = Path(loop.stats.cache_path or ""), loop.py_func.__module__.rpartition(".")[2]
-    return bool(loop.signatures) or any(folder.glob(f"{module}.{loop.py_func.__qualname__}-*.nbi"))
 
 
 def prepare(progress: Progress) -> None:

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from contextdb.compiled.table import CompiledTable
+from contextdb.console import PREPARING
 from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.count import Bounds, is_prepared, prepare, uncovered_share
 from contextdb.covering.crowded import find_crowds
 from contextdb.covering.gaps import SHARE_WORK, Measure, described, find_gaps, share_of
 from contextdb.covering.judge import Judge
-from contextdb.covering.progress import PREPARING, Progress, Stops, Tell
+from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
 from contextdb.covering.sample import LITTLE, Counts, Sampler, affordable
 from contextdb.covering.sampled_shares import SampledShares

@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.compiled.table import CompiledTable
+from contextdb.console import PREPARING
 from contextdb.covering.draw import Drawer
-from contextdb.covering.progress import PREPARING, SILENT, Progress
+from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.questions import MANY, Questions, is_prepared
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps

@@ -12,10 +12,6 @@ Tell = Callable[[str, float], None]
 Stops = Callable[[], bool]
 
 
-PREPARING = "Preparing the loops, for the first time on this machine only"
-"""What is reported while the loops are compiled."""
-
-
 class Cancelled(ContextDBError):
     """The computation was stopped by whoever asked for it."""
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.covering.count import scratch_of, table_of, was_compiled
+from contextdb.console import was_compiled
+from contextdb.covering.count import scratch_of, table_of
 from contextdb.covering.space import Box, runs_of
 
 MANY = 1000

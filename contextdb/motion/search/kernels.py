@@ -212,7 +212,11 @@ _given = {
 """What `search` takes. Told beforehand, so that no array of another kind has it compiled again in the middle of a game."""
 
 
-@njit(types.i8(*_given.values()), **_options)
+SIGNATURE = types.i8(*_given.values())
+"""What the search is compiled for, when it is first loaded."""
+
+
+@njit(**_options)
 def search(
     pack,
     raw,

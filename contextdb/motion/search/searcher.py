@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.console import announce
 from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
@@ -93,4 +94,7 @@ def load_kernels() -> ModuleType | None:
         from contextdb.motion.search import kernels
     except (ImportError, RuntimeError):
         return None
+    announce(kernels.search)
+    kernels.search.compile(kernels.SIGNATURE)
+    kernels.search.disable_compile()
     return kernels

@@ -1,0 +1,203 @@
+"""How much slower everything is without numba: the same work in processes with it and without it, which take turns.
+
+    python benchmarks/no_numba.py             a table of 2,000 rows x 30 conditions, and the samples
+    python benchmarks/no_numba.py --rounds 5  more turns
+    python benchmarks/no_numba.py --only check
+
+A figure is CPU time, the median of the turns; each process does the work once before, so that what is compiled is not timed. Work
+that goes on for longer than its limit without numba is given up, and its ratio is a lower bound. What the two give must be equal.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parent.parent
+if __package__ in (None, ""):
+    sys.path[0] = str(ROOT)  # not this folder: its coverage.py is no package of that name
+
+SIZE = (2_000, 30)
+SHAPE = "tree"
+WORK_OF_COUNT = 40_000_000
+N_CONTEXTS, N_MOMENTS, N_QUERIES = 100_000, 300_000, 100
+LIMIT_S = 120.0
+Work = Callable[[], object]
+"""Gives what both ways must give alike."""
+
+
+def main() -> None:
+    """Measure each piece of work in turns, and print a line for it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3, help="turns of each")
+    parser.add_argument("--only", metavar="TEXT", default="", help="only work whose name holds this")
+    parser.add_argument("--limit", type=float, default=LIMIT_S, metavar="S", help="give work up after so many seconds")
+    parser.add_argument("--alone", nargs=2, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.alone:
+        _alone(*options.alone)
+        return
+    print(f"{'work':46} {'numba s':>9} {'without s':>9} {'ratio':>7}")
+    for name in WORK:
+        if options.only in name:
+            _print_line(name, options.rounds, options.limit)
+
+
+def _print_line(name: str, n_rounds: int, limit_s: float) -> None:
+    times: dict[str, list[float]] = {"with": [], "without": []}
+    given = set()
+    for _ in range(n_rounds):
+        for how, own in times.items():
+            found = _timed(name, how, limit_s)
+            if found is None:
+                print(f"{name:46} {statistics.median(times['with']):9.3f} {'-':>9} {'> ' + format(limit_s, '.0f') + ' s':>7}")
+                return
+            own.append(found["cpu_s"])
+            given.add(found["given"])
+    if len(given) != 1:
+        raise SystemExit(f"{name}: with numba and without do not give the same.")
+    with_s, without_s = (statistics.median(own) for own in times.values())
+    print(f"{name:46} {with_s:9.3f} {without_s:9.3f} {without_s / with_s:7.1f}", flush=True)
+
+
+def _timed(name: str, how: str, limit_s: float) -> dict[str, Any] | None:
+    """What a process of its own took and gave; None where it was given up."""
+    line = [sys.executable, __file__, "--alone", name, how]
+    try:
+        out = subprocess.run(line, capture_output=True, text=True, check=True, timeout=limit_s, env={**os.environ}).stdout
+    except subprocess.TimeoutExpired:
+        return None
+    found: dict[str, Any] = json.loads(out)
+    return found
+
+
+def _alone(name: str, how: str) -> None:
+    if how == "without":
+        sys.modules["numba"] = None  # type: ignore[assignment]
+    with tempfile.TemporaryDirectory() as folder:
+        work = WORK[name](Path(folder))
+        work()
+        start = time.process_time()
+        given = work()
+        cpu_s = time.process_time() - start
+    text = json.dumps(given, sort_keys=True)
+    print(json.dumps({"cpu_s": cpu_s, "given": hashlib.sha256(text.encode()).hexdigest()}))
+
+
+# ---- the work
+
+
+def _tables() -> list[Any]:
+    """The samples."""
+    from contextdb.tables.project import Project
+
+    return [table.flat() for table in Project.load(ROOT / "tables").tables.values()]
+
+
+def _made() -> Any:
+    from benchmarks.coverage_tables import made_table
+
+    return made_table(SHAPE, *SIZE)
+
+
+def _query_many(folder: Path) -> Work:
+    import polars as pl
+
+    from benchmarks.telemetry import record
+
+    table = _made()
+    record(table, "distinct", N_CONTEXTS, folder)
+    columns = pl.read_parquet(folder / "*.parquet")
+    compiled = table.compile()
+    return lambda: compiled.query_many(columns).counts.tolist()
+
+
+def _coverage(tables: Callable[[], list[Any]], work: int, _folder: Path) -> Work:
+    from contextdb.covering import coverage
+
+    opened = tables()
+    return lambda: [coverage(table, work=work).to_json() for table in opened]
+
+
+def _check(tables: Callable[[], list[Any]], _folder: Path) -> Work:
+    from contextdb.checks.rows import check_rows
+
+    opened = tables()
+    return lambda: [[(f.rule, f.row, list(f.by)) for f in check_rows(table)] for table in opened]
+
+
+def _observe(kind: str, folder: Path) -> Work:
+    from benchmarks.telemetry import record
+    from contextdb.telemetry import observe
+
+    table = _made()
+    record(table, kind, N_MOMENTS, folder)
+    return lambda: observe(table, f"{folder}/*.parquet").to_json()
+
+
+def _evaluate(folder: Path) -> Work:
+    from benchmarks.telemetry import record
+    from contextdb.telemetry.evaluate_file import Question, evaluate_file
+
+    table = _made()
+    record(table, "distinct", N_MOMENTS, folder)
+    question = Question(table.compile(), "error", None)
+    return lambda: [evaluate_file(question, path, lambda _: None).hits.tolist() for path in sorted(folder.glob("*.parquet"))]
+
+
+def _casting(_folder: Path) -> Work:
+    from benchmarks.casting import ROLES, made_actors, made_table
+
+    rng = random.Random(0)
+    compiled, actors = made_table(rng).compile(), made_actors(rng)
+
+    def cast() -> list[int]:
+        for _ in range(5):
+            matches = compiled.query({}, actors=dict.fromkeys(ROLES, actors), prefer="distance")
+            rows = [row for row in matches if matches.casting(row)]
+        return rows
+
+    return cast
+
+
+def _search(_folder: Path) -> Work:
+    from benchmarks import captured
+    from contextdb.motion import MotionDatabase
+
+    frames = captured.load()
+    names = [f"clip {i}" for i in range(len(frames.starts))]
+    database = MotionDatabase.from_features(frames.features, frames.starts, frames.stops, names)
+    picks = np.random.default_rng(0).integers(len(frames.features), size=(N_QUERIES, 2))
+    queries = (frames.features[picks[:, 0]] + frames.features[picks[:, 1]]) / 2.0
+    return lambda: [database.search(query).frame for query in queries]
+
+
+WORK: dict[str, Callable[[Path], Work]] = {
+    "query_many, 100,000 contexts": _query_many,
+    "coverage of the samples": partial(_coverage, _tables, WORK_OF_COUNT),
+    "coverage, 2,000 x 30, a hundredth of the work": partial(_coverage, lambda: [_made()], WORK_OF_COUNT // 100),
+    "check of the samples": partial(_check, _tables),
+    "check, 2,000 x 30": partial(_check, lambda: [_made()]),
+    "telemetry, contexts that come back": partial(_observe, "skewed"),
+    "telemetry, contexts that do not": partial(_observe, "distinct"),
+    "evaluate, 300,000 contexts": _evaluate,
+    "casting, 22 actors": _casting,
+    "motion search, 100 queries": _search,
+}
+
+if __name__ == "__main__":
+    main()

@@ -175,8 +175,8 @@ class ManyMatches(Unchanging, Answers[Matches]):
     def _codes(self) -> Codes:
         values = self.values
         out = np.empty((len(values.slots) + len(self.numbers.slots), self.n_contexts), np.int32)
-        present = values.classes >= 0
-        out[values.slots] = np.where(present, values.classes + values.starts[:, None], values.absent[:, None])
+        for slot, classes, start, absent in zip(values.slots, values.classes, values.starts, values.absent, strict=True):
+            out[slot] = np.where(classes < 0, absent, classes + start)
         if kernels := load_kernels(self._work):
             kernels.encode(self.numbers.facts, *self.numbers.arrays, self.numbers.slots, out)
         else:

@@ -118,8 +118,9 @@ class MaskStack:
     def masks_of(self, codes: Codes, enabled: Words) -> Words:
         """The rows for each of many contexts' codes, int32 [N, n_codes], of those that are enabled: uint64 [N, W]."""
         found = np.broadcast_to(enabled, (len(codes), len(enabled))).copy()
+        own = np.empty_like(found)
         for j in range(self.n_plain):
-            found &= self.masks[codes[:, j]]
+            found &= self.masks.take(codes[:, j], axis=0, out=own, mode="clip")  # codes are in range: "raise" would copy once more
         for i in range(len(self.wide)):
             found &= self.wide_masks(i, codes[:, self.n_plain + i])
         return found

@@ -88,7 +88,7 @@ def uncovered(part, depth, n_listed, weights, salts, table, scratch, known, stat
             is_over = state[WORK] >= state[LIMIT] or state[STOP]
             if is_over or 1.0 - found_low <= m * EPSILON:
                 state[CUT] += is_over
-                found_high = min(1.0, found_high + own[t:].sum())
+                found_high = min(1.0, found_high + _sum(own[t:]))
                 break
             n_before = _met_before(part, i, depth, n, before, boxes, scratch)
             before[i >> 6] |= ONE << np.uint64(i & 63)
@@ -133,6 +133,15 @@ def uncovered(part, depth, n_listed, weights, salts, table, scratch, known, stat
     known[0][at, 0], known[0][at, 1] = key1, key2
     known[1][at, 0], known[1][at, 1] = min(low, high), high
     return min(low, high), high
+
+
+@njit(**options)
+def _sum(shares):
+    """The sum, one after the other: numpy's own takes another order than numba's."""
+    total = 0.0
+    for share in shares:
+        total += share
+    return total
 
 
 @njit(**options)

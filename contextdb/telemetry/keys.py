@@ -66,11 +66,30 @@ def grouped(words: KeyWords, moments: Counts) -> tuple[Hashes, NDArray[np.int32]
         n = kernels.group(words, hashes, moments, table, first, sums)
         first, sums = first[:n], sums[:n]
     else:
-        counted = np.flatnonzero(moments)
-        _, at, inverse = np.unique(words[:, counted], axis=1, return_index=True, return_inverse=True)
-        first, sums = counted[at].astype(np.int32), np.zeros(len(at), np.int64)
-        np.add.at(sums, inverse.reshape(-1), moments[counted])
+        first, sums = _grouped_with_numpy(words, hashes, moments)
     return hashes[first], first, sums
+
+
+def _grouped_with_numpy(words: KeyWords, hashes: Hashes, moments: Counts) -> tuple[NDArray[np.int32], Counts]:
+    """The first context of each distinct key that has moments, ascending, and the sum of its moments."""
+    counted = np.flatnonzero(moments)
+    order = counted[np.argsort(hashes[counted], kind="stable")]
+    if not _tells_apart(words[:, order], hashes[order]):
+        order = counted[np.lexsort(words[:, counted])]
+    starts = np.flatnonzero(np.append(True, _differ(words[:, order]))[: len(order)])
+    first, sums = order[starts], np.add.reduceat(moments[order], starts) if len(starts) else np.zeros(0, np.int64)
+    by_first = np.argsort(first)
+    return first[by_first].astype(np.int32), sums[by_first]
+
+
+def _tells_apart(words: KeyWords, hashes: Hashes) -> bool:
+    """Whether keys that lie beside each other, and differ, differ in their hashes too."""
+    return not (_differ(words) & (hashes[1:] == hashes[:-1])).any()
+
+
+def _differ(words: KeyWords) -> NDArray[np.bool_]:
+    """Which keys differ from the one before, from the second on."""
+    return np.asarray((words[:, 1:] != words[:, :-1]).any(axis=0))
 
 
 def begins(ordered: Hashes) -> NDArray[np.bool_]:

@@ -127,7 +127,8 @@ def _evaluated(fields: Fields, words: KeyWords, rows: NDArray[np.int32], sums: C
         for start in range(0, len(codes), NUMPY_BLOCK):
             masks = compiled.stack.masks_of(codes[start : start + NUMPY_BLOCK], compiled.enabled)
             is_open[start : start + NUMPY_BLOCK] = ~masks.any(axis=1)
-            hits += sums[start : start + NUMPY_BLOCK] @ bitmask.unpack(masks, len(hits)).astype(np.int64)
+            contexts, own = bitmask.places(masks)
+            np.add.at(hits, own, sums[start : start + NUMPY_BLOCK][contexts])
     return hits[: compiled.n_rows], is_open
 
 

@@ -7,10 +7,13 @@ import subprocess
 import sys
 from collections.abc import Mapping
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import contextdb as cdb
-from contextdb.covering import coverage, format_percent
+from contextdb.covering import count_kernels, coverage, format_percent
 from contextdb.covering.shares import told_apart, wilson
 from contextdb.schema import TableSettings
 
@@ -254,6 +257,12 @@ print(json.dumps(report.to_json()))
         for how in ("with", "without")
     ]
     assert out[0] == out[1] != ""
+
+
+@given(st.lists(st.floats(0.0, 1.0), max_size=40))
+def test_the_sum_of_the_boxes_that_a_cut_leaves_out_is_the_same_without_numba(shares):
+    loop = count_kernels._sum
+    assert loop(np.array(shares)) == loop.py_func(np.array(shares)) == sum(shares, 0.0)
 
 
 def test_a_text_whose_values_nobody_declares_leaves_every_other_text_open():

@@ -76,11 +76,21 @@ def test_grouping_sums_the_moments_of_equal_contexts_and_leaves_out_those_of_non
     assert summed(words, keys.grouped(words, moments)) == expected
 
 
-def test_contexts_of_one_hash_are_still_told_apart(words, monkeypatch):
+@pytest.mark.parametrize("engine", ["numba", "numpy"])
+def test_contexts_of_one_hash_are_still_told_apart(engine, words, monkeypatch):
+    if engine == "numpy":
+        monkeypatch.setattr(keys, "load_kernels", lambda: None)
     monkeypatch.setattr(keys, "hashes_of", lambda words: np.full(words.shape[1], 7, np.uint64))
     _, first, sums = keys.grouped(words[:, :300], np.ones(300, np.int64))
     assert len(first) == len(np.unique(words[:, :300], axis=1).T)
     assert sums.sum() == 300
+
+
+@pytest.mark.parametrize("engine", ["numba", "numpy"])
+def test_of_no_contexts_there_are_no_groups(engine, words, monkeypatch):
+    if engine == "numpy":
+        monkeypatch.setattr(keys, "load_kernels", lambda: None)
+    assert [len(part) for part in keys.grouped(words, np.zeros(3000, np.int64))] == [0, 0, 0]
 
 
 def test_without_numba_everything_observed_is_the_same(tmp_path, without_numba, monkeypatch):

@@ -71,6 +71,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/editor.py
 	$(PY) benchmarks/start.py
+	$(PY) benchmarks/no_numba.py
 
 clean:
 	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in '$(VENV) build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache'.split()]"

@@ -144,7 +144,7 @@ def test_commands_say_that_loops_are_compiled_and_the_library_is_silent(
 @pytest.mark.parametrize(
     ("load", "module", "longest"),
     [
-        ("contextdb.batch", "contextdb.kernels", "batch"),
+        ("contextdb.compiled.batch", "contextdb.compiled.kernels", "batch"),
         ("contextdb.telemetry.keys", "contextdb.telemetry.kernels", "evaluate"),
         ("contextdb.motion.search.searcher", "contextdb.motion.search.kernels", "search"),
     ],

@@ -19,7 +19,7 @@ from contextdb.cells.mirroring import kept_facts
 from contextdb.compiled.casting.facts import Actors, Prefer
 from contextdb.compiled.casting.live import LiveActors
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.lookup import SingleLookup
+from contextdb.compiled.lookup import UNUSUAL, SingleLookup
 from contextdb.compiled.matches import Matches
 from contextdb.errors import Fault, NoSuchFact, in_quotes, some
 from contextdb.expressions.rules import WhenRules
@@ -95,7 +95,7 @@ class LiveContext(MutableMapping[str, object]):
         try:
             bounds, masks = self._lookups[name]
             self._moving[name] = masks[value] if bounds is None else masks[bisect_right(bounds, ldexp(value, 0))]
-        except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
+        except UNUSUAL:  # it is read again with care, which answers it or says what is wrong
             self._set_carefully(name, value)
         else:
             self._facts[name] = value
@@ -242,6 +242,8 @@ class LiveContext(MutableMapping[str, object]):
             for mask in moving.values():
                 bits &= mask
         except TypeError:
+            if None not in moving.values():
+                raise
             self._read_unusual()
             return self.matches()
         if self._odd:

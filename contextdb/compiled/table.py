@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_path
-from contextdb.cells.facts import Context, Unknown, check_mode
+from contextdb.cells.facts import Context, Unknown, check_mode, require_context
 from contextdb.compiled.artefact import open_artefact, save
 from contextdb.compiled.batch import ManyMatches, query_codes, query_many
 from contextdb.compiled.casting.explaining import explain_with_actors
@@ -21,6 +21,7 @@ from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, explain
 from contextdb.compiled.live import LiveContext, live_context
+from contextdb.compiled.lookup import UNUSUAL
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick import pick
@@ -73,8 +74,11 @@ class CompiledTable(CompiledData):
             return super().query(context, unknown)
         try:  # as there, without a call more: the way of every question
             return self._ask(context)
-        except Exception:
+        except UNUSUAL:
             return self.query_with_care(context)
+        except Exception:  # no mapping, which can raise anything, or a fault of ours
+            require_context(context)
+            raise
 
     @overload
     def query_many(self, contexts: ManyContexts, unknown: Unknown = "error") -> ManyMatches: ...

@@ -12,6 +12,7 @@ from contextdb.cells.facts import Context, Unknown
 from contextdb.compiled.casting.facts import Actor, Actors, Prefer
 from contextdb.compiled.casting.stage import CastMatches, Offered, set_stage
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.lookup import UNUSUAL
 
 _PLAIN = (float, int, str, bool, type(None), frozenset)
 """Types whose values do not change: an actor with others is read for every question."""
@@ -44,7 +45,7 @@ class LiveActors:
             return False
         try:
             return given == self._given and all(_is_same(self.actors[role], copies) for role, copies in self._copies.items())
-        except (TypeError, ValueError):  # what cannot be compared, such as an array, or is not a list of actors any more
+        except UNUSUAL:  # what cannot be compared, such as an array, or is not a list of actors any more
             return False
 
     def _keep(self, offered: Offered, given: list[object]) -> None:

@@ -29,7 +29,7 @@ from contextdb.cells.grammar import ANY, Cell, parse_cell, reads
 from contextdb.cells.mirroring import changed_in_mirror, in_mirror, kept_facts, mirrored_facts
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks
-from contextdb.compiled.lookup import UNUSUAL, Ask, SingleLookup, build_ask, ruled_ask, single_lookup
+from contextdb.compiled.lookup import UNUSUAL, SingleLookup, StraightAsk, build_ask, ruled_ask, single_lookup
 from contextdb.compiled.mask_bits import bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, SetMatches
 from contextdb.compiled.memory import Memory
@@ -380,7 +380,7 @@ class CompiledData(Unchanging):
         object.__setattr__(self, "_ask", ask)
         return ask(context)
 
-    def _binding(self, ask: Ask) -> Ask:
+    def _binding(self, ask: StraightAsk) -> StraightAsk:
         return lambda context: self.bound(ask(context), context)
 
     def _bits_carefully(self, context: Context, unknown: Unknown) -> tuple[int, int]:

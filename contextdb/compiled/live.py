@@ -16,7 +16,7 @@ from typing import Any, Self
 
 from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
 from contextdb.cells.mirroring import kept_facts
-from contextdb.compiled.casting.facts import Actors, Prefer
+from contextdb.compiled.casting.facts import Actors, Ask, Prefer
 from contextdb.compiled.casting.live import LiveActors
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.lookup import UNUSUAL, SingleLookup
@@ -189,7 +189,7 @@ class LiveContext(MutableMapping[str, object]):
         memo[id(self)] = new
         new._facts = deepcopy(self._facts, memo)
         if new._cast is not None:
-            new.actors(deepcopy(new._cast.actors, memo), deepcopy(new._cast.prefer, memo))
+            new.actors(deepcopy(new._cast.ask.actors, memo), deepcopy(new._cast.ask.prefer, memo))
         return new
 
     def _state(self) -> dict[str, Any]:
@@ -198,7 +198,7 @@ class LiveContext(MutableMapping[str, object]):
 
     def __reduce__(self) -> tuple[object, ...]:
         """What is pickled: the table, the facts and the actors. Masks are found again."""
-        cast = None if self._cast is None else (self._cast.actors, self._cast.prefer)
+        cast = None if self._cast is None else (self._cast.ask.actors, self._cast.ask.prefer)
         return _live_again, (self._compiled, self._unknown, self.facts, cast)
 
     def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
@@ -210,7 +210,7 @@ class LiveContext(MutableMapping[str, object]):
         self._cast = None
         self._odd.pop(CAST, None)
         if actors is not None:
-            self._cast = LiveActors(self._compiled, actors, prefer, self._unknown)
+            self._cast = LiveActors(self._compiled, Ask(actors, prefer, self._unknown))
             self._odd[CAST] = (0, False)
 
     @property

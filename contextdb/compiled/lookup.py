@@ -55,12 +55,12 @@ def ask(c, {names}):
 """
 
 Column = tuple[Condition, ColumnMasks]
-Ask = Callable[[Mapping[str, object]], Matches]
+StraightAsk = Callable[[Mapping[str, object]], Matches]
 Keep = Callable[[Mapping[str, object]], dict[str, object]]
 SingleLookup = tuple[list[float] | None, Any]
 
 
-def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, keep: Keep | None = None) -> Ask:
+def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, keep: Keep | None = None) -> StraightAsk:
     """A function from a context to its answer; raises one of `UNUSUAL` when a fact is unusual.
 
     With `keep`, which copies a context, the answer knows the facts it was asked with, for the answer in a mirror.
@@ -78,11 +78,11 @@ def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, kee
     kept = "\n    answer._mirrored = keep(c)" if keep is not None else ""
     source = _ASK.format(names=", ".join(f"{n}={n}" for n in names), terms=" & ".join(values + numbers), kept=kept)
     exec(compile(source, "<contextdb lookup>", "exec"), names)
-    ask: Ask = names["ask"]
+    ask: StraightAsk = names["ask"]
     return ask
 
 
-def ruled_ask(ask: Ask, when: WhenRules, answering: Answering) -> Ask:
+def ruled_ask(ask: StraightAsk, when: WhenRules, answering: Answering) -> StraightAsk:
     """Ask, then take out the rows whose rule does not hold. The facts of rules are read also where no row is left: a missing one is
     an error whatever the others say."""
 

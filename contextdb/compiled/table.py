@@ -15,7 +15,7 @@ from contextdb.cells.facts import Context, Unknown, check_mode, require_context
 from contextdb.compiled.artefact import open_artefact, save
 from contextdb.compiled.batch import ManyMatches, query_codes, query_many
 from contextdb.compiled.casting.explaining import explain_with_actors
-from contextdb.compiled.casting.facts import Actors, Prefer
+from contextdb.compiled.casting.facts import Actors, Ask, Prefer
 from contextdb.compiled.casting.many import ManyCastMatches, query_many_with_actors
 from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.data import CompiledData
@@ -69,7 +69,7 @@ class CompiledTable(CompiledData):
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
         if actors is not None:
-            return query_with_actors(self, context, actors, prefer, unknown)
+            return query_with_actors(self, context, Ask(actors, prefer, unknown))
         if unknown != "error":
             return super().query(context, unknown)
         try:  # as there, without a call more: the way of every question
@@ -144,7 +144,7 @@ class CompiledTable(CompiledData):
         """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
         which role cannot be filled, and whose fact fails."""
         if actors is not None:
-            return explain_with_actors(self, context, actors, prefer, unknown)
+            return explain_with_actors(self, context, Ask(actors, prefer, unknown))
         return explain(self, context, unknown)
 
     def pick(

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 from running import ROOT, Result, run
 
-from contextdb.report import FORMATS
+from contextdb.report import formats
 
 TOML = """
 [conditions.speed]
@@ -59,7 +59,7 @@ LEVELS = {
 @pytest.mark.parametrize(
     ("fail_on", "failing"), [(None, ["error"]), ("error", ["error"]), ("warning", ["error", "warning"]), ("none", [])]
 )
-@pytest.mark.parametrize("output_format", FORMATS)
+@pytest.mark.parametrize("output_format", formats("check"))
 def test_the_exit_code_is_1_for_findings_of_the_level_that_fails(
     here: Path, level: str | None, fail_on: str | None, failing: list[str], output_format: str
 ):
@@ -261,7 +261,7 @@ def test_the_json_document_has_the_promised_fields(here: Path):
 
 def test_each_format_names_file_line_and_rule(here: Path):
     write(here, BAD)
-    for output_format in FORMATS:
+    for output_format in formats("check"):
         out = run("check", "game", "--format", output_format).out
         assert "jog.csv" in out
         assert "empty-cell" in out
@@ -297,7 +297,7 @@ def test_every_finding_is_printed_on_demand(here: Path):
 
 def test_names_from_a_file_cannot_move_the_cursor(here: Path):
     write(here, b'Asset,speed\n\x1b[2J\x1b[31mred,5..3\n\xe2\x80\xaeleft,5..3\n"two\nlines",5..3\n')
-    for output_format in FORMATS:
+    for output_format in formats("check"):
         out = run("check", "game", "--format", output_format).out
         assert not set(out) & {"\x1b", "\x07", "\r"}
     text = run("check", "game").out

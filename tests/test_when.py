@@ -211,7 +211,7 @@ def test_a_live_context_computes_only_rules_whose_facts_have_changed():
     before = dict(live._truths)
     assert live.matches() is live.matches()
     live["speed"] = 3
-    live._read_facts()
+    live._read_facts(live._compiled.when)
     assert live._truths == {1: before[1]}
     assert live.matches().assets == ["a0", "a1"]
     live["speed"] = 0

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import argparse
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
 from contextdb.errors import ContextError
+
+
+def add_format_arguments(parser: argparse.ArgumentParser, formats: Sequence[str]) -> None:
+    """The format of what is printed: --format, and --json for short."""
+    told = f"{', '.join(formats)} (default: text)"
+    parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=told)
+    same = "the same as --format json"
+    parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from contextdb import report
 from contextdb.checks.cases import check_cases, read_cases
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
+from contextdb.commands import add_format_arguments
 from contextdb.commands.coverage_telemetry import Bar, has_many_cells, log_of
 from contextdb.console import ExitCode, output, printable, progress, terminal_width, wants_colour
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
@@ -46,10 +47,7 @@ from contextdb.tables.table import Table
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or its cases")
-    formats = ", ".join(report.FORMATS)
-    parser.add_argument("--format", choices=report.FORMATS, default="text", metavar="FORMAT", help=f"{formats} (default: text)")
-    same = "the same as --format json"
-    parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
+    add_format_arguments(parser, report.formats("check"))
     parser.add_argument(
         "--fail-on", choices=("error", "warning", "none"), default="error", help="the lowest level that fails (default: error)"
     )

@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from contextdb.commands import coverage_telemetry
+from contextdb.commands import add_format_arguments, coverage_telemetry
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import Earlier
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
@@ -29,7 +29,7 @@ from contextdb.covering.pairs import PairTable
 from contextdb.covering.progress import Tell
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, TableError, in_quotes, nearest, plural
-from contextdb.report import coverage_formats
+from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
 from contextdb.report.results import as_path
 from contextdb.tables.nesting.flat import FlatTable
@@ -41,11 +41,7 @@ from contextdb.tables.table import EitherTable, Table
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or the name of a table")
-    formats = coverage_formats.FORMATS
-    told = f"{', '.join(formats)} (default: text)"
-    parser.add_argument("--format", choices=formats, default="text", metavar="FORMAT", help=told)
-    same = "the same as --format json"
-    parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
+    add_format_arguments(parser, formats("coverage"))
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
     parser.add_argument("--fail-under", type=_percent, metavar="PCT", help="fail if the covered percentage of any table is lower")
     parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run")
@@ -73,7 +69,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         results = _results(arguments, tables, baseline)
         code = _code(results)
         colour = wants_colour(sys.stdout) and not arguments.output
-        text = coverage_formats.render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
+        text = render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
     if arguments.output:
         write_atomic(Path(arguments.output), text.encode("utf-8", "backslashreplace"))
     else:

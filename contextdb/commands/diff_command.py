@@ -12,6 +12,7 @@ import argparse
 import sys
 
 from contextdb.checks.effects import Effects
+from contextdb.commands import add_format_arguments
 from contextdb.commands.diff_views import as_markdown, as_text
 from contextdb.commands.effects_views import effects_json, effects_markdown, effects_text
 from contextdb.console import ExitCode, output, wants_colour
@@ -29,9 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("before", metavar="A", help="the table as it was: a .csv or .parquet file, or the name of a table")
     parser.add_argument("after", metavar="B", help="the table as it is")
-    parser.add_argument("--format", choices=FORMATS, default="text", metavar="FORMAT", help=f"{', '.join(FORMATS)} (default: text)")
-    same = "the same as --format json"
-    parser.add_argument("--json", action="store_const", const="json", dest="format", default=argparse.SUPPRESS, help=same)
+    add_format_arguments(parser, FORMATS)
     parser.add_argument("--no-effects", action="store_false", dest="effects", help="leave out the effects of the change")
     parser.add_argument("--all", action="store_true", help="print every difference, not the first of each kind")
 

@@ -30,7 +30,7 @@ from contextdb.cells.mirroring import changed_in_mirror, in_mirror, kept_facts, 
 from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks
-from contextdb.compiled.lookup import Ask, SingleLookup, build_ask, ruled_ask, single_lookup
+from contextdb.compiled.lookup import UNUSUAL, SingleLookup, StraightAsk, build_ask, ruled_ask, single_lookup
 from contextdb.compiled.mask_bits import bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, SetMatches
 from contextdb.compiled.memory import Memory
@@ -132,8 +132,11 @@ class CompiledData(Unchanging):
         try:
             found = self._ask(context)
             return found if unknown == "error" or not self.mirroring else found.with_mirrored(self.keeping(unknown)(context))
-        except Exception:  # everything unusual
+        except UNUSUAL:
             return self.query_with_care(context, unknown)
+        except Exception:  # no mapping, which can raise anything, or a fault of ours
+            require_context(context)
+            raise
 
     def query_with_care(self, context: Context, unknown: Unknown = "error") -> Matches:
         """What is unusual in a context read once more, slowly: this answers it or says what is wrong."""
@@ -378,7 +381,7 @@ class CompiledData(Unchanging):
         object.__setattr__(self, "_ask", ask)
         return ask(context)
 
-    def _binding(self, ask: Ask) -> Ask:
+    def _binding(self, ask: StraightAsk) -> StraightAsk:
         return lambda context: self.bound(ask(context), context)
 
     def _bits_carefully(self, context: Context, unknown: Unknown) -> tuple[int, int]:

@@ -16,10 +16,10 @@ from typing import Any, Self
 
 from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
 from contextdb.cells.mirroring import kept_facts
-from contextdb.compiled.casting.facts import Actors, Prefer
+from contextdb.compiled.casting.facts import Actors, Ask, Prefer
 from contextdb.compiled.casting.live import LiveActors
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.lookup import SingleLookup
+from contextdb.compiled.lookup import UNUSUAL, SingleLookup
 from contextdb.compiled.matches import Matches
 from contextdb.errors import Fault, NoSuchFact, in_quotes, some
 from contextdb.expressions.rules import WhenRules
@@ -49,6 +49,7 @@ class LiveContext(MutableMapping[str, object]):
         "_cast",
         "_compiled",
         "_facts",
+        "_is_soft",
         "_keep",
         "_known",
         "_lookups",
@@ -84,7 +85,9 @@ class LiveContext(MutableMapping[str, object]):
         self._alike: dict[str, tuple[str, ...]] = {}
         """For each other name the facts that it is like."""
         self._keep = compiled.keeping(unknown) if compiled.mirroring and not compiled.is_soft else None
-        """What keeps the facts of an answer, where it must know them for a mirror; a soft table's answers know them anyway."""
+        """What keeps the facts of an answer, where it must know them for a mirror alone."""
+        self._is_soft = compiled.is_soft
+        """Whether an answer must know the facts for the costs of soft cells."""
         self._answer = Matches(0, self._answering)
         """The last answer: while the rows stay the same, so does the object."""
         for condition in compiled.conditions:
@@ -95,7 +98,7 @@ class LiveContext(MutableMapping[str, object]):
         try:
             bounds, masks = self._lookups[name]
             self._moving[name] = masks[value] if bounds is None else masks[bisect_right(bounds, ldexp(value, 0))]
-        except Exception:  # everything unusual is read again with care, which answers it or says what is wrong
+        except UNUSUAL:  # it is read again with care, which answers it or says what is wrong
             self._set_carefully(name, value)
         else:
             self._facts[name] = value
@@ -186,7 +189,7 @@ class LiveContext(MutableMapping[str, object]):
         memo[id(self)] = new
         new._facts = deepcopy(self._facts, memo)
         if new._cast is not None:
-            new.actors(deepcopy(new._cast.actors, memo), deepcopy(new._cast.prefer, memo))
+            new.actors(deepcopy(new._cast.ask.actors, memo), deepcopy(new._cast.ask.prefer, memo))
         return new
 
     def _state(self) -> dict[str, Any]:
@@ -195,7 +198,7 @@ class LiveContext(MutableMapping[str, object]):
 
     def __reduce__(self) -> tuple[object, ...]:
         """What is pickled: the table, the facts and the actors. Masks are found again."""
-        cast = None if self._cast is None else (self._cast.actors, self._cast.prefer)
+        cast = None if self._cast is None else (self._cast.ask.actors, self._cast.ask.prefer)
         return _live_again, (self._compiled, self._unknown, self.facts, cast)
 
     def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
@@ -207,7 +210,7 @@ class LiveContext(MutableMapping[str, object]):
         self._cast = None
         self._odd.pop(CAST, None)
         if actors is not None:
-            self._cast = LiveActors(self._compiled, actors, prefer, self._unknown)
+            self._cast = LiveActors(self._compiled, Ask(actors, prefer, self._unknown))
             self._odd[CAST] = (0, False)
 
     @property
@@ -242,6 +245,8 @@ class LiveContext(MutableMapping[str, object]):
             for mask in moving.values():
                 bits &= mask
         except TypeError:
+            if None not in moving.values():
+                raise
             self._read_unusual()
             return self.matches()
         if self._odd:
@@ -250,6 +255,8 @@ class LiveContext(MutableMapping[str, object]):
             answer = Matches(bits, self._answering)
             answer._mirrored = self._keep(self._told)
             return answer
+        if self._is_soft:
+            return self._compiled.bound(Matches(bits, self._answering), self._told, self._unknown)
         if bits != self._answer.bits:
             self._answer = Matches(bits, self._answering)
         return self._answer
@@ -288,38 +295,36 @@ class LiveContext(MutableMapping[str, object]):
         masks = {**self._masks, **self._moving}
         every = (self._odd[n][0] if n in self._odd else m for n, m in masks.items())
         found = self._compiled.matches(bits, reduce(and_, every, self._compiled.enabled_bits))
-        return found if self._keep is None else found.with_mirrored(self._keep(kept_facts(self._told)))
-
-
-class SoftLiveContext(LiveContext):
-    """The same for a table with soft cells: every answer knows what they cost in the context of its moment."""
-
-    __slots__ = ()
-
-    def matches(self) -> Matches:
-        """The valid rows for the facts as they are now."""
-        answer = super().matches()
-        if self._cast is not None:
-            return answer
-        return self._compiled.bound(answer.again(), kept_facts(self._told) if self._odd else self._told, self._unknown)
+        return self._compiled.bound(found, kept_facts(self._told), self._unknown)
 
 
 class AskingLiveContext(LiveContext):
     """The same for a table with derived facts or rules, which asks for facts that are not columns.
 
-    Derived facts are computed again when one that they need was set since the last question.
+    Derived facts are computed again when one that they need was set since the last question, and a rule is asked again when a fact
+    that it names has changed.
     """
 
-    __slots__ = ("_computed", "_given", "_is_stale", "_others")
+    __slots__ = ("_are_read", "_computed", "_given", "_is_stale", "_left", "_others", "_truths", "_values")
 
     def __init__(self, compiled: CompiledData, unknown: Unknown = "error") -> None:
         super().__init__(compiled, unknown)
-        self._others = {c.name: c for c in (*(compiled.derivation.inputs if compiled.derivation else ()), *compiled.ruled)}
-        """The conditions that derived facts are computed from, and those that only rules name."""
-        self._computed: dict[str, object] = dict.fromkeys(compiled.derivation.names if compiled.derivation else ())
+        inputs, derived = (compiled.derivation.inputs, compiled.derivation.names) if compiled.derivation else ((), ())
+        ruled = compiled.when.conditions if compiled.when else ()
+        self._others = {c.name: c for c in (*inputs, *ruled) if c.name not in derived}
+        """The conditions that derived facts are computed from, and those that rules name."""
+        self._computed: dict[str, object] = dict.fromkeys(derived)
         """The derived facts, when they were last computed."""
         self._given: dict[str, object] = dict.fromkeys(compiled.asked)
         self._is_stale = True
+        """Whether a fact of `_others` was set since derived facts were computed."""
+        self._are_read = False
+        """Whether `_values` are the facts as they are now."""
+        self._values: dict[str, Value] = {}
+        """The facts that rules name, when rules were last asked."""
+        self._truths: dict[int, Value] = {}
+        """Of the rules that were asked with these facts, by their number, whether they hold."""
+        self._left = Matches(0, self._answering)
 
     def __setitem__(self, name: str, value: Any) -> None:
         """Set one fact; a derived one is refused."""
@@ -340,7 +345,8 @@ class AskingLiveContext(LiveContext):
             return self._given[name]
         if name not in self._computed:
             self._refuse(name)
-        self._compute()
+        if self._is_stale:
+            self._compute()
         return self._computed[name]
 
     def __contains__(self, name: object) -> bool:
@@ -363,16 +369,27 @@ class AskingLiveContext(LiveContext):
 
     def matches(self) -> Matches:
         """The valid rows for the facts as they are now."""
-        self._compute()
-        return super().matches()
+        when = self._compiled.when
+        if when is not None and self._odd:
+            return self._carefully()
+        if self._is_stale:
+            self._compute()
+        answer = super().matches()
+        if when is None:
+            return answer
+        try:
+            return self._carefully() if self._odd else self._with_rules(answer, when)
+        except Unusual:
+            return self._carefully()
 
     def _compute(self) -> None:
-        if self._is_stale and self._compiled.derivation is not None:
-            self._computed.update(self._compiled.derivation.compute(self._given))
+        derivation = self._compiled.derivation
+        if derivation is not None:
+            self._computed.update(derivation.compute(self._given))
             for name, value in self._computed.items():
                 if name in self._lookups and value != self._facts[name]:
                     super().__setitem__(name, value)
-        self._is_stale = False
+        self._is_stale = self._are_read = False
 
     def _refuse(self, name: str) -> None:
         derivation = self._compiled.derivation
@@ -380,85 +397,39 @@ class AskingLiveContext(LiveContext):
             derivation.refuse([name])
         raise no_condition(name, self._given)
 
-
-class RuledLiveContext(AskingLiveContext):
-    """The same for a table with rules: one is asked again when a fact that it names has changed."""
-
-    __slots__ = ("_is_set", "_left", "_named", "_truths", "_values", "_when")
-
-    def __init__(self, compiled: CompiledData, unknown: Unknown = "error") -> None:
-        assert compiled.when is not None
-        self._is_set = True
-        """Whether a fact that rules need was set since they were asked."""
-        super().__init__(compiled, unknown)
-        self._when: WhenRules = compiled.when
-        inputs = compiled.derivation.inputs if compiled.derivation is not None else ()
-        self._named = compiled.when.names.union(c.name for c in inputs)
-        self._values: dict[str, Value] = {}
-        """The facts that rules name, when rules were last asked."""
-        self._truths: dict[int, Value] = {}
-        """Of the rules that were asked with these facts, by their number, whether they hold."""
-        self._left = Matches(0, self._answering)
-
-    def __setitem__(self, name: str, value: Any) -> None:
-        """Set one fact; a derived one is refused."""
-        super().__setitem__(name, value)
-        if name in self._named:
-            self._is_set = True
-
-    def matches(self) -> Matches:
-        """The valid rows for the facts as they are now."""
-        if self._odd:
-            return self._carefully()
-        answer = super().matches()
-        try:
-            return self._carefully() if self._odd else self._with_rules(answer)
-        except Unusual:
-            return self._carefully()
-
     def _carefully(self) -> Matches:
         """The answer where facts are missing or sets, or actors are offered."""
         return self._compiled.query(self.facts, self._unknown) if self._cast is None else self._cast.query(self.facts)
 
-    def _with_rules(self, answer: Matches) -> Matches:
+    def _with_rules(self, answer: Matches, when: WhenRules) -> Matches:
         """Of the rows that the cells leave, those whose rule holds."""
-        if self._is_set:
-            self._read_facts()
+        if not self._are_read:
+            self._read_facts(when)
         left = answer.bits
-        for number in self._when.numbers(left):
+        for number in when.numbers(left):
             if number not in self._truths:
-                self._truths[number] = self._when.rules[number].run(self._values)
+                self._truths[number] = when.rules[number].run(self._values)
             if not self._truths[number]:
                 if self._truths[number] is None:
                     raise Unusual
-                left &= ~self._when.rules[number].rows
+                left &= ~when.rules[number].rows
         if left == answer.bits:
             return answer
         if self._keep is not None:
             return Matches(left, self._answering).with_mirrored(self._keep(self._told))
+        if self._is_soft:
+            return self._compiled.bound(Matches(left, self._answering), self._told, self._unknown)
         if left != self._left.bits:
             self._left = Matches(left, self._answering)
         return self._left
 
-    def _read_facts(self) -> None:
-        values = self._when.usual_values({**self._given, **self._computed} if self._computed else self._given)
+    def _read_facts(self, when: WhenRules) -> None:
+        values = when.usual_values({**self._given, **self._computed} if self._computed else self._given)
         for name, value in values.items():
             if self._values.get(name) != value:
-                for number in self._when.naming[name]:
+                for number in when.naming[name]:
                     self._truths.pop(number, None)
-        self._values, self._is_set = values, False
-
-
-class SoftAskingLiveContext(SoftLiveContext, AskingLiveContext):
-    """For a table with both."""
-
-    __slots__ = ()
-
-
-class SoftRuledLiveContext(SoftLiveContext, RuledLiveContext):
-    """For a table with soft cells and rules."""
-
-    __slots__ = ()
+        self._values, self._are_read = values, True
 
 
 def _live_again(
@@ -474,9 +445,5 @@ def _live_again(
 
 def live_context(compiled: CompiledData, unknown: Unknown = "error") -> LiveContext:
     """A context of the kind that a table needs."""
-    is_soft = compiled.is_soft
-    if compiled.when is not None:
-        return SoftRuledLiveContext(compiled, unknown) if is_soft else RuledLiveContext(compiled, unknown)
-    if compiled.derivation is not None:
-        return SoftAskingLiveContext(compiled, unknown) if is_soft else AskingLiveContext(compiled, unknown)
-    return SoftLiveContext(compiled, unknown) if is_soft else LiveContext(compiled, unknown)
+    kind = LiveContext if compiled.when is None and compiled.derivation is None else AskingLiveContext
+    return kind(compiled, unknown)

@@ -7,7 +7,8 @@ are joined (`contextdb.compiled.groups`), a nested dict for each group, whose le
 `ldexp(x, 0)` is the double that any number means, and refuses texts: a float32 would else be compared in its own precision.
 
 The function knows only the straight way. A missing fact, NaN, a wrong type, a set of values, a number past 2**53: everything
-unusual ends in an exception, and the caller then takes the careful way, which says what is wrong or answers it.
+unusual ends in one of the exceptions of `UNUSUAL`, and the caller then takes the careful way, which says what is wrong or answers
+it. Any other exception is a fault of ours and comes out as it is.
 """
 
 from __future__ import annotations
@@ -25,12 +26,25 @@ from contextdb.cells.kinds import Kind
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.groups import groups_of
 from contextdb.compiled.matches import Answering, Matches
+from contextdb.errors import ContextError
 from contextdb.expressions.rules import WhenRules
+from contextdb.expressions.rules.rules import Unusual
 
 EXACT = 2.0**53
 """Below this every whole number is a double, so an int and a double compare as two doubles do."""
 
 MOST_TAG_SETS = 4096
+
+UNUSUAL = (
+    Unusual,  # a number far out, an open rule
+    ContextError,  # a wrong fact where facts are read one by one: tags, rules, derived facts
+    KeyError,  # a missing fact, a value that no class has
+    TypeError,  # a wrong type, one that cannot be hashed, and the mask None
+    ValueError,  # Decimal("sNaN"), an array of texts
+    OverflowError,  # an int past all doubles
+    RuntimeError,  # a tensor of several numbers
+)
+"""What an unusual fact raises on the straight way."""
 
 _ASK = """
 def ask(c, {names}):
@@ -42,13 +56,13 @@ def ask(c, {names}):
 """
 
 Column = tuple[Condition, ColumnMasks]
-Ask = Callable[[Mapping[str, object]], Matches]
+StraightAsk = Callable[[Mapping[str, object]], Matches]
 Keep = Callable[[Mapping[str, object]], dict[str, object]]
 SingleLookup = tuple[list[float] | None, Any]
 
 
-def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, keep: Keep | None = None) -> Ask:
-    """A function from a context to its answer; raises whatever it raises when a fact is unusual.
+def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, keep: Keep | None = None) -> StraightAsk:
+    """A function from a context to its answer; raises one of `UNUSUAL` when a fact is unusual.
 
     With `keep`, which copies a context, the answer knows the facts it was asked with, for the answer in a mirror.
     """
@@ -65,11 +79,11 @@ def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, kee
     kept = "\n    answer._mirrored = keep(c)" if keep is not None else ""
     source = _ASK.format(names=", ".join(f"{n}={n}" for n in names), terms=" & ".join(values + numbers), kept=kept)
     exec(compile(source, "<contextdb lookup>", "exec"), names)
-    ask: Ask = names["ask"]
+    ask: StraightAsk = names["ask"]
     return ask
 
 
-def ruled_ask(ask: Ask, when: WhenRules, answering: Answering) -> Ask:
+def ruled_ask(ask: StraightAsk, when: WhenRules, answering: Answering) -> StraightAsk:
     """Ask, then take out the rows whose rule does not hold. The facts of rules are read also where no row is left: a missing one is
     an error whatever the others say."""
 
@@ -114,7 +128,7 @@ def _term(i: int, condition: Condition, masks: NumberMasks | WideMasks | TagMask
 def single_lookup(condition: Condition, masks: ColumnMasks) -> SingleLookup:
     """What finds the mask of one fact: bounds to bisect in, or None, and the masks by interval or by value.
 
-    An unusual fact finds None or raises whatever it raises.
+    An unusual fact finds None or raises one of `UNUSUAL`.
     """
     if isinstance(masks, ValueMasks):
         return None, _leaves(masks, masks.ints)
@@ -220,7 +234,7 @@ def _wide_lookup(condition: Condition, masks: WideMasks) -> Callable[[Any], int]
     def lookup(fact: Any) -> int:
         value = exact(fact)
         if not low <= value < high:
-            raise ValueError
+            raise Unusual
         return masks.bits(bisect_right(bounds, value))
 
     return lookup
@@ -236,7 +250,7 @@ def _tag_lookup(condition: Condition, masks: TagMasks) -> Callable[[Any], int]:
         if bits is None:
             tags = read_fact(fact, condition)
             if not isinstance(tags, frozenset):
-                raise ValueError
+                raise Unusual
             bits = everything
             for code in masks.codes(tags):
                 bits &= masks.ints[code]

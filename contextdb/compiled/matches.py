@@ -203,10 +203,6 @@ class Matches:
         self._mirrored = asked
         return self
 
-    def again(self) -> Matches:
-        """The same rows as an answer of its own, which knows neither penalties nor a mirror."""
-        return Matches(self.bits, self._table)
-
     def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
         """Who fills which role in a valid row, as {role: actor}; for an answer to a query with actors."""
         raise ContextError(Fault("this query had no actors, so nobody is cast.", "query(facts, actors={...})"))
@@ -291,10 +287,6 @@ class SetMatches(Matches):
     def always(self) -> Words:
         """The rows that hold all values of set-valued facts: uint64 [W]."""
         return bitmask.from_int(self._always, self.n_rows)
-
-    def again(self) -> Matches:
-        """The same rows as an answer of its own, which knows neither penalties nor a mirror."""
-        return SetMatches(self.bits, self._table, self._always)
 
 
 def rows_of(bits: int, numbers: Rows) -> Rows:

@@ -6,6 +6,7 @@ Look-ups are made, and kernels are compiled, or read from numba's cache, for the
 from __future__ import annotations
 
 from contextdb.compiled.batch import load_kernels, query_codes, query_many
+from contextdb.compiled.casting.facts import Ask
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.data import CompiledData
@@ -26,8 +27,8 @@ def prepare(compiled: CompiledData, casting: bool = False, batches: bool = False
 
 
 def _prepare_casting(compiled: CompiledData) -> None:
-    nobody: dict[str, list[dict[str, object]]] = {role: [] for role in roles_of_table(compiled).conditions}
-    query_with_actors(compiled, {}, nobody, None, "any")
+    nobody = Ask({role: [] for role in roles_of_table(compiled).conditions}, None, "any")
+    query_with_actors(compiled, {}, nobody)
 
 
 def _prepare_batches(compiled: CompiledData) -> None:

@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_path
-from contextdb.cells.facts import Context, Unknown, check_mode
+from contextdb.cells.facts import Context, Unknown, check_mode, require_context
 from contextdb.compiled.artefact import open_artefact, save
 from contextdb.compiled.batch import ManyMatches, query_codes, query_many
 from contextdb.compiled.casting.explaining import explain_with_actors
-from contextdb.compiled.casting.facts import Actors, Prefer
+from contextdb.compiled.casting.facts import Actors, Ask, Prefer
 from contextdb.compiled.casting.many import ManyCastMatches, query_many_with_actors
 from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, explain
 from contextdb.compiled.live import LiveContext, live_context
+from contextdb.compiled.lookup import UNUSUAL
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick import pick
@@ -68,13 +69,16 @@ class CompiledTable(CompiledData):
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
         if actors is not None:
-            return query_with_actors(self, context, actors, prefer, unknown)
+            return query_with_actors(self, context, Ask(actors, prefer, unknown))
         if unknown != "error":
             return super().query(context, unknown)
         try:  # as there, without a call more: the way of every question
             return self._ask(context)
-        except Exception:
+        except UNUSUAL:
             return self.query_with_care(context)
+        except Exception:  # no mapping, which can raise anything, or a fault of ours
+            require_context(context)
+            raise
 
     @overload
     def query_many(self, contexts: ManyContexts, unknown: Unknown = "error") -> ManyMatches: ...
@@ -140,7 +144,7 @@ class CompiledTable(CompiledData):
         """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
         which role cannot be filled, and whose fact fails."""
         if actors is not None:
-            return explain_with_actors(self, context, actors, prefer, unknown)
+            return explain_with_actors(self, context, Ask(actors, prefer, unknown))
         return explain(self, context, unknown)
 
     def pick(

@@ -1,38 +1,58 @@
-"""What a check found, as text for people and for machines: one module a format, imported when it is asked for."""
+"""What a check found and what coverage measured, as text for people and for machines: one module a format, imported when it is
+asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import Literal, get_args
+from collections.abc import Collection, Mapping
+from importlib import import_module
 
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, some
 from contextdb.findings import Level
-from contextdb.report.results import CheckReport
+from contextdb.report.results import Report, Subject
 
-Format = Literal["text", "json", "github", "junit", "sarif", "markdown"]
-FORMATS: tuple[Format, ...] = get_args(Format)
+RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
+    ("check", "text"): ("render_text", ("colour", "width", "shows_all")),
+    ("check", "json"): ("render_json", ()),
+    ("check", "github"): ("render_github", ()),
+    ("check", "junit"): ("render_junit", ("failing", "shows_all")),
+    ("check", "sarif"): ("render_sarif", ("shows_all",)),
+    ("check", "markdown"): ("render_markdown", ("shows_all",)),
+    ("coverage", "text"): ("coverage_text", ("colour", "width", "shows_all")),
+    ("coverage", "json"): ("render_json", ()),
+    ("coverage", "github"): ("render_github", ()),
+    ("coverage", "junit"): ("coverage_junit", ()),
+    ("coverage", "sarif"): ("render_sarif", ("shows_all",)),
+    ("coverage", "markdown"): ("coverage_markdown", ("shows_all",)),
+    ("coverage", "html"): ("coverage_html", ()),
+}
+"""For each subject and format the module that renders it and the options that it takes."""
 ERRORS: tuple[Level, ...] = ("error",)
+
+
+def formats(subject: Subject) -> list[str]:
+    """The formats of a subject, in the order in which they are offered."""
+    return [name for about, name in RENDERERS if about == subject]
 
 
 def render(
     format_name: str,
-    report: CheckReport,
+    report: Report,
     *,
     colour: bool = False,
     width: int = 100,
     shows_all: bool = False,
     failing: Collection[Level] = ERRORS,
 ) -> str:
-    """Render the findings of a check; the same arguments always give the same text.
+    """Render the findings of a check, or measured coverage; the same arguments always give the same text.
 
     Parameters
     ----------
     format_name : str
-        One of `FORMATS`.
+        One of `formats(report.subject)`.
     colour, width : bool, int
         For `text`: whether to colour it, and how many terminal cells a line may have.
     shows_all : bool
-        Every finding, where people would else see the first few of each kind.
+        Every finding and gap, where people would else see the first few of each kind.
     failing : collection of str
         For `junit`: the levels that make a test fail, as they make the command fail.
 
@@ -41,31 +61,12 @@ def render(
     ContextDBError
         There is no such format.
     """
-    match format_name:
-        case "text":
-            from contextdb.report import render_text
-
-            return render_text.render(report, colour, width, shows_all)
-        case "json":
-            from contextdb.report import render_json
-
-            return render_json.render(report)
-        case "github":
-            from contextdb.report import render_github
-
-            return render_github.render(report)
-        case "junit":
-            from contextdb.report import render_junit
-
-            return render_junit.render(report, failing, shows_all)
-        case "sarif":
-            from contextdb.report import render_sarif
-
-            return render_sarif.render(report, shows_all)
-        case "markdown":
-            from contextdb.report import render_markdown
-
-            return render_markdown.render(report, shows_all)
-    near = nearest(format_name, FORMATS)
-    found = f"there is no format {in_quotes(format_name)}."
-    raise ContextDBError(Fault(found, some(FORMATS), in_quotes(near) if near else ""))
+    known = formats(report.subject)
+    if format_name not in known:
+        near = nearest(format_name, known)
+        found = f"there is no format {in_quotes(format_name)}."
+        raise ContextDBError(Fault(found, some(known), in_quotes(near) if near else ""))
+    module, taken = RENDERERS[report.subject, format_name]
+    options = {"colour": colour, "width": width, "shows_all": shows_all, "failing": failing}
+    text: str = import_module(f"contextdb.report.{module}").render(report, **{name: options[name] for name in taken})
+    return text

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
 from contextdb.covering.baseline import Change, digest_of
@@ -13,7 +14,7 @@ from contextdb.covering.pairs import left_out
 from contextdb.covering.shares import told_apart
 from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.findings import Finding
-from contextdb.report.results import CheckReport, TableSummary
+from contextdb.report.results import CheckReport, Subject, TableSummary
 from contextdb.telemetry.observed import Observed, SeenGap
 
 ROUNDING = 1e-12
@@ -108,6 +109,7 @@ class Measured:
 class CoverageResults:
     """All measured tables."""
 
+    subject: ClassVar[Subject] = "coverage"
     tables: tuple[Measured, ...]
     gone: Mapping[str, Gate] = field(default_factory=dict)
     """For each table of the baseline that no longer exist the bar that this misses, or keeps where it is intended."""

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from contextdb.console import printable
 from contextdb.findings import Finding, Level
-from contextdb.report.results import CheckReport, as_path, told, worst_first
+from contextdb.report.results import Report, as_path, told, worst_first
 
 COMMANDS: dict[Level, str] = {"error": "error", "warning": "warning", "info": "notice"}
 
 
-def render(report: CheckReport) -> str:
+def render(report: Report) -> str:
     """One annotation a finding, and nothing else."""
-    return "".join(f"{_annotation(finding)}\n" for finding in worst_first(report.findings))
+    return "".join(f"{_annotation(finding)}\n" for finding in worst_first(report.as_check().findings))
 
 
 def _annotation(finding: Finding) -> str:

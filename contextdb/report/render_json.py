@@ -1,5 +1,4 @@
-"""Findings as JSON: `{"format": 1, "findings": [{"rule", "level", "row", "asset", "line", "column", "message", "by", …}],
-"tables"}`.
+"""A report as JSON. Of a check: `{"format": 1, "findings": [{"rule", "level", "row", "asset", "line", "column", …}], "tables"}`.
 
 Rows count from 0, lines from 1; `by` are the rows that cause a finding. What is not known is null.
 """
@@ -9,16 +8,14 @@ from __future__ import annotations
 import json
 import re
 
-from contextdb.report.results import CheckReport, TableSummary
+from contextdb.report.results import Report
 
-FORMAT = 1
 _UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
-def render(report: CheckReport) -> str:
-    """The findings as one JSON document."""
-    findings = [finding.to_json() for finding in report.findings]
-    return as_json({"format": FORMAT, "findings": findings, "tables": [_table(table) for table in report.tables]})
+def render(report: Report) -> str:
+    """The report as one JSON document."""
+    return as_json(report.to_json())
 
 
 def as_json(document: object) -> str:
@@ -30,7 +27,3 @@ def as_json(document: object) -> str:
 def _escaped(found: re.Match[str]) -> str:
     code = ord(found[0])
     return f"\\\\u{code:04x}" if code >= 0xD800 else f"\\u{code:04x}"
-
-
-def _table(table: TableSummary) -> dict[str, object]:
-    return {"table": table.name, "file": table.file, "rows": table.n_rows, "conditions": table.n_conditions}

@@ -19,7 +19,7 @@ from contextdb.checks.rules import RULES
 from contextdb.console import __version__, printable
 from contextdb.findings import Finding, Level
 from contextdb.report.render_json import as_json
-from contextdb.report.results import CheckReport, told, worst_first
+from contextdb.report.results import Report, told, worst_first
 
 Json = dict[str, object]
 
@@ -30,9 +30,9 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 LEVEL_NAMES: dict[Level, str] = {"error": "error", "warning": "warning", "info": "note"}
 
 
-def render(report: CheckReport, shows_all: bool = False) -> str:
+def render(report: Report, shows_all: bool = False) -> str:
     """The findings as a SARIF log of one run; the worst ones where there are more than `MOST_RESULTS`."""
-    ordered = worst_first(report.findings)
+    ordered = worst_first(report.as_check().findings)
     shown = ordered if shows_all else ordered[:MOST_RESULTS]
     rules = list(dict.fromkeys(f.rule for f in shown))
     driver = {"name": "contextdb", "semanticVersion": __version__, "rules": [_rule(name, shown) for name in rules]}

@@ -1,6 +1,6 @@
 """What a check hands to its renderers: the tables that were read and what was found. Data only.
 
-A renderer is a pure function of a `CheckReport` that gives text: the same report gives the same bytes.
+A renderer is a pure function of a `Report` that gives text: the same report gives the same bytes.
 """
 
 from __future__ import annotations
@@ -10,10 +10,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, count
 from pathlib import PurePath
+from typing import ClassVar, Literal, Protocol
 
 from contextdb.console import printable
 from contextdb.errors import plural, row_name
 from contextdb.findings import LEVELS, Finding, Level, worst
+
+Subject = Literal["check", "coverage"]
+"""What a report is about."""
 
 Block = tuple[Level, str, tuple[Finding, ...]]
 """The findings of one level and rule in one group."""
@@ -32,6 +36,10 @@ class TableSummary:
     def size(self) -> str:
         """The size in words."""
         return f"{plural(self.n_rows, 'row')}, {plural(self.n_conditions, 'condition')}"
+
+    def to_json(self) -> dict[str, object]:
+        """The table in the JSON document."""
+        return {"table": self.name, "file": self.file, "rows": self.n_rows, "conditions": self.n_conditions}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +61,23 @@ class Group:
         return [(level, rule, tuple(found[level, rule])) for level, rule in ordered]
 
 
+class Report(Protocol):
+    """What can be rendered: what a check found, or what coverage measured."""
+
+    subject: ClassVar[Subject]
+
+    def to_json(self) -> dict[str, object]:
+        """The JSON document."""
+
+    def as_check(self) -> CheckReport:
+        """All that matters as findings, for formats that know nothing else."""
+
+
 @dataclass(frozen=True, slots=True)
 class CheckReport:
     """The tables that were read, and every finding; those of a file that could not be read have no table."""
 
+    subject: ClassVar[Subject] = "check"
     tables: tuple[TableSummary, ...]
     findings: tuple[Finding, ...]
 
@@ -66,6 +87,15 @@ class CheckReport:
         counts = Counter(f.level for f in self.findings)
         said = ", ".join(plural(counts[level], level) for level in LEVELS if counts[level])
         return f"{plural(len(self.tables), 'table')} checked: {said or 'nothing found'}."
+
+    def to_json(self) -> dict[str, object]:
+        """The JSON document."""
+        findings = [finding.to_json() for finding in self.findings]
+        return {"format": 1, "findings": findings, "tables": [table.to_json() for table in self.tables]}
+
+    def as_check(self) -> CheckReport:
+        """The report itself."""
+        return self
 
     def groups(self) -> list[Group]:
         """What was found, by table and file: the worst first, else in the order given; tables without a finding last."""

@@ -19,8 +19,7 @@ from contextdb.covering import coverage, pairs
 from contextdb.covering.assumed import opened
 from contextdb.covering.baseline import compared, read_baseline
 from contextdb.covering.report import Overlap
-from contextdb.report import coverage_formats
-from contextdb.report.coverage_formats import FORMATS
+from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured, fail_under, fail_under_telemetry, max_drop, table_gone
 from contextdb.report.coverage_text import bar
 from contextdb.schema.settings import TableSettings
@@ -65,7 +64,7 @@ def sample(name: str = "jog", assets: tuple[str, ...] = ("walk", "run", "jog")) 
 def texts_of(found: Measured) -> dict[str, str]:
     name = found.report.table
     results = CoverageResults((found,), {name: table_gone(name, False), "kept": table_gone("kept", True)})
-    return {name: coverage_formats.render(name, results) for name in FORMATS}
+    return {name: render(name, results) for name in formats("coverage")}
 
 
 class Page(HTMLParser):
@@ -119,7 +118,7 @@ def test_hostile_names_leave_every_other_format_whole(name: str, asset: str):
 
 
 def test_a_page_of_several_tables_begins_with_all_of_them():
-    both = coverage_formats.render("html", CoverageResults((PLAIN, replace(PLAIN, gates=()))))
+    both = render("html", CoverageResults((PLAIN, replace(PLAIN, gates=()))))
     assert texts_of(PLAIN)["html"].count('href="#t') == 0
     summary = both[: both.index("<article>")]
     assert re.findall(r'href="(#t\d)"', summary) == ["#t0", "#t1"]
@@ -181,20 +180,20 @@ def test_a_bar_is_full_or_empty_only_where_the_share_is(one: float, other: float
 
 def test_markdown_is_small_enough_for_a_comment():
     many = CoverageResults(tuple(replace(PLAIN, report=replace(PLAIN.report, table=f"t{i}")) for i in range(200)))
-    text = coverage_formats.render("markdown", many)
+    text = render("markdown", many)
     assert len(text.encode()) <= 60_000
     assert "more tables are not shown" in text
-    assert "more tables are not shown" not in coverage_formats.render("markdown", many, shows_all=True)
+    assert "more tables are not shown" not in render("markdown", many, shows_all=True)
 
 
 def test_colour_says_nothing_that_a_word_does_not():
     results = CoverageResults((PLAIN,))
-    coloured = coverage_formats.render("text", results, colour=True)
-    assert re.sub("\x1b\\[\\d+m", "", coloured) == coverage_formats.render("text", results)
+    coloured = render("text", results, colour=True)
+    assert re.sub("\x1b\\[\\d+m", "", coloured) == render("text", results)
     assert "FAILED  fail-under" in re.sub("\x1b\\[\\d+m", "", coloured)
 
 
 @given(st.integers(40, 160))
 def test_lines_are_no_wider_than_the_terminal(width: int):
-    text = coverage_formats.render("text", CoverageResults((PLAIN,)), width=width)
+    text = render("text", CoverageResults((PLAIN,)), width=width)
     assert max(map(len, text.splitlines())) <= width

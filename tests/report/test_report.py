@@ -18,14 +18,14 @@ from contextdb.report.results import CheckReport, TableSummary, place_of, told
 @given(reports())
 def test_the_same_findings_give_the_same_bytes_in_valid_utf8_and_no_text_can_move_the_cursor(found: CheckReport):
     again = CheckReport(tuple(found.tables), tuple(map(replace, found.findings)))
-    for name in report.FORMATS:
+    for name in report.formats("check"):
         text = report.render(name, found)
         assert text.encode() == report.render(name, again).encode()
         assert text == "" or text.endswith("\n")
         assert all(c == "\n" or ord(c) >= 0xA0 or c.isprintable() for c in text)
 
 
-@pytest.mark.parametrize("name", report.FORMATS)
+@pytest.mark.parametrize("name", report.formats("check"))
 def test_every_finding_is_in_every_format_when_all_are_asked_for(name: str):
     found = many(300, n_tables=2)
     text = report.render(name, found, shows_all=True)
@@ -41,7 +41,7 @@ def test_every_finding_is_in_every_format_when_all_are_asked_for(name: str):
         assert text.count(written[name].format(line)) == 2
 
 
-@pytest.mark.parametrize("name", report.FORMATS)
+@pytest.mark.parametrize("name", report.formats("check"))
 def test_one_format_does_not_load_the_others(name: str):
     script = f"""
 import sys

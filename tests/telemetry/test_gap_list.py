@@ -15,7 +15,7 @@ from contextdb.covering import coverage
 from contextdb.covering.assumed import opened
 from contextdb.covering.gaps import gap_id
 from contextdb.covering.report import Gap
-from contextdb.report.coverage_formats import FORMATS, render
+from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
@@ -109,7 +109,7 @@ def test_every_format_tells_a_gap_with_its_share_of_the_moments(tmp_path):
     report = coverage(table)
     seen = observe(table, tmp_path / "a.parquet", known=report.gaps)
     found = Measured(ranked(report, opened(table), seen, 10**6, 10**4), None, ("a",), (2,), telemetry=seen)
-    told = {name: render(name, CoverageResults((found,))) for name in FORMATS}
+    told = {name: render(name, CoverageResults((found,))) for name in formats("coverage")}
     assert "      contexts  moments\n   1   50.00 %  87.50 %  air: False\n" in told["text"]
     assert "| 1 | 50.00 % | 87.50 % | air: False |" in told["markdown"]
     assert '<td class="n" data-v="0.875">87.50 %</td>' in told["html"]

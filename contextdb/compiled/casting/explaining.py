@@ -13,7 +13,7 @@ from contextdb import bitmask
 from contextdb.cells.arguments import require_row
 from contextdb.cells.facts import Context, Unknown
 from contextdb.compiled.casting.assigning import Part
-from contextdb.compiled.casting.facts import Actors, Offer, Prefer
+from contextdb.compiled.casting.facts import Ask, Offer
 from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.casting.stage import CastMatches, Stage, set_stage
 from contextdb.compiled.data import CompiledData
@@ -142,9 +142,7 @@ def _most_filled(parts: list[Part]) -> dict[str, Offer]:
     return {role: cast[role] for role in fitting if role in cast}
 
 
-def explain_with_actors(
-    compiled: CompiledData, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
-) -> CastExplanation:
+def explain_with_actors(compiled: CompiledData, context: Context, ask: Ask) -> CastExplanation:
     """Explain every row of a table for one context and its actors; raises ContextError as `query` does."""
-    stage, plain = set_stage(compiled, context, actors, prefer, unknown)
+    stage, plain = set_stage(compiled, context, ask)
     return CastExplanation(compiled, stage, plain, stage.matches(plain))

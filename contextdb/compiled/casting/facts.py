@@ -22,6 +22,15 @@ Cost = tuple[int, float]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Ask:
+    """How a context is asked with actors: who is offered for each role, who is preferred, and how missing facts are treated."""
+
+    actors: Actors
+    prefer: Prefer = None
+    unknown: Unknown = "error"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Offer:
     """One actor offered for one role."""
 
@@ -59,20 +68,15 @@ def name_of(actor: Actor, place: int) -> str:
 
 
 def read_offers(
-    compiled: CompiledData,
-    conditions: Mapping[str, Sequence[int]],
-    context: Context,
-    actors: Actors,
-    prefer: Prefer,
-    unknown: Unknown,
+    compiled: CompiledData, conditions: Mapping[str, Sequence[int]], context: Context, ask: Ask
 ) -> dict[str, tuple[Offer, ...]]:
     """The actors offered for each role, each once; raises ContextError with every fault of every actor."""
-    reader = _Reader(compiled, context, prefer, unknown)
+    reader = _Reader(compiled, context, ask)
     faults: list[Fault] = []
     offers: dict[str, tuple[Offer, ...]] = {}
     for role, places in conditions.items():
         listed: dict[object, Offer] = {}
-        for place, actor in enumerate(_listed(actors.get(role, ()), role)):
+        for place, actor in enumerate(_listed(ask.actors.get(role, ()), role)):
             try:
                 offer = reader.read(role, places, place, actor)
                 listed.setdefault(offer.key, offer)
@@ -94,7 +98,7 @@ def mirrored_offers(
 ) -> dict[str, tuple[Offer, ...]]:
     """Actors that were read, with their facts as a mirror shows them, in a context that is mirrored already. They are the same
     actors, as much preferred."""
-    reader = _Reader(compiled, context, None, unknown)
+    reader = _Reader(compiled, context, Ask({}, None, unknown))
     return {role: tuple(reader.mirrored(role, conditions[role], offer) for offer in offered) for role, offered in offers.items()}
 
 
@@ -114,8 +118,8 @@ def _kind(value: object) -> str:
 class _Reader:
     """Reads the actors of one moment."""
 
-    def __init__(self, compiled: CompiledData, context: Context, prefer: Prefer, unknown: Unknown) -> None:
-        self.compiled, self.context, self.prefer, self.unknown = compiled, context, prefer, unknown
+    def __init__(self, compiled: CompiledData, context: Context, ask: Ask) -> None:
+        self.compiled, self.context, self.prefer, self.unknown = compiled, context, ask.prefer, ask.unknown
         self.known: dict[object, dict[str, object]] = {}
         """Every fact that was told of each actor with an id."""
         self.preferred: dict[str, bool] = {}

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from contextdb.cells.facts import Context, Unknown
-from contextdb.compiled.casting.facts import Actor, Actors, Prefer
+from contextdb.cells.facts import Context
+from contextdb.compiled.casting.facts import Actor, Ask
 from contextdb.compiled.casting.stage import CastMatches, Offered, set_stage
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.lookup import UNUSUAL
 
 _PLAIN = (float, int, str, bool, type(None), frozenset)
 """Types whose values do not change: an actor with others is read for every question."""
@@ -20,11 +21,11 @@ _PLAIN = (float, int, str, bool, type(None), frozenset)
 class LiveActors:
     """Actors offered for roles until others are, and who is preferred."""
 
-    def __init__(self, compiled: CompiledData, actors: Actors, prefer: Prefer, unknown: Unknown) -> None:
-        self.compiled, self.actors, self.prefer, self.unknown = compiled, actors, prefer, unknown
+    def __init__(self, compiled: CompiledData, ask: Ask) -> None:
+        self.compiled, self.ask = compiled, ask
         self._role_facts = tuple(n for n in compiled.asked if n.partition(".")[1])
         """Facts that, where the context gives them, make a role one that is not cast."""
-        self._may_keep = compiled.derivation is None and not callable(prefer)
+        self._may_keep = compiled.derivation is None and not callable(ask.prefer)
         """Derived facts of actors may hang on the context; what a function prefers, on anything."""
         self._offered: Offered | None = None
         self._copies: dict[str, list[tuple[Actor, dict[str, object]]]] = {}
@@ -34,21 +35,22 @@ class LiveActors:
         """The rows valid now; raises ContextError as `CompiledTable.query` does."""
         given = [context.get(name) for name in self._role_facts]
         offered = self._offered if self._offered is not None and self._is_as_read(given) else None
-        stage, plain = set_stage(self.compiled, context, self.actors, self.prefer, self.unknown, offered)
+        stage, plain = set_stage(self.compiled, context, self.ask, offered)
         if offered is None:
             self._keep(stage.offered, given)
         return stage.matches(plain)
 
     def _is_as_read(self, given: list[object]) -> bool:
-        if self.actors.keys() != self._copies.keys():
+        actors = self.ask.actors
+        if actors.keys() != self._copies.keys():
             return False
         try:
-            return given == self._given and all(_is_same(self.actors[role], copies) for role, copies in self._copies.items())
-        except (TypeError, ValueError):  # what cannot be compared, such as an array, or is not a list of actors any more
+            return given == self._given and all(_is_same(actors[role], copies) for role, copies in self._copies.items())
+        except UNUSUAL:  # what cannot be compared, such as an array, or is not a list of actors any more
             return False
 
     def _keep(self, offered: Offered, given: list[object]) -> None:
-        copies = {role: [(actor, dict(actor)) for actor in self.actors[role]] for role in self.actors}
+        copies = {role: [(actor, dict(actor)) for actor in listed] for role, listed in self.ask.actors.items()}
         values = (*given, *(value for own in copies.values() for _, facts in own for value in facts.values()))
         is_plain = self._may_keep and all(type(value) in _PLAIN for value in values)
         self._offered, self._copies, self._given = (offered, copies, given) if is_plain else (None, {}, [])

@@ -13,7 +13,7 @@ from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.facts import Unknown, check_mode
 from contextdb.compiled.batch import Answers
 from contextdb.compiled.batch_columns import Contexts, common_length, facts_of
-from contextdb.compiled.casting.facts import Actors, Prefer
+from contextdb.compiled.casting.facts import Actors, Ask, Prefer
 from contextdb.compiled.casting.stage import CastMatches, query_with_actors
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.unchanging import Unchanging
@@ -84,7 +84,7 @@ def query_many_with_actors(
         offered: Any = actors if each is None else each[row]
         try:
             facts = {name: values[row] for name, values in columns.items()}
-            answers.append(query_with_actors(compiled, facts, offered, prefer, unknown))
+            answers.append(query_with_actors(compiled, facts, Ask(offered, prefer, unknown)))
         except ContextError as error:
             raise ContextError(*(f.at(Place(row=row, column=f.place.column)) for f in error.faults)) from None
     return ManyCastMatches(compiled, tuple(answers))

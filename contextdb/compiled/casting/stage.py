@@ -24,7 +24,7 @@ from contextdb.cells.arguments import require_whole
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, require_context
 from contextdb.cells.mirroring import in_mirror, kept_facts, mirrored_facts
 from contextdb.compiled.casting.assigning import Chosen, Holds, Part, best, every
-from contextdb.compiled.casting.facts import Actor, Actors, Offer, Prefer, mirrored_offers, read_offers
+from contextdb.compiled.casting.facts import Actor, Actors, Ask, Offer, mirrored_offers, read_offers
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.data import CompiledData
@@ -150,7 +150,7 @@ class Stage:
             context = mirrored_facts(self.context, compiled.mirroring)
             offers = mirrored_offers(compiled, self.roles.conditions, context, self.offers, unknown)
             offered = Offered(self.roles, offers, compiled.n_rows)
-            stage, plain = set_stage(compiled, context, {}, None, unknown, offered)
+            stage, plain = set_stage(compiled, context, Ask({}, None, unknown), offered)
             return stage.matches(plain)
         except ContextError as error:
             raise in_mirror(error) from None
@@ -241,9 +241,7 @@ def _as_casting(chosen: Chosen) -> Casting:
     return {name: offer.actor for name, offer in chosen}
 
 
-def query_with_actors(
-    compiled: CompiledData, context: Context, actors: Actors, prefer: Prefer = None, unknown: Unknown = "error"
-) -> CastMatches:
+def query_with_actors(compiled: CompiledData, context: Context, ask: Ask) -> CastMatches:
     """The rows valid for a context and actors; see `CompiledTable.query`.
 
     Raises
@@ -251,24 +249,20 @@ def query_with_actors(
     ContextError
         As `query`, and for actors that cannot be read, with the role and the actor.
     """
-    stage, plain = set_stage(compiled, context, actors, prefer, unknown)
+    stage, plain = set_stage(compiled, context, ask)
     return stage.matches(plain)
 
 
 def set_stage(
-    compiled: CompiledData,
-    context: Context,
-    actors: Actors,
-    prefer: Prefer = None,
-    unknown: Unknown = "error",
-    offered: Offered | None = None,
+    compiled: CompiledData, context: Context, ask: Ask, offered: Offered | None = None
 ) -> tuple[Stage, dict[int, tuple[int, int]]]:
     """The actors of a moment against the roles, and for each condition that is no role's the rows that may and always accept.
 
     With `offered` the actors are those, and not read.
     """
+    unknown = ask.unknown
     check_mode(unknown)
-    roles = offered.roles if offered is not None else roles_of(compiled, context, actors)
+    roles = offered.roles if offered is not None else roles_of(compiled, context, ask.actors)
     cast = {at for places in roles.conditions.values() for at in places}
     names = {at: c.name for at, c in enumerate(compiled.conditions) if at not in cast}
     rules = CastRules.of(compiled, context, roles.names, unknown)
@@ -276,7 +270,7 @@ def set_stage(
     facts = {at: read[name] for at, name in names.items()}
     plain = {at: compiled.condition_bits(at, fact, unknown) for at, fact in facts.items()}
     if offered is None:
-        offers = read_offers(compiled, roles.conditions, context, actors, prefer, unknown)
+        offers = read_offers(compiled, roles.conditions, context, ask)
         offered = Offered(roles, offers, compiled.n_rows)
     return Stage(compiled, offered, facts, unknown, read, kept_facts(context) if compiled.mirroring else context, rules), plain
 

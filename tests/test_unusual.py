@@ -1,0 +1,160 @@
+"""The careful way of a query and of a live context is for unusual facts alone: a fault of ours comes out as itself."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from datetime import date
+from decimal import Decimal
+from fractions import Fraction
+from unittest import mock
+
+import numpy as np
+import polars as pl
+import pytest
+
+from contextdb.cells.facts import cell
+from contextdb.compiled.classes import FLAT_BYTES
+from contextdb.compiled.lookup import UNUSUAL, build_ask
+from contextdb.compiled.table import CompiledTable
+from contextdb.errors import ContextError
+from contextdb.tables.table import Table
+
+CONDITIONS: dict[str, dict[str, object]] = {
+    "speed": {"type": "number"},
+    "n": {"type": "int"},
+    "heading": {"type": "angle", "mirror": "none"},
+    "ok": {"type": "bool"},
+    "state": {"type": "enum", "values": ["Ground", "Air"]},
+    "note": {"type": "text"},
+    "tags": {"type": "tags"},
+}
+COLUMNS = {
+    "Asset": ["a", "b"],
+    "speed": ["1..3", "Any"],
+    "n": ["Any", "2"],
+    "heading": ["0 ± 90", "Any"],
+    "ok": ["True", "Any"],
+    "state": ["Ground", "Any"],
+    "note": ["left", "Any"],
+    "tags": ["+Move", "Any"],
+}
+FACTS = {"speed": 2.0, "n": 2, "heading": 5.0, "ok": True, "state": "Ground", "note": "left", "tags": frozenset({"Move"})}
+
+
+class Tensor:
+    """Two numbers, which raise what tensors do that are no single number."""
+
+    def __float__(self) -> float:
+        raise RuntimeError("a Tensor with 2 elements cannot be converted to Scalar")
+
+    __index__ = __bool__ = __float__
+
+    def __eq__(self, other: object) -> Tensor:  # type: ignore[override]
+        return self
+
+    __hash__ = object.__hash__
+
+
+ODD: list[object] = [
+    None, True, "", "x", "Grond", b"x", float("nan"), float("inf"), -1e300, 2**60, 10**400, 1j, object(), Tensor(), [], [1],
+    ["Move"], ["Ground"], {1}, {}, (1,), Decimal("NaN"), Decimal("sNaN"), Decimal("1e999"), Fraction(10**400), Fraction(1, 3),
+    np.float32(2), np.float64("nan"), np.int64(2), np.bool_(True), np.str_("Ground"), np.array([1.0, 2.0]), np.array("abc"),
+    np.void(b"abc"), np.datetime64("2020-01-01"), np.timedelta64(1), np.longdouble("1e4000"), date(2020, 1, 1),
+    pl.Series([1.0]), pl.DataFrame({"a": [1]}), pl.col("a"), range(3), print, int, re.compile("x"), cell("Any"), cell("1..2"),
+]  # fmt: skip
+WIDTHS = pytest.mark.parametrize("flat_bytes", [FLAT_BYTES, 0], ids=["flat", "wide"])
+
+
+def compiled(flat_bytes: int = FLAT_BYTES, **more: dict[str, object]) -> CompiledTable:
+    with mock.patch("contextdb.compiled.classes.FLAT_BYTES", flat_bytes):
+        return Table.from_columns(COLUMNS, CONDITIONS | more).compile()
+
+
+def answer(ask: Callable[[], object]) -> object:
+    try:
+        return ask()
+    except ContextError as error:
+        return str(error)
+
+
+@WIDTHS
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_an_odd_fact_is_answered_or_refused_as_the_careful_way_does(flat_bytes: int, name: str):
+    table = compiled(flat_bytes)
+    for value in ODD:
+        context = FACTS | {name: value}
+        expected = answer(lambda context=context: table.query_with_care(context).indices.tolist())
+        for ask in (table.query, lambda context: table.live(context).matches()):
+            assert answer(lambda ask=ask, context=context: ask(context).indices.tolist()) == expected, value
+
+
+def test_the_straight_way_raises_each_of_these_exceptions_for_odd_facts_and_no_other():
+    raised: set[type[BaseException]] = set()
+    for table in (compiled(), compiled(0)):
+        ask = build_ask(list(zip(table.conditions, table.masks, strict=True)), table.enabled_bits, table.answering)
+        for context in (FACTS | {name: value} for name in CONDITIONS for value in ODD):
+            try:
+                ask(context)
+            except Exception as error:
+                raised.add(type(error))
+    assert raised == set(UNUSUAL)
+
+
+@WIDTHS
+@pytest.mark.parametrize("fault", [AttributeError, AssertionError, IndexError, ZeroDivisionError, NameError])
+@pytest.mark.parametrize("unknown", ["error", "any"])
+def test_a_fault_of_ours_in_a_query_comes_out_as_itself(flat_bytes: int, fault: type[Exception], unknown: str):
+    with mock.patch("contextdb.compiled.lookup.bisect_right", side_effect=fault("ours")):
+        table = compiled(flat_bytes)
+        with pytest.raises(fault, match="ours"):
+            table.query(FACTS, unknown)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("fault", [AttributeError, AssertionError, IndexError, ZeroDivisionError, NameError])
+def test_a_fault_of_ours_in_a_live_context_comes_out_as_itself(fault: type[Exception]):
+    live = compiled().live(FACTS)
+    with mock.patch("contextdb.compiled.live.bisect_right", side_effect=fault("ours")), pytest.raises(fault, match="ours"):
+        live["speed"] = 3.0
+
+
+def test_a_mask_of_ours_that_is_no_integer_shows_in_a_live_context():
+    live = compiled().live(FACTS)
+    live._lookups["ok"][1][True] = "no mask"
+    live["ok"] = True
+    with pytest.raises(TypeError):
+        live.matches()
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"heading": {"type": "angle"}}, {"ok": {"type": "bool", "expr": "speed > 1"}}],
+    ids=["plain", "mirrored", "derived"],
+)
+@pytest.mark.parametrize("unknown", ["error", "never"])
+def test_a_context_that_is_no_mapping_is_refused(more: dict[str, dict[str, object]], unknown: str):
+    table = compiled(**more)
+    for context in (
+        None,
+        5,
+        "speed",
+        [],
+        list,
+        np.zeros(3),
+        np.zeros(1, "f8, f8")[0],
+        pl.DataFrame({"a": [1]}),
+        re.match("x", "x"),
+    ):
+        with pytest.raises(ContextError, match="a context is a mapping of facts"):
+            table.query(context, unknown)  # type: ignore[arg-type]
+
+
+def test_an_actor_that_becomes_odd_is_refused_by_name():
+    table = Table.from_columns({"Asset": ["a"], "Defender.speed": ["1..3"]}, {"Defender.speed": {"type": "number"}}).compile()
+    actor: dict[str, object] = {"id": 1, "speed": 2.0}
+    live = table.live()
+    live.actors({"Defender": [actor]})
+    assert live.matches().assets == ["a"]
+    actor["speed"] = Tensor()
+    with pytest.raises(ContextError, match=r"Defender\[0\]"):
+        live.matches()

@@ -236,3 +236,9 @@ def test_an_interval_of_days_is_drawn_and_told_with_its_days():
     assert line.endswith("┤ 2026-12-31")
     assert number_words(cell, year) == "2026-01-01 to 2026-03-31, both ends in"
     assert number_words(parse_cell("Any", year), year) == "every date"
+
+
+def test_a_set_of_days_ends_with_the_calendar():
+    compiled = Table.from_columns({"Asset": ["all"], "day": ["<=9999-12-31"]}, {"day": {"type": "date"}}).compile()
+    for some in ("Any", ">=2026-01-01", "not 2026-12-24"):
+        assert compiled.query({"day": cdb.cell(some)}).always.tolist() == [1], some

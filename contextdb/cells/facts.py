@@ -20,6 +20,7 @@ from contextdb.cells.arguments import require_text
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import parse_cell, parse_tags
+from contextdb.cells.intervals import EVERYTHING
 from contextdb.cells.sets import SET_OF, Cell, NumberSet, ValueSet, covers
 from contextdb.cells.words import truth_of
 from contextdb.errors import CellError, ContextError, Fault, NoSuchFact, Place, in_quotes, nearest, plural, shown, some
@@ -181,7 +182,7 @@ def _checked_set(found: Cell, condition: Condition) -> Cell:
     """A set of values that was read before, if it is one of the condition's own kind."""
     accepts = SET_OF[condition.domain.type.family]
     if found.accepts is None or (isinstance(found.accepts, accepts) and not found.is_soft and not found.is_empty):
-        return found
+        return _within_limits(found, condition)
     raise _fault(found, condition, accepted=f"a set of values of type {condition.domain.kind}")
 
 
@@ -194,7 +195,16 @@ def _read_set(text: str, condition: Condition) -> Cell:
         raise _fault(text, condition, accepted='a set without a penalty ("~")')
     if found.is_empty:
         raise _fault(text, condition, accepted="a set that holds at least one value")
-    return found
+    return _within_limits(found, condition)
+
+
+def _within_limits(found: Cell, condition: Condition) -> Cell:
+    """A set of facts without numbers that no fact of the type can be, such as days after the last of the calendar."""
+    low, high = condition.domain.type.limits
+    if (low, high) == EVERYTHING[0]:
+        return found
+    spans = EVERYTHING if found.accepts is None else found.accepts.spans  # type: ignore[union-attr]
+    return Cell(NumberSet(tuple((max(first, low), min(last, high)) for first, last in spans if first <= high and last >= low)))
 
 
 def _plain_if_single(found: Cell) -> Fact:

@@ -7,6 +7,7 @@ from threading import Event
 import pytest
 
 import contextdb as cdb
+from contextdb.cells.facts import read_fact_text
 from contextdb.covering import Cancelled
 from contextdb.covering.inside import facts_inside
 from contextdb.schema.settings import TableSettings
@@ -223,5 +224,5 @@ def test_a_context_inside_a_box_is_one_that_its_cells_hold(cells, facts):
     shown = cdb.Table.from_columns(columns, SCHEMA)
     found = facts_inside(cells, [c.condition for c in shown.conditions])
     assert found == facts
-    given = {c.condition.name: cdb.facts.read_fact_text(found.get(c.condition.name, ""), c.condition) for c in shown.conditions}
+    given = {c.condition.name: read_fact_text(found.get(c.condition.name, ""), c.condition) for c in shown.conditions}
     assert shown.compile().query(given, unknown="any").indices.tolist() == [0]

@@ -27,9 +27,7 @@ from contextdb.edits.schema_file import schema_path
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
 from contextdb.expressions.rules import has_no_rule
-from contextdb.files.csv_rewrite import rewritten
-from contextdb.files.parquet import ParquetSource, rewritten_parquet
-from contextdb.files.texts import AnySource, read_texts
+from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.schema import toml_edit
 from contextdb.schema.settings import TableSettings, read_schema
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
@@ -262,8 +260,7 @@ def _require_free(path: Path, columns: Sequence[TextColumn]) -> None:
 def _rewritten(path: Path, source: AnySource, before: Sequence[TextColumn], after: Sequence[TextColumn]) -> Iterator[Rewrite]:
     if all(one is other for one, other in zip(before, after, strict=True)):
         return
-    write: Callable[..., Any] = rewritten_parquet if isinstance(source, ParquetSource) else rewritten
-    yield Rewrite(path, source.raw, write(list(after), source, np.arange(after[0].n_rows)).raw)
+    yield Rewrite(path, source.raw, written_over(source, after, np.arange(after[0].n_rows)).raw)
 
 
 # ---- contextdb.toml

@@ -9,18 +9,18 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import polars as pl
 from polars.selectors import by_name
 
+from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes
 from contextdb.files.csv_faults import record_faults
 from contextdb.files.csv_records import Records, fields_of, find_records, text_of
 from contextdb.files.csv_source import name_faults, read_csv
 from contextdb.files.strangers import UTF8_BOM, line_of, require_text
-from contextdb.files.texts import scanned_parquet
+from contextdb.files.texts import is_parquet, scanned_parquet
 
 ROWS = 1 << 16
 BYTES = 1 << 24
@@ -53,11 +53,6 @@ class TelemetryFile:
 
     path: Path
 
-    @cached_property
-    def is_parquet(self) -> bool:
-        """Whether it is a Parquet file by its name."""
-        return self.path.suffix.lower() == ".parquet"
-
     def chunks(self, wanted: Collection[str]) -> Iterator[tuple[tuple[str, ...], Chunk]]:
         """The names of all columns with each chunk of the wanted ones; one empty chunk where the file has no rows.
 
@@ -66,10 +61,10 @@ class TelemetryFile:
         TableError, FileError
             The file cannot be read, with its faults.
         """
-        if self.path.suffix.lower() not in (".csv", ".parquet"):
+        if self.path.suffix.lower() not in TABLE_SUFFIXES:
             found = f"a file of contexts does not end in {in_quotes(self.path.suffix)}."
-            raise FileError(Fault(found, ".csv or .parquet", place=Place(str(self.path))))
-        yield from _parquet_chunks(self.path, wanted) if self.is_parquet else _csv_chunks(self.path, wanted)
+            raise FileError(Fault(found, " or ".join(TABLE_SUFFIXES), place=Place(str(self.path))))
+        yield from _parquet_chunks(self.path, wanted) if is_parquet(self.path) else _csv_chunks(self.path, wanted)
 
 
 def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple[str, ...], Chunk]]:

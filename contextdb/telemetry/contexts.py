@@ -19,7 +19,7 @@ from contextdb.compiled.batch import ManyMatches
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes, nearest
-from contextdb.files.texts import AnySource, read_texts, scanned_parquet
+from contextdb.files.texts import AnySource, is_parquet, read_texts, scanned_parquet
 
 ONE = "one value of its type in each context"
 
@@ -80,7 +80,7 @@ def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
     TableError, ContextError, FileError
         The file cannot be read, or holds facts that the table cannot use; file, line and fact are named.
     """
-    if path.suffix.lower() == ".parquet":
+    if is_parquet(path):
         return Contexts(path, _read_parquet(path, compiled))
     source, columns = read_texts(path)
     known = known_conditions(compiled)

@@ -23,7 +23,7 @@ from contextdb.files.csv_faults import record_faults
 from contextdb.files.csv_records import fields_of, find_records, text_of
 from contextdb.files.csv_source import name_faults, read_csv
 from contextdb.files.strangers import UTF8_BOM, require_text
-from contextdb.files.texts import scanned_parquet
+from contextdb.files.texts import is_parquet, scanned_parquet
 
 SEARCHED_AT_ONCE = 1 << 17
 """Rows that are searched in one go."""
@@ -62,7 +62,7 @@ def open_recording(path: Path, conditions: Collection[str]) -> Recording:
     TableError, FileError
         The file cannot be read; with every fault of it.
     """
-    return _open_parquet(path, conditions) if path.suffix.lower() == ".parquet" else _open_csv(path, conditions)
+    return _open_parquet(path, conditions) if is_parquet(path) else _open_csv(path, conditions)
 
 
 def fact_text(value: object, condition: Condition) -> str:

@@ -7,16 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.columns import TextColumn
-from contextdb.files.csv_rewrite import rewritten
-from contextdb.files.csv_source import read_csv
-from contextdb.files.parquet import ParquetSource, read_parquet, rewritten_parquet
-from contextdb.files.texts import AnySource
+from contextdb.files.texts import is_parquet, texts_of, written_over
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
 from contextdb.tables.data import AnyTable
 from contextdb.tables.merging.merging import Merge
-
-PARQUET = b"PAR1"
-"""How a Parquet file begins."""
 
 
 def table_of(
@@ -31,8 +25,7 @@ def table_of(
     TableError
         The bytes are not a table.
     """
-    source: AnySource
-    source, columns = read_parquet(raw, file) if raw.startswith(PARQUET) else read_csv(raw, file)
+    source, columns = texts_of(raw, file, is_parquet(raw))
     settings = _fitting(settings or TableSettings(Path(file).stem), columns)
     return kind.build(settings.name, columns, schema, settings, Path(file), source)
 
@@ -40,9 +33,7 @@ def table_of(
 def merged_bytes(merge: Merge[AnyTable]) -> bytes:
     """The bytes of a merge, written over those of ours: what theirs did not change stays, under a renamed column too."""
     table, fields = merge.table, merge.fields.ours.tolist()
-    if isinstance(table.source, ParquetSource):
-        return rewritten_parquet(table.columns, table.source, table.origin, fields).raw
-    return rewritten(table.columns, table.source, table.origin, fields).raw
+    return written_over(table.source, table.columns, table.origin, fields).raw
 
 
 def _fitting(settings: TableSettings, columns: list[TextColumn]) -> TableSettings:

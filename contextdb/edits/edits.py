@@ -21,12 +21,13 @@ from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, i
 from contextdb.expressions import assumption_faults
 from contextdb.expressions.rules import check_rule
 from contextdb.files.csv_source import name_faults
+from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
 from contextdb.schema.settings import conditions_from_dict
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
 from contextdb.tables.table import Table
 
-Job = Literal["condition", "output", "enabled", "priority", "weight"]
+Job = Literal["condition", "output", PlainJob]
 
 
 # ---- what a person typed

@@ -123,9 +123,7 @@ class _File:
 
     def has_condition(self, condition: str) -> bool:
         """Whether the table has a column that is this condition."""
-        settings = self.settings
-        jobs = (settings.asset or self.columns[0].name, settings.enabled, settings.priority, settings.weight, settings.when)
-        return condition not in (*jobs, *settings.outputs) and any(c.name == condition for c in self.columns)
+        return condition not in self.settings.plain(self.columns) and any(c.name == condition for c in self.columns)
 
     @property
     def rules(self) -> TextColumn | None:

@@ -103,14 +103,13 @@ class Columns:
             raise TableError(*faults or [Fault("the table has no columns.", "at least one column, the assets")])
         before = {c.name: c for c in table.columns}
         renamed = {old: new for new, old in self.layout if old is not None}
-        settings = _settings_after(table.settings, renamed)
         conditions = dict(table.schema.conditions)
         for old, new in renamed.items():
             if old != new and old in conditions and new not in conditions:
                 conditions[new] = replace(conditions[old], name=new)
         columns = [_column(table, before, new, old) for new, old in self.layout]
         schema = replace(table.schema, conditions=conditions)
-        return _under(table, columns, dict(self.layout), schema, settings)
+        return _under(table, columns, dict(self.layout), schema, table.settings.renamed(renamed.get))
 
     def to_json(self) -> dict[str, object]:
         """The change as plain data."""
@@ -270,8 +269,7 @@ def _under(
 ) -> AnyTable:
     """The table of these columns under another schema and other settings."""
     before = {c.condition.name: c for c in table.conditions}
-    jobs = (settings.enabled, settings.priority, settings.weight, settings.when)
-    plain = {settings.asset or columns[0].name, *jobs, *settings.outputs}
+    plain = settings.plain(columns)
     found = tuple(
         _condition_column(column, before.get(came_from[column.name] or ""), schema.conditions.get(column.name))
         for column in columns
@@ -290,14 +288,6 @@ def _condition_column(column: TextColumn, before: ConditionColumn | None, declar
     if condition.domain == before.condition.domain:
         return ConditionColumn(condition, column, before.cells, before.faults)
     return ConditionColumn.read(column, condition)
-
-
-def _settings_after(settings: TableSettings, renamed: Mapping[str, str]) -> TableSettings:
-    """The settings under the new names; a column that is gone has no job."""
-    jobs = ("asset", "enabled", "priority", "weight", "when")
-    now: dict[str, Any] = {key: renamed.get(getattr(settings, key) or "") for key in jobs}
-    now["outputs"] = tuple(renamed[name] for name in settings.outputs if name in renamed)
-    return replace(settings, **now)
 
 
 def _runs(taken: CameFrom) -> Iterator[list[int]]:

@@ -75,7 +75,7 @@ class TableData(Unchanging):
         """
         settings = settings or TableSettings(name=name)
         _require_columns(columns, settings, path)
-        plain = _plain_names(columns, settings)
+        plain = settings.plain(columns)
         conditions = tuple(
             ConditionColumn.read(c, schema.conditions.get(c.name) or infer_condition(c)) for c in columns if c.name not in plain
         )
@@ -251,16 +251,9 @@ def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, pat
         Fault(f"the column name {in_quotes(n)} appears twice.", "each name once", place=place)
         for n in sorted(n for n, count in Counter(names).items() if count > 1)
     ]
-    wanted = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
-    for key, name in [*wanted, *(("outputs", n) for n in settings.outputs)]:
-        if name is not None and name not in names:
+    for key, name in settings.jobs:
+        if name not in names:
             fault = _no_such("column", name, names)
             faults.append(replace(fault, found=f"{fault.found[:-1]}, which [tables.{settings.name}] names as {key}.", place=place))
     if faults:
         raise TableError(*faults)
-
-
-def _plain_names(columns: Sequence[TextColumn], settings: TableSettings) -> set[str]:
-    asset = settings.asset or (columns[0].name if columns else None)
-    jobs = (asset, settings.enabled, settings.priority, settings.weight, settings.when, *settings.outputs)
-    return {name for name in jobs if name is not None}

@@ -8,14 +8,12 @@ import numpy as np
 
 from contextdb.columns import TextColumn
 from contextdb.errors import SchemaError
+from contextdb.schema.jobs import JOB_KEYS
 from contextdb.schema.sections import condition_to_dict, differences, settings_to_dict
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
 from contextdb.tables.data import TableData
 from contextdb.tables.merging.shared import Shared
-
-JOBS = ("asset", "outputs", "enabled", "priority", "weight", "when")
-"""What settings say of columns."""
 
 _EMPTY = TextColumn("", ("",), np.zeros(1, np.int32))
 
@@ -49,8 +47,8 @@ def edit_to(
 
 
 def _said_of(table: TableData, columns: Sequence[TextColumn], settings: TableSettings, schema: Schema) -> Sections:
-    old, new = settings_to_dict(table.settings), settings_to_dict(settings)
-    jobs = differences({k: v for k, v in old.items() if k in JOBS}, {k: v for k, v in new.items() if k in JOBS})
+    changed = differences(settings_to_dict(table.settings), settings_to_dict(settings))
+    jobs = {key: value for key, value in changed.items() if key in JOB_KEYS}
     known = table.schema.conditions
     wanted = (schema.conditions.get(c.name) for c in columns)
     declared = {c.name: condition_to_dict(c) for c in wanted if c is not None and known.get(c.name) != c}

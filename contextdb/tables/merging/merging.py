@@ -21,7 +21,7 @@ from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.merging.alignment import align
-from contextdb.tables.merging.building import edit_to
+from contextdb.tables.merging.building import edit_under
 from contextdb.tables.merging.cells import merge_column
 from contextdb.tables.merging.conflicts import Conflict, Decided, Side
 from contextdb.tables.merging.order import Origins
@@ -65,7 +65,7 @@ class Merge(Generic[AnyTable]):
         return merge(self.base, self.ours, self.theirs, decided)
 
     def _edit(self, side: TableData, rows: CameFrom, fields: CameFrom, name: str) -> Edit:
-        return edit_to(side, self.columns, rows, fields, self.settings, self.schema, name)
+        return edit_under(side, self.columns, rows, fields, self.settings, self.schema, name)
 
 
 def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | None = None) -> Merge[AnyTable]:

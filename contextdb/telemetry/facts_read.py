@@ -19,6 +19,7 @@ from contextdb.cells.domains import NUMERIC
 from contextdb.cells.facts import Fact, describe, read_fact, read_fact_text
 from contextdb.cells.grammar import Cell
 from contextdb.errors import ContextError
+from contextdb.telemetry.contexts import fact_type
 
 PLAIN_NUMBER = r"^[ \t]*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?[ \t]*$"
 MOST_EXAMPLES = 5
@@ -181,12 +182,7 @@ def _coded(given: pl.Series) -> tuple[NDArray[np.int64], list[object]]:
 
 
 def _dtype(condition: Condition) -> pl.DataType:
-    kind = condition.domain.kind
-    if kind in NUMERIC:
-        return pl.Float64()
-    if kind == "enum":
-        return pl.Enum(list(condition.domain.values or ()))
-    return pl.Boolean() if kind == "bool" else pl.List(pl.String) if kind == "tags" else pl.String()
+    return pl.Enum(list(condition.domain.values or ())) if condition.domain.kind == "enum" else fact_type(condition)
 
 
 def _shown(value: object) -> str:

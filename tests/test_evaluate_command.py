@@ -7,7 +7,7 @@ import os
 import stat
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
@@ -25,6 +25,7 @@ from contextdb.commands.evaluate_command import share
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
 from contextdb.telemetry import evaluate_file
+from contextdb.telemetry.chunks import chunks_of
 from contextdb.telemetry.contexts import read_contexts
 
 TOML = """
@@ -418,14 +419,14 @@ def test_nothing_is_written_when_a_context_is_wrong(here: Path):
 def test_an_interrupted_run_leaves_the_old_answers_and_nothing_else(here: Path, monkeypatch: pytest.MonkeyPatch):
     (here / "data" / "b.csv").write_text(WHOLE, encoding="utf-8")
     (here / "answers.csv").write_text("of yesterday", encoding="utf-8")
-    true, before = evaluate_file.TelemetryFile.chunks, sorted(here.iterdir())
+    before = sorted(here.iterdir())
 
-    def interrupted(file: evaluate_file.TelemetryFile, wanted: object) -> Iterator[object]:
-        yield from true(file, wanted)  # type: ignore[arg-type]
-        if file.path.name == "b.csv":
+    def interrupted(path: Path, wanted: Collection[str]) -> Iterator[object]:
+        yield from chunks_of(path, wanted)
+        if path.name == "b.csv":
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(evaluate_file.TelemetryFile, "chunks", interrupted)
+    monkeypatch.setattr("contextdb.telemetry.contexts.chunks_of", interrupted)
     result = run("evaluate", "moves", "data/*.csv", "--out", "answers.csv")
     assert (result.code, result.out) == (130, "")
     assert (here / "answers.csv").read_text(encoding="utf-8") == "of yesterday"

@@ -305,6 +305,14 @@ def test_rows_disabled_on_one_side_are_disabled_in_the_merge(base):
     assert merged.enabled.tolist() == [True, True, False, True]
 
 
+@pytest.mark.parametrize("was", [{"outputs": ("hit",)}, {"enabled": "hit"}], ids=["from outputs", "to outputs"])
+def test_a_column_that_theirs_gave_another_job_has_it_in_the_merge(was: dict[str, object]):
+    [now] = [one for one in ({"outputs": ("hit",)}, {"enabled": "hit"}) if one != was]
+    base = table_of(RAW, **was)
+    merged = clean(base, base.with_cell(0, "speed", "7"), table_of(RAW, **now))
+    assert merged.settings == table_of(RAW, **now).settings
+
+
 def test_a_large_merge_of_moved_rows_and_cells_is_both():
     n = 3000
     columns = [TextColumn.of("A", [f"a{i}" for i in range(n)]), TextColumn.of("x", [str(i % 7) for i in range(n)])]

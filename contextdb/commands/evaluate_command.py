@@ -31,16 +31,16 @@ from contextdb.commands import missing_facts_by_option
 from contextdb.commands.coverage_telemetry import ENGINES, bar, has_many_bytes
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, output, printable, styled, wants_colour
-from contextdb.disk import is_stream, path_in_quotes, refused_writing, write_atomic
+from contextdb.disk import TABLE_SUFFIXES, is_stream, path_in_quotes, refused_writing, write_atomic
 from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, plural
+from contextdb.files.texts import is_parquet
 from contextdb.report.render_json import as_json
 from contextdb.tables.places import open_compiled
 from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.evaluate_file import Answered
 
 N_SHOWN = 15
-OUT_SUFFIXES = (".csv", ".parquet")
 PIECE_BYTES = 1 << 22
 
 
@@ -144,9 +144,9 @@ def _out_file(out: Path, files: Sequence[Path]) -> Path:
     place = Place(str(out))
     if is_stream(out):
         return out
-    if out.suffix not in OUT_SUFFIXES:
+    if out.suffix not in TABLE_SUFFIXES:
         raise FileError(
-            Fault("answers cannot be written to such a file.", f"a name that ends in {' or '.join(OUT_SUFFIXES)}", place=place)
+            Fault("answers cannot be written to such a file.", f"a name that ends in {' or '.join(TABLE_SUFFIXES)}", place=place)
         )
     if not os.path.isdir(out.parent):
         raise FileError(
@@ -166,9 +166,9 @@ def _write(answered: Mapping[Path, Answered], folder: Path, out: Path) -> None:
         scan = pl.scan_parquet(answers_of(folder, path), glob=False)
         frames.append(scan.with_columns(pl.col("context") + first))
         first += own.contexts
-    joined, whole = pl.concat(frames), folder / f"answers{out.suffix or OUT_SUFFIXES[0]}"
+    joined, whole = pl.concat(frames), folder / f"answers{out.suffix or TABLE_SUFFIXES[0]}"
     with answers_written(out):
-        if whole.suffix == ".parquet":
+        if is_parquet(whole):
             joined.sink_parquet(whole)
         else:
             texts = (pl.col("rows").cast(pl.List(pl.String)).list.join(" "), pl.col("assets").list.join(" | "))

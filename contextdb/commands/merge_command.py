@@ -35,10 +35,11 @@ from contextdb.edits.diffing.markers import with_markers
 from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.errors import ContextDBError, Fault, Place, SchemaError, TableError, in_quotes, plural, shown
 from contextdb.files.parquet import ParquetSource
+from contextdb.files.texts import is_parquet
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
 from contextdb.tables.merging.conflicts import Side
 from contextdb.tables.merging.merging import Merge, merge
-from contextdb.tables.merging.reading import PARQUET, merged_bytes, table_of
+from contextdb.tables.merging.reading import merged_bytes, table_of
 from contextdb.tables.project import neighbours, schema_for, settings_of
 from contextdb.tables.table import Table
 
@@ -84,14 +85,14 @@ def _merged_tables(path: Path, raws: Raws, arguments: argparse.Namespace) -> Mer
     found = merge(base, ours, theirs)
     if arguments.take:
         found = _decided(found, arguments.take)
-    is_parquet = isinstance(found.ours.source, ParquetSource)
-    raw = with_markers(found) if found.conflicts and not is_parquet else None if found.conflicts else merged_bytes(found)
-    return raw, lambda: _told(found, path, is_parquet, arguments)
+    is_text = not isinstance(found.ours.source, ParquetSource)
+    raw = merged_bytes(found) if not found.conflicts else with_markers(found) if is_text else None
+    return raw, lambda: _told(found, path, is_text, arguments)
 
 
-def _told(found: Merge[Table], path: Path, is_parquet: bool, arguments: argparse.Namespace) -> ExitCode:
+def _told(found: Merge[Table], path: Path, is_text: bool, arguments: argparse.Namespace) -> ExitCode:
     """Tell what came of it."""
-    _tell(found, path, is_parquet)
+    _tell(found, path, is_text)
     if found.conflicts:
         return ExitCode.FOUND
     return ExitCode.FOUND if _tell_meaning(found, path) and arguments.strict else ExitCode.OK
@@ -149,7 +150,7 @@ def _merge_lines(path: Path, raws: Raws, arguments: argparse.Namespace, error: E
         print(printable(f"contextdb: {fault}"), file=sys.stderr)
     if len(faults) > MOST_TOLD:
         print(f"contextdb: … and {len(faults) - MOST_TOLD:,} more.", file=sys.stderr)
-    if any(raw.startswith(PARQUET) for raw in raws):
+    if any(map(is_parquet, raws)):
         said, mend = "the file stays as ours has it.", "to take one side with git checkout --ours or --theirs"
     else:
         raw, n_conflicts = merged_lines(*raws)
@@ -204,7 +205,7 @@ def _decided(found: Merge[Table], side: Side) -> Merge[Table]:
     return found
 
 
-def _tell(found: Merge[Table], path: Path, is_parquet: bool) -> None:
+def _tell(found: Merge[Table], path: Path, is_text: bool) -> None:
     for one in found.conflicts[:MOST_TOLD]:
         texts = ", ".join(
             f"{name} {_said(text)}" for name, text in (("ours", one.ours), ("theirs", one.theirs), ("before", one.base))
@@ -214,9 +215,9 @@ def _tell(found: Merge[Table], path: Path, is_parquet: bool) -> None:
         print(f"contextdb: … and {len(found.conflicts) - MOST_TOLD:,} more.", file=sys.stderr)
     if found.conflicts:
         mend = (
-            "to decide with --take ours or --take theirs"
-            if is_parquet
-            else "to open the file with contextdb edit, or to keep one of each"
+            "to open the file with contextdb edit, or to keep one of each"
+            if is_text
+            else "to decide with --take ours or --take theirs"
         )
         said = f"{plural(len(found.conflicts), 'place')} changed on both sides."
         print(printable(f"contextdb: {Fault(said, mend=mend, place=Place(str(path)))}"), file=sys.stderr)

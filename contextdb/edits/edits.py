@@ -21,12 +21,14 @@ from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, i
 from contextdb.expressions import assumption_faults
 from contextdb.expressions.rules import check_rule
 from contextdb.files.csv_source import name_faults
+from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict, settings_with
 from contextdb.schema.settings import conditions_from_dict
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
+from contextdb.tables.merging.building import edit_to
 from contextdb.tables.table import Table
 
-Job = Literal["condition", "output", "enabled", "priority", "weight"]
+Job = Literal["condition", "output", PlainJob]
 
 
 # ---- what a person typed
@@ -297,28 +299,9 @@ def _checked(table: Table, edit: Edit) -> Edit:
 
 def edit_between(before: Table, after: Table, came_from: CameFrom, name: str) -> Edit:
     """An edit that makes the texts of `before` those of `after`, whose row i is what was row `came_from[i]`, -1 a new one."""
-    changes: list[Change] = []
-    if not np.array_equal(came_from, np.arange(before.n_rows)):
-        changes.append(Rows(came_from))
-    names = [c.name for c in before.columns]
-    layout = tuple((c.name, c.name if c.name in names else None) for c in after.columns)
-    if [c.name for c in after.columns] != names:
-        changes.append(Columns(layout))
-    said = Sections.between(Edit(name, tuple(changes)).apply(before), after)
-    changes += [] if said.is_empty else [said]
-    middle = Edit(name, tuple(changes)).apply(before)
-    texts = {c.name: _differences(middle.text_column(c.name), c) for c in after.columns}
-    texts = {column: cells for column, cells in texts.items() if cells}
-    return Edit(name, (*changes, Cells(texts)) if texts else tuple(changes))
-
-
-def _differences(before: TextColumn, after: TextColumn) -> dict[int, str]:
-    if before.codes is after.codes and before.texts is after.texts:
-        return {}
-    known = {text: code for code, text in enumerate(before.texts)}
-    as_before = np.array([known.get(text, -1) for text in after.texts], np.int64)
-    rows = np.flatnonzero(as_before[after.codes] != before.codes) if after.n_rows else np.empty(0, np.int64)
-    return {row: after[row] for row in rows.tolist()}
+    places = {column.name: at for at, column in enumerate(before.columns)}
+    fields = np.array([places.get(column.name, -1) for column in after.columns], np.int64)
+    return edit_to(before, after.columns, came_from, fields, lambda table: Sections.between(table, after), name)
 
 
 # ---- parts

@@ -27,9 +27,7 @@ from contextdb.edits.schema_file import schema_path
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
 from contextdb.expressions.rules import has_no_rule
-from contextdb.files.csv_rewrite import rewritten
-from contextdb.files.parquet import ParquetSource, rewritten_parquet
-from contextdb.files.texts import AnySource, read_texts
+from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.schema import toml_edit
 from contextdb.schema.settings import TableSettings, read_schema
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path
@@ -125,9 +123,7 @@ class _File:
 
     def has_condition(self, condition: str) -> bool:
         """Whether the table has a column that is this condition."""
-        settings = self.settings
-        jobs = (settings.asset or self.columns[0].name, settings.enabled, settings.priority, settings.weight, settings.when)
-        return condition not in (*jobs, *settings.outputs) and any(c.name == condition for c in self.columns)
+        return condition not in self.settings.plain(self.columns) and any(c.name == condition for c in self.columns)
 
     @property
     def rules(self) -> TextColumn | None:
@@ -262,8 +258,7 @@ def _require_free(path: Path, columns: Sequence[TextColumn]) -> None:
 def _rewritten(path: Path, source: AnySource, before: Sequence[TextColumn], after: Sequence[TextColumn]) -> Iterator[Rewrite]:
     if all(one is other for one, other in zip(before, after, strict=True)):
         return
-    write: Callable[..., Any] = rewritten_parquet if isinstance(source, ParquetSource) else rewritten
-    yield Rewrite(path, source.raw, write(list(after), source, np.arange(after[0].n_rows)).raw)
+    yield Rewrite(path, source.raw, written_over(source, after, np.arange(after[0].n_rows)).raw)
 
 
 # ---- contextdb.toml

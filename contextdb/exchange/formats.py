@@ -241,7 +241,9 @@ def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[
 
         return write_xlsx(table), ()
     if kind in ("csv", "parquet"):
-        return _rewritten(table, columns, kind), told
+        from contextdb.files.texts import written_over
+
+        return written_over(table.source, columns, table.origin, as_parquet=kind == "parquet").raw, told
     if kind == "tsv":
         from contextdb.exchange.tab_text import write_tab_text
 
@@ -258,20 +260,3 @@ def _written(table: Table, kind: str, formulas: Formulas) -> tuple[bytes, tuple[
     from contextdb.exchange import unreal
 
     return unreal.write_json(table) if kind == "unreal-json" else unreal.write_csv(table)
-
-
-def _rewritten(table: Table, columns: Sequence[TextColumn], kind: str) -> bytes:
-    """The table's own file as it would be saved: what nobody changed keeps its bytes."""
-    import numpy as np
-
-    from contextdb.files.csv_rewrite import rewritten
-    from contextdb.files.csv_source import Source
-    from contextdb.files.parquet import ParquetSource, rewritten_parquet
-
-    fresh = np.full(table.n_rows, -1)
-    if kind == "csv":
-        is_own = isinstance(table.source, Source)
-        return rewritten(columns, table.source, table.origin).raw if is_own else rewritten(columns, None, fresh).raw  # type: ignore[arg-type]
-    if isinstance(table.source, ParquetSource):
-        return rewritten_parquet(columns, table.source, table.origin).raw
-    return rewritten_parquet(columns, None, fresh).raw

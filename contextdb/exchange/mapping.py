@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -18,13 +18,14 @@ from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest, plural, some
 from contextdb.exchange.proposals import n_unreadable, names_of, pair_in, propose_type
 from contextdb.exchange.reading import Reading
+from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import condition_to_dict
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 from contextdb.tables.table import Table
 
-Job = Literal["asset", "condition", "output", "enabled", "priority", "weight", "when", "left out"]
-JOBS: tuple[Job, ...] = ("asset", "condition", "output", "enabled", "priority", "weight", "when", "left out")
-PLAIN_JOBS: tuple[Job, ...] = ("enabled", "priority", "weight", "when")
+Job = Literal["asset", "condition", "output", PlainJob, "when", "left out"]
+JOBS: tuple[Job, ...] = get_args(Job)
+PLAIN_JOBS: tuple[Job, ...] = (*get_args(PlainJob), "when")
 _NEVER_GUESSED = ("when",)
 """Jobs whose word is too common a name to go by."""
 

@@ -6,7 +6,7 @@ are read by polars and kept as their distinct texts, so that no cell is an objec
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +16,7 @@ import polars as pl
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.files.csv_faults import record_faults
-from contextdb.files.csv_records import CR, LF, Octets, Positions, Records, fields_of, find_records, line_ends, text_of
+from contextdb.files.csv_records import CR, LF, Positions, Records, fields_of, find_records, line_ends, text_of
 from contextdb.files.strangers import UTF8_BOM, line_of, require_text, seems_markup
 
 MOST_NAME_FAULTS = 20
@@ -102,6 +102,14 @@ def read_csv(raw: bytes, file: str) -> tuple[Source, list[TextColumn]]:
     TableError
         With every fault of the file, each with its line.
     """
+    records, names = find_rows(raw, file)
+    starts, stops = records.starts[1:], records.stops[1:]
+    columns = text_columns(read_rows(raw, starts, stops, names), names) if len(starts) else [TextColumn.of(n, ()) for n in names]
+    return Source(raw, np.append(records.starts, len(raw)), records.stops, tuple(columns)), columns
+
+
+def find_rows(raw: bytes, file: str) -> tuple[Records, list[str]]:
+    """The records of a CSV, the header first, and the names of its columns; the parameters and errors are those of `read_csv`."""
     require_text(raw, file)
     records, strays = find_records(raw)
     faults, names = record_faults(raw, records, strays, file), list[str]()
@@ -114,8 +122,20 @@ def read_csv(raw: bytes, file: str) -> tuple[Source, list[TextColumn]]:
         kind = seems_markup(raw)
         hint = [Fault(f"not a CSV file: looks like {kind}.", "CSV text in UTF-8", place=Place(file))] if kind else []
         raise TableError(*hint, *faults)
-    columns = _columns(raw, names, records)
-    return Source(raw, np.append(records.starts, len(raw)), records.stops, tuple(columns)), columns
+    return records, names
+
+
+def read_rows(
+    raw: bytes, starts: Positions, stops: Positions, names: Sequence[str], wanted: Collection[str] | None = None
+) -> pl.DataFrame:
+    """Rows of a CSV between these positions as strings, null where a field is empty: the wanted columns, by default all."""
+    places = {str(at): name for at, name in enumerate(names) if wanted is None or name in wanted}
+    if not (len(starts) and places):
+        return pl.DataFrame()
+    schema = dict.fromkeys(map(str, range(len(names))), pl.String)
+    frame = pl.read_csv(_plain_rows(raw, starts, stops), has_header=False, schema=schema).select(list(places))
+    assert frame.height == len(starts), "polars and the records disagree"
+    return frame.rename(places)
 
 
 def name_faults(names: Sequence[str]) -> Iterator[Fault]:
@@ -161,27 +181,12 @@ def _codes(column: str, texts: pl.Series, n_rows: int) -> pl.Expr:
     return pl.col(column).cast(pl.Enum(texts)).to_physical().cast(pl.Int32)
 
 
-def _columns(raw: bytes, names: Sequence[str], records: Records) -> list[TextColumn]:
-    if len(records.starts) == 1:
-        return [TextColumn.of(name, ()) for name in names]
-    rows, n_skipped = _rows_only(raw, records)
-    frame = pl.read_csv(rows, has_header=False, schema=dict.fromkeys(map(str, range(len(names))), pl.String), skip_lines=n_skipped)
-    assert frame.shape == (len(records.starts) - 1, len(names)), "polars and the records disagree"
-    return text_columns(frame, names)
-
-
-def _rows_only(raw: bytes, records: Records) -> tuple[bytes, int]:
-    """The rows as polars reads them, with plain line ends and no blank lines between them, and how many lines are before them."""
-    starts, stops = records.starts[1:], records.stops[1:]
-    first, has_bom = int(starts[0]), raw.startswith(UTF8_BOM, int(starts[0]))
-    if not has_bom and _are_plain(np.frombuffer(raw, np.uint8), starts, stops):
-        return raw, raw.count(b"\n", 0, first)
-    rows = b"\n".join([raw[a:b] for a, b in zip(starts.tolist(), stops.tolist(), strict=True)])
-    return (UTF8_BOM + rows if has_bom else rows), 0  # polars takes one away: here it is text
-
-
-def _are_plain(octets: Octets, starts: Positions, stops: Positions) -> bool:
-    """Whether "\\n" or "\\r\\n" is before each row, and nothing else between rows or after the last."""
-    between = starts[1:] - stops[:-1]
-    is_plain = (between == 1) | ((between == 2) & (octets[stops[:-1]] == CR))
-    return bool(is_plain.all() and (octets[starts - 1] == LF).all() and octets[int(stops[-1]) :].tobytes() in (b"", b"\n", b"\r\n"))
+def _plain_rows(raw: bytes, starts: Positions, stops: Positions) -> bytes:
+    """The rows as polars reads them, with plain line ends and no blank lines between them."""
+    octets, between = np.frombuffer(raw, np.uint8), starts[1:] - stops[:-1]
+    is_plain = (octets[starts[1:] - 1] == LF) & ((between == 1) | ((between == 2) & (octets[stops[:-1]] == CR)))
+    if is_plain.all():
+        rows = raw[int(starts[0]) : int(stops[-1])]
+    else:
+        rows = b"\n".join([raw[a:b] for a, b in zip(starts.tolist(), stops.tolist(), strict=True)])
+    return UTF8_BOM + rows if rows.startswith(UTF8_BOM) else rows  # polars takes one away: here it is text

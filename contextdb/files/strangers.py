@@ -8,11 +8,12 @@ from __future__ import annotations
 import re
 
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
+from contextdb.files.parquet_frame import MAGIC
 
 UTF8_BOM = b"\xef\xbb\xbf"
 
 _SIGNATURES = (
-    (b"PAR1", "a Parquet file"),
+    (MAGIC, "a Parquet file"),
     (b"\x89PNG", "a PNG image"),
     (b"\xff\xd8\xff", "a JPEG image"),
     (b"%PDF", "a PDF document"),

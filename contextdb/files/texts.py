@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,12 +15,17 @@ from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nea
 from contextdb.files.csv_rewrite import Origin, rewritten
 from contextdb.files.csv_source import Source, read_csv
 from contextdb.files.parquet import ParquetSource, read_parquet, rewritten_parquet
-from contextdb.files.parquet_frame import DamagedFrame, require_whole_file
+from contextdb.files.parquet_frame import MAGIC, DamagedFrame, require_whole_file
 
 AnySource = Source | ParquetSource
 """What a table's texts came from."""
 
 _OTHER_TABLES = (".tsv", ".xlsx", ".json")
+
+
+def is_parquet(file: str | Path | bytes) -> bool:
+    """Whether a file is Parquet and not CSV: by its suffix, or, given its bytes, by the first of them."""
+    return file.startswith(MAGIC) if isinstance(file, bytes) else Path(file).suffix.lower() == ".parquet"
 
 
 def read_texts(path: str | Path) -> tuple[AnySource, list[TextColumn]]:
@@ -41,7 +46,13 @@ def read_texts(path: str | Path) -> tuple[AnySource, list[TextColumn]]:
         The file is not a table, with every fault in it.
     """
     raw = read_bytes(path)
-    return read_parquet(raw, str(path)) if _suffix(path) == ".parquet" else read_csv(raw, str(path))
+    _require_table(path)
+    return texts_of(raw, str(path))
+
+
+def texts_of(raw: bytes, file: str, as_parquet: bool | None = None) -> tuple[AnySource, list[TextColumn]]:
+    """A table's texts from the bytes of a file, as its name says if nothing else does; the rest as in `read_texts`."""
+    return read_parquet(raw, file) if (is_parquet(file) if as_parquet is None else as_parquet) else read_csv(raw, file)
 
 
 @contextmanager
@@ -69,12 +80,21 @@ def new_source(
     field_of: Sequence[int] | None = None,
 ) -> AnySource:
     """What a file becomes, before it is written: its bytes are `raw`. The parameters and errors are those of `write_texts`."""
-    fresh = np.full(len(origin), -1)
-    if _suffix(path) == ".csv":
-        return rewritten(columns, source, origin, field_of) if isinstance(source, Source) else rewritten(columns, None, fresh)
-    if isinstance(source, ParquetSource):
-        return rewritten_parquet(columns, source, origin, field_of)
-    return rewritten_parquet(columns, None, fresh)
+    _require_table(path)
+    return written_over(source, columns, origin, field_of, is_parquet(path))
+
+
+def written_over(
+    source: AnySource | None,
+    columns: Sequence[TextColumn],
+    origin: Origin,
+    field_of: Sequence[int] | None = None,
+    as_parquet: bool | None = None,
+) -> AnySource:
+    """Texts written over the bytes they came from; from scratch where another format than theirs is asked for."""
+    kind = type(source) if as_parquet is None else ParquetSource if as_parquet else Source
+    write: Callable[..., AnySource] = rewritten_parquet if kind is ParquetSource else rewritten
+    return write(columns, source, origin, field_of) if isinstance(source, kind) else write(columns, None, np.full(len(origin), -1))
 
 
 def write_texts(
@@ -105,10 +125,10 @@ def write_texts(
     return new
 
 
-def _suffix(path: str | Path) -> str:
+def _require_table(path: str | Path) -> None:
     suffix = Path(path).suffix
     if suffix.lower() in TABLE_SUFFIXES:
-        return suffix.lower()
+        return
     near = nearest(suffix, TABLE_SUFFIXES)
     mend = "to save it as CSV" if suffix.lower() in _OTHER_TABLES else path_in_quotes(Path(path).with_suffix(near)) if near else ""
     found = f"a table file does not end in {in_quotes(suffix)}." if suffix else "the name has no suffix."

@@ -17,6 +17,7 @@ from urllib.parse import quote
 
 from contextdb.checks.rules import RULES
 from contextdb.console import __version__, printable
+from contextdb.files.texts import is_parquet
 from contextdb.findings import Finding, Level
 from contextdb.report.render_json import as_json
 from contextdb.report.results import Report, told, worst_first
@@ -92,7 +93,7 @@ def _locations(finding: Finding) -> list[Json]:
     place: Json = {"artifactLocation": _artifact(finding.file)}
     if finding.line is not None:
         place["region"] = {"startLine": finding.line}
-    elif not finding.file.endswith(".parquet"):  # of a text the whole file is meant, and GitHub wants a line
+    elif not is_parquet(finding.file):  # of a text the whole file is meant, and GitHub wants a line
         place["region"] = {"startLine": 1}
     return [{"physicalLocation": place}]
 

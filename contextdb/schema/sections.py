@@ -13,6 +13,7 @@ from typing import Any
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
+from contextdb.schema.jobs import columns_checked
 from contextdb.schema.settings import KINDS_WITH, Schema, TableSettings, conditions_from_dict
 from contextdb.schema.shapes import NAMES, SECTIONS, as_toml, wrong_name
 
@@ -126,21 +127,16 @@ def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSett
 
 def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) -> Iterator[Fault]:
     """Why a table of these columns cannot have these settings: a column that is missing, has two jobs, or is a condition."""
-    jobs: dict[str, str] = {}
     known = frozenset(columns)
-    named = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
-    for key, column in [*named, *(("outputs", name) for name in settings.outputs)]:
-        if column is None:
-            continue
+    for key, column, twice in columns_checked(vars(settings)):
         if column not in known:
             near = nearest(column, columns)
             yield Fault(f"there is no column {in_quotes(column)} for {key}.", some(columns), in_quotes(near) if near else "")
-        elif column in jobs:
-            yield Fault(f"{key} and {jobs[column]} both name the column {in_quotes(column)}.", "one job for a column")
+        elif twice:
+            yield twice
         elif column in schema.conditions:
             found = f"{key} names {in_quotes(column)}, which contextdb.toml declares as a condition."
             yield Fault(found, "a column that is not a condition")
-        jobs.setdefault(column, key)
 
 
 def blueprint_faults(schema: Schema) -> Iterator[Fault]:

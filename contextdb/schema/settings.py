@@ -10,7 +10,7 @@ from __future__ import annotations
 import datetime
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import PurePosixPath
@@ -21,11 +21,13 @@ from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind, names_where
 from contextdb.cells.mirroring import sided_pairs, swap_faults, swapped_tag
 from contextdb.cells.sets import covers
+from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
 from contextdb.expressions import Derivation, assumption_faults, derivation_faults, derive
 from contextdb.files.file_names import alike, composed
 from contextdb.schema import shapes, toml_values
+from contextdb.schema.jobs import JOBS, columns_checked, columns_with_jobs
 from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
 from contextdb.schema.toml_lines import Path, key_lines, line_of, read_toml
 
@@ -58,6 +60,20 @@ class TableSettings:
     assume: tuple[str, ...] = ()
     when: str | None = None
     """The column of each row's own rule."""
+
+    @property
+    def jobs(self) -> list[tuple[str, str]]:
+        """Each job with a column that has it, as far as columns are named."""
+        return columns_with_jobs(vars(self))
+
+    def plain(self, columns: Sequence[TextColumn]) -> set[str]:
+        """The names of columns that are not conditions."""
+        return {*(column.name for column in columns[:1] if not self.asset), *(name for _, name in self.jobs)}
+
+    def renamed(self, name_of: Callable[[str], str | None]) -> TableSettings:
+        """The settings under other names of the columns; one that is gone, None, has no job."""
+        now: dict[str, Any] = {job: name_of(getattr(self, job) or "") for job in JOBS}
+        return replace(self, **now, outputs=tuple(name for name in map(name_of, self.outputs) if name is not None))
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -375,13 +391,9 @@ def _unknown_partners(mirror: Mapping[str, str], is_tags: bool, values: Sequence
 
 
 def _column_faults(path: Path, table: Section, conditions: Set[str]) -> Iterator[Found]:
-    jobs: dict[str, str] = {}
-    columns = [(key, table[key]) for key in ("asset", "enabled", "priority", "weight", "when") if key in table]
-    for key, column in [*columns, *(("outputs", name) for name in table.get("outputs", ()))]:
-        if column in jobs:
-            found = f"{_header(path)} {key} and {jobs[column]} both name the column {in_quotes(column)}."
-            yield (*path, key), Fault(found, "one job for a column")
-        jobs.setdefault(column, key)
+    for key, column, twice in columns_checked(table):
+        if twice:
+            yield (*path, key), replace(twice, found=f"{_header(path)} {twice.found}")
         if column in conditions:
             found = f"{_header(path)} {key} names {in_quotes(column)}, which is declared as a condition."
             mend = f"to leave out {_header(('conditions', column))}"

@@ -19,7 +19,6 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, SchemaError, TableError
 from contextdb.files.csv_source import name_faults
@@ -33,9 +32,8 @@ from contextdb.schema.sections import (
     settings_to_dict,
     settings_with,
 )
-from contextdb.schema.settings import Schema, TableSettings, expression_faults
-from contextdb.tables.condition_column import ConditionColumn, infer_condition
-from contextdb.tables.data import AnyTable, TableData
+from contextdb.schema.settings import expression_faults
+from contextdb.tables.data import AnyTable, TableData, conditions_of, with_columns
 
 CameFrom = NDArray[np.int64]
 """For each row the row it was before, or -1 for a new one."""
@@ -58,7 +56,7 @@ class Rows:
             raise TableError(Fault(f"there is no row {int(wrong[0])}.", f"rows 0 to {n_before - 1}"))
         new, at_least_0 = np.flatnonzero(taken < 0), np.maximum(taken, 0)
         columns = [_with_rows(c, at_least_0, new) for c in table.columns]
-        return _with_columns(table, columns, self._origin(table.origin, n_before))
+        return with_columns(table, columns, self._origin(table.origin, n_before))
 
     def _origin(self, origin: CameFrom, n_before: int) -> CameFrom:
         taken = self.came_from
@@ -83,7 +81,7 @@ class Cells:
     def apply(self, table: AnyTable) -> AnyTable:
         """The table with these texts."""
         changed = {name: _with_texts(table.text_column(name), texts) for name, texts in self.texts.items()}
-        return _with_columns(table, [changed.get(c.name, c) for c in table.columns], table.origin)
+        return with_columns(table, [changed.get(c.name, c) for c in table.columns], table.origin)
 
     def to_json(self) -> dict[str, object]:
         """The change as plain data: for each column the rows and their texts."""
@@ -103,14 +101,16 @@ class Columns:
             raise TableError(*faults or [Fault("the table has no columns.", "at least one column, the assets")])
         before = {c.name: c for c in table.columns}
         renamed = {old: new for new, old in self.layout if old is not None}
-        settings = _settings_after(table.settings, renamed)
         conditions = dict(table.schema.conditions)
         for old, new in renamed.items():
             if old != new and old in conditions and new not in conditions:
                 conditions[new] = replace(conditions[old], name=new)
         columns = [_column(table, before, new, old) for new, old in self.layout]
         schema = replace(table.schema, conditions=conditions)
-        return _under(table, columns, dict(self.layout), schema, settings)
+        settings, known = table.settings.renamed(renamed.get), {c.condition.name: c for c in table.conditions}
+        moved = {new: known[old] for new, old in self.layout if old in known}
+        found = conditions_of(columns, schema, settings, moved)
+        return replace(table, columns=tuple(columns), conditions=found, settings=settings, schema=schema)
 
     def to_json(self) -> dict[str, object]:
         """The change as plain data."""
@@ -152,7 +152,8 @@ class Sections:
             faults += expression_faults(replace(schema, tables={**schema.tables, settings.name: settings}))
         if faults:
             raise SchemaError(*faults)
-        return _under(table, table.columns, {name: name for name in names}, schema, settings)
+        conditions = conditions_of(table.columns, schema, settings, {c.condition.name: c for c in table.conditions})
+        return replace(table, conditions=conditions, settings=settings, schema=schema)
 
     def to_json(self) -> dict[str, object]:
         """The change as plain data."""
@@ -219,12 +220,6 @@ class Edit:
 # ---- parts
 
 
-def _with_columns(table: AnyTable, columns: Sequence[TextColumn], origin: CameFrom) -> AnyTable:
-    now = {c.name: c for c in columns}
-    conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in table.conditions)
-    return replace(table, columns=tuple(columns), conditions=conditions, origin=origin)
-
-
 def _with_rows(column: TextColumn, taken: CameFrom, new: CameFrom) -> TextColumn:
     """The column with rows `taken`, of which those at `new` are empty."""
     if not len(new):
@@ -263,41 +258,6 @@ def _column(table: TableData, before: Mapping[str, TextColumn], name: str, old: 
     if old not in before:
         table.text_column(old)  # says what is there
     return before[old] if old == name else before[old].renamed(name)
-
-
-def _under(
-    table: AnyTable, columns: Sequence[TextColumn], came_from: Mapping[str, str | None], schema: Schema, settings: TableSettings
-) -> AnyTable:
-    """The table of these columns under another schema and other settings."""
-    before = {c.condition.name: c for c in table.conditions}
-    jobs = (settings.enabled, settings.priority, settings.weight, settings.when)
-    plain = {settings.asset or columns[0].name, *jobs, *settings.outputs}
-    found = tuple(
-        _condition_column(column, before.get(came_from[column.name] or ""), schema.conditions.get(column.name))
-        for column in columns
-        if column.name not in plain
-    )
-    return replace(table, columns=tuple(columns), conditions=found, settings=settings, schema=schema)
-
-
-def _condition_column(column: TextColumn, before: ConditionColumn | None, declared: Condition | None) -> ConditionColumn:
-    """A column as a condition; one that was one before, with the same domain, is not read again."""
-    if before is None or (declared is None and before.condition.is_declared):
-        return ConditionColumn.read(column, declared or infer_condition(column))
-    condition = declared or replace(before.condition, name=column.name)
-    if condition == before.condition and column is before.texts:
-        return before
-    if condition.domain == before.condition.domain:
-        return ConditionColumn(condition, column, before.cells, before.faults)
-    return ConditionColumn.read(column, condition)
-
-
-def _settings_after(settings: TableSettings, renamed: Mapping[str, str]) -> TableSettings:
-    """The settings under the new names; a column that is gone has no job."""
-    jobs = ("asset", "enabled", "priority", "weight", "when")
-    now: dict[str, Any] = {key: renamed.get(getattr(settings, key) or "") for key in jobs}
-    now["outputs"] = tuple(renamed[name] for name in settings.outputs if name in renamed)
-    return replace(settings, **now)
 
 
 def _runs(taken: CameFrom) -> Iterator[list[int]]:

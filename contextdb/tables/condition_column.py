@@ -6,7 +6,7 @@ Texts that cannot be read stay as they are, with their fault. What was worked ou
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,19 +49,36 @@ class ConditionColumn:
         cells, faults = _read_cells(texts.texts, condition)
         return cls(condition, texts, cells, faults)
 
-    def with_texts(self, texts: TextColumn) -> ConditionColumn:
-        """The column with other texts; those that it had already are not read again."""
-        known = len(self.texts.texts)
+    @classmethod
+    def like(cls, before: ConditionColumn | None, texts: TextColumn, declared: Condition | None) -> ConditionColumn:
+        """A column under what is declared of it, else inferred; what an older one had worked out for the same is not again."""
+        is_same = before is not None and texts.texts is before.texts.texts and texts.codes is before.texts.codes
+        if before is not None and is_same and declared is None and not before.condition.is_declared:
+            condition = replace(before.condition, name=texts.name)
+        else:
+            condition = declared or infer_condition(texts)
+        if before is None or before.condition.domain != condition.domain:
+            return cls.read(texts, condition)
+        return before if texts is before.texts and condition == before.condition else before.with_texts(texts, condition)
+
+    def with_texts(self, texts: TextColumn, condition: Condition | None = None) -> ConditionColumn:
+        """The column with other texts, as a condition of the same domain; texts that it had already are not read again."""
+        condition, known = condition or self.condition, len(self.texts.texts)
         if texts.texts is self.texts.texts:
-            return ConditionColumn(self.condition, texts, self.cells, self.faults)
-        if texts.texts[:known] != self.texts.texts:
-            return ConditionColumn.read(texts, self.condition)
-        cells, faults = _read_cells(texts.texts[known:], self.condition)
-        more = {known + i: fault for i, fault in faults.items()}
-        all_cells = (
-            self.cells.followed_by(texts.texts[known:], cells) if isinstance(self.cells, NumberCells) else (*self.cells, *cells)
-        )
-        return ConditionColumn(self.condition, texts, all_cells, {**self.faults, **more})
+            return ConditionColumn(condition, texts, self.cells, self.faults)
+        if texts.texts[:known] == self.texts.texts:
+            cells, faults = _read_cells(texts.texts[known:], condition)
+            more = {known + i: fault for i, fault in faults.items()}
+            return ConditionColumn(condition, texts, _followed(self.cells, texts.texts[known:], cells), {**self.faults, **more})
+        if isinstance(self.cells, NumberCells):  # reading many numbers again is faster
+            return ConditionColumn.read(texts, condition)
+        read = dict(zip(self.texts.texts, zip(self.cells, map(self.faults.get, range(known)), strict=True), strict=True))
+        others = tuple(text for text in texts.texts if text not in read)
+        cells, faults = _read_cells(others, condition)
+        read |= {text: (cells[i], faults.get(i)) for i, text in enumerate(others)}
+        found = [read[text] for text in texts.texts]
+        wrong = {i: fault for i, (_, fault) in enumerate(found) if fault is not None}
+        return ConditionColumn(condition, texts, tuple(cell for cell, _ in found), wrong)
 
     def cell(self, row: int) -> Cell:
         """What the row accepts."""
@@ -88,6 +105,10 @@ class ConditionColumn:
         hard = [Cell(c.accepts) if c.is_soft else ANY for c in self.cells]
         penalties = np.array([c.penalty or 0.0 for c in self.cells])
         return column_masks(hard, self.texts.codes, self.condition.domain), penalties[self.texts.codes]
+
+
+def _followed(cells: ColumnCells, texts: Sequence[str], more: ColumnCells) -> ColumnCells:
+    return cells.followed_by(texts, more) if isinstance(cells, NumberCells) else (*cells, *more)
 
 
 def _read_cells(texts: Sequence[str], condition: Condition) -> tuple[ColumnCells, dict[int, Fault]]:

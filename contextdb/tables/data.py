@@ -32,7 +32,7 @@ from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, 
 from contextdb.expressions.rules import WhenColumn
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
-from contextdb.tables.condition_column import ConditionColumn, infer_condition
+from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.plain_columns import PlainColumns
 
 AnyTable = TypeVar("AnyTable", bound="TableData")
@@ -65,8 +65,11 @@ class TableData(Unchanging):
         settings: TableSettings | None = None,
         path: Path | None = None,
         source: AnySource | None = None,
+        before: Mapping[str, ConditionColumn] | None = None,
     ) -> Self:
         """A table of texts under a schema; cells that cannot be read are kept and are in its `faults`.
+
+        `before`: the same columns in another version of the table, by name; what is known of them is not worked out again.
 
         Raises
         ------
@@ -75,10 +78,7 @@ class TableData(Unchanging):
         """
         settings = settings or TableSettings(name=name)
         _require_columns(columns, settings, path)
-        plain = _plain_names(columns, settings)
-        conditions = tuple(
-            ConditionColumn.read(c, schema.conditions.get(c.name) or infer_condition(c)) for c in columns if c.name not in plain
-        )
+        conditions = conditions_of(columns, schema, settings, before or {})
         n_rows = columns[0].n_rows if columns else 0
         return cls(name, settings, tuple(columns), conditions, schema, path, source, np.arange(n_rows))
 
@@ -161,7 +161,7 @@ class TableData(Unchanging):
             if not 0 <= row < self.n_rows:
                 raise TableError(self._no_row(row))
             changed[at] = changed.get(at, self.columns[at]).with_text(row, text)
-        return self._with_columns([changed.get(i, c) for i, c in enumerate(self.columns)], self.origin)
+        return with_columns(self, [changed.get(i, c) for i, c in enumerate(self.columns)], self.origin)
 
     def with_rows(self, at: int, rows: Sequence[Mapping[str, str]]) -> Self:
         """The table with new rows before row `at`; columns that a row leaves out are empty (Any)."""
@@ -173,7 +173,7 @@ class TableData(Unchanging):
         if not 0 <= at <= self.n_rows:
             raise TableError(Fault(f"there is no row {at}.", f"0 to {self.n_rows}, to insert before"))
         columns = [c.with_inserted(at, [row.get(c.name, "") for row in rows]) for c in self.columns]
-        return self._with_columns(columns, np.insert(self.origin, at, np.full(len(rows), -1)))
+        return with_columns(self, columns, np.insert(self.origin, at, np.full(len(rows), -1)))
 
     def with_rows_taken(self, rows: Sequence[int] | NDArray[np.int64]) -> Self:
         """The table of the given rows in the given order: deletes, moves, sorts."""
@@ -182,7 +182,7 @@ class TableData(Unchanging):
         if wrong := [row for row in numbers if not 0 <= row < self.n_rows]:
             raise TableError(self._no_row(wrong[0]))
         taken = np.array(numbers, np.int64)
-        return self._with_columns([c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
+        return with_columns(self, [c.with_rows_taken(taken) for c in self.columns], self.origin[taken])
 
     @property
     def ways(self) -> Ways | None:
@@ -231,10 +231,20 @@ class TableData(Unchanging):
                 return at
         raise TableError(_no_such("column", name, [c.name for c in self.columns]))
 
-    def _with_columns(self, columns: Sequence[TextColumn], origin: NDArray[np.int64]) -> Self:
-        now = {c.name: c for c in columns}
-        conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in self.conditions)
-        return replace(self, columns=tuple(columns), conditions=conditions, origin=origin)
+
+def conditions_of(
+    columns: Sequence[TextColumn], schema: Schema, settings: TableSettings, before: Mapping[str, ConditionColumn]
+) -> tuple[ConditionColumn, ...]:
+    """Those of some columns that are conditions; what is known of them from `before` is not worked out again."""
+    plain, declared = settings.plain(columns), schema.conditions
+    return tuple(ConditionColumn.like(before.get(c.name), c, declared.get(c.name)) for c in columns if c.name not in plain)
+
+
+def with_columns(table: AnyTable, columns: Sequence[TextColumn], origin: NDArray[np.int64]) -> AnyTable:
+    """The table with other texts in the same columns, and where its rows then came from."""
+    now = {c.name: c for c in columns}
+    conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in table.conditions)
+    return replace(table, columns=tuple(columns), conditions=conditions, origin=origin)
 
 
 def _no_such(what: str, name: str, known: list[str]) -> Fault:
@@ -251,16 +261,9 @@ def _require_columns(columns: Sequence[TextColumn], settings: TableSettings, pat
         Fault(f"the column name {in_quotes(n)} appears twice.", "each name once", place=place)
         for n in sorted(n for n, count in Counter(names).items() if count > 1)
     ]
-    wanted = [(key, getattr(settings, key)) for key in ("asset", "enabled", "priority", "weight", "when")]
-    for key, name in [*wanted, *(("outputs", n) for n in settings.outputs)]:
-        if name is not None and name not in names:
+    for key, name in settings.jobs:
+        if name not in names:
             fault = _no_such("column", name, names)
             faults.append(replace(fault, found=f"{fault.found[:-1]}, which [tables.{settings.name}] names as {key}.", place=place))
     if faults:
         raise TableError(*faults)
-
-
-def _plain_names(columns: Sequence[TextColumn], settings: TableSettings) -> set[str]:
-    asset = settings.asset or (columns[0].name if columns else None)
-    jobs = (asset, settings.enabled, settings.priority, settings.weight, settings.when, *settings.outputs)
-    return {name for name in jobs if name is not None}

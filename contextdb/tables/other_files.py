@@ -14,6 +14,7 @@ from pathlib import Path
 
 from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import in_quotes
+from contextdb.files.texts import is_parquet
 
 HEAD = 65_536
 """Bytes of a file that are looked at."""
@@ -33,7 +34,7 @@ def other_form(path: Path, conditions: Collection[str]) -> str | None:
     `conditions` are those that contextdb.toml declares.
     """
     with suppress(OSError):
-        if path.suffix.lower() == ".parquet":
+        if is_parquet(path):
             return "a recorded session of motion matching" if SESSION in _footer(path) else None
         with path.open("rb") as file:
             head = file.read(HEAD)

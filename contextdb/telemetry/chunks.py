@@ -7,20 +7,18 @@ batch at a time.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import polars as pl
 from polars.selectors import by_name
 
+from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes
-from contextdb.files.csv_faults import record_faults
-from contextdb.files.csv_records import Records, fields_of, find_records, text_of
-from contextdb.files.csv_source import name_faults, read_csv
-from contextdb.files.strangers import UTF8_BOM, line_of, require_text
-from contextdb.files.texts import scanned_parquet
+from contextdb.files.csv_source import find_rows, read_csv, read_rows
+from contextdb.files.strangers import line_of
+from contextdb.files.texts import is_parquet, scanned_parquet
 
 ROWS = 1 << 16
 BYTES = 1 << 24
@@ -47,32 +45,21 @@ class Chunk:
         return self.lines_before + line_of(self.raw, self.starts[row]) if self.starts else None
 
 
-@dataclass(frozen=True)
-class TelemetryFile:
-    """One file: the names of its columns, and its rows."""
+def chunks_of(path: Path, wanted: Collection[str]) -> Iterator[tuple[Sequence[str], Chunk]]:
+    """The names of all columns with each chunk of the wanted ones; one empty chunk where the file has no rows.
 
-    path: Path
-
-    @cached_property
-    def is_parquet(self) -> bool:
-        """Whether it is a Parquet file by its name."""
-        return self.path.suffix.lower() == ".parquet"
-
-    def chunks(self, wanted: Collection[str]) -> Iterator[tuple[tuple[str, ...], Chunk]]:
-        """The names of all columns with each chunk of the wanted ones; one empty chunk where the file has no rows.
-
-        Raises
-        ------
-        TableError, FileError
-            The file cannot be read, with its faults.
-        """
-        if self.path.suffix.lower() not in (".csv", ".parquet"):
-            found = f"a file of contexts does not end in {in_quotes(self.path.suffix)}."
-            raise FileError(Fault(found, ".csv or .parquet", place=Place(str(self.path))))
-        yield from _parquet_chunks(self.path, wanted) if self.is_parquet else _csv_chunks(self.path, wanted)
+    Raises
+    ------
+    TableError, FileError
+        The file cannot be read, with its faults.
+    """
+    if path.suffix.lower() not in TABLE_SUFFIXES:
+        found = f"a file of contexts does not end in {in_quotes(path.suffix)}."
+        raise FileError(Fault(found, " or ".join(TABLE_SUFFIXES), place=Place(str(path))))
+    yield from _parquet_chunks(path, wanted) if is_parquet(path) else _csv_chunks(path, wanted)
 
 
-def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple[str, ...], Chunk]]:
+def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[Sequence[str], Chunk]]:
     with scanned_parquet(path) as scan:
         names = tuple(scan.collect_schema().names())
         n_rows = int(scan.select(pl.len()).collect().item())
@@ -104,55 +91,32 @@ def _batches(scan: pl.LazyFrame, n_rows: int) -> Iterator[pl.DataFrame]:
             yield scan.slice(start, ROWS).collect()
 
 
-def _csv_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[tuple[str, ...], Chunk]]:
-    names: tuple[str, ...] | None = None
-    head = b""
+def _csv_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[Sequence[str], Chunk]]:
+    head, names = b"", list[str]()
     n_rows, n_lines, n_bytes, size = 0, 0, 0, max(1, os.path.getsize(path)) if path.exists() else 1
-    for raw in _pieces(path):
-        require_text(raw, str(path))
-        records, strays = find_records(head + raw)
-        if not len(records.starts):
-            continue
-        if strays or record_faults(head + raw, records, strays, str(path)):
-            raise _told(path)
-        if names is None:
-            names = _names(raw, records, path)
-            head = raw[: int(records.starts[1])] if len(records.starts) > 1 else raw
-            lead = 0
-        else:
-            lead = len(head)
-        n_bytes += len(raw)
-        before = n_lines - head[:lead].count(b"\n")
-        chunk = _csv_chunk(head[:lead] + raw, records, names, wanted, n_rows, before, min(1.0, n_bytes / size))
-        n_lines += line_of(raw, len(raw)) - 1
-        n_rows += chunk.n_rows
-        if chunk.n_rows:
-            yield names, chunk
-    if names is None:
+    for piece in _pieces(path):
+        raw = head + piece
+        try:
+            records, names = find_rows(raw, str(path))
+        except TableError:
+            raise _told(path) from None
+        starts, stops = records.starts[1:], records.stops[1:]
+        n_bytes += len(piece)
+        if len(starts):
+            frame = read_rows(raw, starts, stops, names, wanted)
+            before = n_lines - _n_lines(head)
+            yield names, Chunk(len(starts), frame, n_rows, True, min(1.0, n_bytes / size), raw, starts.tolist(), before)
+        n_lines += _n_lines(piece)
+        n_rows += len(starts)
+        head = head or raw[: int(starts[0]) if len(starts) else len(raw)]
+    if not names:
         raise _told(path)
     if not n_rows:
         yield names, Chunk(0, pl.DataFrame(), 0, True)
 
 
-def _csv_chunk(
-    raw: bytes,
-    records: Records,
-    names: tuple[str, ...],
-    wanted: Collection[str],
-    first_row: int,
-    lines_before: int,
-    share_done: float,
-) -> Chunk:
-    starts, stops = records.starts[1:].tolist(), records.stops[1:].tolist()
-    places = [at for at, name in enumerate(names) if name in wanted]
-    frame = pl.DataFrame()
-    if starts and places:
-        rows = b"\n".join([raw[a:b] for a, b in zip(starts, stops, strict=True)])
-        rows = UTF8_BOM + rows if rows.startswith(UTF8_BOM) else rows  # polars takes one away: here it is text
-        schema = dict.fromkeys(map(str, range(len(names))), pl.String)
-        frame = pl.read_csv(rows, has_header=False, schema=schema).select(map(str, places))
-        frame = frame.rename({str(at): names[at] for at in places})
-    return Chunk(len(starts), frame, first_row, True, share_done, raw, starts, lines_before)
+def _n_lines(raw: bytes) -> int:
+    return line_of(raw, len(raw)) - 1
 
 
 def _pieces(path: Path) -> Iterator[bytes]:
@@ -181,14 +145,6 @@ def _cut(raw: bytes) -> int:
         quotes -= raw.count(b'"', before, cut)
         cut = before
     return cut
-
-
-def _names(raw: bytes, records: Records, path: Path) -> tuple[str, ...]:
-    head = raw[int(records.starts[0]) : int(records.stops[0])]
-    names = tuple(text_of(f) for f in fields_of(head, int(records.n_fields[0])))
-    if any(name_faults(names)):
-        raise _told(path)
-    return names
 
 
 def _told(path: Path) -> TableError:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import polars as pl
-from polars.selectors import by_name
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Unknown, read_fact_text
@@ -18,31 +17,36 @@ from contextdb.compiled.batch import ManyMatches
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes, nearest
-from contextdb.files.texts import AnySource, read_texts, scanned_parquet
+from contextdb.files.csv_source import text_columns
+from contextdb.telemetry.chunks import Chunk, chunks_of
 
 ONE = "one value of its type in each context"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contexts:
-    """The contexts of one file, one row each."""
+    """Contexts of one file, one row each."""
 
     path: Path
     facts: pl.DataFrame
     """The facts that the table asks for, typed as `query_many` takes them, null where one is missing. Other columns are all null:
     their names may tell of a misspelling, and a row that says nothing to the table is a context too."""
-    source: AnySource | None = None
+    chunks: Sequence[Chunk]
+    """Where the rows come from, one after the other."""
 
     def ask(self, compiled: CompiledTable, unknown: Unknown) -> ManyMatches:
         """The valid rows in every context; a ContextError names file, line and fact."""
         try:
             return compiled.query_many(self.facts, unknown)
         except ContextError as error:
-            raise ContextError(*(fault.at(self._place(fault.place)) for fault in error.faults)) from None
+            raise ContextError(*(replace(fault, place=self._place(fault.place)) for fault in error.faults)) from None
 
     def _place(self, place: Place) -> Place:
-        line = self.source.line(place.row) if self.source is not None and place.row is not None else None
-        return Place(str(self.path), line, place.column, place.row)
+        if place.row is None:
+            return Place(str(self.path), None, place.column)
+        row = self.chunks[0].first_row + place.row
+        chunk = next(one for one in reversed(self.chunks) if one.first_row <= row)
+        return Place(str(self.path), chunk.line(row - chunk.first_row), place.column, row)
 
 
 def context_files(pattern: str) -> list[Path]:
@@ -79,23 +83,33 @@ def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
     TableError, ContextError, FileError
         The file cannot be read, or holds facts that the table cannot use; file, line and fact are named.
     """
-    if path.suffix.lower() == ".parquet":
-        return Contexts(path, _read_parquet(path, compiled))
-    source, columns = read_texts(path)
+    read = list(contexts_in(path, compiled))
+    return Contexts(path, pl.concat([one.facts for one in read]), [chunk for one in read for chunk in one.chunks])
+
+
+def contexts_in(path: Path, compiled: CompiledTable) -> Iterator[Contexts]:
+    """The same, a chunk of the file at a time."""
     known = known_conditions(compiled)
+    for names, chunk in chunks_of(path, known):
+        yield Contexts(path, _facts(path, names, chunk, known), (chunk,))
+
+
+def _facts(path: Path, names: Sequence[str], chunk: Chunk, known: Mapping[str, Condition]) -> pl.DataFrame:
     series, faults = [], []
-    for column in columns:
-        condition = known.get(column.name)
-        if condition is None:
-            series.append(without_facts(column.name, column.n_rows))
-            continue
-        values, wrong = read_texts_as(column.texts, condition)
-        faults += [f.at(Place(str(path), source.line(int((column.codes == i).argmax())), column.name)) for i, f in wrong]
-        distinct = pl.Series(column.name, values, dtype=fact_type(condition), strict=False)
-        series.append(distinct.gather(column.codes) if len(distinct) else distinct)
+    for name in names:
+        condition = known.get(name)
+        if condition is None or not chunk.n_rows:
+            series.append(pl.repeat(None, chunk.n_rows, dtype=pl.Null, eager=True).alias(name))
+        elif not chunk.is_text:
+            series.append(chunk.frame[name])
+        else:
+            [column] = text_columns(chunk.frame[name].to_frame(), [name])
+            values, wrong = read_texts_as(column.texts, condition)
+            faults += [f.at(Place(str(path), chunk.line(int((column.codes == i).argmax())), name)) for i, f in wrong]
+            series.append(pl.Series(name, values, dtype=fact_type(condition), strict=False).gather(column.codes))
     if faults:
         raise ContextError(*sorted(faults, key=lambda fault: fault.place.line or 0))
-    return Contexts(path, pl.DataFrame(series), source)
+    return pl.DataFrame(series)
 
 
 def known_conditions(compiled: CompiledTable) -> dict[str, Condition]:
@@ -130,18 +144,3 @@ def fact_type(condition: Condition) -> pl.DataType:
     """The type of a column of facts."""
     dtype: pl.DataType = condition.domain.type.dtype
     return dtype
-
-
-def _read_parquet(path: Path, compiled: CompiledTable) -> pl.DataFrame:
-    with scanned_parquet(path) as scan:
-        names = scan.collect_schema().names()
-        n_rows = scan.select(pl.len()).collect().item()
-        known = known_conditions(compiled)
-        asked = [n for n in names if n in known]
-        facts = scan.select(by_name(asked)).collect().get_columns() if asked else []
-    return pl.DataFrame([*facts, *(without_facts(n, n_rows) for n in names if n not in known)])
-
-
-def without_facts(name: str, n_rows: int) -> pl.Series:
-    """A column without a fact."""
-    return pl.repeat(None, n_rows, dtype=pl.Null, eager=True).alias(name)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import polars as pl
 
@@ -13,7 +15,7 @@ MOST_COUNT = 1 << 40
 """The largest number in a count column."""
 
 
-def moments_of(count: str | None, names: tuple[str, ...], chunk: Chunk, file: str) -> Counts:
+def moments_of(count: str | None, names: Sequence[str], chunk: Chunk, file: str) -> Counts:
     """How many moments each row stands for: int64 [N]; 1 without a count column.
 
     Raises

@@ -14,7 +14,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +22,10 @@ import polars as pl
 
 from contextdb.bitmask import Rows
 from contextdb.cells.facts import Unknown
-from contextdb.compiled.batch import ManyMatches
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import printable
-from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place
-from contextdb.telemetry.chunks import Chunk, TelemetryFile
-from contextdb.telemetry.contexts import fact_type, known_conditions, read_texts_as, without_facts
+from contextdb.errors import ContextDBError, Fault, FileError, Place
+from contextdb.telemetry.contexts import contexts_in
 from contextdb.telemetry.keys import rows_of
 
 MOST_ANSWERS = 1 << 21
@@ -72,16 +70,15 @@ def evaluate_file(question: Question, path: Path, tell: Callable[[float], None] 
     hits = np.zeros(compiled.n_rows, np.int64)
     try:
         with _answers_folder(question.folder, path) as folder:
-            for i, (names, chunk) in enumerate(TelemetryFile(path).chunks(set(known_conditions(compiled)))):
-                facts = _facts(compiled, names, chunk, str(path))
-                many = _asked(question, facts, chunk, str(path))
+            for i, contexts in enumerate(contexts_in(path, compiled)):
+                many = contexts.ask(compiled, question.unknown)
                 n_without += int((many.counts == 0).sum())
                 hits += many.hits
                 if folder is not None:
-                    _write(question, facts, many.counts, n_contexts, printable(str(path)), folder / f"{i:08}")
-                n_contexts += chunk.n_rows
+                    _write(question, contexts.facts, many.counts, n_contexts, printable(str(path)), folder / f"{i:08}")
+                n_contexts += len(contexts.facts)
                 if tell is not None:
-                    tell(chunk.share_done)
+                    tell(contexts.chunks[-1].share_done)
     except ContextDBError as error:
         return Answered(0, 0, np.zeros(compiled.n_rows, np.int64), error.faults)
     return Answered(n_contexts, n_without, hits)
@@ -127,42 +124,6 @@ def answers_written(place: Path) -> Iterator[None]:
 def _without_paths(said: str) -> str:
     """The first line of what polars says, without the names of files that nobody asked for."""
     return re.sub(r"\s*:?\s*\S*\.contextdb-\S*", "", said.strip().splitlines()[0] if said.strip() else "no room").rstrip(".:")
-
-
-def _facts(compiled: CompiledTable, names: tuple[str, ...], chunk: Chunk, file: str) -> pl.DataFrame:
-    """The facts as `query_many` takes them. Other columns are all null: their names may tell of a misspelling."""
-    known = known_conditions(compiled)
-    series, faults = [], []
-    for name in names:
-        condition = known.get(name)
-        if condition is None or not chunk.n_rows:
-            series.append(without_facts(name, chunk.n_rows))
-        elif not chunk.is_text:
-            series.append(chunk.frame[name])
-        else:
-            texts = chunk.frame[name].fill_null("")
-            distinct = texts.unique(maintain_order=True)
-            codes = texts.cast(pl.Enum(distinct)).to_physical().cast(pl.Int64)
-            values, wrong = read_texts_as(distinct.to_list(), condition)
-            firsts = [(int((codes == i).arg_max() or 0), fault) for i, fault in wrong]
-            faults += [fault.at(Place(file, chunk.line(row), name)) for row, fault in firsts]
-            series.append(pl.Series(name, values, dtype=fact_type(condition), strict=False).gather(codes))
-    if faults:
-        raise ContextError(*sorted(faults, key=lambda fault: fault.place.line or 0))
-    return pl.DataFrame(series)
-
-
-def _asked(question: Question, facts: pl.DataFrame, chunk: Chunk, file: str) -> ManyMatches:
-    try:
-        return question.compiled.query_many(facts, question.unknown)
-    except ContextError as error:
-        raise ContextError(*(_placed(fault, chunk, file) for fault in error.faults)) from None
-
-
-def _placed(fault: Fault, chunk: Chunk, file: str) -> Fault:
-    row = fault.place.row
-    line, at = (None, None) if row is None else (chunk.line(row), chunk.first_row + row)
-    return replace(fault, place=Place(file, line, fault.place.column, at))
 
 
 def _write(question: Question, facts: pl.DataFrame, counts: Rows, first: int, file: str, stem: Path) -> None:

@@ -7,7 +7,7 @@ worked out side by side, as many as there are cores; their sums are the same in 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ from contextdb import bitmask
 from contextdb.bitmask import Flags
 from contextdb.errors import ContextDBError
 from contextdb.telemetry import parts
-from contextdb.telemetry.chunks import Chunk, TelemetryFile
+from contextdb.telemetry.chunks import Chunk, chunks_of
 from contextdb.telemetry.counts import moments_of
 from contextdb.telemetry.facts_read import FactColumn, read_facts
 from contextdb.telemetry.fields import Fields
@@ -27,17 +27,16 @@ from contextdb.telemetry.keys import NUMPY_BLOCK, Counts, Hashes, KeyWords, grou
 from contextdb.telemetry.parts import Part, Plan, most_examples, nothing, require_countable
 from contextdb.telemetry.smallest import SmallestHashes, SmallestKeys
 
-Chunks = Iterable[tuple[tuple[str, ...], Chunk]]
+Chunks = Iterable[tuple[Sequence[str], Chunk]]
 TellRows = Callable[[float], None]
 """Is told which share of a file is done."""
 
 
 def observe_file(plan: Plan, path: str | Path, n_threads: int = 1, tell: TellRows | None = None) -> Part:
     """Hold one file against the table; a file that cannot be read gives a part that says why."""
-    file = TelemetryFile(Path(path))
     sums = _Sums(plan)
     try:
-        chunks = file.chunks({*plan.compiled.asked, *([plan.count] if plan.count else [])})
+        chunks = chunks_of(Path(path), {*plan.compiled.asked, *([plan.count] if plan.count else [])})
         for found in _worked_out(plan, chunks, str(path), n_threads):
             sums.add(found)
             if tell is not None:
@@ -81,7 +80,7 @@ class _Found:
     share_done: float
 
 
-def _observe_chunk(plan: Plan, names: tuple[str, ...], chunk: Chunk, file: str) -> _Found:
+def _observe_chunk(plan: Plan, names: Sequence[str], chunk: Chunk, file: str) -> _Found:
     moments = moments_of(plan.count, names, chunk, file)
     asked = plan.compiled.asked
     total = int(moments.sum())

@@ -18,11 +18,8 @@ from polars.selectors import by_name
 from contextdb.cells.conditions import Condition
 from contextdb.cells.words import quoted
 from contextdb.disk import read_bytes
-from contextdb.files.csv_faults import record_faults
-from contextdb.files.csv_records import fields_of, find_records, text_of
-from contextdb.files.csv_source import name_faults, read_csv
-from contextdb.files.strangers import UTF8_BOM, require_text
-from contextdb.files.texts import scanned_parquet
+from contextdb.files.csv_source import find_rows, read_rows
+from contextdb.files.texts import is_parquet, scanned_parquet
 
 SEARCHED_AT_ONCE = 1 << 17
 """Rows that are searched in one go."""
@@ -61,7 +58,7 @@ def open_recording(path: Path, conditions: Collection[str]) -> Recording:
     TableError, FileError
         The file cannot be read; with every fault of it.
     """
-    return _open_parquet(path, conditions) if path.suffix.lower() == ".parquet" else _open_csv(path, conditions)
+    return _open_parquet(path, conditions) if is_parquet(path) else _open_csv(path, conditions)
 
 
 def fact_text(value: object, condition: Condition) -> str:
@@ -116,25 +113,7 @@ def _open_parquet(path: Path, conditions: Collection[str]) -> Recording:
 
 def _open_csv(path: Path, conditions: Collection[str]) -> Recording:
     raw = read_bytes(path)
-    require_text(raw, str(path))
-    records, strays = find_records(raw)
-    if strays or record_faults(raw, records, strays, str(path)):
-        read_csv(raw, str(path))  # says what is wrong with the file
-    head = raw[records.starts[0] : records.stops[0]]
-    names = [text_of(field) for field in fields_of(head, int(records.n_fields[0]))]
-    if any(name_faults(names)):
-        read_csv(raw, str(path))
+    records, names = find_rows(raw, str(path))
     starts, stops = records.starts[1:], records.stops[1:]
-    places = [at for at, name in enumerate(names) if name in conditions]
-    schema = dict.fromkeys(map(str, range(len(names))), pl.String)
-
-    def read(start: int, stop: int) -> pl.DataFrame:
-        if not (places and start < stop):
-            return pl.DataFrame()
-        spans = zip(starts[start:stop].tolist(), stops[start:stop].tolist(), strict=True)
-        rows = b"\n".join([raw[a:b] for a, b in spans])
-        rows = UTF8_BOM + rows if rows.startswith(UTF8_BOM) else rows  # polars takes one away: here it is text
-        frame = pl.read_csv(rows, has_header=False, schema=schema).select(map(str, places))
-        return frame.rename({str(at): names[at] for at in places})
-
-    return Recording(path, len(starts), tuple(names[at] for at in places), read)
+    facts = tuple(name for name in names if name in conditions)
+    return Recording(path, len(starts), facts, lambda i, j: read_rows(raw, starts[i:j], stops[i:j], names, facts))

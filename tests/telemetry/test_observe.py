@@ -324,6 +324,13 @@ def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path, monkeypatch)
     assert (found.hits, found.uncovered, found.unknown_columns) == ((2, 1), 4, ())
 
 
+def test_a_piece_of_blank_lines_only_has_no_rows(tmp_path, monkeypatch):
+    monkeypatch.setattr("contextdb.telemetry.chunks.BYTES", 4)
+    (tmp_path / "a.csv").write_text("speed,n\n1,2\n\n\n\n\n\n\n3,4\n\n\n\n\n\n\n\n", encoding="utf-8")
+    found = observe(SMALL, tmp_path / "a.csv", count="n")
+    assert (found.moments, found.unread) == (6, ())
+
+
 def test_progress_is_told_inside_a_file_too(tmp_path, monkeypatch):
     monkeypatch.setattr("contextdb.telemetry.chunks.ROWS", 25)
     for name in "ab":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -220,6 +221,8 @@ def test_a_column_may_have_one_job_and_no_declared_condition_has_any():
     table = small()
     assert columns_for(table, "enabled") == ["on", "slot"]
     assert columns_for(table, "asset") == ["Asset", "on", "slot"]
+    ruled = replace(table, settings=replace(table.settings, when="on"))
+    assert columns_for(ruled, "enabled") == ["slot"]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import get_args
 
@@ -10,6 +10,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.edits import edits
 from contextdb.edits.edits import Job, NewColumn
 from contextdb.errors import ContextDBError, in_quotes, plural, shown
+from contextdb.schema.jobs import PlainJob
 from contextdb.schema.shapes import wrong_name
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
@@ -138,8 +139,7 @@ def _wrong_name(table: Table, name: str) -> str:
 
 
 def _wrong_job(table: Table, job: Job, name: str) -> str:
-    present: Mapping[str, str | None] = {key: getattr(table.settings, key) for key in ("enabled", "priority", "weight")}
-    if column := present.get(job):
+    if job in get_args(PlainJob) and (column := getattr(table.settings, job)):
         return f"The table has one already: {in_quotes(column)}."
     is_declared = job != "condition" and name in table.schema.conditions
     return f"{in_quotes(name)} is declared as a condition." if is_declared else ""

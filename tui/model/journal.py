@@ -31,10 +31,8 @@ from contextdb.edits.edits import edit_between
 from contextdb.edits.history import History, Step
 from contextdb.edits.schema_file import SchemaChange
 from contextdb.errors import ContextDBError, Fault, Place, plural
-from contextdb.files.csv_source import read_csv
 from contextdb.files.journal_lines import Record, line_of, n_lost, read_records
-from contextdb.files.parquet import read_parquet
-from contextdb.files.texts import AnySource
+from contextdb.files.texts import texts_of
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.model.lock import FOLDER, own_folder
@@ -258,9 +256,7 @@ def _base_of(table: Table, digest: object) -> Table | None:
         raw = read_bytes(base_path(table.path))
         if digest_of(raw) != digest:
             return None
-        is_csv = table.path.suffix.lower() == ".csv"
-        source: AnySource
-        source, columns = read_csv(raw, str(table.path)) if is_csv else read_parquet(raw, str(table.path))
+        source, columns = texts_of(raw, str(table.path))
         base = Table.build(table.name, columns, table.schema, table.settings, table.path, source)
         return replace(base, around=table.around)
     except ContextDBError:

@@ -15,9 +15,6 @@ POLICY_WORDS = {
 }
 """What each policy means, in a few words."""
 
-JOBS = ("enabled", "priority", "weight")
-"""The settings that name one column, next to that of the assets."""
-
 
 @dataclass(frozen=True)
 class Option:
@@ -44,9 +41,7 @@ OPTIONS = (
 
 def columns_for(table: Table, key: str) -> list[str]:
     """The columns that may have a job: those with no other job and not declared as a condition; the one that has it comes too."""
-    settings = table.settings
-    present = [name for job in JOBS if job != key and (name := getattr(settings, job))]
-    taken = {*present, *(settings.outputs if key != "outputs" else ()), *(() if key == "asset" else (table.asset_column,))}
+    taken = {name for job, name in table.settings.jobs if job != key} | (set() if key == "asset" else {table.asset_column})
     return [c.name for c in table.columns if c.name not in taken and c.name not in table.schema.conditions]
 
 

@@ -6,7 +6,7 @@ the reason.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_args
 
 from rich.markup import escape
 from textual import on
@@ -23,13 +23,14 @@ from textual.widgets.selection_list import Selection
 from contextdb.cells.kinds import KINDS
 from contextdb.edits import edits
 from contextdb.errors import ContextDBError
+from contextdb.schema.jobs import PlainJob
 from contextdb.schema.sections import has_place
 from contextdb.schema.shapes import POLICIES
 from contextdb.tables.changes import Edit
 from contextdb.tables.condition_column import ConditionColumn
 from tui.messages import Edited
 from tui.model.condition_form import ConditionForm, plain
-from tui.model.options import JOBS, OPTIONS, POLICY_WORDS, columns_for, with_expression
+from tui.model.options import OPTIONS, POLICY_WORDS, columns_for, with_expression
 from tui.model.sheet import Sheet
 from tui.panes.pane import Pane
 from tui.widgets.field import Field
@@ -38,7 +39,7 @@ from tui.widgets.ticks import TickList
 WIDE = 120
 """From so many columns on the condition is next to the table's settings."""
 
-_BY_COLUMN = ("asset", *JOBS)
+_BY_COLUMN = ("asset", *get_args(PlainJob))
 _FORM = {"min": "minimum", "max": "maximum", "unit": "unit", "values": "values", "mirror": "mirror", "description": "description"}
 """The keys of a condition that are typed, and the fields of the form that hold them."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from contextdb.errors import plural
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.merging.alignment import Alignment, align, inverse, moved
-from contextdb.tables.merging.building import edit_to
+from contextdb.tables.merging.building import edit_under
 from contextdb.tables.merging.meaning import is_same, meaning_of
 from contextdb.tables.merging.shared import Places, Shared
 from contextdb.tables.table import EitherTable
@@ -164,7 +164,7 @@ class Diff:
     def edit(self, name: str = "Changes") -> Edit:
         """The edit that makes the texts of `before` those of `after`, and what is said of its columns too."""
         after, found = self.after, self.alignment
-        return edit_to(self.before, after.columns, found.rows, found.columns, after.settings, after.schema, name)
+        return edit_under(self.before, after.columns, found.rows, found.columns, after.settings, after.schema, name)
 
     def to_json(self) -> dict[str, object]:
         """The differences as plain data. Rows count from 0; "line" is that of the file, where there is one."""

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from contextdb.columns import TextColumn
 from contextdb.errors import SchemaError
+from contextdb.schema.jobs import JOB_KEYS
 from contextdb.schema.sections import condition_to_dict, differences, settings_to_dict
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
 from contextdb.tables.data import TableData
 from contextdb.tables.merging.shared import Shared
-
-JOBS = ("asset", "outputs", "enabled", "priority", "weight", "when")
-"""What settings say of columns."""
 
 _EMPTY = TextColumn("", ("",), np.zeros(1, np.int32))
 
@@ -25,14 +23,13 @@ def edit_to(
     columns: Sequence[TextColumn],
     rows: CameFrom,
     fields: CameFrom,
-    settings: TableSettings,
-    schema: Schema,
+    say: Callable[[TableData], Sections],
     name: str,
 ) -> Edit:
     """An edit that gives `before` these columns.
 
-    `rows` and `fields` are, for each row and column, the one it was before or -1; of `settings` the jobs of columns are taken, and
-    of `schema` what it declares of these columns, unless the two cannot be said together: then `before` keeps what it says.
+    `rows` and `fields` are, for each row and column, the one it was before or -1. `say` gives what changes in
+    contextdb.toml for a table that has the columns already.
     """
     changes: list[Change] = []
     if not np.array_equal(rows, np.arange(before.n_rows)):
@@ -41,28 +38,39 @@ def edit_to(
     if layout != tuple((c.name, c.name) for c in before.columns):
         changes.append(Columns(layout))
     middle = Edit(name, tuple(c for c in changes if isinstance(c, Columns))).apply(before)
-    said = _said_of(middle, columns, settings, schema)
-    changes += [said] if not said.is_empty and _fits(middle, said) else []
+    said = say(middle)
+    changes += [] if said.is_empty else [said]
     texts = {c.name: _differences(before, c, rows, f) for c, f in zip(columns, fields.tolist(), strict=True)}
     texts = {column: cells for column, cells in texts.items() if cells}
     return Edit(name, (*changes, Cells(texts)) if texts else tuple(changes))
 
 
+def edit_under(
+    before: TableData,
+    columns: Sequence[TextColumn],
+    rows: CameFrom,
+    fields: CameFrom,
+    settings: TableSettings,
+    schema: Schema,
+    name: str,
+) -> Edit:
+    """The same, with the jobs of columns from `settings` and what `schema` declares of these columns, unless the two cannot be said
+    together: then `before` keeps what it says."""
+    return edit_to(before, columns, rows, fields, lambda table: _said_of(table, columns, settings, schema), name)
+
+
 def _said_of(table: TableData, columns: Sequence[TextColumn], settings: TableSettings, schema: Schema) -> Sections:
-    old, new = settings_to_dict(table.settings), settings_to_dict(settings)
-    jobs = differences({k: v for k, v in old.items() if k in JOBS}, {k: v for k, v in new.items() if k in JOBS})
+    changed = differences(settings_to_dict(table.settings), settings_to_dict(settings))
+    jobs = {key: value for key, value in changed.items() if key in JOB_KEYS}
     known = table.schema.conditions
     wanted = (schema.conditions.get(c.name) for c in columns)
     declared = {c.name: condition_to_dict(c) for c in wanted if c is not None and known.get(c.name) != c}
-    return Sections(jobs, {"conditions": declared} if declared else {})
-
-
-def _fits(table: TableData, said: Sections) -> bool:
+    said = Sections(jobs, {"conditions": declared} if declared else {})
     try:
         said.apply(table.with_rows_taken([]))
     except SchemaError:
-        return False
-    return True
+        return Sections()
+    return said
 
 
 def _differences(before: TableData, column: TextColumn, rows: CameFrom, field: int) -> dict[int, str]:

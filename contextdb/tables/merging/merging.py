@@ -15,12 +15,13 @@ from typing import Any, Generic
 
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
+from contextdb.schema.jobs import JOB_KEYS, JOBS
 from contextdb.schema.sections import job_faults
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.merging.alignment import align
-from contextdb.tables.merging.building import JOBS, edit_to
+from contextdb.tables.merging.building import edit_under
 from contextdb.tables.merging.cells import merge_column
 from contextdb.tables.merging.conflicts import Conflict, Decided, Side
 from contextdb.tables.merging.order import Origins
@@ -64,7 +65,7 @@ class Merge(Generic[AnyTable]):
         return merge(self.base, self.ours, self.theirs, decided)
 
     def _edit(self, side: TableData, rows: CameFrom, fields: CameFrom, name: str) -> Edit:
-        return edit_to(side, self.columns, rows, fields, self.settings, self.schema, name)
+        return edit_under(side, self.columns, rows, fields, self.settings, self.schema, name)
 
 
 def merge(base: AnyTable, ours: AnyTable, theirs: AnyTable, decided: Decided | None = None) -> Merge[AnyTable]:
@@ -111,29 +112,16 @@ def _settings(
 ) -> TableSettings:
     """The settings of ours, with what only theirs changed where that goes together, under the names of the merge."""
     was, mine, yours = (
-        _jobs(table, dict(zip(places.tolist(), names, strict=True)))
+        vars(table.settings.renamed({table.columns[at].name: name for at, name in zip(places, names, strict=True) if at >= 0}.get))
         for table, places in ((base, fields.base), (ours, fields.ours), (theirs, fields.theirs))
     )
-    said = mine
-    for key in (key for key in JOBS if yours[key] != was[key]):
-        if key == "outputs":
-            tried = said | {key: _merged_names(was[key], mine[key], yours[key])}
-        else:
-            tried = said | {key: yours[key] if mine[key] == was[key] else mine[key]}
-        if not any(job_faults(replace(ours.settings, **tried), names, schema)):
-            said = tried
-    return replace(ours.settings, **said)
-
-
-def _jobs(table: TableData, name_of: Mapping[int, str]) -> dict[str, Any]:
-    """What the settings say, under the names that columns have in the merge; of a column that is missing nothing."""
-    places = {c.name: at for at, c in enumerate(table.columns)}
-
-    def named(column: str | None) -> str | None:
-        return name_of.get(places[column]) if column in places else None
-
-    said: dict[str, Any] = {key: named(getattr(table.settings, key)) for key in JOBS if key != "outputs"}
-    said["outputs"] = tuple(name for name in map(named, table.settings.outputs) if name is not None)
+    is_same = yours["outputs"] == was["outputs"]
+    wanted: dict[str, Any] = {} if is_same else {"outputs": _merged_names(was["outputs"], mine["outputs"], yours["outputs"])}
+    wanted |= {key: yours[key] for key in JOBS if mine[key] == was[key] != yours[key]}
+    said: TableSettings = replace(ours.settings, **{key: mine[key] for key in JOB_KEYS})
+    for tried in (wanted, *({key: value} for key, value in wanted.items())):  # all at once, else what can be
+        if not any(job_faults(now := replace(said, **tried), names, schema)):
+            said = now
     return said
 
 

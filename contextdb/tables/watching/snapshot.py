@@ -14,8 +14,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError
-from contextdb.files.csv_source import read_csv
-from contextdb.files.parquet import read_parquet
+from contextdb.files.texts import texts_of
 from contextdb.schema.settings import EMPTY, Schema, read_schema
 from contextdb.tables.nesting.links import reached
 from contextdb.tables.project import SCHEMA_FILE, ByName, Project, around_each_other, settings_of, twice_named
@@ -116,8 +115,7 @@ def _table(path: Path, folder: Path, schema: Schema, contents: Contents, digests
     is_same = old is not None and old.path == path and last is not None and digests[path] == last.digests.get(path)
     if is_same and old is not None and old.schema is schema:
         return old
-    read = read_parquet if path.suffix.lower() == ".parquet" else read_csv
-    source, columns = (old.source, old.columns) if is_same and old and old.source else read(contents[path], str(path))
+    source, columns = (old.source, old.columns) if is_same and old and old.source else texts_of(contents[path], str(path))
     table = table_like(old, columns, schema, settings, path, source)
     table.require_readable()
     return table

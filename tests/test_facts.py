@@ -17,6 +17,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.facts import cell, check_mode, describe, missing_error, misspelt, read_fact, read_fact_text
 from contextdb.cells.grammar import parse_cell
+from contextdb.cells.intervals import EVERYTHING
 from contextdb.cells.sets import Cell
 from contextdb.errors import ContextError
 
@@ -145,8 +146,17 @@ def test_a_set_is_read_as_the_cell_that_it_is_written_as(domain, data):
     expected = parse_cell(text, domain)
     if expected.is_empty:
         assert "a set that holds at least one value" in refused(cell(text), domain)
-    else:
+    elif domain.type.limits == EVERYTHING[0]:
         assert read(cell(text), domain) == expected
+    else:  # what no fact can be is left out
+        low, high = domain.type.limits
+        found, ends = (
+            read(cell(text), domain),
+            {end for accepts in (expected.accepts,) if accepts for s in accepts.spans for end in s},
+        )
+        days = {min(max(end + step, low), high) for end in (*ends, low, high) for step in (-1, 0, 1)}
+        assert isinstance(found, Cell)
+        assert [found.holds(day) for day in days] == [expected.holds(day) for day in days]
 
 
 @pytest.mark.parametrize("domain", [INT, NUMBER, ANGLE], ids=lambda domain: domain.kind)

@@ -24,8 +24,6 @@ OTHER_WORDS = {
     "contextdb/expressions/check.py": "what functions give",
     "contextdb/expressions/parse.py": "tokens",
     "contextdb/files/parquet.py": "sorts of files",
-    "contextdb/report/__init__.py": "formats of reports",
-    "contextdb/report/coverage_formats.py": "formats of reports",
     "contextdb/commands/coverage_command.py": "formats of reports",
     "tui/widgets/grid_paint.py": "looks of cells",
 }

@@ -25,6 +25,7 @@ begin with `|` are what a command shows, and a test compares them:
 from __future__ import annotations
 
 import difflib
+import re
 import shutil
 import sys
 from collections.abc import Iterator
@@ -48,6 +49,8 @@ from tui.widgets.bar import CellLine  # noqa: E402
 
 FILES = sorted((HERE / "replays").glob("*.keys"))
 SHOWS = ("screen", "said", "place", "column", "file", "ended")
+SCROLL_BAR = re.compile(r" +([▁▂▃▄▅▆▇])\1?$")
+"""The end of a scroll bar's slider, which comes a moment after the text that it belongs to."""
 WAIT_S = 60.0
 KEYS_OF = {" ": "space"}
 
@@ -202,7 +205,7 @@ class Replay:
         if step.command == "said":
             text, level = self.app.main._said
             return iter([text if level == "information" else f"! {text}"])
-        lines = screen_text(self.app).splitlines()
+        lines = [SCROLL_BAR.sub("", line) for line in screen_text(self.app).splitlines()]
         if step.command == "place":
             return iter([lines[self.app.main.query_one(CellLine).region.y].strip()])
         first, last = map(int, step.rest.split() or (0, len(lines) - 1))

@@ -254,7 +254,7 @@ def test_an_error_message_moves_no_cursor():
 
 
 def test_a_query_loads_neither_the_editor_nor_the_compilers():
-    heavy = "textual", "numba", "dask", "scipy", "rich", "tomlkit", "contextdb.motion"
+    heavy = "textual", "numba", "dask", "scipy", "rich", "contextdb.motion"
     code = (
         "import sys; from contextdb.cli import main; main(['query', 't.csv', 'ok=True']); "
         f"sys.exit(' '.join(m for m in {heavy!r} if m in sys.modules) or 0)"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from running import ROOT
 
-HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "tomlkit", "python_calamine", "xlsxwriter"}
+HEAVY = {"numba", "textual", "tui", "rich", "scipy", "dask", "safetensors", "python_calamine", "xlsxwriter"}
 
 
 def modules_after(statement: str) -> set[str]:

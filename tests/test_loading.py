@@ -14,7 +14,7 @@ from contextdb import cli
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = {
-    "numpy", "polars", "numba", "safetensors", "tomlkit", "python_calamine", "xlsxwriter", "rich", "textual", "pyperclip",
+    "numpy", "polars", "numba", "safetensors", "python_calamine", "xlsxwriter", "rich", "textual", "pyperclip",
     "dask", "pyarrow", "scipy",
 }  # fmt: skip
 LOADS = {
@@ -26,10 +26,10 @@ LOADS = {
     "diff": "numpy polars",
     "merge": "numpy polars",
     "git status": "",
-    "import, of CSV": "numpy polars tomlkit",
-    "import, of Excel": "numpy polars python_calamine tomlkit",
+    "import, of CSV": "numpy polars",
+    "import, of Excel": "numpy polars python_calamine",
     "export, to CSV": "numpy polars",
-    "export, to Excel": "numpy polars tomlkit xlsxwriter",
+    "export, to Excel": "numpy polars xlsxwriter",
     "compile": "numpy polars",
     "verify": "numpy polars safetensors",
     "motion search": "numpy polars safetensors",

@@ -12,10 +12,9 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
-from contextdb.schema.toml_values import TOKEN, Path, as_toml, dotted, end_of_line, merged
+from contextdb.schema.toml_values import TOKEN, Path, as_toml, dotted, end_of_line, keys_of, merged
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,20 +138,10 @@ def _statement(tokens: Sequence[tuple[str, int]], section: Path, start: int, sto
     end = tokens[-1][1] + len(words[-1])
     span = (tokens[0][1], end)
     if words[0] == "[":
-        path = _keys("".join(words).strip("[]"))
+        path = keys_of("".join(words).strip("[]"))
         return Statement(path, path, start, stop, span)
     equals = words.index("=")
-    return Statement(section + _keys("".join(words[:equals])), section, start, stop, span, (tokens[equals + 1][1], end))
-
-
-@lru_cache(4096)
-def _keys(dotted: str) -> Path:
-    value: object = tomllib.loads(f"{dotted} = 0")
-    path: list[str] = []
-    while isinstance(value, dict):
-        key, value = next(iter(value.items()))
-        path.append(key)
-    return tuple(path)
+    return Statement(section + keys_of("".join(words[:equals])), section, start, stop, span, (tokens[equals + 1][1], end))
 
 
 def _end_of_section(text: str, found: Sequence[Statement], paths: Sequence[Path]) -> int:

@@ -1,14 +1,17 @@
 """Values of a TOML text: written, and changed in place so that what stays in a list or an inline table keeps its text and comments.
 
-Strings are written, and inline tables changed, by tomlkit. Nothing here knows where in a file a value stands.
+Nothing here knows where in a file a value stands.
 """
 
 from __future__ import annotations
 
+import datetime
+import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 Path = tuple[str, ...]
@@ -23,20 +26,31 @@ TOKEN = re.compile(
 
 def as_toml(value: object) -> str:
     """A value as TOML writes it, on one line."""
-    import tomlkit
-
     if isinstance(value, Mapping):
         inner = ", ".join(f"{dotted((key,))} = {as_toml(item)}" for key, item in value.items())
         return f"{{ {inner} }}" if inner else "{}"
     if isinstance(value, (list, tuple)):
         inner = ", ".join(map(as_toml, value))
         return f"[ {inner} ]" if any(isinstance(item, Mapping) for item in value) else f"[{inner}]"
-    return tomlkit.item(value).as_string()
+    if isinstance(value, (str, bool)):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return value.isoformat() if isinstance(value, (datetime.date, datetime.time)) else str(value)
 
 
 def dotted(path: Path) -> str:
     """A path as a header writes it: conditions."Defender.Tags"."""
     return ".".join(key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else as_toml(key) for key in path)
+
+
+@lru_cache(4096)
+def keys_of(dotted: str) -> Path:
+    """The path that a dotted key says: `conditions."Defender.Tags"`."""
+    value: object = tomllib.loads(f"{dotted} = 0")
+    path: list[str] = []
+    while isinstance(value, dict):
+        key, value = next(iter(value.items()))
+        path.append(key)
+    return tuple(path)
 
 
 def end_of_line(text: str) -> str:
@@ -54,22 +68,54 @@ def merged(old: str, keys: Path, value: object) -> str:
     return as_toml(value)
 
 
-def _inline(old: str, keys: Path, value: object) -> str:
-    import tomlkit
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """`key = value` in an inline table: its path, and where it and its value start and where both stop."""
 
-    document = tomlkit.parse(f"x = {old}\n")
-    inner: Any = document["x"]
-    for key in keys[:-1]:
-        if key not in inner:
-            inner[key] = tomlkit.inline_table()
-        inner = inner[key]
+    path: Path
+    start: int
+    value: int
+    stop: int
+
+
+def _inline(old: str, keys: Path, value: object) -> str:
+    """The text of an inline table with a key set, or with None removed; all other text stays."""
+    entries = list(_entries(old))
+    for one in entries:
+        if one.path == keys[: len(one.path)] and (len(one.path) < len(keys) or value is not None):
+            inner = merged(old[one.value : one.stop], keys[len(one.path) :], value)
+            return old[: one.value] + inner + old[one.stop :]
+    kept = [one for one in entries if one.path[: len(keys)] != keys]
+    if len(kept) < len(entries):
+        texts = [old[one.start : one.stop] for one in kept]
+        old = f"{{ {', '.join(texts)} }}" if texts else "{}"
     if value is None:
-        inner.pop(keys[-1], None)
-    elif keys[-1] in inner or not isinstance(value, Mapping):
-        inner[keys[-1]] = value
-    else:
-        inner.append(keys[-1], tomlkit.item(value))
-    return document.as_string().removeprefix("x = ").removesuffix("\n")
+        return old
+    end = list(_entries(old))[-1].stop if kept else 0
+    new = f"{dotted(keys)} = {as_toml(value)}"
+    return f"{old[:end]}, {new}{old[end:]}" if kept else f"{{ {new} }}"
+
+
+def _entries(text: str) -> Iterator[_Entry]:
+    """The entries of an inline table, in order."""
+    depth, start, value, stop = 0, 0, 0, 0
+    for match in TOKEN.finditer(text, 1, len(text) - 1):
+        token = match[0]
+        if depth == 0 and token == ",":
+            yield _entry(text, start, value, stop)
+            start = value = stop = 0
+        elif not token.isspace():
+            start = start or match.start()
+            value = value or (match.end() if depth == 0 and token == "=" else 0)
+            stop = match.end()
+        depth += (token in ("[", "{")) - (token in ("]", "}"))
+    if stop:
+        yield _entry(text, start, value, stop)
+
+
+def _entry(text: str, start: int, equals: int, stop: int) -> _Entry:
+    value = equals + len(text[equals:stop]) - len(text[equals:stop].lstrip())
+    return _Entry(keys_of(text[start : equals - 1]), start, value, stop)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from terminal import press, screen_text, with_editor
 
+from contextdb.schema.toml_values import as_toml
 from tui.app import EditorApp
 from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
 
@@ -96,9 +97,7 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory, raw):
     )
 )
 def test_any_value_in_place_of_the_keys_is_read_or_refused(tmp_path_factory, value):
-    import tomlkit
-
-    text = tomlkit.dumps({"keys": {"sort": value}, "theme": value})
+    text = f"theme = {as_toml(value)}\nkeys = {{ sort = {as_toml(value)} }}\n"
     assert is_read_or_refused(tmp_path_factory.mktemp("any"), text)
 
 

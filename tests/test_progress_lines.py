@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 from running import ROOT, run
 
-from contextdb.commands.coverage_telemetry import log_of
+from contextdb.commands.progress import log_of
 from contextdb.console import LOOPS, PREPARING, announce, announced
 from contextdb.covering import count, coverage
 from contextdb.tables.table import Table
@@ -37,7 +37,7 @@ def test_of_a_small_table_only_the_preparing_is_told(capsys: pytest.CaptureFixtu
 
 @pytest.mark.parametrize("command", ["check", "coverage"])
 def test_a_large_table_is_told_of(command: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    monkeypatch.setattr("contextdb.commands.coverage_telemetry.MANY_CELLS", 4)
+    monkeypatch.setattr("contextdb.commands.progress.MANY_CELLS", 4)
     (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
     result = run(command, str(tmp_path / "t.csv"))
     lines = [line for line in result.err.splitlines() if " % " in line]
@@ -65,7 +65,7 @@ def test_a_loop_that_was_compiled_is_prepared():
 
 
 def test_a_log_is_told_of_the_pairs_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    monkeypatch.setattr("contextdb.commands.coverage_telemetry.MANY_CELLS", 4)
+    monkeypatch.setattr("contextdb.commands.progress.MANY_CELLS", 4)
     (tmp_path / "t.csv").write_text("Asset,up,down\na,True,Any\nb,Any,True\n", encoding="utf-8")
     told = run("coverage", str(tmp_path / "t.csv")).err
     assert "contextdb: comparing conditions of t: 0 % Comparing conditions\n" in told
@@ -109,7 +109,7 @@ def test_a_log_is_told_of_long_recordings(command: tuple[str, ...], monkeypatch:
     label = "reading telemetry for t" if command[0] == "coverage" else "evaluating"
     size = sum((tmp_path / name).stat().st_size for name in ("seen1.csv", "seen2.csv"))
     for least, is_told in ((size, True), (size + 1, False)):
-        monkeypatch.setattr("contextdb.commands.coverage_telemetry.MANY_BYTES", least)
+        monkeypatch.setattr("contextdb.commands.progress.MANY_BYTES", least)
         lines = [line for line in run(*command).err.splitlines() if line.startswith(f"contextdb: {label}: ")]
         assert (lines[-1:] == [f"contextdb: {label}: 100 %"]) is is_told
         assert (f"contextdb: {label}: 50 %" in lines) is is_told

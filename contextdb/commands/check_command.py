@@ -21,7 +21,7 @@ from contextdb.checks.cases import check_cases, read_cases
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
 from contextdb.commands import add_format_arguments
-from contextdb.commands.coverage_telemetry import Bar, has_many_cells, log_of
+from contextdb.commands.progress import Bar, has_many_cells, log_of
 from contextdb.console import ExitCode, output, printable, progress, terminal_width, wants_colour
 from contextdb.disk import CASES_SUFFIX, TABLE_SUFFIXES, path_in_quotes, read_bytes
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest

@@ -22,6 +22,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from contextdb.commands import add_format_arguments, coverage_telemetry
+from contextdb.commands.progress import Bar, bar, has_many_cells
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import Earlier
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
@@ -160,7 +161,7 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     from contextdb.report.coverage_results import Measured
 
     with _placed(table):
-        with coverage_telemetry.bar(f"measuring {printable(table.name)}", coverage_telemetry.has_many_cells(table)) as told:
+        with bar(f"measuring {printable(table.name)}", has_many_cells(table)) as told:
             report = coverage(
                 table,
                 seed=arguments.seed,
@@ -184,11 +185,11 @@ def _pairs(arguments: argparse.Namespace, table: EitherTable) -> PairTable | Non
     if left_out(len(table.conditions)):
         return None
     label = f"comparing conditions of {printable(table.name)}"
-    with coverage_telemetry.bar(label, coverage_telemetry.has_many_cells(table)) as told:
+    with bar(label, has_many_cells(table)) as told:
         return pairs(table, seed=arguments.seed, samples=min(arguments.samples, SAMPLES), progress=_tell(told))
 
 
-def _tell(told: coverage_telemetry.Bar | None) -> Tell | None:
+def _tell(told: Bar | None) -> Tell | None:
     """What tells a bar of a computation."""
     return None if told is None else lambda part, share: told(int(1000 * share), 1000, part)
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Protocol
 
-from contextdb.console import PREPARING, printable
+from contextdb.commands.progress import bar, has_many_bytes
+from contextdb.console import printable
 from contextdb.covering import Gap
 from contextdb.errors import ContextError, Fault
 from contextdb.report.coverage_results import Measured
@@ -20,17 +17,6 @@ from contextdb.telemetry import Observed
 from contextdb.telemetry.contexts import context_files
 
 ENGINES = ("local", "dask")
-
-MANY_CELLS = 20_000
-"""From so many cells of a table on a log is told of the work."""
-MANY_BYTES = 10_000_000
-"""From so many bytes of recorded contexts on a log is told of the work."""
-
-
-class Bar(Protocol):
-    """Is told how much is done of how much, and what is being done."""
-
-    def __call__(self, done: float, total: int, part: str = "") -> None: ...
 
 
 def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], float]) -> None:
@@ -107,46 +93,3 @@ def ranked(arguments: argparse.Namespace, measured: Measured, table: EitherTable
 
     report = by_moments(measured.report, opened(table), measured.telemetry, arguments.work, arguments.samples)
     return replace(measured, report=report)
-
-
-def has_many_cells(table: EitherTable) -> bool:
-    """Whether a table is so large that a log is told of the work."""
-    return table.n_rows * len(table.conditions) >= MANY_CELLS
-
-
-def has_many_bytes(files: Sequence[Path]) -> bool:
-    """Whether files of recorded contexts are so large that a log is told of the work."""
-    return sum(os.path.getsize(file) for file in files if os.path.exists(file)) >= MANY_BYTES
-
-
-@contextmanager
-def bar(label: str, is_long: bool) -> Iterator[Bar | None]:
-    """Shows on standard error what is being done and how much of it is: a bar on a terminal, else lines as `log_of` has them."""
-    if not sys.stderr.isatty():
-        yield log_of(label, is_long)
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task(label, total=None)
-        yield lambda done, total, part="": shown.update(
-            task, completed=done, total=total, description=f"{label}: {part}" if part else label
-        )
-
-
-def log_of(label: str, is_long: bool) -> Bar | None:
-    """Tells of the work in plain lines on standard error, one for each tenth that is done; None for a terminal. Where the work is
-    not long it tells only that loops are compiled."""
-    if sys.stderr.isatty():
-        return None
-    told: set[object] = set()
-
-    def tell(done: float, total: int, part: str = "") -> None:
-        tenth = int(10 * done / total) if total else 0
-        mark = part if part == PREPARING else tenth
-        if mark not in told and (mark == PREPARING or is_long):
-            told.add(mark)
-            print(f"contextdb: {label}: {10 * tenth} % {part}".rstrip(), file=sys.stderr, flush=True)
-
-    return tell

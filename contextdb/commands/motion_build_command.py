@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from contextdb.commands.motion_bar import building_bar
+from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some

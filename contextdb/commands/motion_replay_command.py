@@ -20,9 +20,9 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from pathlib import Path
 
-from contextdb.commands.motion_bar import building_bar
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_stage import add_view
+from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, MotionError, Place, QueryError, in_quotes

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, Unknown
 from contextdb.commands import missing_facts_by_option
-from contextdb.commands.motion_bar import building_bar
 from contextdb.commands.motion_build_command import LeftOut, MotionProject, warn
+from contextdb.commands.progress import building_bar
 from contextdb.commands.query_command import read_facts
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.table import CompiledTable

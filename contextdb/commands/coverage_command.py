@@ -55,7 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all", action="store_true", help="list every gap and finding")
     parser.add_argument("--seed", type=_count, default=0, metavar="N", help="the seed of the samples (default: 0)")
     parser.add_argument("--work", type=_count, default=WORK, metavar="N", help=f"steps of the exact count (default: {WORK:,})")
-    parser.add_argument("--samples", type=_count, default=SAMPLES, metavar="N", help=f"contexts to sample (default: {SAMPLES:,})")
+    parser.add_argument(
+        "--samples", type=_count, metavar="N", help=f"contexts to sample (default: {SAMPLES:,}, fewer above 500 conditions)"
+    )
     coverage_telemetry.add_arguments(parser, _percent)
 
 
@@ -186,7 +188,12 @@ def _pairs(arguments: argparse.Namespace, table: EitherTable) -> PairTable | Non
         return None
     label = f"comparing conditions of {printable(table.name)}"
     with bar(label, has_many_cells(table)) as told:
-        return pairs(table, seed=arguments.seed, samples=min(arguments.samples, SAMPLES), progress=_tell(told))
+        return pairs(
+            table,
+            seed=arguments.seed,
+            samples=None if arguments.samples is None else min(arguments.samples, SAMPLES),
+            progress=_tell(told),
+        )
 
 
 def _tell(told: Bar | None) -> Tell | None:

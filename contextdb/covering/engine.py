@@ -21,7 +21,7 @@ from contextdb.covering.gaps import SHARE_WORK, Measure, described, find_gaps, s
 from contextdb.covering.judge import Judge
 from contextdb.covering.progress import Progress, Stops, Tell
 from contextdb.covering.report import CoverageReport, Crowd, Method, Overlap
-from contextdb.covering.sample import LITTLE, Counts, Sampler, affordable
+from contextdb.covering.sample import LITTLE, Counts, Sampler, samples_of
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Space, WeightsOf, comparable_rows, require_counts
@@ -49,7 +49,7 @@ def coverage(
     *,
     seed: int = 0,
     work: int = WORK,
-    samples: int = SAMPLES,
+    samples: int | None = None,
     max_gaps: int = MOST_GAPS,
     impossible: Sequence[CellBox] = (),
     weights: WeightsOf | None = None,
@@ -67,9 +67,9 @@ def coverage(
         Where samples start; the same input and seed give the same report.
     work : int
         Steps of the exact count, and in proportion of the searches for gaps and findings. 0: bounds only.
-    samples : int
-        Random contexts, for the estimate where the count is not finished and for overlap; of a table of more than 500 conditions
-        as many fewer as it has more. 0: none. The report says how many there were.
+    samples : int, optional
+        Random contexts, for the estimate where the count is not finished and for overlap; 0: none. The report says how many there
+        were. Default: 200,000, and of a table of more than 500 conditions as many fewer as it has more.
     max_gaps : int
         The report names at most this many gaps, the largest.
     impossible : sequence of mapping of str to Cell or cell text
@@ -101,16 +101,16 @@ def coverage(
     of other conditions of the table, are known to samples only: the share is then an estimate, a gap's share is that of the samples
     in it, and gaps without a sample that can happen are left out.
     """
-    require_counts(work=work, samples=samples, max_gaps=max_gaps, seed=seed)
+    require_counts(work=work, samples=SAMPLES if samples is None else samples, max_gaps=max_gaps, seed=seed)
     watcher = Progress(progress, should_stop)
     found = opened(table, impossible, weights, assume, watcher.within("Reading the cells", 0.0, COUNT_AT))
     report = _report(found, seed, work, samples, max_gaps, watcher)
     return report if found.ruled is None else found.ruled.told(report)
 
 
-def _report(opened: Opened, seed: int, work: int, samples: int, max_gaps: int, watcher: Progress) -> CoverageReport:
+def _report(opened: Opened, seed: int, work: int, asked: int | None, max_gaps: int, watcher: Progress) -> CoverageReport:
     space, compiled, drawer = opened.space, opened.compiled, opened.drawer
-    samples = affordable(samples, space)
+    samples = samples_of(asked, SAMPLES, space)
     if space.boxes and not is_prepared():
         prepare(watcher.within(PREPARING, COUNT_AT, COUNT_AT))
     possible = uncovered_share(space, space.impossible, work, watcher.within("Counting contexts", COUNT_AT, COUNT_AT))

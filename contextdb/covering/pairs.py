@@ -25,7 +25,7 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
 from contextdb.covering.parts import parts_of
 from contextdb.covering.progress import Progress, Stops, Tell
-from contextdb.covering.sample import Codes, Sampler, affordable, lookup
+from contextdb.covering.sample import Codes, Sampler, lookup, samples_of
 from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Sides, Space, WeightsOf, require_counts
 from contextdb.errors import plural
@@ -179,7 +179,7 @@ def pairs(
     table: EitherTable | CompiledTable,
     *,
     seed: int = 0,
-    samples: int = SAMPLES,
+    samples: int | None = None,
     impossible: Sequence[CellBox] = (),
     weights: WeightsOf | None = None,
     assume: bool = True,
@@ -192,11 +192,11 @@ def pairs(
     two parts is certain in either case. Rows' own rules count, and are in no pair themselves. The arguments, and what is raised,
     are those of `coverage`.
     """
-    require_counts(samples=samples, seed=seed)
+    require_counts(samples=SAMPLES if samples is None else samples, seed=seed)
     watcher = Progress(progress, should_stop).within("Comparing conditions", 0.0, 1.0)
     found = opened(table, impossible, weights, assume, watcher)
     space = found.space
-    samples = affordable(samples, space)
+    samples = samples_of(samples, SAMPLES, space)
     rules = () if found.ruled is None else found.ruled.rules
     shown = [at for at, condition in enumerate(space.conditions) if condition.name not in rules]
     parts = [parts_of(space, at) for at in shown]

@@ -175,9 +175,12 @@ class Sampler:
         return codes
 
 
-def affordable(samples: int, space: Space) -> int:
-    """How many of so many samples are drawn: all, but where factors are very many as many less as each takes longer."""
-    return samples if len(space.factors) <= MANY_FACTORS else samples * MANY_FACTORS // len(space.factors)
+def samples_of(asked: int | None, usual: int, space: Space) -> int:
+    """How many samples are drawn: as many as were asked for. When none were, the usual number, and of a space with more than
+    `MANY_FACTORS` factors as many fewer as it has more, since each sample takes longer."""
+    if asked is not None:
+        return asked
+    return usual if len(space.factors) <= MANY_FACTORS else usual * MANY_FACTORS // len(space.factors)
 
 
 def lookup(

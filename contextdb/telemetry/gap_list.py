@@ -11,15 +11,16 @@ import numpy as np
 from contextdb.cells.grammar import parse_cell
 from contextdb.covering.assumed import Opened
 from contextdb.covering.count import uncovered_share
+from contextdb.covering.engine import SAMPLES
 from contextdb.covering.gaps import SHARE_WORK, Measure, share_of
 from contextdb.covering.report import CoverageReport, Gap
-from contextdb.covering.sample import Sampler, affordable
+from contextdb.covering.sample import Sampler, samples_of
 from contextdb.covering.sampled_shares import SampledShares
 from contextdb.covering.space import Box, Sides, Space
 from contextdb.telemetry.observed import Observed
 
 
-def ranked(report: CoverageReport, ready: Opened, seen: Observed, work: int, samples: int) -> CoverageReport:
+def ranked(report: CoverageReport, ready: Opened, seen: Observed, work: int, samples: int | None) -> CoverageReport:
     """The report with each gap's share of the recorded moments, those of most moments first, then the largest.
 
     `ready` is the table that the report and the recording are of; `seen` was observed with the report's gaps as `known`. Gaps that
@@ -58,11 +59,13 @@ def _renewed(space: Space, gaps: Sequence[Gap], boxes: Mapping[str, Box | None],
     return found
 
 
-def _measure(ready: Opened, work: int, samples: int, seed: int) -> Measure:
+def _measure(ready: Opened, work: int, samples: int | None, seed: int) -> Measure:
     """What tells the share of a box, as in the report."""
     space = ready.space
     if ready.drawer is not None:
-        return SampledShares.of(Sampler(space, drawer=ready.drawer), affordable(samples, space), np.random.default_rng(seed))
+        return SampledShares.of(
+            Sampler(space, drawer=ready.drawer), samples_of(samples, SAMPLES, space), np.random.default_rng(seed)
+        )
     possible = uncovered_share(space, space.impossible, work)
     impossible = [space.sides_of(box) for box in space.impossible]
     return lambda box, without: share_of(space, box, [*impossible, *without], possible, min(work, SHARE_WORK))

@@ -19,8 +19,10 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import ValueSet
 from contextdb.checks.rows import check_rows
 from contextdb.covering import coverage, pairs
+from contextdb.covering.assumed import opened
 from contextdb.covering.factors import ValueFactor
 from contextdb.covering.gaps import NearRows, find_gaps
+from contextdb.covering.sample import samples_of
 from contextdb.covering.space import SMALLEST, Space, comparable_rows, weight_of
 from contextdb.covering.witness import BoxSet
 from contextdb.errors import TableError
@@ -132,7 +134,7 @@ def test_a_table_of_very_many_conditions_is_measured_and_says_how_many_samples_i
     columns = {f"c{i}": ["True", "False" if i == 7 else "Any"] for i in range(n)}
     table = cdb.Table.from_columns({"Asset": ["A", "B"], **columns}, {f"c{i}": {"type": "bool"} for i in range(n)})
     report = coverage(table, samples=1000, max_gaps=3)
-    assert (report.covered, report.n_samples) == (0.5, 250)
+    assert (report.covered, report.n_samples) == (0.5, 1000)
     assert [(gap.share, gap.new_share, gap.is_exact) for gap in report.gaps] == [
         (0.25, 0.25, True),
         (0.25, 0.125, True),
@@ -141,3 +143,10 @@ def test_a_table_of_very_many_conditions_is_measured_and_says_how_many_samples_i
     assert all(gap.cells["c7"] == "True" and "False" in gap.cells.values() and len(gap.cells) == 2 for gap in report.gaps)
     assert {(gap.nearest.row, gap.nearest.n_changes) for gap in report.gaps if gap.nearest} == {(1, 1)}
     assert report.hits == (SMALLEST, 0.5)
+
+
+def test_as_many_samples_are_drawn_as_were_asked_for_and_else_fewer_of_very_many_conditions():
+    columns = {f"c{i}": ["True", "False" if i == 7 else "Any"] for i in range(2000)}
+    table = cdb.Table.from_columns({"Asset": ["A", "B"], **columns}, {name: {"type": "bool"} for name in columns})
+    space = opened(table).space
+    assert (samples_of(1000, 200_000, space), samples_of(None, 200_000, space)) == (1000, 50_000)

@@ -234,7 +234,7 @@ def test_an_interval_of_days_is_drawn_and_told_with_its_days():
     line = "".join(text for text, _ in framed_line(cell, year, 60))
     assert line.startswith("2026-01-01 ├")
     assert line.endswith("┤ 2026-12-31")
-    assert number_words(cell, year) == "2026-01-01 to 2026-03-31, both ends in"
+    assert number_words(cell, year) == "2026-01-01 to 2026-03-31, ends included"
     assert number_words(parse_cell("Any", year), year) == "every date"
 
 

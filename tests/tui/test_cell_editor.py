@@ -262,7 +262,7 @@ def test_typing_on_takes_the_fault_away():
     desk = Desk(SPEED, "1..2x")
     screen = press(desk, "enter", "backspace")
     assert "cannot read" not in screen
-    assert "1 to 2 m/s, both ends in" in screen
+    assert "1 to 2 m/s, ends included" in screen
 
 
 def test_while_one_types_what_is_wrong_is_said_in_short():

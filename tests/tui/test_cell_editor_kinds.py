@@ -169,12 +169,12 @@ def test_numbers_are_drawn_as_they_are_typed():
     screen = press(Desk(SPEED, "(0.3..1.1]"))
     assert "0 ├" in screen
     assert "○━" in screen
-    assert "0.3 to 1.1 m/s, 0.3 out" in screen
+    assert "0.3 to 1.1 m/s, 0.3 excluded" in screen
 
 
 def test_an_angle_has_a_dial_and_words():
     screen = press(Desk(WAY, "20.0000, 9.9900"))
-    assert "10.01 to 29.99 degrees, both ends in" in screen
+    assert "10.01 to 29.99 degrees, ends included" in screen
     assert any("90 ⡇" in row and "⢸ -90" in row for row in screen.splitlines())
 
 
@@ -227,8 +227,8 @@ KINDS: Sequence[tuple[Condition | None, str, str]] = [
     (HIT, "True", "only True"),
     (CHART, "CB", "1 of 5 declared values"),
     (STATE, "+InAir", "has InAir"),
-    (SPEED, "1..2", "1 to 2 m/s, both ends in"),
-    (STEPS, "1..2", "1 to 2, both ends in"),
+    (SPEED, "1..2", "1 to 2 m/s, ends included"),
+    (STEPS, "1..2", "1 to 2, ends included"),
     (WAY, "90", "exactly 90 degrees"),
     (SIDE, "left", "1 value"),
 ]

@@ -301,7 +301,7 @@ def test_what_is_moved_still_reads(data, domain, steps):
         ("", BOOL, "every value"),
         ("+InAir -Stunned", MOVES, "has InAir, has not Stunned"),
         ("not +InAir", MOVES, "anything but: has InAir"),
-        ("1..2", SPEED, "1 to 2 m/s, both ends in"),
+        ("1..2", SPEED, "1 to 2 m/s, ends included"),
     ],
 )
 def test_what_a_cell_means(text, domain, said):
@@ -317,7 +317,7 @@ def test_what_a_cell_means(text, domain, said):
         ("CB FS", CHART, "may be 2 of 5 declared values"),
         ("InAir Stunned", MOVES, "has InAir Stunned"),
         ("3", SPEED, "exactly 3"),
-        ("1..2", SPEED, "may be 1 to 2, both ends in"),
+        ("1..2", SPEED, "may be 1 to 2, ends included"),
     ],
 )
 def test_what_a_fact_means(text, domain, said):

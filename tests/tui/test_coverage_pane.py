@@ -243,7 +243,7 @@ def test_a_large_table_waits_to_be_asked_and_tells_its_progress_and_escape_stops
         await pilot.press("r")
         assert held.begun.wait(WAIT_S)
         await pilot.pause()
-        assert "Counting contexts … 42 %    Esc stops" in screen_text(pilot.app)
+        assert "Counting contexts … 42 %\n  █████████████░░░░░░░░░░░░░░░░░  Esc stops" in screen_text(pilot.app)
         await pilot.press("escape")
 
     _, screen = shown(play, of=large, run=run)

@@ -168,10 +168,10 @@ def test_a_dot_is_filled_exactly_where_the_cell_holds_an_angle_under_it(data):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("20, 9.99", "10.01 to 29.99 m/s, both ends in"),
-        ("(10..30]", "10 to 30 m/s, 10 out"),
-        ("[10..30)", "10 to 30 m/s, 30 out"),
-        ("(10..30)", "10 to 30 m/s, both ends out"),
+        ("20, 9.99", "10.01 to 29.99 m/s, ends included"),
+        ("(10..30]", "10 to 30 m/s, 10 excluded"),
+        ("[10..30)", "10 to 30 m/s, 30 excluded"),
+        ("(10..30)", "10 to 30 m/s, ends excluded"),
         (">=5", "5 and more m/s"),
         ("<5", "below 5 m/s"),
         ("5", "exactly 5 m/s"),
@@ -187,11 +187,11 @@ def test_a_set_of_numbers_in_words(text, said):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("20, 9.99", "10.01 to 29.99 degrees, both ends in"),
-        ("170..-170", "170 to -170 degrees, both ends in"),
-        ("170, 20", "150 to -170 degrees, both ends in"),
-        ("90..180", "90 to 180 degrees, both ends in"),
-        ("[170..180)", "170 to 180 degrees, 180 out"),
+        ("20, 9.99", "10.01 to 29.99 degrees, ends included"),
+        ("170..-170", "170 to -170 degrees, ends included"),
+        ("170, 20", "150 to -170 degrees, ends included"),
+        ("90..180", "90 to 180 degrees, ends included"),
+        ("[170..180)", "170 to 180 degrees, 180 excluded"),
         ("180", "exactly 180 degrees"),
         ("not 90", "every angle but 90 degrees"),
         ("0, 180", "every angle"),
@@ -202,6 +202,6 @@ def test_a_set_of_angles_in_words(text, said):
 
 
 def test_a_set_outside_the_bounds_says_so():
-    assert words("8..9", SPEED) == "8 to 9, both ends in; nothing within 0 to 7"
+    assert words("8..9", SPEED) == "8 to 9, ends included; nothing within 0 to 7"
     assert words("-2", Domain("number", None, 0.0)) == "exactly -2; nothing from 0 up"
     assert words("2", Domain("number", None, -UP, 0.0)) == "exactly 2; nothing up to 0"

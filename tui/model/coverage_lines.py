@@ -39,7 +39,7 @@ def state_text(run: CoverageRun, table: Table) -> str:
         return f"Coverage cannot be worked out. {run.problem}"
     if state == "running":
         part, share = run.progress
-        return f"{part or 'Starting'} … {int(100 * share)} %    Esc stops"
+        return f"{part or 'Starting'} … {int(100 * share)} %"
     if run.result is None:
         return f"Which contexts have no valid row? R works it out ({size})."
     headline = run.result.report.headline

@@ -205,7 +205,7 @@ def holds_dot(spans: Spans, distance: float, degrees: float) -> bool:
 
 
 def number_words(cell: Cell, domain: Domain, unit: str = "") -> str:
-    """A set of numbers in words: "10.01 to 29.99 degrees, both ends in"."""
+    """A set of numbers in words: "10.01 to 29.99 degrees, ends included"."""
     found = pieces(cell, domain)
     if cell.is_any or spans_of(cell) in (EVERYTHING, (CIRCLE,)):
         return f"every {domain.type.value.removeprefix('a ').removeprefix('an ')}"
@@ -224,11 +224,11 @@ def _alone(piece: Piece, unit: str, domain: Domain) -> str:
         return ("exactly " if piece.is_point else "") + _among(piece, domain) + unit
     low, high = _ends(piece, domain)
     if piece.is_low_in and piece.is_high_in:
-        which = "both ends in"
+        which = "ends included"
     elif piece.is_low_in or piece.is_high_in:
-        which = f"{high if piece.is_low_in else low} out"
+        which = f"{high if piece.is_low_in else low} excluded"
     else:
-        which = "both ends out"
+        which = "ends excluded"
     return f"{low} to {high}{unit}, {which}"
 
 

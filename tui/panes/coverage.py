@@ -72,7 +72,7 @@ class CoveragePane(Pane):
         & LineList, & HeatMap { height: 1fr; }
         & HeatMap { padding: 0 2; }
         & #about { padding: 1 2; }
-        & > #coverage-detail { height: auto; max-height: 45%; border-top: solid $panel; }
+        & > #coverage-detail { height: auto; max-height: 45%; border-top: solid $panel; scrollbar-gutter: stable; scrollbar-size-vertical: 1; }
         & #coverage-detail-text { padding: 0 2; min-height: 3; height: auto; }
     }
     """
@@ -162,7 +162,7 @@ class CoveragePane(Pane):
         result, width = self.run.result, max(10, min(40, self.size.width - 50))
         if self.run.state == "running":
             share = self.run.progress[1]
-            text = bar(share, share, width)
+            text = f"{bar(share, share, width)}  Esc stops"
         elif result is None:
             text = ""
         else:

@@ -72,7 +72,9 @@ class CoveragePane(Pane):
         & LineList, & HeatMap { height: 1fr; }
         & HeatMap { padding: 0 2; }
         & #about { padding: 1 2; }
-        & > #coverage-detail { height: auto; max-height: 45%; border-top: solid $panel; scrollbar-gutter: stable; scrollbar-size-vertical: 1; }
+        & > #coverage-detail {
+            height: auto; max-height: 45%; border-top: solid $panel; scrollbar-gutter: stable; scrollbar-size-vertical: 1;
+        }
         & #coverage-detail-text { padding: 0 2; min-height: 3; height: auto; }
     }
     """

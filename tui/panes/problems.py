@@ -53,7 +53,9 @@ class ProblemsPane(Pane):
         & > #problems-summary { height: 1; padding: 0 2; text-style: bold; }
         & > ChoiceLine { margin: 1 0 0 0; }
         & > LineList { height: 1fr; }
-        & > #problems-detail { height: auto; max-height: 45%; border-top: solid $panel; scrollbar-gutter: stable; scrollbar-size-vertical: 1; }
+        & > #problems-detail {
+            height: auto; max-height: 45%; border-top: solid $panel; scrollbar-gutter: stable; scrollbar-size-vertical: 1;
+        }
         & #problems-detail-text { padding: 0 2; min-height: 3; height: auto; }
     }
     """

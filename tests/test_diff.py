@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from contextdb.columns import TextColumn
 from contextdb.edits import edits
 from contextdb.edits.diffing import Diff, diff
-from contextdb.files.csv_rewrite import write_csv
+from contextdb.files.csv_rewrite import rewritten
 from contextdb.files.csv_source import read_csv
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.changes import Edit, Rows
@@ -31,12 +31,12 @@ def table_of(text: str, **settings: object) -> Table:
 
 def fresh(table: Table) -> bytes:
     """The table as a CSV written anew."""
-    return write_csv(table.columns, None, np.full(table.n_rows, -1))
+    return rewritten(table.columns, None, np.full(table.n_rows, -1)).raw
 
 
 def saved(table: Table) -> bytes:
     """The table as a save writes it over what it came from."""
-    return write_csv(table.columns, table.source, table.origin)
+    return rewritten(table.columns, table.source, table.origin).raw
 
 
 @pytest.fixture

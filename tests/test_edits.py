@@ -17,7 +17,7 @@ from contextdb.edits import edits
 from contextdb.edits.edits import edit_between
 from contextdb.edits.history import History
 from contextdb.errors import SchemaError, TableError
-from contextdb.files.csv_rewrite import write_csv
+from contextdb.files.csv_rewrite import rewritten
 from contextdb.files.csv_source import read_csv
 from contextdb.schema.sections import schema_to_dict
 from contextdb.schema.settings import EMPTY, TableSettings, read_schema
@@ -33,7 +33,7 @@ def table_of(raw: bytes = RAW, settings: TableSettings | None = None) -> Table:
 
 
 def bytes_of(table: Table) -> bytes:
-    return write_csv(table.columns, table.source, table.origin)
+    return rewritten(table.columns, table.source, table.origin).raw
 
 
 def texts_of(table: Table) -> dict[str, list[str]]:

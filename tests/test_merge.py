@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from contextdb.columns import TextColumn
 from contextdb.edits import edits
-from contextdb.files.csv_rewrite import write_csv
+from contextdb.files.csv_rewrite import rewritten
 from contextdb.files.csv_source import read_csv
 from contextdb.schema.settings import EMPTY, TableSettings
 from contextdb.tables.changes import Edit, Rows
@@ -28,11 +28,11 @@ def table_of(text: str, **settings: object) -> Table:
 
 
 def saved(table: Table) -> bytes:
-    return write_csv(table.columns, table.source, table.origin)
+    return rewritten(table.columns, table.source, table.origin).raw
 
 
 def fresh(table: Table) -> bytes:
-    return write_csv(table.columns, None, np.full(table.n_rows, -1))
+    return rewritten(table.columns, None, np.full(table.n_rows, -1)).raw
 
 
 def after(table: Table, *steps: Edit) -> Table:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from contextdb.columns import TextColumn
 from contextdb.errors import TableError
-from contextdb.files.csv_rewrite import rewritten, write_csv
+from contextdb.files.csv_rewrite import rewritten
 from contextdb.files.csv_source import Source, read_csv
 
 EDITS = st.one_of(CELLS, st.sampled_from(["<<<<<<< HEAD", "\ufeffx", "a;b", "x\r\ny", "-1"]))
@@ -37,7 +37,7 @@ def same(source: Source) -> np.ndarray:
 @given(csv_files())
 def test_a_file_that_was_opened_and_saved_is_the_same_file(file: CsvFile):
     source, columns = read_csv(file.raw, "t.csv")
-    assert write_csv(columns, source, same(source)) == file.raw
+    assert rewritten(columns, source, same(source)).raw == file.raw
 
 
 @given(csv_files(), st.data())
@@ -49,7 +49,7 @@ def test_an_edit_changes_its_field_and_no_other_byte(file: CsvFile, data: st.Dat
     at = data.draw(st.integers(0, len(columns) - 1))
     text = data.draw(EDITS)
     start, stop = int(source.starts[row + 1]), int(source.stops[row + 1])
-    new = write_csv([c.with_text(row, text) if i == at else c for i, c in enumerate(columns)], source, same(source))
+    new = rewritten([c.with_text(row, text) if i == at else c for i, c in enumerate(columns)], source, same(source)).raw
     assert new.startswith(file.raw[:start])
     assert new.endswith(file.raw[stop:])
     assert reread(new)[1:] == [[text if (r, c) == (row, at) else t for c, t in enumerate(ts)] for r, ts in enumerate(file.rows)]
@@ -95,7 +95,7 @@ def test_columns_that_are_moved_renamed_added_or_taken_away_keep_their_raw_field
     fresh = TextColumn.of("", data.draw(st.lists(EDITS, min_size=source.n_records, max_size=source.n_records)))
     names = data.draw(st.lists(CELLS.filter(str.strip), min_size=len(field_of), max_size=len(field_of), unique=True))
     moved = [(columns[f] if f >= 0 else fresh).renamed(n) for f, n in zip(field_of, names, strict=True)]
-    new = write_csv(moved, source, same(source), field_of)
+    new = rewritten(moved, source, same(source), field_of).raw
     assert reread(new) == [names, *map(list, zip(*(c.to_list() for c in moved), strict=True))]
     before, after = strict_records(file.text.removeprefix("\ufeff")), strict_records(new.decode().removeprefix("\ufeff"))
     for old, now in zip(before[1:], after[1:], strict=True):
@@ -108,7 +108,7 @@ def test_a_fresh_file_is_what_pythons_csv_module_writes(rows: list[list[str]]):
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerows([["a", "b"], *rows])
     columns = [TextColumn.of(name, [row[i] for row in rows]) for i, name in enumerate("ab")]
-    raw = write_csv(columns, None, np.full(len(rows), -1))
+    raw = rewritten(columns, None, np.full(len(rows), -1)).raw
     assert reread(raw) == [["a", "b"], *rows]
     if not any(row[0].startswith("<<<<<<<") or "\r" in "".join(row) for row in rows):  # csv.writer forgets to quote a lone return
         assert raw.decode() == out.getvalue()
@@ -117,7 +117,7 @@ def test_a_fresh_file_is_what_pythons_csv_module_writes(rows: list[list[str]]):
 def written_after(text: str, change, origin=None) -> str:
     """The file after a change of its columns."""
     source, columns = read_csv(text.encode(), "t.csv")
-    return write_csv(change(columns), source, same(source) if origin is None else np.array(origin, np.int64)).decode()
+    return rewritten(change(columns), source, same(source) if origin is None else np.array(origin, np.int64)).raw.decode()
 
 
 def test_a_field_in_quotes_without_need_stays_in_quotes_when_it_is_edited():
@@ -161,12 +161,12 @@ def test_a_text_that_reads_like_a_git_conflict_is_written_in_quotes():
 
 
 def test_a_header_that_reads_like_another_delimiter_is_written_in_quotes():
-    assert write_csv([TextColumn.of("a;b", ["1;2"])], None, np.array([-1])) == b'"a;b"\n1;2\n'
+    assert rewritten([TextColumn.of("a;b", ["1;2"])], None, np.array([-1])).raw == b'"a;b"\n1;2\n'
 
 
 def test_a_renamed_column_keeps_the_fields_of_the_header_beside_it():
     source, (a, b) = read_csv(b'"a",b\n1,"2"\n', "t.csv")
-    assert write_csv([a, b.renamed("c")], source, same(source), [0, 1]) == b'"a",c\n1,"2"\n'
+    assert rewritten([a, b.renamed("c")], source, same(source), [0, 1]).raw == b'"a",c\n1,"2"\n'
 
 
 def test_rows_can_be_added_to_a_header_alone():
@@ -184,14 +184,14 @@ def test_rows_can_be_added_to_a_header_alone():
 def test_a_text_that_could_not_be_read_again_is_not_written(text: str, found: str):
     source, (a, b) = read_csv(b"a,b\n1,2\n3,4\n", "t.csv")
     with pytest.raises(TableError) as caught:
-        write_csv([a, b.with_text(1, text)], source, same(source))
+        rewritten([a, b.with_text(1, text)], source, same(source))
     assert str(caught.value) == found
 
 
 def test_names_that_could_not_be_read_again_are_not_written():
     columns = [TextColumn.of(name, []) for name in ("a", "", "a", "x\0")]
     with pytest.raises(TableError) as caught:
-        write_csv(columns, None, np.array([], np.int64))
+        rewritten(columns, None, np.array([], np.int64))
     assert [f.found for f in caught.value.faults] == [
         "field 2 of 4 column names is empty.",
         'the column name "a" appears twice, in fields 1 and 3.',
@@ -201,4 +201,4 @@ def test_names_that_could_not_be_read_again_are_not_written():
 
 def test_a_table_without_columns_is_not_written():
     with pytest.raises(TableError, match="no columns"):
-        write_csv([], None, np.array([], np.int64))
+        rewritten([], None, np.array([], np.int64))

@@ -28,11 +28,6 @@ _SAMPLE = 100
 """Records that tell whether a column's fields always are in quotes."""
 
 
-def write_csv(columns: Sequence[TextColumn], source: Source | None, origin: Origin, field_of: Sequence[int] | None = None) -> bytes:
-    """The bytes of a CSV that holds these texts: the `raw` of `rewritten`."""
-    return rewritten(columns, source, origin, field_of).raw
-
-
 def rewritten(
     columns: Sequence[TextColumn], source: Source | None, origin: Origin, field_of: Sequence[int] | None = None
 ) -> Source:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import contextdb as cdb
 from contextdb.disk import write_atomic
 from contextdb.edits import edits
-from contextdb.files.csv_rewrite import write_csv
+from contextdb.files.csv_rewrite import rewritten
 from contextdb.tables.table import Table
 from tui.model.journal import Journal, base_path, journal_path, recover
 from tui.model.lock import Holder, Lock
@@ -41,7 +41,7 @@ def reopened(path: Path) -> Sheet:
 
 
 def bytes_of(table: Table) -> bytes:
-    return write_csv(table.columns, table.source, table.origin)
+    return rewritten(table.columns, table.source, table.origin).raw
 
 
 def save(sheet: Sheet) -> None:

@@ -269,13 +269,13 @@ def table_of(column: str, text: str) -> Table:
             "damage",
             "11",
             "output-out-of-bounds",
-            '"11" is outside the declared bounds of the output "damage". Accepted: {DAMAGE}. Did you mean "10"?',
+            '"11" is outside the declared bounds. Accepted: {DAMAGE}. Did you mean "10"?',
         ),
         (
             "damage",
             " ",
             "missing-output",
-            'the output "damage" is empty and has no default. Accepted: {DAMAGE}. '
+            "the cell is empty, and the output has no default. Accepted: {DAMAGE}. "
             "Try to fill in the cell, or to declare a default in contextdb.toml.",
         ),
         (
@@ -308,7 +308,7 @@ def table_of(column: str, text: str) -> Table:
             "element",
             "Fyre",
             "unreadable-output",
-            '"Fyre" is not a declared value of the output "element". Accepted: "Fire", "Ice". Did you mean "Fire"?',
+            '"Fyre" is not a declared value. Accepted: "Fire", "Ice". Did you mean "Fire"?',
         ),
         (
             "at",

@@ -104,7 +104,12 @@ class Output:
         if not text.strip():
             if self.needs_cell:
                 raise CellError(
-                    Fault(f"the output {in_quotes(self.name)} is empty and has no default.", self.accepted, _FILL, rule=MISSING)
+                    Fault(
+                        "the cell is empty, and the output has no default.",
+                        self.accepted,
+                        _FILL,
+                        rule="missing-output",
+                    )
                 )
             return self.nothing
         try:
@@ -113,12 +118,20 @@ class Output:
             why = f": {error}." if str(error) else "."
             found = f"cannot read {in_quotes(text)} as {self._noun}{why}"
             if self.kind == "enum":
-                found = f"{in_quotes(text.strip())} is not a declared value of the output {in_quotes(self.name)}."
-            raise CellError(Fault(found, self.accepted, self._mend(text) if wants_mend else "", rule=UNREADABLE)) from None
+                found = f"{in_quotes(text.strip())} is not a declared value."
+            raise CellError(Fault(found, self.accepted, self._mend(text) if wants_mend else "", rule="unreadable-output")) from None
         if not self._is_inside(value):
-            found = f"{in_quotes(text.strip())} is outside the declared bounds of the output {in_quotes(self.name)}."
-            raise CellError(Fault(found, self.accepted, in_quotes(self.written(self._clipped(value))), rule=OUTSIDE))
+            found = f"{in_quotes(text.strip())} is outside the declared bounds."
+            raise CellError(Fault(found, self.accepted, in_quotes(self.written(self._clipped(value))), rule="output-out-of-bounds"))
         return value
+
+    def fault(self, text: str) -> Fault | None:
+        """What is wrong with the text of a cell; None where it can be read."""
+        try:
+            self.read(text)
+        except CellError as error:
+            return error.faults[0]
+        return None
 
     def reads(self, text: str) -> bool:
         """Whether a text, not an empty one, is a value."""
@@ -184,9 +197,6 @@ class Output:
         short = text[:1000].strip()
         return next((in_quotes(near) for near in _near(short, self) if near != short and self.reads(near)), "")
 
-
-UNREADABLE, OUTSIDE, MISSING = "unreadable-output", "output-out-of-bounds", "missing-output"
-"""The rules that a cell of an output may break."""
 
 _FILL = "to fill in the cell, or to declare a default in contextdb.toml"
 _LEAVE_EMPTY = "to leave the cell empty, which means the default"

@@ -62,16 +62,6 @@ def settings_to_dict(settings: TableSettings) -> Part:
     return said
 
 
-def outputs_said(settings: TableSettings, names: Sequence[str]) -> object:
-    """What `outputs` says of some names, with what is declared of those that are outputs already."""
-    return outputs_to_toml(names, settings.typed)
-
-
-def fallback_said(settings: TableSettings, asset: str | None) -> object:
-    """What `fallback` says with another asset; None for none."""
-    return fallback_to_toml(asset, settings.fallback_outputs)
-
-
 def schema_to_dict(schema: Schema) -> dict[str, dict[str, Part]]:
     """The sections that edits may change: section to name to keys."""
     return {

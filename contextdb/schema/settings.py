@@ -73,6 +73,10 @@ class TableSettings:
         typed = {output.name: output for output in self.typed}
         return tuple(typed.get(name) or Output(name) for name in self.outputs)
 
+    def output(self, name: str) -> Output | None:
+        """What is declared of an output; None for a column of another kind, or one of which nothing is."""
+        return next((output for output in self.typed if output.name == name), None)
+
     @property
     def jobs(self) -> list[tuple[str, str]]:
         """Each job with a column that has it, as far as columns are named."""
@@ -93,6 +97,14 @@ class TableSettings:
             outputs=tuple(name for name in map(name_of, self.outputs) if name is not None),
             typed=tuple(replace(output, name=name) for name, output in typed if name is not None),
             fallback_outputs=tuple((name, value) for name, value in given if name is not None),
+        )
+
+    def with_outputs(self, names: Iterable[str]) -> TableSettings:
+        """The settings with other outputs; what is said of those that stay is kept."""
+        outputs = tuple(names)
+        typed = tuple(output for output in self.typed if output.name in outputs)
+        return replace(
+            self, outputs=outputs, typed=typed, fallback_outputs=tuple(o for o in self.fallback_outputs if o[0] in outputs)
         )
 
     @property

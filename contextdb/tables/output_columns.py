@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.outputs import MISSING, Output, OutputValue
+from contextdb.cells.outputs import Output, OutputValue
 from contextdb.columns import TextColumn
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs, outputs_of_values
 from contextdb.errors import CellError, Fault, Place
@@ -60,7 +60,7 @@ class OutputColumn:
         codes = self.texts.codes
         for row in np.flatnonzero(np.isin(codes, list(self.faults))).tolist():
             fault = self.faults[int(codes[row])]
-            if fault.rule != MISSING or row not in may_be_empty:
+            if fault.rule != "missing-output" or row not in may_be_empty:
                 yield row, fault
 
 

@@ -6,16 +6,19 @@ import json
 import math
 import pickle
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from running import run
 from strategies import examples
 
 import contextdb as cdb
+from contextdb.compiled.stubs import stubs_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.files.tensors import read_tensors, write_tensors
 from contextdb.schema.sections import settings_to_dict, settings_with
@@ -501,3 +504,60 @@ def test_every_fault_of_the_outputs_is_said_at_once():
     with pytest.raises(cdb.SchemaError) as error:
         read_schema(text, "contextdb.toml")
     assert [fault.place.line for fault in error.value.faults] == [2, 3, 4, 7, 7]
+
+
+# ---- other faces
+
+
+def abilities() -> Table:
+    columns = {"Asset": ["slash", "@inner"], "n": ["-3", ""], "x": ["inf", "0.5"], "at": ["1 2", ""], "e": ["A", ""], "b": ["", ""]}
+    inner = {"Asset": ["bolt"], "line": ["zap"]}
+    declared = {
+        "n": {"type": "int", "unit": "points", "description": "what it costs"},
+        "x": {"type": "number", "min": 0},
+        "at": {"type": "numbers", "size": 2},
+        "e": {"type": "enum", "values": ["A", "B b"]},
+        "b": {"type": "bool", "default": True},
+    }
+    outer = Table.from_columns(columns, {}, {"outputs": declared}, "outer")
+    return replace(outer, around={"outer": outer, "inner": Table.from_columns(inner, {}, {"outputs": ["line"]}, "inner")})
+
+
+def test_a_query_tells_the_outputs_of_each_match_in_json(tmp_path: Path):
+    abilities().compile().save(tmp_path / "outer.safetensors")
+    assert Table.from_columns({"Asset": ["a"]}).compile().outputs.of_row(0) == {}
+    ran = run("query", str(tmp_path / "outer.safetensors"), "--json")
+    assert [match["outputs"] for match in json.loads(ran.out)["matches"]] == [
+        {"n": -3, "x": "inf", "at": [1.0, 2.0], "e": "A", "b": True, "line": ""},
+        {"n": 0, "x": 0.5, "at": [None, None], "e": "", "b": True, "line": "zap"},
+    ]
+
+
+def test_stubs_have_the_outputs_of_a_row():
+    names: dict[str, Any] = {}
+    exec(stubs_of({"outer": abilities().compile()}), names)
+    found = get_type_hints(names["OuterOutputs"])
+    pair = tuple[float, float]
+    assert found == {"n": int, "x": float, "at": pair, "e": names["OuterE"], "b": bool, "line": str}
+    assert get_args(names["OuterE"]) == ("A", "B b", "")
+    assert "'n': int,  # points: what it costs\n" in stubs_of({"outer": abilities().compile()})
+    assert "'x': float,  # 0..\n" in stubs_of({"outer": abilities().compile()})
+
+
+def test_settings_given_in_python_are_those_of_the_file():
+    with pytest.raises(cdb.SchemaError, match='output "n" type = "itn"'):
+        Table.from_columns({"Asset": ["a"], "n": ["1"]}, {}, {"outputs": {"n": {"type": "itn"}}})
+    table = Table.from_columns({"Asset": ["a"], "n": ["1"]}, {}, {"outputs": {"n": {"type": "int"}}, "policy": "first"}, name="x")
+    assert (table.name, table.settings.policy, table.compile().outputs.of_row(0)) == ("x", "first", {"n": 1})
+
+
+def test_a_workbook_carries_the_types_of_outputs_along(tmp_path: Path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "contextdb.toml").write_text(TOML.replace("[tables.t]", '[conditions.on]\ntype = "bool"\n[tables.t]'))
+    (tmp_path / "a" / "t.csv").write_text("Asset,on,damage,line,at\nx,True,3,hey,1 2\n")
+    assert run("export", str(tmp_path / "a" / "t.csv"), str(tmp_path / "t.xlsx")).code == 0
+    assert run("import", str(tmp_path / "t.xlsx"), str(tmp_path / "t.csv")).code == 0
+    before, after = cdb.load(tmp_path / "a" / "t.csv"), cdb.load(tmp_path / "t.csv")
+    assert set(after.settings.typed) == set(before.settings.typed)
+    assert after.settings.fallback_outputs == before.settings.fallback_outputs
+    assert after.compile().outputs.of_row(0) == before.compile().outputs.of_row(0)

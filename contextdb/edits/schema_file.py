@@ -95,7 +95,7 @@ def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
         The file may not be read.
     """
     path = schema_path(after)
-    wanted = _changes(_keys(before, path) if before else {}, _keys(after, path, only_own=before is None))
+    wanted = _changes({} if before is None else _keys(before, path), _keys(after, path, only_own=before is None))
     if not wanted:
         return None
     raw = read_bytes(path) if path.is_file() else b""
@@ -244,7 +244,7 @@ def _finest(wanted: Changes) -> Iterator[tuple[KeyPath, object]]:
     for key, (was, now) in wanted.items():
         if key[0] == "tables" and isinstance(was, Mapping) and isinstance(now, Mapping):
             inner = {(*key, name): (was.get(name), now.get(name)) for name in {**was, **now}}
-            yield from _finest({path: said for path, said in inner.items() if said[0] != said[1]})
+            yield from _finest({path: said for path, said in inner.items() if repr(said[0]) != repr(said[1])})  # false is not 0
         else:
             yield key, now
 

@@ -116,9 +116,9 @@ def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSett
     faults = []
     for key, value in said.items():
         if key not in shapes:
-            near = nearest(key, shapes)
+            near = nearest(str(key), shapes)
             faults.append(
-                Fault(f"a table has no setting {in_quotes(key)}.", some(shapes, len(shapes)), in_quotes(near) if near else "")
+                Fault(f"a table has no setting {in_quotes(str(key))}.", some(shapes, len(shapes)), in_quotes(near) if near else "")
             )
         elif value is not None and (wrong := shapes[key].wrong(value)):
             meant = shapes[key].mend(value)

@@ -393,7 +393,7 @@ def test_what_an_output_says_is_part_of_the_version():
     assert Table.from_columns(texts, {}, other).compile().version != table.compile().version
 
 
-@pytest.mark.parametrize("damage", [1, 2, 3, 4])
+@pytest.mark.parametrize("damage", [1, 2, 3, 4, 5])
 def test_a_file_whose_outputs_do_not_fit_is_refused(tmp_path: Path, damage: int):
     """The digest is made anew: the shapes are looked at too."""
     from contextdb.compiled.artefact import WITH_RULES
@@ -402,17 +402,19 @@ def test_a_file_whose_outputs_do_not_fit_is_refused(tmp_path: Path, damage: int)
     path = tmp_path / "t.safetensors"
     table_of("damage", "3").compile().save(path)
     tensors, metadata = read_tensors(path, WITH_RULES)
-    about = json.loads(metadata["about"])
+    declared = json.loads(tensors["outputs.declared"].tobytes())
     if damage == 1:
         tensors["outputs.000.values"] = tensors["outputs.000.values"][:-1]
     elif damage == 2:
         tensors["outputs.003.codes"] = tensors["outputs.003.codes"] + np.int32(9)
     elif damage == 3:
+        tensors["outputs.002.values"] = tensors["outputs.002.values"] + np.uint8(2)
+    elif damage == 4:
         del tensors["outputs.004.values"]
     else:
-        about["outputs"][1]["type"] = "nothing"
-    text = json.dumps(about)
-    write_tensors(path, WITH_RULES, dict(tensors), {"about": text, "digest": digest_of(tensors, text)})
+        declared[1]["type"] = "nothing"
+        tensors["outputs.declared"] = np.frombuffer(json.dumps(declared).encode(), np.uint8)
+    write_tensors(path, WITH_RULES, dict(tensors), {"about": metadata["about"], "digest": digest_of(tensors, metadata["about"])})
     with pytest.raises(cdb.ArtefactError, match="does not hold what its header says"):
         CompiledTable.open(path)
 

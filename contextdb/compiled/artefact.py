@@ -11,14 +11,16 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     CCC.texts              uint8                 JSON list of the distinct texts
     slots.CCC.codes        as CCC.codes and CCC.texts, for the columns of slots, named in `about`
     slots.CCC.texts
-    outputs.CCC.values     output CCC of bool, int or number: bool, int64 or float64 [R + 1]; of numbers: float64 [R + 1, size]
+    outputs.declared       uint8                 JSON list: name, type, default, bounds, values, size, unit, description of each
+    outputs.CCC.values     output CCC, of bool, int, number: uint8 (0 or 1), int64, float64 [R + 1]; numbers: float64 [R + 1, size]
     outputs.CCC.codes      int32 [R + 1]         of enum and text: which of the texts
     outputs.CCC.texts      uint8                 JSON list; of an enum its values in their order, then "" for none
     when.codes             as CCC.codes and CCC.texts, for the column of rules, named in `about`
     when.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
 
-Value R of an output is what there is without a row: what `fallback` gives, else the default, else False, 0, NaN or "".
+Value R of an output is what there is without a row: what `fallback` gives, else the default, else False, 0, NaN or "". Infinite
+defaults are "inf" and "-inf" in the JSON. What knows no outputs passes all of these over: they change no answer.
 
 For a table with tables inside, D the depth, T the number of tables (`contextdb.compiled.ways`; soft cells then have D R rows):
 
@@ -31,9 +33,8 @@ For a table with tables inside, D the depth, T the number of tables (`contextdb.
     when.layers, when.said                       the same for the rows' own rules
 
 The metadata hold `contextdb` (the version of this layout), `about` (JSON: name, policy, fallback, conditions and the kind of each
-column; where there are outputs, what is declared of each: name, type, default, bounds, values, size, unit, description; infinite
-numbers are "inf" and "-inf"; where facts are derived also the conditions that they are computed from; where rows have rules also
-their column and the conditions that they name and that are not columns) and `digest`, BLAKE2b-128 of `about` and of all
+column; where facts are derived also the conditions that they are computed from; where rows have rules also their column and the
+conditions that they name and that are not columns) and `digest`, BLAKE2b-128 of `about` and of all
 tensors in the order of their names. Opening checks all of it. A table with rules has layout 2, so that what knows only masks does
 not answer without them, and so has one with tables inside and soft cells; any other has layout 1.
 """
@@ -52,7 +53,7 @@ from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData, SoftMasks
-from contextdb.compiled.outputs_stored import outputs_from, outputs_to_json, outputs_to_tensors
+from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors
 from contextdb.compiled.ways_stored import ways_from, ways_to_json, ways_to_tensors
 from contextdb.expressions import Derivation
 from contextdb.expressions.rules import WhenColumn, WhenRules
@@ -115,7 +116,6 @@ def save(compiled: CompiledData, path: Path) -> None:
             "columns": kinds,
         }
         | ({"slots": [c.name for c in compiled.slots]} if compiled.slots is not None else {})
-        | ({"outputs": outputs_to_json(compiled.outputs)} if len(compiled.outputs) else {})
         | ({"computed_from": [_condition_to_json(c) for c in _computed_from(compiled)]} if compiled.derivation else {})
         | ({"when": _when_to_json(compiled)} if compiled.when else {})
         | ({"ways": ways_to_json(compiled.ways)} if compiled.ways else {})
@@ -166,7 +166,7 @@ def _table(about: dict[str, Any], tensors: Tensors, kind: type[Compiled]) -> Com
         when=_when(about, conditions, tensors),
         ways=ways_from(about["ways"], tensors, len(conditions)) if "ways" in about else None,
         declared=frozenset(texts_from_array(tensors["declared"]) if "declared" in tensors else ()),
-        outputs=outputs_from(about.get("outputs", []), tensors, n_rows),
+        outputs=outputs_from(tensors, n_rows),
     )
 
 

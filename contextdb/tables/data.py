@@ -27,6 +27,7 @@ from contextdb.cells.arguments import (
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
 from contextdb.compiled.outputs import Outputs
+from contextdb.compiled.pick_columns import PickColumns, specificities
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Ways
 from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, some
@@ -208,6 +209,15 @@ class TableData(Unchanging):
     def row_weights(self) -> NDArray[np.float64]:
         """The weight of each row in a random pick: float64 [n_rows]; 1 without a weight column."""
         return self._plain.weights
+
+    @cached_property
+    def picking(self) -> PickColumns:
+        """How specific the rows are, where the policy asks for it, and how long they rest after they were picked."""
+        if self.settings.policy != "specific":
+            return self._plain.resting
+        columns = [(c.condition, c.cells, c.texts.codes) for c in self.conditions]
+        has_rule = None if self.when is None else self.when.has_rule
+        return replace(self._plain.resting, specificities=specificities(columns, has_rule, self.n_rows))
 
     @cached_property
     def output_columns(self) -> tuple[OutputColumn, ...]:

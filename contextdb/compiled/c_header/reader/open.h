@@ -29,8 +29,8 @@ static inline void cdbi_read(cdbi_opening *opening, const cdbi_json *header)
         cdbi_refuse(opening, CDB_BAD_FILE, metadata.why ? metadata.why : "not a file that contextdb compiled", -1, "");
         return;
     }
-    if (strcmp(version, "1") != 0 && strcmp(version, "2") != 0)
-        cdbi_refuse(opening, CDB_BAD_FILE, "the layout of the file is neither 1 nor 2, which this header reads", -1, "");
+    if (strcmp(version, "1") != 0 && strcmp(version, "2") != 0 && strcmp(version, "3") != 0)
+        cdbi_refuse(opening, CDB_BAD_FILE, "the layout of the file is not 1, 2 or 3, which this header reads", -1, "");
     whole = about;
     cdbi_skip(&whole, 0);
     room = (size_t)(whole.at - about.at) + 1;

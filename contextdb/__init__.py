@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from contextdb.cells.facts import cell
-    from contextdb.compiled.batch import ManyMatches
     from contextdb.compiled.explain import Explanation, Failure, RowExplanation
     from contextdb.compiled.live import LiveContext
+    from contextdb.compiled.many import ManyMatches
     from contextdb.compiled.matches import Matches
     from contextdb.compiled.table import CompiledTable
     from contextdb.console import __version__ as __version__
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         QueryError,
         SchemaError,
         TableError,
+        WrongType,
     )
     from contextdb.findings import Finding
     from contextdb.tables.project import Project, load
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from contextdb.tables.watching import watch
 
 _HOMES = {
-    "compiled.batch": ("ManyMatches",),
+    "compiled.many": ("ManyMatches",),
     "compiled.table": ("CompiledTable",),
     "console": ("__version__",),
     "covering": ("CoverageReport", "Gap", "coverage"),
@@ -68,6 +69,7 @@ _HOMES = {
         "QueryError",
         "SchemaError",
         "TableError",
+        "WrongType",
     ),
     "compiled.explain": ("Explanation", "Failure", "RowExplanation"),
     "cells.facts": ("cell",),
@@ -106,6 +108,7 @@ __all__ = [  # noqa: RUF022
     "ContextError",
     "NoSuchFact",
     "NoSuchPlace",
+    "WrongType",
     "PolicyError",
     "ArtefactError",
     "MotionError",

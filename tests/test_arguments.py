@@ -95,15 +95,15 @@ CALLS: dict[str, Call] = {
     "save(path), compiled": lambda x: isinstance(x, (str, Path)) or COMPILED.save(x),  # type: ignore[arg-type]
     "way(row)": lambda x: COMPILED.way(x),  # type: ignore[arg-type]
     "query(context)": lambda x: COMPILED.query(x),  # type: ignore[arg-type]
-    "query(unknown)": lambda x: COMPILED.query({}, x),  # type: ignore[arg-type]
+    "query(unknown)": lambda x: COMPILED.query({}, unknown=x),  # type: ignore[arg-type]
     "query(actors)": lambda x: COMPILED.query(PLAIN, actors=x),  # type: ignore[arg-type]
     "query(prefer)": lambda x: COMPILED.query(PLAIN, actors=ACTORS, prefer=x),  # type: ignore[arg-type]
     "query_many(contexts)": lambda x: list(COMPILED.query_many(x)),  # type: ignore[arg-type]
-    "query_many(unknown)": lambda x: COMPILED.query_many(MANY, x),  # type: ignore[arg-type]
+    "query_many(unknown)": lambda x: COMPILED.query_many(MANY, unknown=x),  # type: ignore[arg-type]
     "query_many(actors)": lambda x: COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=x),  # type: ignore[arg-type]
     "query_many(actors), one": lambda x: COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=[x]),  # type: ignore[list-item]
     "live(facts)": lambda x: COMPILED.live(x).matches(),  # type: ignore[arg-type]
-    "live(unknown)": lambda x: COMPILED.live({}, x),  # type: ignore[arg-type]
+    "live(unknown)": lambda x: COMPILED.live({}, unknown=x),  # type: ignore[arg-type]
     "live[name]": lambda x: COMPILED.live(FACTS)[x],  # type: ignore[index]
     "live[name] =": lambda x: COMPILED.live(FACTS).__setitem__(x, 1.0),  # type: ignore[arg-type]
     "live.update(facts)": lambda x: COMPILED.live(FACTS).update(x),  # type: ignore[arg-type]
@@ -113,13 +113,13 @@ CALLS: dict[str, Call] = {
     "query_codes(codes)": lambda x: COMPILED.query_codes(x),  # type: ignore[arg-type]
     "explain(context)": lambda x: COMPILED.explain(x),  # type: ignore[arg-type]
     "explain(actors)": lambda x: COMPILED.explain(PLAIN, actors=x),  # type: ignore[arg-type]
-    "explain(unknown)": lambda x: COMPILED.explain({}, x),  # type: ignore[arg-type]
+    "explain(unknown)": lambda x: COMPILED.explain({}, unknown=x),  # type: ignore[arg-type]
     "pick(context)": lambda x: COMPILED.pick(x),  # type: ignore[arg-type]
     "pick(rng)": lambda x: COMPILED.pick(FACTS, x),  # type: ignore[arg-type]
     "pick(last)": lambda x: COMPILED.pick(FACTS, last=x),  # type: ignore[arg-type]
     "pick(unknown)": lambda x: COMPILED.pick({}, unknown=x),  # type: ignore[arg-type]
     "penalties(context)": lambda x: COMPILED.penalties(x),  # type: ignore[arg-type]
-    "penalties(unknown)": lambda x: COMPILED.penalties({}, x),  # type: ignore[arg-type]
+    "penalties(unknown)": lambda x: COMPILED.penalties({}, unknown=x),  # type: ignore[arg-type]
     "cell(text)": lambda x: COMPILED.query({**FACTS, "speed": cdb.cell(x)}),  # type: ignore[arg-type]
     "matches.casting(row)": lambda x: CAST.casting(x),  # type: ignore[arg-type]
     "matches.castings(row)": lambda x: CAST.castings(x),  # type: ignore[arg-type]
@@ -147,7 +147,7 @@ CALLS: dict[str, Call] = {
 
 def live_with(actors: object, prefer: object = None) -> cdb.LiveContext:
     live = COMPILED.live(PLAIN)
-    live.actors(actors, prefer)  # type: ignore[arg-type]
+    live.actors(actors, prefer=prefer)  # type: ignore[arg-type]
     return live
 
 

@@ -31,7 +31,7 @@ from contextdb.compiled.data import CompiledData
 from contextdb.compiled.mask_bits import bits_of
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.ways import Step
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, plural, some
+from contextdb.errors import plural
 from contextdb.expressions import Expression
 from contextdb.expressions.rules import WhenColumn, WhenRules, has_no_rule, told_facts
 from contextdb.expressions.rules.rules import Rule, values_of
@@ -121,10 +121,7 @@ class Explanation:
         names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
         found = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
         if not found:
-            known = dict.fromkeys((*self.compiled.assets, *self.compiled.leaves))
-            near = nearest(asset, known)
-            told = f"the table {in_quotes(self.compiled.name)} has no asset {in_quotes(asset)}."
-            raise ContextError(Fault(told, some(known) or "none: the table has no rows", in_quotes(near) if near else ""))
+            raise self.compiled.answering.no_asset(asset)
         return found
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
@@ -234,7 +231,7 @@ class Explanation:
 
 def explain(compiled: CompiledData, context: Context, unknown: Unknown = "error") -> Explanation:
     """Explain every row of a table for one context; raises ContextError as `query` does."""
-    return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown))
+    return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown=unknown))
 
 
 @dataclass(frozen=True, slots=True)

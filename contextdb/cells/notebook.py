@@ -10,11 +10,11 @@ from contextdb.errors import in_quotes, shown
 
 MOST_ROWS = 20
 MOST_COLUMNS = 12
+MOST_CHARACTERS = 300
 
 
-def one_line(thing: object, name: str, told: str) -> str:
-    """What a thing is, in one line: its type, its name where it has one, and what there is to tell."""
-    kind = type(thing).__name__
+def one_line(kind: str, name: str, told: str) -> str:
+    """What a thing is, in one line: its public type, its name where it has one, and what there is to tell."""
     return f"<{kind} {in_quotes(name)}: {told}>" if name else f"<{kind}: {told}>"
 
 
@@ -24,7 +24,7 @@ def as_html(caption: str, heads: Sequence[str], rows: Iterable[Sequence[object]]
     first = [_line("td", row) for row in islice(listed, MOST_ROWS)]
     left = sum(1 for _ in listed) if n_rows is None else n_rows - len(first)
     more = [f"<p>and {left:,} more</p>"] if left > 0 else []
-    head = f"<p>{escape(caption)}</p>"
+    head = f"<p>{escape(shown(caption, MOST_CHARACTERS))}</p>"
     return "\n".join([head, "<table>", f"<thead>{_line('th', heads)}</thead>", "<tbody>", *first, "</tbody>", "</table>", *more])
 
 

@@ -27,6 +27,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
 from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.mirroring import changed_in_mirror, in_mirror, kept_facts, mirrored_facts
+from contextdb.cells.notebook import one_line
 from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks
@@ -38,7 +39,7 @@ from contextdb.compiled.stack import MaskStack
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.versions import version_of
 from contextdb.compiled.ways import Step, Ways
-from contextdb.errors import ContextError, Fault, Place, in_quotes
+from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
 from contextdb.expressions.derived import Derivation
 from contextdb.expressions.rules import WhenRules
 from contextdb.schema.shapes import Policy
@@ -51,7 +52,7 @@ Made = TypeVar("Made")
 SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CompiledData(Unchanging):
     """A table as masks: what every way to ask it needs. `CompiledTable` has the ways.
 
@@ -94,6 +95,10 @@ class CompiledData(Unchanging):
     def n_rows(self) -> int:
         """The number of rows."""
         return len(self.assets)
+
+    def __repr__(self) -> str:
+        size = f"{plural(self.n_rows, 'row')} x {plural(len(self.conditions), 'condition')}, {plural(self.nbytes, 'byte')}"
+        return one_line(type(self).__name__, self.name, size)
 
     @property
     def leaves(self) -> Sequence[str]:

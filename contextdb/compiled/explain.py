@@ -23,6 +23,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import Context, Fact, Unknown, describe
 from contextdb.cells.grammar import format_cell, parse_cell, reads
+from contextdb.cells.notebook import as_html, one_line
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, union
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.columns import TextColumn
@@ -166,6 +167,13 @@ class Explanation:
     def __str__(self) -> str:
         lines = [f"{len(self.matches)} of {plural(self.compiled.n_rows, 'row')} valid"]
         return "\n".join(lines + [str(r) for r, _ in zip(self, range(10), strict=False)])
+
+    def __repr__(self) -> str:
+        return one_line("Explanation", self.compiled.name, f"{len(self.matches):,} of {plural(self.compiled.n_rows, 'row')} valid")
+
+    def _repr_html_(self) -> str:
+        rows = ((r.asset, "" if r.is_valid else str(r).removeprefix(f"{r.asset}: ")) for r in self)
+        return as_html(repr(self), ("asset", "why not"), rows, len(self))
 
     @cached_property
     def _enabled(self) -> NDArray[np.bool_]:

@@ -280,7 +280,7 @@ class LiveContext(MutableMapping[str, object]):
         return explain(self._compiled, self.facts, self._unknown)
 
     def __repr__(self) -> str:
-        return one_line(self, self._compiled.name, f"{len(self)} of {plural(len(self._known), 'fact')} set")
+        return one_line("LiveContext", self._compiled.name, f"{len(self)} of {plural(len(self._known), 'fact')} set")
 
     def _settle(self) -> None:
         """Intersect what stands still; when too many facts have moved, let all of them stand still again."""

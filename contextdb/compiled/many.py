@@ -155,7 +155,7 @@ class ManyMatches(Unchanging, Sequence[Matches]):
         return (self._answer(context) for context in range(len(self)))
 
     def __repr__(self) -> str:
-        return one_line(self, self.compiled.name, f"{plural(len(self), 'context')} x {plural(self.n_rows, 'row')}")
+        return one_line("ManyMatches", self.compiled.name, f"{plural(len(self), 'context')} x {plural(self.n_rows, 'row')}")
 
     @cached_property
     def _counts_and_hits(self) -> tuple[Rows, Rows]:

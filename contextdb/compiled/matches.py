@@ -368,7 +368,8 @@ class Matches:
         bits = join(self.bits, other.bits)
         every = self.always_bits & other.always_bits if join is and_ else self.always_bits | other.always_bits
         tellers = (self,) if join is _minus else (self, other)
-        found = self._table.answer(bits, every & bits, tuple(stage for m in tellers for stage in m._stages))
+        stages = tuple((rows & m.bits, stage) for m in tellers for rows, stage in m._stages)
+        found = self._table.answer(bits, every & bits, stages)
         if costs := [m for m in tellers if m.has_penalties]:
             found.with_penalties(costs[0]._penalties if len(costs) == 1 or join is and_ else lambda: _costs_of_both(*costs))
         if self._table.is_mirroring:
@@ -417,7 +418,7 @@ class Matches:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return one_line(self, self._table.name, f"{len(self):,} of {plural(self.n_rows, 'row')}")
+        return one_line("Matches", self._table.name, f"{len(self):,} of {plural(self.n_rows, 'row')}")
 
     def _repr_html_(self) -> str:
         return as_html(repr(self), ("row", "asset"), ((row, self._table.assets[row]) for row in self))

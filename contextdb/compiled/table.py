@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     ManyContexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CompiledTable(CompiledData):
     """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`.
 

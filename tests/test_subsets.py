@@ -21,6 +21,7 @@ from test_mirroring import mirroring_tables, plain_in_mirror
 import contextdb as cdb
 from contextdb import motion
 from contextdb.bitmask import rows as rows_of
+from contextdb.errors import QueryError
 from contextdb.tables.table import Table
 
 OPERATORS = {"&": operator.and_, "|": operator.or_, "-": operator.sub, "^": operator.xor}
@@ -352,9 +353,7 @@ def test_a_motion_search_takes_fewer_rows_and_many_answers_where_there_are_many_
     assert database.search([0.0], many[0] - ["walk"]).asset == "limp"
     selector = motion.Selector([motion.Entry("moves", database)])
     for search in (database.search, selector.search):
-        with pytest.raises(
-            motion.QueryError, match=r"valid holds the answers for many contexts.*Try to give that of one: many\[i\]"
-        ):
+        with pytest.raises(QueryError, match=r"valid holds the answers for many contexts.*Try to give that of one: many\[i\]"):
             search([0.0], many)
 
 

@@ -294,6 +294,11 @@ def test_many_answers_with_sets_of_values_and_fewer_rows_are_those_of_single_que
         (many.only(alone[0]), [m.only(alone[0]) for m in alone]),
         (many.only(other), [m.only(o) for m, o in zip(alone, alone[::-1], strict=True)]),
         (many & other, [m & o for m, o in zip(alone, alone[::-1], strict=True)]),
+        (many | other, [m | o for m, o in zip(alone, alone[::-1], strict=True)]),
+        (many - other, [m - o for m, o in zip(alone, alone[::-1], strict=True)]),
+        (many ^ other, [m ^ o for m, o in zip(alone, alone[::-1], strict=True)]),
+        (many - flags, [m - f for m, f in zip(alone, flags, strict=True)]),
+        (many - alone[0].only([]), alone),
         ((many & other).only(flags), [(m & o).only(f) for m, o, f in zip(alone, alone[::-1], flags, strict=True)]),
     ):
         for same in (found, pickle.loads(pickle.dumps(found))):
@@ -328,6 +333,17 @@ def test_flags_or_answers_for_another_number_of_contexts_are_refused():
         many.only(np.ones((3, 3), np.bool_))
     with pytest.raises(cdb.ContextError, match="answers for 1 context, and for 2"):
         many.only(MOVES.query_many({"speed": [1.0], "is_hurt": [True]}))
+
+
+def test_answers_for_many_contexts_are_joined_with_such_answers_only():
+    many = MOVES.query_many({"speed": [1.0, 2.0], "is_hurt": [True, False]})
+    for join in (operator.or_, operator.xor):
+        with pytest.raises(
+            TypeError, match=r"many contexts cannot be joined with Matches\. Accepted: as many answers of the same table"
+        ):
+            join(many, many[0])
+    with pytest.raises(TypeError, match=r"pick is given the answers for many contexts.*Did you mean many\[i\]"):
+        MOVES.pick(many)
 
 
 def test_sets_of_values_for_many_contexts_hold_derived_facts_and_rules_too():

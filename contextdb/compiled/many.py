@@ -9,6 +9,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import and_, or_, xor
 from typing import Any, overload
 
 import numpy as np
@@ -19,10 +20,10 @@ from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import one_line
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.matches import Matches
+from contextdb.compiled.matches import Join, Matches, minus
 from contextdb.compiled.said_rows import SaidRows
 from contextdb.compiled.unchanging import Unchanging
-from contextdb.errors import ContextError, Fault, Place, plural
+from contextdb.errors import ContextError, Fault, Place, WrongType, plural
 
 BLOCK = 2048
 """Contexts whose masks are worked out together."""
@@ -30,7 +31,9 @@ BLOCK = 2048
 
 class ManyMatches(Unchanging, Sequence[Matches]):
     """The valid rows of many contexts: a sequence of `Matches`, each as `query` gives it, with or without actors. Results are
-    computed on first use and kept; arrays are read-only."""
+    computed on first use and kept; arrays are read-only. As with `Matches`, `&`, `|`, `-` and `^` join the answers for as many
+    contexts, each with its own; `&` and `-` also take what `only` takes.
+    """
 
     compiled: CompiledData
 
@@ -113,23 +116,41 @@ class ManyMatches(Unchanging, Sequence[Matches]):
         ContextError
             As `Matches.only`; flags or answers for another number of contexts.
         """
+        return FewerMatches(self, self._masks_said(rows))
+
+    def _masks_said(self, rows: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> Words:
+        """Some rows, for all contexts or for each: uint64 [1 or N, W]."""
         if isinstance(rows, ManyMatches):
-            return FewerMatches(self, self._beside(rows).mask)
+            return self._beside(rows).mask
         if isinstance(rows, np.ndarray) and rows.dtype == np.bool_ and rows.ndim == 2:
             if rows.shape != (len(self), self.n_rows):
                 found = (
                     f"there are flags of shape {rows.shape}, for {plural(len(self), 'context')} of {plural(self.n_rows, 'row')}."
                 )
                 raise ContextError(Fault(found, f"one bool for each row of each context: ({len(self)}, {self.n_rows})"))
-            return FewerMatches(self, read_only(bitmask.pack(rows.astype(np.bool_, copy=False))))
-        bits = self.compiled.answering.bits_of(rows)
-        return FewerMatches(self, bitmask.from_int(bits, self.n_rows)[None])
+            return read_only(bitmask.pack(rows.astype(np.bool_, copy=False)))
+        return bitmask.from_int(self.compiled.answering.bits_of(rows), self.n_rows)[None]
 
     def __and__(self, other: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> ManyMatches:
-        return FewerMatches(self, self._beside(other)) if isinstance(other, ManyMatches) else self.only(other)
+        return self._joined(other, and_) if isinstance(other, ManyMatches) else self.only(other)
 
     __rand__ = __and__
     __array_ufunc__ = None
+
+    def __sub__(self, other: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> ManyMatches:
+        return self._joined(other, minus) if isinstance(other, ManyMatches) else FewerMatches(self, ~self._masks_said(other))
+
+    def __or__(self, other: ManyMatches) -> ManyMatches:
+        return self._joined(other, or_)
+
+    def __xor__(self, other: ManyMatches) -> ManyMatches:
+        return self._joined(other, xor)
+
+    def _joined(self, other: object, join: Join) -> ManyMatches:
+        if not isinstance(other, ManyMatches):
+            found = f"the answers for many contexts cannot be joined with {type(other).__name__}."
+            raise WrongType(Fault(found, "as many answers of the same table"))
+        return JoinedMatches(self, self._beside(other), join)
 
     def _beside(self, other: ManyMatches) -> ManyMatches:
         """Other answers, which must be of the same table and for as many contexts."""
@@ -208,52 +229,77 @@ class ListedMatches(ManyMatches):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FewerMatches(ManyMatches):
-    """Answers without the rows that are not among others: those of other answers, or of masks, uint64 [1 or N, W]."""
+    """Answers without the rows that are not among some."""
 
     whole: ManyMatches
-    others: ManyMatches | Words
+    others: Words
+    """The rows to keep, for all contexts or for each: uint64 [1 or N, W]."""
 
     @property
     def compiled(self) -> CompiledData:  # type: ignore[override]
         """The table."""
         return self.whole.compiled
 
-    @property
-    def mirrored(self) -> ManyMatches:
-        """The valid rows of the same contexts with mirrored facts: fewer by the same rows, or by those of the others' mirror."""
-        return self._mirrored if self.compiled.mirroring else self
-
     @cached_property
-    def _mirrored(self) -> ManyMatches:
-        others = self.others
-        return FewerMatches(self.whole.mirrored, others.mirrored if isinstance(others, ManyMatches) else others)
+    def mirrored(self) -> ManyMatches:
+        """The valid rows of the same contexts with mirrored facts, without the same rows."""
+        return FewerMatches(self.whole.mirrored, self.others) if self.compiled.mirroring else self
 
     @cached_property
     def always(self) -> Words:
         """The rows that hold all values of set-valued facts: uint64 [N, W]."""
-        others = self.others
-        return read_only(self.whole.always & (others.always if isinstance(others, ManyMatches) else others))
+        return read_only(self.whole.always & self.others)
 
     def __len__(self) -> int:
         return len(self.whole)
 
-    def _answer(self, context: int) -> Matches:
-        found, others = self.whole[context], self.others
-        if isinstance(others, ManyMatches):
-            return found & others[context]
-        return found.kept(bitmask.to_int(others[context if len(others) > 1 else 0]))
-
     def __iter__(self) -> Iterator[Matches]:
-        if isinstance(self.others, ManyMatches):
-            return (one & other for one, other in zip(self.whole, self.others, strict=True))
         bits = [bitmask.to_int(mask) for mask in self.others]
         return (one.kept(bits[i if len(bits) > 1 else 0]) for i, one in enumerate(self.whole))
 
+    def _answer(self, context: int) -> Matches:
+        return self.whole[context].kept(bitmask.to_int(self.others[context if len(self.others) > 1 else 0]))
+
     def _masks(self, start: int, stop: int) -> Words:
-        whole, others = self.whole._masks(start, stop), self.others
-        if isinstance(others, ManyMatches):
-            return whole & others._masks(start, stop)
-        return whole & (others[start:stop] if len(others) > 1 else others)
+        return self.whole._masks(start, stop) & (self.others[start:stop] if len(self.others) > 1 else self.others)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JoinedMatches(ManyMatches):
+    """The answers of two for the same contexts, each with its own, joined as sets of rows."""
+
+    first: ManyMatches
+    second: ManyMatches
+    join: Join
+
+    @property
+    def compiled(self) -> CompiledData:  # type: ignore[override]
+        """The table."""
+        return self.first.compiled
+
+    @cached_property
+    def mirrored(self) -> ManyMatches:
+        """The answers with mirrored facts, joined in the same way."""
+        return JoinedMatches(self.first.mirrored, self.second.mirrored, self.join) if self.compiled.mirroring else self
+
+    @cached_property
+    def always(self) -> Words:
+        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
+        one, other = self.first.always, self.second.always
+        return read_only(self.mask & (one & other if self.join is and_ else one | other))
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def __iter__(self) -> Iterator[Matches]:
+        return (one.joined(other, self.join) for one, other in zip(self.first, self.second, strict=True))
+
+    def _answer(self, context: int) -> Matches:
+        return self.first[context].joined(self.second[context], self.join)
+
+    def _masks(self, start: int, stop: int) -> Words:
+        masks: Words = self.join(self.first._masks(start, stop), self.second._masks(start, stop))
+        return masks
 
 
 def one_by_one(

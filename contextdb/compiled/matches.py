@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from functools import partial
 from operator import and_, or_, xor
-from typing import Any, Protocol, Self, overload
+from typing import Any, Protocol, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,10 @@ from contextdb.cells.arguments import require_place
 from contextdb.cells.notebook import as_html, one_line
 from contextdb.compiled.said_rows import SaidRows, bits_said
 from contextdb.errors import ContextError, Fault, WrongType, in_quotes, nearest, plural, some
+
+Bits = TypeVar("Bits", int, Words)
+Join = Callable[[Any, Any], Any]
+"""How two answers are joined: a function of their rows, as integers or as masks."""
 
 _INT64 = np.dtype(np.int64)
 
@@ -87,14 +91,14 @@ class Answering:
             return said.bits
         return bits_said(said, len(self.assets), self.bits_of_assets)
 
-    def bits_of_assets(self, names: Iterable[str]) -> int:
+    def bits_of_assets(self, names: Sequence[str]) -> int:
         """The rows of some assets, with their paths or without; raises ContextError for one that the table does not have."""
         if not self._of_asset:
             self._of_asset = self._rows_by_asset()
         bits = 0
+        if unknown := set(names) - self._of_asset.keys():
+            raise self.no_asset(min(unknown))
         for name in names:
-            if name not in self._of_asset:
-                raise self.no_asset(name)
             bits |= self._of_asset[name]
         return bits
 
@@ -342,38 +346,38 @@ class Matches:
         return self.bits
 
     def __and__(self, other: SaidRows | Matches) -> Matches:
-        return self._joined(other, and_) if isinstance(other, Matches) else self.only(other)
+        return self.joined(other, and_) if isinstance(other, Matches) else self.only(other)
 
     __rand__ = __and__
 
     def __sub__(self, other: SaidRows | Matches) -> Matches:
-        return self._joined(other, _minus) if isinstance(other, Matches) else self.kept(~self._table.bits_of(other))
+        return self.joined(other, minus) if isinstance(other, Matches) else self.kept(~self._table.bits_of(other))
 
     def __or__(self, other: Matches) -> Matches:
-        return self._joined(other, or_)
+        return self.joined(other, or_)
 
     def __xor__(self, other: Matches) -> Matches:
-        return self._joined(other, xor)
+        return self.joined(other, xor)
 
     @property
     def _stages(self) -> Stages:
         """Who plays what in it; nothing for an answer without actors."""
         return ()
 
-    def _joined(self, other: object, join: Callable[[int, int], int]) -> Matches:
+    def joined(self, other: object, join: Join) -> Matches:
         """The answer of the rows that two answers of one table give together."""
         if not isinstance(other, Matches):
             raise WrongType(Fault(f"an answer cannot be joined with {type(other).__name__}.", "an answer of the same table"))
         other.require_own(self._table)
         bits = join(self.bits, other.bits)
         every = self.always_bits & other.always_bits if join is and_ else self.always_bits | other.always_bits
-        tellers = (self,) if join is _minus else (self, other)
+        tellers = (self,) if join is minus else (self, other)
         stages = tuple((rows & m.bits, stage) for m in tellers for rows, stage in m._stages)
         found = self._table.answer(bits, every & bits, stages)
         if costs := [m for m in tellers if m.has_penalties]:
             found.with_penalties(costs[0]._penalties if len(costs) == 1 or join is and_ else lambda: _costs_of_both(*costs))
         if self._table.is_mirroring:
-            found.with_mirrored(lambda: self.mirrored._joined(other.mirrored, join))
+            found.with_mirrored(lambda: self.mirrored.joined(other.mirrored, join))
         return found
 
     def require_own(self, table: Answering) -> None:
@@ -467,7 +471,8 @@ def rows_of(bits: int, numbers: Rows) -> Rows:
     return np.frombuffer(_PACK[len(found)](*found), _INT64)
 
 
-def _minus(rows: int, others: int) -> int:
+def minus(rows: Bits, others: Bits) -> Bits:
+    """The rows that are not among others."""
     return rows & ~others
 
 

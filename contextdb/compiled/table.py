@@ -27,6 +27,7 @@ from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick import pick
 from contextdb.compiled.preparing import prepare
+from contextdb.errors import Fault, WrongType
 
 if TYPE_CHECKING:
     import polars as pl
@@ -187,6 +188,8 @@ class CompiledTable(CompiledData):
         `contextdb.compiled.pick.pick`."""
         if old:
             return self.pick(context, rng, last, **by_name("pick", old, unknown=unknown, actors=actors, prefer=prefer))
+        if isinstance(context, ManyMatches):
+            raise WrongType(Fault("pick is given the answers for many contexts.", "a context, or the answer for one", "many[i]"))
         if not isinstance(context, Matches):
             context = self.query(context, unknown=unknown, actors=actors, prefer=prefer)
         return pick(self, context, rng, last)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import operator
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -54,7 +55,7 @@ WRONG: list[object] = [
     None, True, 0, -1, 1, 99, 2**70, 1.5, float("nan"), "", "x", "walk", "a\0b", "\ud800", b"x", [], [5], ["x"], [[]], [None], [{}],
     {}, {5: 5}, {"x": 5}, {"x": [5]}, {"speed": Odd()}, {"Defender": 5}, {"Defender": [5]}, {"Defender": [{5: 5}]},
     {"speed": [Odd()]}, {"speed": "abc"}, {"speed": [[1]], "gait": [1, 2]}, {"speed": np.zeros((2, 2))}, (1, 2, 3), {1},
-    np.zeros((2, 2)), np.arange(3), Odd(), Odd, len, Path("nowhere"), COMPILED.query(FACTS),
+    np.zeros((2, 2)), np.arange(3), Odd(), Odd, len, Path("nowhere"), COMPILED.query(FACTS), ANSWERS,
 ]  # fmt: skip
 FUNCTIONS = ("prefer)", "on_change)", "on_error)")
 """Arguments that are functions: what goes wrong in one that the caller gave is not ours to tell."""
@@ -72,6 +73,9 @@ CALLS: dict[str, Call] = {
     "from_columns(columns)": lambda x: Table.from_columns(x),  # type: ignore[arg-type]
     "from_columns(schema)": lambda x: Table.from_columns({"A": ["a"], "speed": ["1"]}, x),  # type: ignore[arg-type]
     "from_columns(settings)": lambda x: Table.from_columns({"A": ["a"]}, {}, x),  # type: ignore[arg-type]
+    "from_columns(columns), rows": lambda x: Table.from_columns([x]),  # type: ignore[list-item]
+    "from_columns(columns), a cell of a row": lambda x: Table.from_columns([{"A": "a", "speed": x}]),
+    "from_columns(settings), mapping": lambda x: Table.from_columns({"A": ["a"]}, {}, {"priority": x}),
     "from_columns(name)": lambda x: Table.from_columns({"A": ["a"]}, name=x),  # type: ignore[arg-type]
     "text(row)": lambda x: TABLE.text(x, "speed"),  # type: ignore[arg-type]
     "text(column)": lambda x: TABLE.text(0, x),  # type: ignore[arg-type]
@@ -124,6 +128,16 @@ CALLS: dict[str, Call] = {
     "matches.casting(row)": lambda x: CAST.casting(x),  # type: ignore[arg-type]
     "matches.castings(row)": lambda x: CAST.castings(x),  # type: ignore[arg-type]
     "matches.casting(row) without actors": lambda x: COMPILED.query(FACTS).casting(x),  # type: ignore[arg-type]
+    "matches[place]": lambda x: CAST[x],  # type: ignore[call-overload]
+    **{
+        f"{kind} {sign} rows": lambda x, one=one, join=join: list(join(one, x))
+        for kind, one in {"matches": CAST, "many": ANSWERS, "many with actors": CAST_ANSWERS}.items()
+        for sign, join in {"&": operator.and_, "|": operator.or_, "-": operator.sub, "^": operator.xor}.items()
+    },
+    "matches.only(rows)": lambda x: CAST.only(x),  # type: ignore[arg-type]
+    "many.only(rows)": lambda x: ANSWERS.only(x),  # type: ignore[arg-type]
+    "live.pick(rng)": lambda x: COMPILED.live(FACTS).pick(x),  # type: ignore[arg-type]
+    "live.pick(last)": lambda x: COMPILED.live(FACTS).pick(last=x),  # type: ignore[arg-type]
     "in matches(row)": lambda x: x in CAST,
     "many[context]": lambda x: ANSWERS[x],  # type: ignore[call-overload]
     "many[context] with actors": lambda x: CAST_ANSWERS[x],  # type: ignore[call-overload]

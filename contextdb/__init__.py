@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from contextdb.cells.facts import cell
-    from contextdb.compiled.batch import ManyMatches
     from contextdb.compiled.explain import Explanation, Failure, RowExplanation
     from contextdb.compiled.live import LiveContext
+    from contextdb.compiled.many import ManyMatches
     from contextdb.compiled.matches import Matches
     from contextdb.compiled.picker import Pick, Picker
     from contextdb.compiled.table import CompiledTable
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         QueryError,
         SchemaError,
         TableError,
+        WrongType,
     )
     from contextdb.findings import Finding
     from contextdb.tables.project import Project, load
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     from contextdb.tables.watching import watch
 
 _HOMES = {
-    "compiled.batch": ("ManyMatches",),
+    "compiled.many": ("ManyMatches",),
     "compiled.picker": ("Pick", "Picker"),
     "compiled.table": ("CompiledTable",),
     "console": ("__version__",),
@@ -72,6 +73,7 @@ _HOMES = {
         "QueryError",
         "SchemaError",
         "TableError",
+        "WrongType",
     ),
     "compiled.explain": ("Explanation", "Failure", "RowExplanation"),
     "cells.facts": ("cell",),
@@ -113,6 +115,7 @@ __all__ = [  # noqa: RUF022
     "NoSuchFact",
     "NoSuchOutput",
     "NoSuchPlace",
+    "WrongType",
     "PolicyError",
     "ArtefactError",
     "MotionError",

@@ -7,7 +7,7 @@ row, and whatever is worked out from a text (its cell, its mask) is worked out o
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,8 @@ class TextColumn:
     """
 
     name: str
-    texts: tuple[str, ...]
-    codes: Codes
+    texts: tuple[str, ...] = field(repr=False)
+    codes: Codes = field(repr=False)
 
     @classmethod
     def of(cls, name: str, texts: Iterable[str]) -> TextColumn:

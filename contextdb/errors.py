@@ -12,7 +12,8 @@ correction, in that order. One error reports all faults of a file together.
     ├── ContextError    facts that a query cannot use, or an invalid argument
     │   ├── NoSuchFact      a fact that does not exist; also a KeyError
     │   ├── NoSuchOutput    an output that a table does not have; also a KeyError
-    │   └── NoSuchPlace     a row, or a place in an answer, that does not exist; also an IndexError
+    │   ├── NoSuchPlace     a row, or a place in an answer, that does not exist; also an IndexError
+    │   └── WrongType       an argument of a type that is not accepted; also a TypeError
     ├── PolicyError     a table breaks its own policy
     ├── ArtefactError   a compiled file that is truncated, altered or from another version
     └── MotionError     clips, features and searches
@@ -134,6 +135,10 @@ class NoSuchOutput(ContextError, KeyError):
 
 class NoSuchPlace(ContextError, IndexError):
     """A row that a table does not have, or a place that an answer does not have."""
+
+
+class WrongType(ContextError, TypeError):
+    """An argument of a type that a function does not accept."""
 
 
 class PolicyError(ContextDBError):

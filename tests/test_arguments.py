@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import operator
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -54,7 +55,7 @@ WRONG: list[object] = [
     None, True, 0, -1, 1, 99, 2**70, 1.5, float("nan"), "", "x", "walk", "a\0b", "\ud800", b"x", [], [5], ["x"], [[]], [None], [{}],
     {}, {5: 5}, {"x": 5}, {"x": [5]}, {"speed": Odd()}, {"Defender": 5}, {"Defender": [5]}, {"Defender": [{5: 5}]},
     {"speed": [Odd()]}, {"speed": "abc"}, {"speed": [[1]], "gait": [1, 2]}, {"speed": np.zeros((2, 2))}, (1, 2, 3), {1},
-    np.zeros((2, 2)), np.arange(3), Odd(), Odd, len, Path("nowhere"), COMPILED.query(FACTS),
+    np.zeros((2, 2)), np.arange(3), Odd(), Odd, len, Path("nowhere"), COMPILED.query(FACTS), ANSWERS,
 ]  # fmt: skip
 FUNCTIONS = ("prefer)", "on_change)", "on_error)")
 """Arguments that are functions: what goes wrong in one that the caller gave is not ours to tell."""
@@ -72,6 +73,9 @@ CALLS: dict[str, Call] = {
     "from_columns(columns)": lambda x: Table.from_columns(x),  # type: ignore[arg-type]
     "from_columns(schema)": lambda x: Table.from_columns({"A": ["a"], "speed": ["1"]}, x),  # type: ignore[arg-type]
     "from_columns(settings)": lambda x: Table.from_columns({"A": ["a"]}, {}, x),  # type: ignore[arg-type]
+    "from_columns(columns), rows": lambda x: Table.from_columns([x]),  # type: ignore[list-item]
+    "from_columns(columns), a cell of a row": lambda x: Table.from_columns([{"A": "a", "speed": x}]),
+    "from_columns(settings), mapping": lambda x: Table.from_columns({"A": ["a"]}, {}, {"priority": x}),
     "from_columns(name)": lambda x: Table.from_columns({"A": ["a"]}, name=x),  # type: ignore[arg-type]
     "text(row)": lambda x: TABLE.text(x, "speed"),  # type: ignore[arg-type]
     "text(column)": lambda x: TABLE.text(0, x),  # type: ignore[arg-type]
@@ -95,15 +99,15 @@ CALLS: dict[str, Call] = {
     "save(path), compiled": lambda x: isinstance(x, (str, Path)) or COMPILED.save(x),  # type: ignore[arg-type]
     "way(row)": lambda x: COMPILED.way(x),  # type: ignore[arg-type]
     "query(context)": lambda x: COMPILED.query(x),  # type: ignore[arg-type]
-    "query(unknown)": lambda x: COMPILED.query({}, x),  # type: ignore[arg-type]
+    "query(unknown)": lambda x: COMPILED.query({}, unknown=x),  # type: ignore[arg-type]
     "query(actors)": lambda x: COMPILED.query(PLAIN, actors=x),  # type: ignore[arg-type]
     "query(prefer)": lambda x: COMPILED.query(PLAIN, actors=ACTORS, prefer=x),  # type: ignore[arg-type]
     "query_many(contexts)": lambda x: list(COMPILED.query_many(x)),  # type: ignore[arg-type]
-    "query_many(unknown)": lambda x: COMPILED.query_many(MANY, x),  # type: ignore[arg-type]
+    "query_many(unknown)": lambda x: COMPILED.query_many(MANY, unknown=x),  # type: ignore[arg-type]
     "query_many(actors)": lambda x: COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=x),  # type: ignore[arg-type]
     "query_many(actors), one": lambda x: COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=[x]),  # type: ignore[list-item]
     "live(facts)": lambda x: COMPILED.live(x).matches(),  # type: ignore[arg-type]
-    "live(unknown)": lambda x: COMPILED.live({}, x),  # type: ignore[arg-type]
+    "live(unknown)": lambda x: COMPILED.live({}, unknown=x),  # type: ignore[arg-type]
     "live[name]": lambda x: COMPILED.live(FACTS)[x],  # type: ignore[index]
     "live[name] =": lambda x: COMPILED.live(FACTS).__setitem__(x, 1.0),  # type: ignore[arg-type]
     "live.update(facts)": lambda x: COMPILED.live(FACTS).update(x),  # type: ignore[arg-type]
@@ -113,17 +117,27 @@ CALLS: dict[str, Call] = {
     "query_codes(codes)": lambda x: COMPILED.query_codes(x),  # type: ignore[arg-type]
     "explain(context)": lambda x: COMPILED.explain(x),  # type: ignore[arg-type]
     "explain(actors)": lambda x: COMPILED.explain(PLAIN, actors=x),  # type: ignore[arg-type]
-    "explain(unknown)": lambda x: COMPILED.explain({}, x),  # type: ignore[arg-type]
+    "explain(unknown)": lambda x: COMPILED.explain({}, unknown=x),  # type: ignore[arg-type]
     "pick(context)": lambda x: COMPILED.pick(x),  # type: ignore[arg-type]
     "pick(rng)": lambda x: COMPILED.pick(FACTS, x),  # type: ignore[arg-type]
     "pick(last)": lambda x: COMPILED.pick(FACTS, last=x),  # type: ignore[arg-type]
     "pick(unknown)": lambda x: COMPILED.pick({}, unknown=x),  # type: ignore[arg-type]
     "penalties(context)": lambda x: COMPILED.penalties(x),  # type: ignore[arg-type]
-    "penalties(unknown)": lambda x: COMPILED.penalties({}, x),  # type: ignore[arg-type]
+    "penalties(unknown)": lambda x: COMPILED.penalties({}, unknown=x),  # type: ignore[arg-type]
     "cell(text)": lambda x: COMPILED.query({**FACTS, "speed": cdb.cell(x)}),  # type: ignore[arg-type]
     "matches.casting(row)": lambda x: CAST.casting(x),  # type: ignore[arg-type]
     "matches.castings(row)": lambda x: CAST.castings(x),  # type: ignore[arg-type]
     "matches.casting(row) without actors": lambda x: COMPILED.query(FACTS).casting(x),  # type: ignore[arg-type]
+    "matches[place]": lambda x: CAST[x],  # type: ignore[call-overload]
+    **{
+        f"{kind} {sign} rows": lambda x, one=one, join=join: list(join(one, x))
+        for kind, one in {"matches": CAST, "many": ANSWERS, "many with actors": CAST_ANSWERS}.items()
+        for sign, join in {"&": operator.and_, "|": operator.or_, "-": operator.sub, "^": operator.xor}.items()
+    },
+    "matches.only(rows)": lambda x: CAST.only(x),  # type: ignore[arg-type]
+    "many.only(rows)": lambda x: ANSWERS.only(x),  # type: ignore[arg-type]
+    "live.pick(rng)": lambda x: COMPILED.live(FACTS).pick(x),  # type: ignore[arg-type]
+    "live.pick(last)": lambda x: COMPILED.live(FACTS).pick(last=x),  # type: ignore[arg-type]
     "in matches(row)": lambda x: x in CAST,
     "many[context]": lambda x: ANSWERS[x],  # type: ignore[call-overload]
     "many[context] with actors": lambda x: CAST_ANSWERS[x],  # type: ignore[call-overload]
@@ -147,7 +161,7 @@ CALLS: dict[str, Call] = {
 
 def live_with(actors: object, prefer: object = None) -> cdb.LiveContext:
     live = COMPILED.live(PLAIN)
-    live.actors(actors, prefer)  # type: ignore[arg-type]
+    live.actors(actors, prefer=prefer)  # type: ignore[arg-type]
     return live
 
 

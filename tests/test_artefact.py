@@ -100,12 +100,14 @@ def test_an_opened_table_answers_as_the_saved_one(tmp_path_factory, flat_bytes: 
     after = CompiledTable.open(saved(before, tmp_path_factory.getbasetemp()))
     context, _ = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
     for unknown in ("any", "never"):
-        one, other = before.query(context, unknown), after.query(context, unknown)
+        one, other = before.query(context, unknown=unknown), after.query(context, unknown=unknown)
         assert one == other
         assert one.assets == other.assets
         assert one.always.tolist() == other.always.tolist()
-        assert before.penalties(context, unknown).tolist() == after.penalties(context, unknown).tolist()
-        assert [str(r) for r in before.explain(context, unknown)] == [str(r) for r in after.explain(context, unknown)]
+        assert before.penalties(context, unknown=unknown).tolist() == after.penalties(context, unknown=unknown).tolist()
+        assert [str(r) for r in before.explain(context, unknown=unknown)] == [
+            str(r) for r in after.explain(context, unknown=unknown)
+        ]
 
 
 @COLUMNS
@@ -349,4 +351,4 @@ def test_a_file_that_may_not_be_read_is_no_broken_artefact(small: Path):
 
 def test_a_parquet_of_contexts_can_be_asked_of_an_opened_table(small: Path):
     contexts = pl.DataFrame({"x": [1.5, 9.0, None], "y": [True, False, True]})
-    assert CompiledTable.open(small).query_many(contexts, "any").counts.tolist() == [1, 1, 1]
+    assert CompiledTable.open(small).query_many(contexts, unknown="any").counts.tolist() == [1, 1, 1]

@@ -181,7 +181,7 @@ def python_says(compiled: CompiledTable, unknown: str, facts: Facts) -> tuple[in
     """Status and rows, as one integer."""
     if unknown == "error" and any(facts.get(c.name) is None for c in compiled.conditions):
         return MISSING_FACT, 0
-    return OK, compiled.query(facts, unknown).bits  # type: ignore[arg-type]
+    return OK, compiled.query(facts, unknown=unknown).bits  # type: ignore[arg-type]
 
 
 def random_cells(rng: random.Random, n_rows: int, columns: Sequence[str], assets: Sequence[str]) -> Table:

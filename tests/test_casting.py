@@ -174,10 +174,10 @@ def test_actors_that_cannot_be_read_are_refused_with_the_reason(actors, told):
 def test_a_missing_fact_of_an_actor_is_refused_ignored_or_accepted_by_any_alone():
     compiled = table_of([{"Defender.kind": "a"}, {"Mandatory_Slots": "Defender"}])
     actors = {"Defender": [{"Defender.kind": None}]}
-    assert compiled.query({"is_wet": True}, "any", actors).indices.tolist() == [0, 1]
-    assert compiled.query({"is_wet": True}, "never", actors).indices.tolist() == [1]
+    assert compiled.query({"is_wet": True}, unknown="any", actors=actors).indices.tolist() == [0, 1]
+    assert compiled.query({"is_wet": True}, unknown="never", actors=actors).indices.tolist() == [1]
     with pytest.raises(ContextError, match="missing"):
-        compiled.query({"is_wet": True}, "error", actors)
+        compiled.query({"is_wet": True}, unknown="error", actors=actors)
 
 
 def test_without_actors_a_role_s_fact_is_a_plain_fact_and_nobody_is_cast():

@@ -53,7 +53,7 @@ def speed_table(*cells: str) -> CompiledTable:
 
 
 def found(table: CompiledTable, context: dict[str, object], unknown: str = "error") -> list[int]:
-    return table.query(context, unknown).indices.tolist()
+    return table.query(context, unknown=unknown).indices.tolist()
 
 
 # ---- a query is what reading every cell finds
@@ -84,7 +84,7 @@ def test_missing_facts_are_ignored_or_accepted_by_any_alone(flat_bytes, table, u
 def test_sets_of_values_find_the_rows_that_may_and_that_always_match(flat_bytes, table, unknown, data):
     context, plain = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
     with keeping(flat_bytes):
-        answer = table.compile().query(context, unknown)
+        answer = table.compile().query(context, unknown=unknown)
     assert answer.indices.tolist() == oracles.rows(table, plain, unknown)
     assert bitmask.rows(answer.always).tolist() == oracles.rows_always(table, plain, unknown)
 
@@ -96,7 +96,7 @@ def test_codes_find_what_their_context_finds(flat_bytes, engine, table, unknown,
     context, plain = data.draw(strategies.contexts(table, has_missing=True))
     with keeping(flat_bytes), mock.patch.object(batch, "load_kernels", return_value=engine):
         ready = table.compile()
-        codes = ready.encode(context, unknown)
+        codes = ready.encode(context, unknown=unknown)
         assert ready.query_codes(codes).indices.tolist() == oracles.rows(table, plain, unknown)
     assert codes.dtype == np.int32
 
@@ -106,7 +106,7 @@ def test_codes_find_what_their_context_finds(flat_bytes, engine, table, unknown,
 def test_penalties_are_the_sum_of_the_soft_cells_that_do_not_match(flat_bytes, table, unknown, data):
     context, plain = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
     with keeping(flat_bytes):
-        costs = table.compile().penalties(context, unknown)
+        costs = table.compile().penalties(context, unknown=unknown)
     assert costs.dtype == np.float64
     assert costs.tolist() == pytest.approx(oracles.costs(table, plain, unknown))
 
@@ -175,8 +175,8 @@ def test_every_way_to_ask_takes_or_refuses_an_odd_number_alike(fact):
     ways = [
         lambda: found(table, {"speed": fact}, "never"),
         lambda: table.live({"speed": fact}, unknown="never").matches().indices.tolist(),
-        lambda: table.query_codes(table.encode({"speed": fact}, "never")).indices.tolist(),
-        lambda: table.query_many({"speed": [fact, fact]}, "never").lists()[1].tolist(),
+        lambda: table.query_codes(table.encode({"speed": fact}, unknown="never")).indices.tolist(),
+        lambda: table.query_many({"speed": [fact, fact]}, unknown="never").lists()[1].tolist(),
     ]
     answers = [answer_of(way) for way in ways]
     assert answers == answers[:1] * 4
@@ -332,7 +332,7 @@ COMPLETE = {"speed": 3.0, "state": "Top", "tags": ["InAir"]}
 def said_of(changes: dict[str, object], unknown: str = "error") -> str:
     context = {name: fact for name, fact in {**COMPLETE, **changes}.items() if fact is not ...}
     with pytest.raises(ContextError) as caught:
-        compiled(DECLARED).query(context, unknown)
+        compiled(DECLARED).query(context, unknown=unknown)
     return str(caught.value)
 
 
@@ -455,9 +455,9 @@ def test_a_declared_fact_of_another_table_is_no_slip_for_a_missing_one(unknown, 
     facts = {"Defender.CatchingAnim": True}
     for asked in (table, cdb.CompiledTable.open(tmp_path / "table.safetensors")):
         rows = [0] if unknown == "any" else []
-        assert list(asked.query(facts, unknown)) == rows
-        assert asked.query_many({name: [value] for name, value in facts.items()}, unknown).counts.tolist() == [len(rows)]
+        assert list(asked.query(facts, unknown=unknown)) == rows
+        assert asked.query_many({name: [value] for name, value in facts.items()}, unknown=unknown).counts.tolist() == [len(rows)]
         actors = {"Defender": [{"CatchingAnim": True}]}
-        assert list(asked.query({}, unknown, actors=actors)) == rows
+        assert list(asked.query({}, unknown=unknown, actors=actors)) == rows
         with pytest.raises(ContextError, match=r'Did you mean "Defender\.Catching"'):
-            asked.query({"Defender.Catchin": True}, unknown)
+            asked.query({"Defender.Catchin": True}, unknown=unknown)

@@ -82,7 +82,7 @@ def test_one_day_after_the_other_is_answered_as_all_at_once():
     for column in columns:
         assert [rows.tolist() for rows in compiled.query_many({"day": column}).lists()] == ROWS
     frame = pl.DataFrame({"day": [*DAYS, None]})
-    assert [rows.tolist() for rows in compiled.query_many(frame, "any").lists()] == [*ROWS, [0, 1, 2]]
+    assert [rows.tolist() for rows in compiled.query_many(frame, unknown="any").lists()] == [*ROWS, [0, 1, 2]]
 
 
 def test_a_set_of_days_is_written_as_a_cell():
@@ -155,7 +155,7 @@ def test_a_date_is_derived_from_another_and_one_beyond_the_calendar_is_missing()
     schema = {"day": {"type": "date"}, "end": {"type": "date", "expr": "day + 7"}}
     compiled = Table.from_columns({"Asset": ["a", "b"], "end": ["2026-01-08", "not 2026-01-08"]}, schema).compile()
     assert compiled.query({"day": "2026-01-01"}).assets == ["a"]
-    assert [r.tolist() for r in compiled.query_many({"day": [date(2026, 1, 1), date.max]}, "never").lists()] == [[0], []]
+    assert [r.tolist() for r in compiled.query_many({"day": [date(2026, 1, 1), date.max]}, unknown="never").lists()] == [[0], []]
     with pytest.raises(ContextDBError):
         compiled.query({"day": date.max})
 

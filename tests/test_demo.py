@@ -39,7 +39,7 @@ def test_of_two_teams_it_casts_the_nearest_who_fits_and_says_of_everybody_near_w
     assert len({p["id"] for p in everybody}) == 22
     compiled = Project.load(sample_folder())["contested_catch"].compile()
     fitting = [
-        p for p in everybody if compiled.query({**CATCH, **{f"Defender.{f}": p.get(f) for f in p}}, "never").assets
+        p for p in everybody if compiled.query({**CATCH, **{f"Defender.{f}": p.get(f) for f in p}}, unknown="never").assets
     ]  # without actors: each player's facts as plain facts
     told = list(cast_lines(compiled))
     cast = [line for line in told if "Defender is" in line]

@@ -120,8 +120,8 @@ def doubles(facts: dict[str, Any]) -> dict[str, Any]:
 
 @given(FACTS, MODES)
 def test_a_query_answers_as_if_the_derived_facts_had_been_computed_by_hand_and_given(facts, unknown):
-    expected = given_like_any_other().query(by_hand(doubles(facts)), unknown)
-    found = compiled().query(facts, unknown)
+    expected = given_like_any_other().query(by_hand(doubles(facts)), unknown=unknown)
+    found = compiled().query(facts, unknown=unknown)
     assert found.assets == expected.assets
     assert found.penalties.tolist() == expected.penalties.tolist()
 
@@ -130,8 +130,8 @@ def test_a_query_answers_as_if_the_derived_facts_had_been_computed_by_hand_and_g
 def test_many_contexts_at_once_get_the_answers_of_each(contexts, unknown):
     table = compiled()
     columns = {name: [facts[name] for facts in contexts] for name in contexts[0]}
-    many = table.query_many(columns, unknown)
-    assert [rows.tolist() for rows in many.lists()] == [table.query(facts, unknown).indices.tolist() for facts in contexts]
+    many = table.query_many(columns, unknown=unknown)
+    assert [rows.tolist() for rows in many.lists()] == [table.query(facts, unknown=unknown).indices.tolist() for facts in contexts]
 
 
 @given(st.lists(st.tuples(st.sampled_from(["speed", "target_speed", "heading", "is_hurt"]), FACTS, st.booleans())), MODES)
@@ -141,9 +141,9 @@ def test_a_live_context_answers_as_a_query_with_its_facts_does(changes, unknown)
     for name, facts, asks in changes:
         live[name] = facts[name]
         if asks:
-            assert live.matches().assets == table.query(live.facts, unknown).assets
-    assert live.matches().assets == table.query(live.facts, unknown).assets
-    assert live.matches().penalties.tolist() == table.query(live.facts, unknown).penalties.tolist()
+            assert live.matches().assets == table.query(live.facts, unknown=unknown).assets
+    assert live.matches().assets == table.query(live.facts, unknown=unknown).assets
+    assert live.matches().penalties.tolist() == table.query(live.facts, unknown=unknown).penalties.tolist()
 
 
 WHOLE = {"speed": 6.0, "target_speed": 2.0, "heading": 88.0, "is_hurt": False}

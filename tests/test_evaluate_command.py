@@ -255,7 +255,7 @@ def test_each_context_of_a_file_is_answered_as_when_it_is_asked_alone(
         pl.DataFrame(texts, schema=dict.fromkeys(texts, pl.String)).with_columns(frame=pl.lit("1")).write_csv(path)
         facts = [{n: None if f == frozenset() else f for n, f in fact.items()} for fact in facts]
     many = read_contexts(path, compiled).ask(compiled, unknown)
-    alone = [compiled.query(fact, unknown).indices.tolist() for fact in facts]
+    alone = [compiled.query(fact, unknown=unknown).indices.tolist() for fact in facts]
     assert [rows.tolist() for rows in many.lists()] == alone
     assert many.counts.tolist() == [len(rows) for rows in alone]
     assert many.hits.tolist() == [sum(row in rows for rows in alone) for row in range(table.n_rows)]

@@ -35,7 +35,7 @@ def table_of(kind: str, *cells: str, **more: object) -> CompiledTable:
 
 def mend_of(kind: str, text: str, fact: object, unknown: str = "error", **more: object) -> str:
     """The cell that is suggested instead of one that fails."""
-    (failure,) = table_of(kind, text, **more).explain({"x": fact}, unknown).row(0).failures
+    (failure,) = table_of(kind, text, **more).explain({"x": fact}, unknown=unknown).row(0).failures
     return failure.mend
 
 
@@ -83,7 +83,7 @@ def width(domain: Domain, masks: ColumnMasks) -> float:
 @given(strategies.tables(), st.data(), UNKNOWN)
 def test_each_row_fails_with_the_cells_that_reading_them_finds(table: Table, data: st.DataObject, unknown: str):
     context, plain = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
-    explanation = table.compile().explain(context, unknown)
+    explanation = table.compile().explain(context, unknown=unknown)
     assert len(explanation) == table.n_rows
     for row in range(table.n_rows):
         found = explanation.row(row)
@@ -99,7 +99,7 @@ def test_each_row_fails_with_the_cells_that_reading_them_finds(table: Table, dat
 def test_rows_come_valid_first_then_with_fewest_failures_then_the_least_far_off(table: Table, data: st.DataObject, unknown: str):
     context, plain = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
     compiled = table.compile()
-    explanation = compiled.explain(context, unknown)
+    explanation = compiled.explain(context, unknown=unknown)
     order = explanation.order.tolist()
     assert sorted(order) == list(range(table.n_rows))
     n_failures = [len(failing(table, plain, r, unknown)) + (not oracles.is_enabled(table, r)) for r in range(table.n_rows)]
@@ -115,7 +115,7 @@ def test_rows_come_valid_first_then_with_fewest_failures_then_the_least_far_off(
 @given(strategies.tables(), st.data(), UNKNOWN)
 def test_rows_with_the_same_cells_stay_in_the_order_of_the_file(table: Table, data: st.DataObject, unknown: str):
     context, _ = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
-    place = np.argsort(table.compile().explain(context, unknown).order)
+    place = np.argsort(table.compile().explain(context, unknown=unknown).order)
     cells = [tuple(texts[row] for _, _, texts in oracles.columns(table)) for row in range(table.n_rows)]
     keys = [(oracles.is_enabled(table, row), cells[row]) for row in range(table.n_rows)]
     for key in set(keys):
@@ -126,10 +126,10 @@ def test_rows_with_the_same_cells_stay_in_the_order_of_the_file(table: Table, da
 @given(strategies.tables(), st.data(), UNKNOWN)
 def test_a_row_whose_failing_cells_are_changed_as_said_is_valid(table: Table, data: st.DataObject, unknown: str):
     context, _ = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
-    explanation = table.compile().explain(context, unknown)
+    explanation = table.compile().explain(context, unknown=unknown)
     rows = explanation.order.tolist()[:: max(1, table.n_rows // 8)]
     edits = [(row, f.condition, f.mend) for row in rows for f in explanation.row(row).failures]
-    mended = table.with_cells(edits).compile().query(context, unknown)
+    mended = table.with_cells(edits).compile().query(context, unknown=unknown)
     assert [row for row in rows if oracles.is_enabled(table, row) and row not in mended] == []
 
 
@@ -137,7 +137,7 @@ def test_a_row_whose_failing_cells_are_changed_as_said_is_valid(table: Table, da
 def test_a_changed_cell_still_accepts_all_that_the_old_one_did(table: Table, data: st.DataObject, unknown: str):
     context, _ = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
     domains = {name: domain for name, domain, _ in oracles.columns(table)}
-    failures = {(f.condition, f.cell, f.mend) for row in table.compile().explain(context, unknown) for f in row.failures}
+    failures = {(f.condition, f.cell, f.mend) for row in table.compile().explain(context, unknown=unknown) for f in row.failures}
     for name, old, new in failures:
         for value in oracles.representatives([old, new], domains[name]):
             assert oracles.accepts(new, domains[name], value) or not oracles.accepts(old, domains[name], value)
@@ -226,7 +226,7 @@ def test_a_set_of_facts_is_added_as_a_whole():
 def test_only_any_accepts_a_missing_fact():
     assert mend_of("number", "0..5", None, "never") == "Any"
     assert mend_of("text", "run", None, "never") == "Any"
-    (failure,) = table_of("number", "0..5").explain({}, "never").row(0).failures
+    (failure,) = table_of("number", "0..5").explain({}, unknown="never").row(0).failures
     assert str(failure) == "x is (missing), the cell says 0..5"
 
 

@@ -344,7 +344,7 @@ def test_any_python_value_as_a_fact_is_answered_or_refused(name: str, value: obj
         except ContextError as error:
             assert str(error)  # noqa: PT017
     try:
-        compiled.query_many({k: [v] for k, v in context.items()}, "any")
+        compiled.query_many({k: [v] for k, v in context.items()}, unknown="any")
     except ContextError as error:
         assert str(error)  # noqa: PT017
 

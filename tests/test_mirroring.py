@@ -100,9 +100,9 @@ def test_the_answer_in_a_mirror_holds_the_rows_whose_cells_accept_the_mirrored_f
     unknown = data.draw(st.sampled_from(["any", "never"]))
     expected = oracles.rows(table, plain_in_mirror(table, plain, facts), unknown)
     compiled = table.compile()
-    answer = compiled.query(facts, unknown)
-    live = compiled.live(facts, unknown).matches()
-    again = compiled.live(facts, unknown).matches()
+    answer = compiled.query(facts, unknown=unknown)
+    live = compiled.live(facts, unknown=unknown).matches()
+    again = compiled.live(facts, unknown=unknown).matches()
     for found in (answer, live, again):
         assert found.mirrored.indices.tolist() == expected
         assert found.mirrored.mirrored.indices.tolist() == found.indices.tolist() == oracles.rows(table, plain, unknown)
@@ -218,7 +218,7 @@ def test_a_derived_fact_that_the_mirror_leaves_without_value_is_said_to_be_asked
         _ = answer.mirrored
     with pytest.raises(ContextError, match="with mirrored facts"):
         _ = compiled.query_many({"side": [2.0]}).mirrored
-    assert not compiled.query({"side": 2.0}, "never").mirrored
+    assert not compiled.query({"side": 2.0}, unknown="never").mirrored
 
 
 def test_rules_are_asked_with_mirrored_facts():

@@ -159,12 +159,12 @@ def test_a_renamed_condition_answers_as_before(only_here: bool, old: str, new: s
     facts = {name: data.draw(st.sampled_from([0.0, 2.5, 4.5, 8.5])) for name in ("speed", "target")}
     with tempfile.TemporaryDirectory() as name:
         folder = write(Path(name))
-        before = {n: table.compile().query(facts, "any").assets for n, table in Project.load(folder).tables.items()}
+        before = {n: table.compile().query(facts, unknown="any").assets for n, table in Project.load(folder).tables.items()}
         renaming(load(folder / "a.csv"), old, new, only_here).write()
         now = Project.load(folder)
         both = {**facts, new: facts[old]}
         for n, table in now.tables.items():
             known = {fact: value for fact, value in both.items() if fact in table.compile().asked}
-            assert table.compile().query(known, "any").assets == before[n]
+            assert table.compile().query(known, unknown="any").assets == before[n]
             assert not check_cases(table, read_cases(folder / f"{n}.cases.csv"))
         assert {f.level for f in check(now.tables["a"])} <= {"info", "warning"}

@@ -362,7 +362,7 @@ def test_a_table_out_of_a_pickle_answers_the_same_before_and_after_it_was_asked(
     assert compiled.query(given_facts, unknown="never").indices.tolist() == rows
     for one in (pickle.loads(before), again(compiled), again(table).compile()):
         assert one.query(given_facts, unknown="never").indices.tolist() == rows
-        assert told(lambda one=one: one.live(given_facts, "never").matches()) == told(
+        assert told(lambda one=one: one.live(given_facts, unknown="never").matches()) == told(
             lambda: compiled.query(given_facts, unknown="never")
         )
 
@@ -544,10 +544,10 @@ def test_each_of_many_answers_is_that_of_a_query(table: Table, data: st.DataObje
     compiled = table.compile()
     drawn = [data.draw(strategies.contexts(table, has_missing=True)) for _ in range(3)]
     contexts = [{name: given_facts.get(name) for name in plain} for given_facts, plain in drawn]
-    many = compiled.query_many({name: [c[name] for c in contexts] for name in contexts[0]}, "never")
+    many = compiled.query_many({name: [c[name] for c in contexts] for name in contexts[0]}, unknown="never")
     mask = many.mask if data.draw(st.booleans()) else None
     for context, matches in zip(contexts, many, strict=True):
-        assert told(lambda matches=matches: matches) == told(lambda context=context: compiled.query(context, "never"))
+        assert told(lambda matches=matches: matches) == told(lambda context=context: compiled.query(context, unknown="never"))
     assert mask is None or [m.mask.tolist() for m in many] == mask.tolist()
 
 
@@ -560,10 +560,8 @@ def test_what_soft_cells_cost_is_that_of_the_moment_of_the_question():
 
 
 @pytest.mark.parametrize("fact", [cdb.cell("0..5"), "0 ± 90"])
-def test_sets_of_values_are_refused_for_many_contexts_with_the_way_to_ask_them(fact):
-    with pytest.raises(cdb.ContextError) as caught:
-        MOVES.query_many({"speed": [1.0, fact], "is_hurt": [True, True]})
-    assert str(caught.value) == (
-        'row 2, column "speed": a set of values is for one query at a time. Accepted: one value in each context. '
-        "Try to query these contexts one by one: query(facts)."
-    )
+def test_a_set_of_values_among_many_contexts_gives_the_answer_of_a_query(fact):
+    many = MOVES.query_many({"speed": [1.0, fact], "is_hurt": [True, True]})
+    alone = MOVES.query({"speed": fact, "is_hurt": True})
+    assert (many[1], many.always[1].tolist()) == (alone, alone.always.tolist())
+    assert (many.counts.tolist(), many.hits.tolist()) == ([2, len(alone)], [2, 0, 2])

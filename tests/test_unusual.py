@@ -108,7 +108,7 @@ def test_a_fault_of_ours_in_a_query_comes_out_as_itself(flat_bytes: int, fault: 
     with mock.patch("contextdb.compiled.lookup.bisect_right", side_effect=fault("ours")):
         table = compiled(flat_bytes)
         with pytest.raises(fault, match="ours"):
-            table.query(FACTS, unknown)  # type: ignore[arg-type]
+            table.query(FACTS, unknown=unknown)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("fault", [AttributeError, AssertionError, IndexError, ZeroDivisionError, NameError])
@@ -146,7 +146,7 @@ def test_a_context_that_is_no_mapping_is_refused(more: dict[str, dict[str, objec
         re.match("x", "x"),
     ):
         with pytest.raises(ContextError, match="a context is a mapping of facts"):
-            table.query(context, unknown)  # type: ignore[arg-type]
+            table.query(context, unknown=unknown)  # type: ignore[arg-type]
 
 
 def test_an_actor_that_becomes_odd_is_refused_by_name():

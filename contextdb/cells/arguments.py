@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from operator import index
 from pathlib import Path
 from typing import Any
 
-from contextdb.errors import ContextError, Fault, FileError, NoSuchPlace, Place, in_quotes, plural
+from contextdb.errors import ContextError, Fault, FileError, NoSuchPlace, Place, WrongType, in_quotes, plural
 
 MOST = 1e9
 """The most seconds, or whatever else is waited for or counted."""
@@ -51,7 +52,8 @@ def require_number(value: object, what: str) -> float:
     """A number from 0 up, not infinite."""
     if isinstance(value, (int, float)) and 0.0 <= value <= MOST:
         return float(value)
-    raise _wrong(value, what, f"a number from 0 to {MOST:g}")
+    error = _wrong(value, what, f"a number from 0 to {MOST:g}")
+    raise ContextError(*error.faults) if isinstance(value, (int, float)) else error
 
 
 def require_path(value: object, what: str = "path") -> Path:
@@ -75,6 +77,26 @@ def require_path(value: object, what: str = "path") -> Path:
         found = "the path holds a character that no name of a file can hold."
         raise FileError(Fault(found, place=Place(str(path)), rule="no-such-path"))
     return path
+
+
+def by_name(call: str, given: Sequence[object], **named: Any) -> dict[str, Any]:
+    """The arguments of a function that takes them by name now, where the first were given by position; warns that they were.
+
+    Parameters
+    ----------
+    call : str
+        What is called, for the warning.
+    given : sequence
+        The arguments that were given by position.
+    named
+        The arguments that are to be given by name, in the order in which they could be given by position.
+    """
+    if len(given) > len(named):
+        raise WrongType(Fault(f"{call} is given {plural(len(given) - len(named), 'argument')} too many.", ", ".join(named)))
+    now = dict(zip(named, given, strict=False))
+    told = ", ".join(f"{name}=..." for name in now)
+    warnings.warn(f"{call}: give {told} by name; the next minor version takes it in no other way", DeprecationWarning, stacklevel=3)
+    return {**named, **now}
 
 
 def require_mapping(value: object, what: str, accepted: str) -> Mapping[Any, Any]:
@@ -103,10 +125,10 @@ def require_kind(value: object, kinds: type | tuple[type, ...], what: str, accep
         raise _wrong(value, what, accepted)
 
 
-def _wrong(value: object, what: str, accepted: str) -> ContextError:
+def _wrong(value: object, what: str, accepted: str) -> WrongType:
     if isinstance(value, (str, int, float)):
-        return ContextError(Fault(f"{what} is {type(value).__name__} {in_quotes(_text_of(value))}.", accepted))
-    return ContextError(Fault(f"{what} is of type {type(value).__name__}.", accepted))
+        return WrongType(Fault(f"{what} is {type(value).__name__} {in_quotes(_text_of(value))}.", accepted))
+    return WrongType(Fault(f"{what} is of type {type(value).__name__}.", accepted))
 
 
 def _text_of(value: object) -> str:

@@ -38,7 +38,7 @@ def cast_lines(compiled: CompiledTable) -> Iterator[str]:
     """Who is near, which rows are valid with whom, and why another who is near cannot play the part."""
     everybody = players()
     near = sorted((p for p in everybody if _distance(p) < NEAR_M), key=_distance)
-    matches = compiled.query(CATCH, "never", actors={"Defender": everybody}, prefer="distance")
+    matches = compiled.query(CATCH, unknown="never", actors={"Defender": everybody}, prefer="distance")
     yield f"   MidAir_Catch_Direction  =  {CATCH['MidAir_Catch_Direction']}"
     yield f"   {len(everybody)} players, all offered as Defender; these are within {NEAR_M:g} m:"
     yield from aligned([_shown(player) for player in near], indent="     ")
@@ -73,6 +73,6 @@ def _shown(player: Player) -> tuple[str, ...]:
 
 def _why_not(compiled: CompiledTable, player: Player, row: int) -> str:
     """The facts of one player that are in his way."""
-    explanation = compiled.explain(CATCH, "never", actors={"Defender": [player]})
+    explanation = compiled.explain(CATCH, unknown="never", actors={"Defender": [player]})
     assert isinstance(explanation, CastExplanation)
     return "; ".join(str(failure) for failure in explanation.row(row).failures)

@@ -102,7 +102,7 @@ class Stage:
             raise ContextDBError(Fault(found, f"table = … in [databases.NAME] of {SCHEMA_FILE}"))
         facts = facts_of(given, tables)
         with missing_facts_by_option():
-            matches = {table: tables[table].query(facts[table], unknown) for table in tables}
+            matches = {table: tables[table].query(facts[table], unknown=unknown) for table in tables}
         every = {name: fact for each in facts.values() for name, fact in each.items()}
         return {name: matches[table] for name in names if (table := self.config.databases[name].table) is not None}, every
 

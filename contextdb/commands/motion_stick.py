@@ -124,7 +124,7 @@ class Moments:
         facts = {name: each.facts.select(known[name]).to_dicts() for name, each in read.items()}
         n_moments = max(map(len, facts.values()))
         merged = [_given([each[i] for each in facts.values()]) for i in range(n_moments)]
-        answers = {name: [tables[name].query(_given([row]), unknown) for row in facts[name]] for name in facts}
+        answers = {name: [tables[name].query(_given([row]), unknown=unknown) for row in facts[name]] for name in facts}
         valid = [{database: answers[table][i] for database, table in table_of.items()} for i in range(n_moments)]
         return cls(merged, valid)
 

@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         raise ContextError(Fault("there are no actors to choose from.", 'facts of actors, such as "Defender[0].distance=2"'))
     context = read_facts(plain, compiled)
     with missing_facts_by_option():
-        explanation = compiled.explain(context, arguments.unknown, actors, arguments.prefer)
+        explanation = compiled.explain(context, unknown=arguments.unknown, actors=actors, prefer=arguments.prefer)
     with output():
         if arguments.json:
             print(as_json(_document(compiled, explanation, arguments.explain, arguments.most)), end="")

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import os
 import sys
-from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import ModuleType
-from typing import Any, TypeVar, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,6 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Rows, Words, read_only
 from contextdb.cells.angles import wrap_angles
-from contextdb.cells.arguments import require_place
 from contextdb.cells.fact_columns import plain_numbers
 from contextdb.cells.facts import Unknown, check_mode, missing_error, misspelt, read_fact
 from contextdb.cells.mirroring import in_mirror
@@ -33,6 +31,7 @@ from contextdb.compiled.batch_columns import (
     Contexts,
     common_length,
     facts_of,
+    holds_sets,
     kept_columns,
     listed,
     mirrored_columns,
@@ -40,15 +39,12 @@ from contextdb.compiled.batch_columns import (
 )
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.many import BLOCK, ManyMatches, one_by_one
 from contextdb.compiled.matches import Matches
-from contextdb.compiled.unchanging import Unchanging
 from contextdb.console import announce
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.expressions.rules import ManyRules
 
-Answer = TypeVar("Answer", bound=Matches)
-
-NUMPY_BLOCK = 2048
 RULED_WORDS = 1 << 21
 """Words of masks at once for a table with rules: each distinct rule is computed once for all of them."""
 MUCH_WORK = 1 << 18
@@ -103,32 +99,9 @@ class Values:
     absent: NDArray[np.int64]
 
 
-class Answers(Sequence[Answer]):
-    """The answers of many contexts: what answers with actors and without have in common."""
-
-    __slots__ = ()
-
-    @overload
-    def __getitem__(self, context: int) -> Answer: ...
-
-    @overload
-    def __getitem__(self, context: slice) -> list[Answer]: ...
-
-    def __getitem__(self, context: int | slice) -> Answer | list[Answer]:
-        """The answer of one context, as `query` gives it, or those of a slice; NoSuchPlace, an IndexError too, where none is."""
-        if isinstance(context, slice):
-            return [self._answer(i) for i in range(*context.indices(len(self)))]
-        return self._answer(require_place(context, len(self), "context"))
-
-    @abstractmethod
-    def _answer(self, context: int) -> Answer:
-        """The answer of a context by its number, from 0."""
-
-
-@dataclass(frozen=True, eq=False)
-class ManyMatches(Unchanging, Answers[Matches]):
-    """The valid rows of many contexts: a sequence of `Matches`. Results are computed on first use and kept; arrays are
-    read-only."""
+@dataclass(frozen=True, eq=False, repr=False)
+class BatchMatches(ManyMatches):
+    """The valid rows of many contexts that were encoded together."""
 
     compiled: CompiledData
     n_contexts: int
@@ -154,16 +127,6 @@ class ManyMatches(Unchanging, Answers[Matches]):
             raise in_mirror(error) from None
 
     @property
-    def counts(self) -> Rows:
-        """How many rows are valid in each context: int64 [N]."""
-        return self._counts_and_hits[0]
-
-    @property
-    def hits(self) -> Rows:
-        """In how many contexts each row is valid: int64 [n_rows]."""
-        return self._counts_and_hits[1]
-
-    @property
     def codes(self) -> Codes:
         """The codes of every context, as `CompiledTable.encode` gives them for one: int32 [N, P]."""
         self.compiled.refuse_rules("codes do not keep the facts that they need")
@@ -181,26 +144,12 @@ class ManyMatches(Unchanging, Answers[Matches]):
             _encode_with_numpy(self.numbers, out)
         return np.ascontiguousarray(out.T)
 
-    @cached_property
-    def mask(self) -> Words:
-        """The rows of each context as bits: uint64 [N, W]."""
-        return read_only(self._masks(0, self.n_contexts))
-
-    def lists(self) -> list[Rows]:
-        """The row numbers of each context: a list of int64 arrays."""
-        found: list[Rows] = []
-        for start in range(0, self.n_contexts, NUMPY_BLOCK):
-            flags = bitmask.unpack(self._masks(start, start + NUMPY_BLOCK), self.compiled.n_rows)
-            contexts, rows = np.nonzero(flags)
-            found += np.split(read_only(rows), np.searchsorted(contexts, np.arange(1, len(flags))))
-        return found
-
     def __len__(self) -> int:
         return self.n_contexts
 
     def __iter__(self) -> Iterator[Matches]:
-        for start in range(0, self.n_contexts, NUMPY_BLOCK):
-            for context, mask in enumerate(self._masks(start, start + NUMPY_BLOCK), start):
+        for start in range(0, self.n_contexts, BLOCK):
+            for context, mask in enumerate(self._masks(start, start + BLOCK), start):
                 yield self._matches(context, mask)
 
     def _answer(self, context: int) -> Matches:
@@ -225,14 +174,11 @@ class ManyMatches(Unchanging, Answers[Matches]):
     def _counts_and_hits(self) -> tuple[Rows, Rows]:
         if self.rules is None and (kernels := load_kernels(self._work)):
             return self._with_kernels(kernels)
-        counts = np.zeros(self.n_contexts, np.int64)
-        hits = np.zeros(self.compiled.n_rows, np.int64)
-        block = NUMPY_BLOCK if self.rules is None else max(NUMPY_BLOCK, RULED_WORDS // max(1, len(self.compiled.enabled)))
-        for start in range(0, self.n_contexts, block):
-            masks = self._masks(start, start + block)
-            counts[start : start + len(masks)] = bitmask.count(masks)
-            hits += np.bincount(bitmask.places(masks)[1], minlength=self.compiled.n_rows)
-        return read_only(counts), read_only(hits)
+        return super()._counts_and_hits
+
+    @property
+    def _block(self) -> int:
+        return BLOCK if self.rules is None else max(BLOCK, RULED_WORDS // max(1, len(self.compiled.enabled)))
 
     def _with_kernels(self, kernels: ModuleType) -> tuple[Rows, Rows]:
         stack, numbers = self.compiled.stack, self.numbers
@@ -308,7 +254,20 @@ def query_codes(compiled: CompiledData, codes: Codes) -> Matches:
 
 
 def query_many(compiled: CompiledData, contexts: Contexts, unknown: Unknown = "error") -> ManyMatches:
-    """Encode the columns of many contexts; see `CompiledTable.query_many`."""
+    """Answer many contexts; see `CompiledTable.query_many`. Where facts are sets, each context is asked on its own."""
+    check_mode(unknown)
+    columns = facts_of(contexts)
+    try:
+        return query_encoded(compiled, columns, unknown)
+    except ContextError:
+        if not any(holds_sets(column, compiled.asked[name]) for name, column in columns.items() if name in compiled.asked):
+            raise
+    plain = {name: listed(column) for name, column in columns.items()}
+    return one_by_one(compiled, plain, common_length(columns), lambda _, facts: compiled.query(facts, unknown=unknown))
+
+
+def query_encoded(compiled: CompiledData, contexts: Contexts, unknown: Unknown = "error") -> BatchMatches:
+    """The same for contexts all of whose facts are single values; raises ContextError for a set."""
     check_mode(unknown)
     columns = given = facts_of(contexts)
     n_contexts = common_length(columns)
@@ -340,7 +299,7 @@ class _Encoder:
         self.missing: list[int] = []
         self.columns: Mapping[str, Any] = {}
 
-    def encode(self, columns: Mapping[str, Any]) -> ManyMatches:
+    def encode(self, columns: Mapping[str, Any]) -> BatchMatches:
         """Every condition's column, in the order of slots."""
         self.columns = columns
         stack = self.compiled.stack
@@ -354,7 +313,7 @@ class _Encoder:
                 self._add_values(at, masks, given, slot)
             wide_slot += is_wide
             slot += 0 if is_wide else stack.n_slots[at]
-        return ManyMatches(self.compiled, self.n_contexts, self._values(), self._numbers(), self._rules())
+        return BatchMatches(self.compiled, self.n_contexts, self._values(), self._numbers(), self._rules())
 
     def _rules(self) -> ManyRules | None:
         if self.compiled.when is None:

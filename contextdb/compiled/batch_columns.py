@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.fact_columns import as_series, plain_numbers
 from contextdb.cells.facts import read_fact
 from contextdb.cells.mirroring import kept_fact, mirrored_fact
+from contextdb.cells.sets import Cell
 from contextdb.compiled.classes import ValueMasks
 from contextdb.errors import ContextError, Fault, Place
 
@@ -48,6 +50,21 @@ def common_length(columns: Mapping[str, Any]) -> int:
 def listed(given: Any) -> list[Any]:
     """A column as a list of Python's own values."""
     return given.to_list() if isinstance(given, pl.Series) else given.tolist() if isinstance(given, np.ndarray) else list(given)
+
+
+def holds_sets(given: Any, condition: Condition) -> bool:
+    """Whether some fact of a column is a set of values."""
+    if isinstance(given, np.ndarray) and given.dtype.kind in "biufM":
+        return False
+    known: set[object] = set()
+    for value in listed(given):
+        key = (type(value), tuple(value)) if isinstance(value, (list, set, tuple)) else (type(value), value)
+        with suppress(ContextError, TypeError):  # a fact that cannot be read is no set
+            if key not in known:
+                known.add(key)
+                if isinstance(read_fact(value, condition), Cell):
+                    return True
+    return False
 
 
 def kept_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condition]) -> dict[str, Any]:

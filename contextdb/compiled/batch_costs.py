@@ -10,30 +10,32 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Rows
-from contextdb.compiled.batch import Answers, ManyMatches, query_many
+from contextdb.compiled.batch import BatchMatches, query_many
 from contextdb.compiled.data import CompiledData, SoftMasks
+from contextdb.compiled.many import FewerMatches, ManyMatches
 
 CostsOfPairs = Callable[[Rows, Rows], NDArray[np.float64]]
 """Of P contexts and rows what the soft cells of each depth cost: float64 [D, P]."""
 
 
-def costs_of_pairs(many: Answers[Any]) -> CostsOfPairs | None:
+def costs_of_pairs(many: ManyMatches) -> CostsOfPairs | None:
     """What tells the costs of rows of many answers; None for a table without soft cells."""
-    compiled: CompiledData = many.compiled  # type: ignore[attr-defined]
-    if not compiled.is_soft:
+    if not many.compiled.is_soft:
         return None
-    return _of_batch(many) if isinstance(many, ManyMatches) else lambda contexts, rows: _one_by_one(many, contexts, rows)
+    if isinstance(many, FewerMatches):
+        return costs_of_pairs(many.whole)
+    return _of_batch(many) if isinstance(many, BatchMatches) else lambda contexts, rows: _one_by_one(many, contexts, rows)
 
 
-def _one_by_one(many: Answers[Any], contexts: Rows, rows: Rows) -> NDArray[np.float64]:
-    costs = np.empty((many.compiled.n_depths, len(rows)))  # type: ignore[attr-defined]
+def _one_by_one(many: ManyMatches, contexts: Rows, rows: Rows) -> NDArray[np.float64]:
+    costs = np.empty((many.compiled.n_depths, len(rows)))
     for context in np.unique(contexts).tolist():
         start, stop = np.searchsorted(contexts, [context, context + 1])
         costs[:, start:stop] = many[context].layered_penalties[:, rows[start:stop]]
     return costs
 
 
-def _of_batch(many: ManyMatches) -> CostsOfPairs:
+def _of_batch(many: BatchMatches) -> CostsOfPairs:
     """A batch asks each condition with soft cells as a table of its own: which of them match."""
     compiled, kept = many.compiled, many.kept
     assert kept is not None, "a table with soft cells keeps its facts"

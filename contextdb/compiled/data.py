@@ -15,24 +15,25 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, Self, TypeVar
+from typing import Any, Never, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words, read_only
-from contextdb.cells.arguments import require_row
+from contextdb.cells.arguments import by_name, require_row
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
 from contextdb.cells.grammar import parse_cell, reads
 from contextdb.cells.mirroring import changed_in_mirror, in_mirror, kept_facts, mirrored_facts
+from contextdb.cells.notebook import one_line
 from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks
 from contextdb.compiled.lookup import UNUSUAL, SingleLookup, StraightAsk, build_ask, ruled_ask, single_lookup
 from contextdb.compiled.mask_bits import bits_of, nbytes
-from contextdb.compiled.matches import Answering, Matches, SetMatches
+from contextdb.compiled.matches import Answering, Matches
 from contextdb.compiled.memory import Memory
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.pick_columns import NOTHING, PickColumns, ranks_of
@@ -40,7 +41,7 @@ from contextdb.compiled.stack import MaskStack
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.versions import version_of
 from contextdb.compiled.ways import Step, Ways
-from contextdb.errors import ContextError, Fault, Place, in_quotes
+from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
 from contextdb.expressions.derived import Derivation
 from contextdb.expressions.rules import WhenRules
 from contextdb.schema.shapes import Policy
@@ -50,7 +51,7 @@ Made = TypeVar("Made")
 SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CompiledData(Unchanging):
     """A table as masks: what every way to ask it needs. `CompiledTable` has the ways.
 
@@ -98,6 +99,10 @@ class CompiledData(Unchanging):
         """The number of rows."""
         return len(self.assets)
 
+    def __repr__(self) -> str:
+        size = f"{plural(self.n_rows, 'row')} x {plural(len(self.conditions), 'condition')}, {plural(self.nbytes, 'byte')}"
+        return one_line(type(self).__name__, self.name, size)
+
     @property
     def leaves(self) -> Sequence[str]:
         """The asset of each row, without the path that it has in a table inside the table."""
@@ -128,7 +133,7 @@ class CompiledData(Unchanging):
         """The rows that may match at all, as an integer."""
         return bitmask.to_int(self.enabled)
 
-    def query(self, context: Context, unknown: Unknown = "error") -> Matches:
+    def query(self, context: Context, *, unknown: Unknown = "error") -> Matches:
         """Find the rows whose every cell accepts its fact; see `CompiledTable.query`, which casts actors too."""
         if unknown != "error":
             check_mode(unknown)
@@ -146,9 +151,11 @@ class CompiledData(Unchanging):
         found = self.matches(*self._bits_carefully(context, unknown))
         return self.bound(found, kept_facts(context), unknown) if self.is_bound else found
 
-    def encode(self, context: Context, unknown: Unknown = "error") -> NDArray[np.int32]:
+    def encode(self, context: Context, *old: Never, unknown: Unknown = "error") -> NDArray[np.int32]:
         """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.compiled.stack`. Rules have no
         codes."""
+        if old:
+            return self.encode(context, **by_name("encode", old, unknown=unknown))
         self.refuse_rules("codes do not keep the facts that its rules need")
         facts = self.read_context(context, unknown)
         local: list[tuple[int, ...] | None] = []
@@ -170,8 +177,8 @@ class CompiledData(Unchanging):
         """The policies of the table and of those that are in it."""
         return frozenset((self.policy,) if self.ways is None else (table.policy for table in self.ways.tables))
 
-    def penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:
-        """What each row's soft cells cost in a search: float64 [n_rows], the sum of the penalties of those that do not match.
+    def plain_penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:
+        """What each row's soft cells cost without actors: float64 [n_rows], the sum of the penalties of those that do not match.
 
         A soft cell whose fact is missing costs nothing with unknown="any", its penalty with "never". A set-valued fact costs
         nothing where some value of the set matches.
@@ -209,7 +216,7 @@ class CompiledData(Unchanging):
     def query_mirrored(self, context: Context, unknown: Unknown = "error") -> Matches:
         """The answer to a context as a mirror shows it. What is derived is computed from mirrored facts."""
         try:
-            return self.query(mirrored_facts(context, self.mirroring), unknown)
+            return self.query(mirrored_facts(context, self.mirroring), unknown=unknown)
         except ContextError as error:
             raise in_mirror(error) from None
 
@@ -306,7 +313,7 @@ class CompiledData(Unchanging):
 
     def matches(self, bits: int, always: int | None = None) -> Matches:
         """An answer of this table from its rows as an integer."""
-        return Matches(bits, self.answering) if always is None or always == bits else SetMatches(bits, self.answering, always)
+        return self.answering.answer(bits, bits if always is None else always)
 
     @cached_property
     def single_lookups(self) -> dict[str, SingleLookup]:

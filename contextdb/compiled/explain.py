@@ -23,6 +23,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import Context, Fact, Unknown, describe
 from contextdb.cells.grammar import format_cell, parse_cell, reads
+from contextdb.cells.notebook import as_html, one_line
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet, covers, union
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.columns import TextColumn
@@ -31,7 +32,7 @@ from contextdb.compiled.data import CompiledData
 from contextdb.compiled.mask_bits import bits_of
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.ways import Step
-from contextdb.errors import ContextError, Fault, in_quotes, nearest, plural, some
+from contextdb.errors import plural
 from contextdb.expressions import Expression
 from contextdb.expressions.rules import WhenColumn, WhenRules, has_no_rule, told_facts
 from contextdb.expressions.rules.rules import Rule, values_of
@@ -121,10 +122,7 @@ class Explanation:
         names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
         found = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
         if not found:
-            known = dict.fromkeys((*self.compiled.assets, *self.compiled.leaves))
-            near = nearest(asset, known)
-            told = f"the table {in_quotes(self.compiled.name)} has no asset {in_quotes(asset)}."
-            raise ContextError(Fault(told, some(known) or "none: the table has no rows", in_quotes(near) if near else ""))
+            raise self.compiled.answering.no_asset(asset)
         return found
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
@@ -169,6 +167,13 @@ class Explanation:
     def __str__(self) -> str:
         lines = [f"{len(self.matches)} of {plural(self.compiled.n_rows, 'row')} valid"]
         return "\n".join(lines + [str(r) for r, _ in zip(self, range(10), strict=False)])
+
+    def __repr__(self) -> str:
+        return one_line("Explanation", self.compiled.name, f"{len(self.matches):,} of {plural(self.compiled.n_rows, 'row')} valid")
+
+    def _repr_html_(self) -> str:
+        rows = ((r.asset, "" if r.is_valid else str(r).removeprefix(f"{r.asset}: ")) for r in self)
+        return as_html(repr(self), ("asset", "why not"), rows, len(self))
 
     @cached_property
     def _enabled(self) -> NDArray[np.bool_]:
@@ -234,7 +239,7 @@ class Explanation:
 
 def explain(compiled: CompiledData, context: Context, unknown: Unknown = "error") -> Explanation:
     """Explain every row of a table for one context; raises ContextError as `query` does."""
-    return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown))
+    return Explanation(compiled, compiled.read_context(context, unknown), unknown, compiled.query(context, unknown=unknown))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,16 +12,22 @@ from copy import copy, deepcopy
 from functools import reduce
 from math import ldexp
 from operator import and_
-from typing import Any, Self
+from typing import Any, Never, Self
 
+from contextdb.cells.arguments import by_name
 from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
 from contextdb.cells.mirroring import kept_facts
+from contextdb.cells.notebook import one_line
+from contextdb.compiled.casting.explaining import explain_with_actors
 from contextdb.compiled.casting.facts import Actors, Ask, Prefer
 from contextdb.compiled.casting.live import LiveActors
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.explain import Explanation, explain
 from contextdb.compiled.lookup import UNUSUAL, SingleLookup
 from contextdb.compiled.matches import Matches
-from contextdb.errors import Fault, NoSuchFact, in_quotes, some
+from contextdb.compiled.memory import Rng
+from contextdb.compiled.pick import pick
+from contextdb.errors import Fault, NoSuchFact, in_quotes, plural, some
 from contextdb.expressions.rules import WhenRules
 from contextdb.expressions.rules.rules import Unusual
 from contextdb.expressions.scalar import Value
@@ -189,7 +195,7 @@ class LiveContext(MutableMapping[str, object]):
         memo[id(self)] = new
         new._facts = deepcopy(self._facts, memo)
         if new._cast is not None:
-            new.actors(deepcopy(new._cast.ask.actors, memo), deepcopy(new._cast.ask.prefer, memo))
+            new.actors(deepcopy(new._cast.ask.actors, memo), prefer=deepcopy(new._cast.ask.prefer, memo))
         return new
 
     def _state(self) -> dict[str, Any]:
@@ -201,12 +207,14 @@ class LiveContext(MutableMapping[str, object]):
         cast = None if self._cast is None else (self._cast.ask.actors, self._cast.ask.prefer)
         return _live_again, (self._compiled, self._unknown, self.facts, cast)
 
-    def actors(self, actors: Actors | None, prefer: Prefer = None) -> None:
+    def actors(self, actors: Actors | None, *old: Never, prefer: Prefer = None) -> None:
         """Offer actors for roles from now on, as `query` accepts them; None withdraws them. They are read at the next query.
 
         The mappings are kept, not copied: what the game changes in them counts in the next query. While they do not change, they
         are not read again.
         """
+        if old:
+            return self.actors(actors, **by_name("actors", old, prefer=prefer))
         self._cast = None
         self._odd.pop(CAST, None)
         if actors is not None:
@@ -260,6 +268,19 @@ class LiveContext(MutableMapping[str, object]):
         if bits != self._answer.bits:
             self._answer = Matches(bits, self._answering)
         return self._answer
+
+    def pick(self, rng: Rng | int | None = None, last: str | None = None) -> str | None:
+        """One asset by the table's policy for the facts as they are now; see `CompiledTable.pick`."""
+        return pick(self._compiled, self.matches(), rng, last)
+
+    def explain(self) -> Explanation:
+        """Why each row is valid or not with the facts and actors as they are now; see `CompiledTable.explain`."""
+        if self._cast is not None:
+            return explain_with_actors(self._compiled, self.facts, self._cast.ask)
+        return explain(self._compiled, self.facts, self._unknown)
+
+    def __repr__(self) -> str:
+        return one_line("LiveContext", self._compiled.name, f"{len(self)} of {plural(len(self._known), 'fact')} set")
 
     def _settle(self) -> None:
         """Intersect what stands still; when too many facts have moved, let all of them stand still again."""
@@ -399,7 +420,7 @@ class AskingLiveContext(LiveContext):
 
     def _carefully(self) -> Matches:
         """The answer where facts are missing or sets, or actors are offered."""
-        return self._compiled.query(self.facts, self._unknown) if self._cast is None else self._cast.query(self.facts)
+        return self._compiled.query(self.facts, unknown=self._unknown) if self._cast is None else self._cast.query(self.facts)
 
     def _with_rules(self, answer: Matches, when: WhenRules) -> Matches:
         """Of the rows that the cells leave, those whose rule holds."""
@@ -439,7 +460,7 @@ def _live_again(
     live = live_context(compiled, unknown)
     live.update(facts)
     if cast is not None:
-        live.actors(*cast)
+        live.actors(cast[0], prefer=cast[1])
     return live
 
 

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from functools import partial
-from typing import Any, Self
+from operator import and_, or_, xor
+from typing import Any, Protocol, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Flags, Rows, Words, read_only
+from contextdb.cells.arguments import require_place
+from contextdb.cells.notebook import as_html, one_line
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
-from contextdb.errors import ContextError, Fault, in_quotes, plural
+from contextdb.compiled.said_rows import SaidRows, bits_said
+from contextdb.errors import ContextError, Fault, WrongType, in_quotes, nearest, plural, some
+
+Bits = TypeVar("Bits", int, Words)
+Join = Callable[[Any, Any], Any]
+"""How two answers are joined: a function of their rows, as integers or as masks."""
 
 _INT64 = np.dtype(np.int64)
 
@@ -30,7 +39,9 @@ class Answering:
     Two are of the same table where name and `version` are equal; the version is worked out where two have to be compared.
     """
 
-    __slots__ = ("_version", "ask_mirrored", "asked_of", "assets", "is_mirroring", "leaves", "name", "outputs", "row_numbers")
+    __slots__ = (
+        "_of_asset", "_version", "ask_mirrored", "asked_of", "assets", "is_mirroring", "leaves", "name", "outputs", "row_numbers",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -55,6 +66,8 @@ class Answering:
         self.outputs = outputs
         self.row_numbers: Rows = read_only(np.arange(len(assets), dtype=np.int64))
         self._version = version
+        self._of_asset: dict[str, int] = {}
+        """The rows of each asset, with its path and without; read when they are first asked for."""
 
     @property
     def version(self) -> str:
@@ -73,6 +86,44 @@ class Answering:
             raise ContextError(Fault(f"the answer is of another version of {its}, {versions}.", _OWN_ANSWER, _ASK_AGAIN))
         raise ContextError(Fault(f"the answer is of the table {its}), not of {own}).", _OWN_ANSWER, _ASK_AGAIN))
 
+    def answer(self, bits: int, always: int, stages: Stages = ()) -> Matches:
+        """An answer of this table from its rows as integers, and who plays what in them."""
+        if stages:
+            return stages[0][1].answer(bits, always, stages, self)
+        return Matches(bits, self) if always == bits else SetMatches(bits, self, always)
+
+    def bits_of(self, said: SaidRows | Matches) -> int:
+        """Some rows as bits: those of an answer of this table, or as `Matches.only` takes them."""
+        if isinstance(said, Matches):
+            said.require_own(self)
+            return said.bits
+        return bits_said(said, len(self.assets), self.bits_of_assets)
+
+    def bits_of_assets(self, names: Sequence[str]) -> int:
+        """The rows of some assets, with their paths or without; raises ContextError for one that the table does not have."""
+        if not self._of_asset:
+            self._of_asset = self._rows_by_asset()
+        bits = 0
+        if unknown := set(names) - self._of_asset.keys():
+            raise self.no_asset(min(unknown))
+        for name in names:
+            bits |= self._of_asset[name]
+        return bits
+
+    def _rows_by_asset(self) -> dict[str, int]:
+        found: dict[str, list[int]] = {}
+        for row, names in enumerate(zip(self.assets, self.leaves, strict=True)):
+            for name in dict.fromkeys(names):
+                found.setdefault(name, []).append(row)
+        return {name: bitmask.int_of(rows) for name, rows in found.items()}
+
+    def no_asset(self, asset: str) -> ContextError:
+        """The error for an asset that no row has, with the nearest that one has."""
+        known = dict.fromkeys((*self.assets, *self.leaves))
+        near = nearest(asset, known)
+        found = f"the table {in_quotes(self.name)} has no asset {in_quotes(asset)}."
+        return ContextError(Fault(found, some(known) or "none: the table has no rows", in_quotes(near) if near else ""))
+
     def __copy__(self) -> Answering:
         return self
 
@@ -88,9 +139,24 @@ _OWN_ANSWER = "an answer of this compiled table"
 _ASK_AGAIN = "to query this table again: query(facts)"
 
 
+class Staged(Protocol):
+    """Who plays what in an answer to a query with actors; see `contextdb.compiled.casting`."""
+
+    def answer(self, bits: int, always: int, stages: Stages, table: Answering) -> Matches:
+        """An answer of some rows, with the castings of several."""
+
+
+Stages = tuple[tuple[int, Staged], ...]
+"""For some rows, as bits, who plays what in them; the first that has a row counts."""
+
+
 class Matches:
     """The valid rows for one context. True when there is at least one; its length is their number. Iteration gives row numbers;
-    `in` takes a row number or an asset.
+    `in` takes a row number or an asset; `m[0]` is the first row number.
+
+    Answers of one version of one table are combined as sets of rows are: `&`, `|`, `-`, `^`. What belongs to a row, its casting and
+    what its soft cells cost, is then that of the first of the two answers that holds the row. Answers in a mirror are combined in
+    the same way. `&` and `-` also take what `only` takes.
 
     Attributes
     ----------
@@ -112,6 +178,8 @@ class Matches:
     """Set for tables with conditions whose facts change in a mirror: the answer there, the facts to ask with, or what asks."""
     _penalties: Callable[[], NDArray[np.float64]]
     """Set for tables with soft cells only: a plain answer has nothing to pay for."""
+
+    __array_ufunc__ = None  # else numpy would combine an array of flags with row numbers, one by one
 
     def __init__(self, bits: int, table: Answering) -> None:
         self.bits = bits
@@ -256,6 +324,91 @@ class Matches:
             return False
         return 0 <= number < self.n_rows and bool(number == row and self.bits >> number & 1)
 
+    @overload
+    def __getitem__(self, place: int) -> int: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> list[int]: ...
+
+    def __getitem__(self, place: int | slice) -> int | list[int]:
+        """The number of one valid row by its place among them, or of those of a slice; NoSuchPlace, also an IndexError, where none
+        is."""
+        if isinstance(place, slice):
+            rows: list[int] = self.indices[place].tolist()
+            return rows
+        return int(self.indices[require_place(place, len(self), "valid row")])
+
+    def only(self, rows: SaidRows | Matches) -> Self:
+        """The same answer without the rows that are not among some rows.
+
+        Parameters
+        ----------
+        rows : bool array, row numbers, assets, or Matches
+            A flag for each row of the table, bool [n_rows]; row numbers; assets, with paths or without; or the rows of another
+            answer, whatever that was asked with. The answer in a mirror loses the same rows.
+
+        Raises
+        ------
+        ContextError
+            There are not as many flags as rows; an asset that the table does not have, with the nearest; an answer of another table
+            or version.
+        NoSuchPlace, WrongType
+            A row that the table does not have; rows are said in another way.
+        """
+        return self.kept(self._table.bits_of(rows))
+
+    def kept(self, bits: int) -> Self:
+        """The same answer without the rows that are not among some, given as bits."""
+        found = copy(self)
+        found._keep(bits)
+        if self._table.is_mirroring:
+            found.with_mirrored(lambda: self.mirrored.kept(bits))
+        return found
+
+    def _keep(self, bits: int) -> None:
+        self.bits &= bits
+        self._rows = None
+
+    @property
+    def always_bits(self) -> int:
+        """The rows that hold all values of set-valued facts, as one integer."""
+        return self.bits
+
+    def __and__(self, other: SaidRows | Matches) -> Matches:
+        return self.joined(other, and_) if isinstance(other, Matches) else self.only(other)
+
+    __rand__ = __and__
+
+    def __sub__(self, other: SaidRows | Matches) -> Matches:
+        return self.joined(other, minus) if isinstance(other, Matches) else self.kept(~self._table.bits_of(other))
+
+    def __or__(self, other: Matches) -> Matches:
+        return self.joined(other, or_)
+
+    def __xor__(self, other: Matches) -> Matches:
+        return self.joined(other, xor)
+
+    @property
+    def _stages(self) -> Stages:
+        """Who plays what in it; nothing for an answer without actors."""
+        return ()
+
+    def joined(self, other: object, join: Join) -> Matches:
+        """The answer of the rows that two answers of one table give together."""
+        if not isinstance(other, Matches):
+            raise WrongType(Fault(f"an answer cannot be joined with {type(other).__name__}.", "an answer of the same table"))
+        other.require_own(self._table)
+        bits = join(self.bits, other.bits)
+        every = self.always_bits & other.always_bits if join is and_ else self.always_bits | other.always_bits
+        tellers = (self,) if join is minus else (self, other)
+        stages = tuple((rows & m.bits, stage) for m in tellers for rows, stage in m._stages)
+        found = self._table.answer(bits, every & bits, stages)
+        if costs := [m for m in tellers if m.has_penalties]:
+            found.with_penalties(costs[0]._penalties if len(costs) == 1 or join is and_ else lambda: _costs_of_both(*costs))
+        if self._table.is_mirroring:
+            found.with_mirrored(lambda: self.mirrored.joined(other.mirrored, join))
+        return found
+
     def require_own(self, table: Answering) -> None:
         """Raise ContextError unless this is an answer of a table, in that version."""
         if self._table is not table:
@@ -298,7 +451,10 @@ class Matches:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return f"<Matches: {len(self)} of {self.n_rows} rows>"
+        return one_line("Matches", self._table.name, f"{len(self):,} of {plural(self.n_rows, 'row')}")
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), ("row", "asset"), ((row, self._table.assets[row]) for row in self))
 
 
 class SetMatches(Matches):
@@ -314,6 +470,15 @@ class SetMatches(Matches):
     def always(self) -> Words:
         """The rows that hold all values of set-valued facts: uint64 [W]."""
         return bitmask.from_int(self._always, self.n_rows)
+
+    @property
+    def always_bits(self) -> int:
+        """The rows that hold all values of set-valued facts, as one integer."""
+        return self._always
+
+    def _keep(self, bits: int) -> None:
+        super()._keep(bits)
+        self._always &= bits
 
 
 def rows_of(bits: int, numbers: Rows) -> Rows:
@@ -333,6 +498,16 @@ def rows_of(bits: int, numbers: Rows) -> Rows:
         rest ^= 1 << top
     found.reverse()
     return np.frombuffer(_PACK[len(found)](*found), _INT64)
+
+
+def minus(rows: Bits, others: Bits) -> Bits:
+    """The rows that are not among others."""
+    return rows & ~others
+
+
+def _costs_of_both(first: Matches, second: Matches) -> NDArray[np.float64]:
+    """What the soft cells of each row cost in the first answer, and of those that only the second holds in that."""
+    return np.where(second.flags & ~first.flags, second.penalties, first.penalties)
 
 
 def _slots(matches: Matches) -> dict[str, Any]:

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from contextdb import bitmask
 from contextdb.bitmask import Rows, read_only
 from contextdb.cells.arguments import require_kind, require_whole
-from contextdb.compiled.batch import Answers
 from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.chance import uniform, uniforms
 from contextdb.compiled.choosing import Choosing, highest, starts_of
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.pick import not_unique
 from contextdb.compiled.picked import Picked
@@ -177,7 +177,7 @@ class Picker:
         return Pick(row, compiled.fallback if row is None else compiled.assets[row], left)
 
     def pick_many(
-        self, many: Answers[Any], *, time_s: float | None = None, who: Sequence[int] | NDArray[np.integer[Any]] | None = None
+        self, many: ManyMatches, *, time_s: float | None = None, who: Sequence[int] | NDArray[np.integer[Any]] | None = None
     ) -> Rows:
         """Pick for many characters at once: what `pick` would give each of them alone.
 
@@ -202,15 +202,15 @@ class Picker:
         PolicyError
             As `pick`, with the first context concerned. No turn counts then.
         """
-        require_kind(many, Answers, "many", "the answers of query_many")
-        compiled: CompiledData = many.compiled  # type: ignore[attr-defined]
+        require_kind(many, ManyMatches, "many", "the answers of query_many")
+        compiled: CompiledData = many.compiled
         self._require(compiled.name)
         known = self._version(compiled)
         time = _time(known, time_s)
         ids = _characters(who, len(many))
         slots = self._picked.slots_of(ids)
         rows = np.full(len(many), -1, np.int64)
-        masks: NDArray[np.uint64] = many.mask  # type: ignore[attr-defined]
+        masks = many.mask
         costs = costs_of_pairs(many) if "cheapest" in compiled.policies else None
         block = max(1, MOST_PAIRS // max(1, compiled.n_rows))
         for start in range(0, len(many), block):

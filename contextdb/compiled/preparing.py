@@ -37,4 +37,4 @@ def _prepare_batches(compiled: CompiledData) -> None:
     many = query_many(compiled, {} if name is None else {name: [None]}, "any")
     _ = many.counts, many.mask
     if compiled.when is None:
-        query_codes(compiled, compiled.encode({}, "any"))
+        query_codes(compiled, compiled.encode({}, unknown="any"))

@@ -5,29 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, overload
+from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.arguments import require_path
+from contextdb.cells.arguments import by_name, require_path
 from contextdb.cells.facts import Context, Unknown, check_mode, require_context
 from contextdb.compiled.artefact import open_artefact, save
-from contextdb.compiled.batch import ManyMatches, query_codes, query_many
+from contextdb.compiled.batch import query_codes, query_many
 from contextdb.compiled.casting.explaining import explain_with_actors
 from contextdb.compiled.casting.facts import Actors, Ask, Prefer
-from contextdb.compiled.casting.many import ManyCastMatches, query_many_with_actors
+from contextdb.compiled.casting.many import query_many_with_actors
 from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, explain
 from contextdb.compiled.live import LiveContext, live_context
 from contextdb.compiled.lookup import UNUSUAL
+from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick import pick
 from contextdb.compiled.picker import Picker
 from contextdb.compiled.preparing import prepare
-from contextdb.errors import ContextError, Fault
+from contextdb.errors import ContextError, Fault, WrongType
 
 if TYPE_CHECKING:
     import polars as pl
@@ -35,14 +36,16 @@ if TYPE_CHECKING:
     ManyContexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CompiledTable(CompiledData):
     """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`.
 
     It can be pickled at any time. The copy gives the same answers; only the memory of `pick` is not pickled.
     """
 
-    def query(self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None) -> Matches:
+    def query(
+        self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
+    ) -> Matches:
         """Find the rows whose cells all accept their facts, and whose roles can be filled.
 
         Parameters
@@ -70,10 +73,12 @@ class CompiledTable(CompiledData):
         -----
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
+        if old:
+            return self.query(context, **by_name("query", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
             return query_with_actors(self, context, Ask(actors, prefer, unknown))
         if unknown != "error":
-            return super().query(context, unknown)
+            return super().query(context, unknown=unknown)
         try:  # as there, without a call more: the way of every question
             return self._ask(context)
         except UNUSUAL:
@@ -82,22 +87,14 @@ class CompiledTable(CompiledData):
             require_context(context)
             raise
 
-    @overload
-    def query_many(self, contexts: ManyContexts, unknown: Unknown = "error") -> ManyMatches: ...
-
-    @overload
-    def query_many(
-        self, contexts: ManyContexts, unknown: Unknown = "error", *, actors: Actors | Sequence[Actors], prefer: Prefer = None
-    ) -> ManyCastMatches: ...
-
     def query_many(
         self,
         contexts: ManyContexts,
+        *old: Never,
         unknown: Unknown = "error",
-        *,
         actors: Actors | Sequence[Actors] | None = None,
         prefer: Prefer = None,
-    ) -> ManyMatches | ManyCastMatches:
+    ) -> ManyMatches:
         """Find the valid rows for many contexts at once: counts, hits and masks.
 
         Parameters
@@ -112,15 +109,28 @@ class CompiledTable(CompiledData):
         ContextError
             As `query`, naming the first contexts concerned.
         """
+        if old:
+            return self.query_many(contexts, **by_name("query_many", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
-            return query_many_with_actors(self, contexts, actors, prefer, unknown)
+            return query_many_with_actors(self, contexts, Ask(actors, prefer, unknown))  # type: ignore[arg-type]
         return query_many(self, contexts, unknown)
 
-    def live(self, facts: Context | None = None, unknown: Unknown = "error") -> LiveContext:
-        """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`."""
+    def live(
+        self,
+        facts: Context | None = None,
+        *old: Never,
+        unknown: Unknown = "error",
+        actors: Actors | None = None,
+        prefer: Prefer = None,
+    ) -> LiveContext:
+        """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`. Actors are offered from then on, as with
+        `LiveContext.actors`."""
+        if old:
+            return self.live(facts, **by_name("live", old, unknown=unknown, actors=actors, prefer=prefer))
         check_mode(unknown)
         live = live_context(self, unknown)
         live.update({} if facts is None else facts)
+        live.actors(actors, prefer=prefer)
         return live
 
     def prepare(self, casting: bool = False, batches: bool = False) -> None:
@@ -141,27 +151,48 @@ class CompiledTable(CompiledData):
         return query_codes(self, codes)
 
     def explain(
-        self, context: Context, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
+        self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
     ) -> Explanation:
         """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
         which role cannot be filled, and whose fact fails."""
+        if old:
+            return self.explain(context, **by_name("explain", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
             return explain_with_actors(self, context, Ask(actors, prefer, unknown))
         return explain(self, context, unknown)
+
+    def penalties(
+        self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
+    ) -> NDArray[np.float64]:
+        """What each row's soft cells cost in a search: float64 [n_rows], the sum of the penalties of those that do not match.
+
+        A soft cell whose fact is missing costs nothing with unknown="any", its penalty with "never". A set-valued fact costs
+        nothing where some value of the set matches. With actors a row costs what it does with its best casting.
+        """
+        if old:
+            return self.penalties(context, **by_name("penalties", old, unknown=unknown, actors=actors, prefer=prefer))
+        if actors is not None:
+            return self.query(context, unknown=unknown, actors=actors, prefer=prefer).penalties
+        return self.plain_penalties(context, unknown)
 
     def pick(
         self,
         context: Context | Matches,
         rng: Rng | int | None = None,
         last: str | None = None,
+        *old: Never,
         unknown: Unknown = "error",
-        *,
         actors: Actors | None = None,
         prefer: Prefer = None,
     ) -> str | None:
-        """One asset by the table's policy: see `contextdb.compiled.pick.pick`. Actors are those of `query`."""
+        """One asset by the table's policy, for a context, which is asked as in `query`, or for an answer: see
+        `contextdb.compiled.pick.pick`."""
+        if old:
+            return self.pick(context, rng, last, **by_name("pick", old, unknown=unknown, actors=actors, prefer=prefer))
+        if isinstance(context, ManyMatches):
+            raise WrongType(Fault("pick is given the answers for many contexts.", "a context, or the answer for one", "many[i]"))
         if not isinstance(context, Matches):
-            context = self.query(context, unknown, actors, prefer)
+            context = self.query(context, unknown=unknown, actors=actors, prefer=prefer)
         elif actors is not None:
             found = "actors are for a query, and this is the answer to one."
             raise ContextError(Fault(found, "facts with actors, or the answer to a query with actors"))

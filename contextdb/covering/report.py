@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from contextdb.cells.notebook import as_html, one_line
 from contextdb.covering.shares import format_percent, told_apart
+from contextdb.errors import plural
 from contextdb.findings import Finding
 
 Method = Literal["exact", "bounds", "estimate"]
@@ -93,7 +95,7 @@ class Crowd:
         return {"rows": list(self.rows), "share": self.share, "cells": self.cells}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class CoverageReport:
     """The context coverage of one table.
 
@@ -143,6 +145,13 @@ class CoverageReport:
         ends = " and ".join(told_apart(self.lower, self.upper))
         how = "certain bounds" if self.method == "bounds" else f"99 % interval, {self.n_samples:,} samples, seed {self.seed}"
         return f"Between {ends} of the contexts have a valid row ({how})."
+
+    def __repr__(self) -> str:
+        return one_line("CoverageReport", self.table, f"{self.headline.rstrip('.')}, {plural(len(self.gaps), 'gap')}")
+
+    def _repr_html_(self) -> str:
+        rows = [(gap.text, format_percent(gap.share)) for gap in self.gaps]
+        return as_html(f"{self.table}: {self.headline}", ("gap", "share of the contexts"), rows)
 
     def to_json(self) -> dict[str, object]:
         """The report as plain data: one entry of `tables` in `coverage --format json`."""

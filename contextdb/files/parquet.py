@@ -78,15 +78,21 @@ def read_parquet(raw: bytes, file: str) -> tuple[ParquetSource, list[TextColumn]
         The file is no Parquet, cut off or damaged; or columns of a type that no cell has, each with what it is.
     """
     frame = _frame(raw, file)
+    if not frame.width:
+        raise TableError(Fault("the file has no columns.", "at least one column, the assets", place=Place(file)))
+    columns = columns_of_frame(frame, file)
+    return ParquetSource(raw, tuple(columns)), columns
+
+
+def columns_of_frame(frame: pl.DataFrame, file: str | None = None) -> list[TextColumn]:
+    """The texts of a DataFrame as those of a Parquet file; raises TableError for columns of a type that no cell has."""
     faults = [fault.at(Place(file)) for fault in name_faults(frame.columns)]
     faults += [fault.at(Place(file, column=s.name)) for s in frame for fault in _type_faults(s)]
-    if not frame.width:
-        faults = [Fault("the file has no columns.", "at least one column, the assets", place=Place(file))]
-    columns = [] if faults else _texts(frame)
+    columns = [] if faults or not frame.width else _texts(frame)
     faults += [fault.at(Place(file, column=c.name)) for c in columns for fault in _long_faults(c)]
     if faults:
         raise TableError(*faults)
-    return ParquetSource(raw, tuple(columns)), columns
+    return columns
 
 
 def rewritten_parquet(

@@ -49,6 +49,8 @@ def numbers_of(values: object, what: str) -> Floats:
 def flags_of(values: object, n_wanted: int, what: str, of: str) -> Flags:
     """A bool array of one length; numbers are refused, for they possible as indices."""
     accepted = f"{'Matches, or ' if what == 'valid' else ''}one bool for each of {plural(n_wanted, of)}"
+    if hasattr(values, "lists"):  # a table's answers for many contexts
+        raise QueryError(Fault(f"{what} holds the answers for many contexts.", accepted, "to give that of one: many[i]"))
     try:
         array = np.asarray(values)
     except ValueError:

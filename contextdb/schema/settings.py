@@ -20,11 +20,12 @@ from contextdb.cells.conditions import Condition, Mirror
 from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind, names_where
 from contextdb.cells.mirroring import sided_pairs, swap_faults, swapped_tag
+from contextdb.cells.notebook import one_line
 from contextdb.cells.outputs import Output, OutputValue
 from contextdb.cells.sets import covers
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES
-from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, plural, shown, some
 from contextdb.expressions import Derivation, assumption_faults, derivation_faults, derive
 from contextdb.files.file_names import alike, composed
 from contextdb.schema import shapes, toml_values
@@ -120,7 +121,7 @@ class TableSettings:
         return tuple(str(PurePosixPath(name)) for name in names)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Schema:
     """All that a contextdb.toml says."""
 
@@ -133,6 +134,10 @@ class Schema:
     selectors: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     controllers: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     file: str | None = None
+
+    def __repr__(self) -> str:
+        told = f"{plural(len(self.conditions), 'condition')}, {plural(len(self.tables), 'table')}"
+        return one_line("Schema", self.name, told)
 
     def __getstate__(self) -> dict[str, object]:
         """What is pickled: not `derivation`, which is functions."""
@@ -210,6 +215,20 @@ def conditions_from_dict(mapping: Mapping[str, Mapping[str, object]]) -> dict[st
     if found := list(_section_faults("conditions", mapping)):
         raise SchemaError(*(fault for _, fault in found))
     return {name: _condition(name, section) for name, section in mapping.items()}
+
+
+def settings_from_dict(name: str, mapping: Mapping[str, object], conditions: Set[str]) -> TableSettings:
+    """Settings of a table from what `[tables.NAME]` of contextdb.toml would hold: `{"priority": "Prio"}`.
+
+    Raises
+    ------
+    SchemaError
+        With every fault, as from a file but without a line; also for a column that is among the declared `conditions`.
+    """
+    path, part = ("tables", name), {key: list(value) if isinstance(value, tuple) else value for key, value in mapping.items()}
+    if found := [*_part_faults(path, part), *_column_faults(path, _fitting("tables", part), conditions)]:
+        raise SchemaError(*(fault for _, fault in found))
+    return _settings(name, part)
 
 
 def expression_faults(schema: Schema) -> Iterator[Fault]:

@@ -6,7 +6,7 @@ Texts that cannot be read stay as they are, with their fault. What was worked ou
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,9 +38,9 @@ class ConditionColumn:
 
     condition: Condition
     texts: TextColumn
-    cells: ColumnCells
+    cells: ColumnCells = field(repr=False)
     """The cell of `texts.texts[i]`; Any for a text that cannot be read."""
-    faults: Mapping[int, Fault]
+    faults: Mapping[int, Fault] = field(repr=False)
     """Why `texts.texts[i]` cannot be read."""
 
     @classmethod

@@ -25,12 +25,13 @@ from contextdb.cells.arguments import (
     require_whole,
 )
 from contextdb.cells.conditions import Condition
+from contextdb.cells.notebook import as_html, one_line
 from contextdb.columns import TextColumn
 from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick_columns import PickColumns, specificities
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Ways
-from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, plural, some
 from contextdb.expressions.rules import WhenColumn
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
@@ -42,7 +43,7 @@ from contextdb.tables.plain_columns import PlainColumns
 AnyTable = TypeVar("AnyTable", bound="TableData")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TableData(Unchanging):
     """Assets against conditions, as texts and as the cells they mean; `Table` has what a table can do besides."""
 
@@ -93,6 +94,15 @@ class TableData(Unchanging):
 
     def __len__(self) -> int:
         return self.n_rows
+
+    def __repr__(self) -> str:
+        size = f"{plural(self.n_rows, 'row')} x {plural(len(self.conditions), 'condition')}"
+        return one_line(type(self).__name__, self.name, size)
+
+    def _repr_html_(self) -> str:
+        heads = [column.name for column in self.columns]
+        rows = ([column[row] for column in self.columns] for row in range(self.n_rows))
+        return as_html(repr(self), heads, rows, self.n_rows)
 
     @cached_property
     def assets(self) -> list[str]:

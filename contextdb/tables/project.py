@@ -10,11 +10,24 @@ from pathlib import Path
 from typing import TypeVar
 
 from contextdb.cells.arguments import require_kind, require_path
+from contextdb.cells.notebook import one_line
 from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import names_a_table, path_in_quotes, read_bytes
 from contextdb.disk.together import finish
-from contextdb.errors import ContextDBError, Fault, FileError, NoSuchTable, Place, SchemaError, TableError, in_quotes, nearest, some
+from contextdb.errors import (
+    ContextDBError,
+    Fault,
+    FileError,
+    NoSuchTable,
+    Place,
+    SchemaError,
+    TableError,
+    in_quotes,
+    nearest,
+    plural,
+    some,
+)
 from contextdb.files import texts as files
 from contextdb.files.file_names import alike, composed, spelled
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
@@ -41,7 +54,7 @@ class ByName(Mapping[str, T]):
         return True
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Project(Unchanging, ByName[Table]):
     """All tables of a folder, under one contextdb.toml: a mapping of tables by name."""
 
@@ -99,6 +112,9 @@ class Project(Unchanging, ByName[Table]):
         """The project with one table in another version, for those too whose rows refer to it."""
         require_kind(table, Table, "table", "a Table")
         return replace(self, tables=around_each_other({**self.tables, table.name: table}))
+
+    def __repr__(self) -> str:
+        return one_line("Project", self.schema.name or self.folder.name, plural(len(self.tables), "table"))
 
     @property
     def inner(self) -> set[str]:

@@ -8,21 +8,21 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 
-from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
-from contextdb.columns import TextColumn
+from contextdb.cells.arguments import require_kind, require_mapping, require_path, require_text
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, SchemaError, TableError, in_quotes
-from contextdb.schema.sections import settings_with
-from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults
+from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults, settings_from_dict
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.data import TableData
+from contextdb.tables.given_columns import columns_given
 from contextdb.tables.nesting.flat import FlatTable, flatten
 from contextdb.tables.nesting.links import inner_rows, is_nested, nesting_faults
 from contextdb.tables.saving import save_table
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Table(TableData):
     """Assets and their conditions. Get one from `cdb.load`, `Table.from_columns` or a `Project`."""
 
@@ -32,28 +32,30 @@ class Table(TableData):
     @classmethod
     def from_columns(
         cls,
-        columns: Mapping[str, Sequence[str]],
+        columns: Mapping[str, Sequence[object]] | Sequence[Mapping[str, object]] | pl.DataFrame,
         schema: Mapping[str, Mapping[str, object]] | Schema | None = None,
-        settings: TableSettings | Mapping[str, object] | None = None,
+        settings: Mapping[str, object] | TableSettings | None = None,
         name: str | None = None,
     ) -> Table:
         """Build a table from texts.
 
         Parameters
         ----------
-        columns : mapping of str to sequence of str
-            The cells of each column, equally many; the first column names the assets unless `settings.asset` says otherwise.
+        columns : mapping of str to sequence of str, list of mappings, or polars DataFrame
+            The cells of each column, equally many; or the rows, each a mapping of columns to cells; or a frame, read as a Parquet
+            file is. Cells are texts, and numbers and truths as they are written; None is empty (Any). The first column names the
+            assets unless the settings say otherwise.
         schema : mapping, optional
             The contents of `[conditions.NAME]` in contextdb.toml: `{"speed": {"type": "number"}}`. Others are inferred.
-        settings : mapping, optional
+        settings : mapping or TableSettings, optional
             The contents of `[tables.NAME]` in contextdb.toml: `{"policy": "first", "outputs": {"damage": {"type": "int"}}}`.
         name : str, optional
-            The name of the table. Default: that of the settings, or "table".
+            The name of the table. Default: that of a TableSettings, or "table".
 
         Raises
         ------
         SchemaError
-            The schema or the settings are invalid.
+            The schema is invalid, or the settings are.
         TableError
             Columns of unequal length, or cells that cannot be read.
         """
@@ -62,17 +64,14 @@ class Table(TableData):
             schema = replace(EMPTY, conditions=conditions_from_dict(schema))
             if faults := list(expression_faults(schema)):
                 raise SchemaError(*faults)
-        if isinstance(settings, Mapping):
-            settings = settings_with(TableSettings(name if isinstance(name, str) else "table"), settings)
-        elif settings is not None:
-            require_kind(settings, TableSettings, "settings", "a mapping, with the keys of [tables.NAME] in contextdb.toml")
-        name = require_text(name, "name") if name is not None else settings.name if settings is not None else "table"
-        for n, values in require_mapping(columns, "columns", 'a mapping: {"Asset Name": [...], "speed": [...]}').items():
-            require_many(values, f"the column {in_quotes(require_text(n, 'a name of columns'))}", "a list of texts")
-        texts = [TextColumn.of(n, map(str, values)) for n, values in columns.items()]
-        lengths = {c.name: c.n_rows for c in texts}
-        if len(set(lengths.values())) > 1:
-            raise TableError(Fault(f"the columns are not equally long: {lengths}.", "one text for each row in every column"))
+        if name is not None:
+            require_text(name, "name")
+        else:
+            name = settings.name if isinstance(settings, TableSettings) else "table"
+        if settings is not None and not isinstance(settings, TableSettings):
+            accepted = 'a mapping: {"priority": "Prio"}, or a contextdb.schema.TableSettings'
+            settings = settings_from_dict(name, require_mapping(settings, "settings", accepted), schema.conditions.keys())
+        texts = columns_given(columns)
         table = cls.build(name, texts, schema, settings)
         table.require_readable()
         return table

@@ -13,7 +13,8 @@ import polars as pl
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Unknown, read_fact_text
 from contextdb.cells.sets import Cell
-from contextdb.compiled.batch import ManyMatches
+from contextdb.compiled.batch import query_encoded
+from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes, nearest
@@ -37,7 +38,7 @@ class Contexts:
     def ask(self, compiled: CompiledTable, unknown: Unknown) -> ManyMatches:
         """The valid rows in every context; a ContextError names file, line and fact."""
         try:
-            return compiled.query_many(self.facts, unknown)
+            return query_encoded(compiled, self.facts, unknown)
         except ContextError as error:
             raise ContextError(*(replace(fault, place=self._place(fault.place)) for fault in error.faults)) from None
 

@@ -82,7 +82,7 @@ def cases(draw: st.DrawFn) -> Case:
 
 def asked(compiled: CompiledTable, facts: dict[str, Any], unknown: str) -> list[int] | None:
     try:
-        return compiled.query(facts, unknown).indices.tolist()
+        return compiled.query(facts, unknown=unknown).indices.tolist()
     except ContextError:
         return None
 
@@ -103,13 +103,13 @@ def test_many_contexts_have_the_answers_of_each_alone(case, moments, unknown):
     columns = {name: [facts[name] for facts in moments] for name in CONDITIONS}
     if None in expected:
         with pytest.raises(ContextError):
-            _ = compiled.query_many(columns, unknown).counts
+            _ = compiled.query_many(columns, unknown=unknown).counts
         return
     for few_rows in (-1, 64):  # against whole masks, row by row
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("contextdb.expressions.rules.many.MANY_ROWS", few_rows)
-            assert [rows.tolist() for rows in compiled.query_many(columns, unknown).lists()] == expected
-    many = compiled.query_many(columns, unknown)
+            assert [rows.tolist() for rows in compiled.query_many(columns, unknown=unknown).lists()] == expected
+    many = compiled.query_many(columns, unknown=unknown)
     assert [rows.tolist() for rows in many.lists()] == expected
     assert many.counts.tolist() == [len(rows) for rows in expected]
     assert many.hits.tolist() == [sum(row in rows for rows in expected) for row in range(compiled.n_rows)]
@@ -125,7 +125,7 @@ MOSTLY_KNOWN = contexts().map(lambda facts: {n: STANDING_IN.get(n, 1.0) if f is 
 @given(cases(), MOSTLY_KNOWN, st.lists(st.tuples(st.sampled_from(sorted(CONDITIONS)), MOSTLY_KNOWN), max_size=16), st.data())
 def test_a_live_context_answers_as_a_query_does(case, first, changes, data):
     unknown = data.draw(st.sampled_from(["error", "any", "never"]))
-    facts, live = dict(first), case.compiled.live(first, unknown)
+    facts, live = dict(first), case.compiled.live(first, unknown=unknown)
     for name, other in [("a", first), *changes]:
         facts[name] = other[name]
         if name in live.facts:
@@ -147,7 +147,7 @@ def test_a_file_keeps_the_rules_and_an_explanation_says_which_row_breaks_its_own
         expected = case.answer(facts, unknown)
         assert asked(opened, facts, unknown) == expected
         assert list(opened.asked) == list(case.compiled.asked)
-        explanation = opened.explain(facts, unknown)
+        explanation = opened.explain(facts, unknown=unknown)
         for row, rule in enumerate(case.rules):
             told, truth = explanation.row(row), rule.value(facts)
             assert told.is_valid == (row in expected)
@@ -163,7 +163,7 @@ SETS = {"a": ("0..2.5", (0.0, 0.5, 1.0, 2.5)), "gait": ("Walk Run", GAITS[:2]), 
 @given(cases(), contexts(), st.sets(st.sampled_from(sorted(SETS)), min_size=1), st.sampled_from(["any", "never"]))
 def test_sets_of_values_leave_every_row_that_may_match_and_promise_none_that_may_not(case, facts, names, unknown):
     given_facts = {**facts, **{name: cdb.cell(SETS[name][0]) for name in names}}
-    matches = case.compiled.query(given_facts, unknown)
+    matches = case.compiled.query(given_facts, unknown=unknown)
     always = np.flatnonzero(np.unpackbits(matches.always.view(np.uint8), bitorder="little")).tolist()
     worlds = [dict(facts)]
     for name in names:

@@ -120,7 +120,7 @@ def test_a_range_is_valid_when_some_row_of_its_asset_accepts_the_facts_as_it_pla
     starts, stops = (np.array(side) for side in zip(*pairwise(edges.tolist()), strict=True))
     flags = rng.random(len(assets)) < 0.5
     plainly = MotionDatabase.from_features(np.zeros((edges[-1], 1)), starts, stops, assets)
-    found = replace(plainly, mirrored=flags).filter(rows.compile().query(facts, "never"))
+    found = replace(plainly, mirrored=flags).filter(rows.compile().query(facts, unknown="never"))
     seen = plain_in_mirror(rows, plain, facts)
     for at, (asset, is_mirrored) in enumerate(zip(assets, flags, strict=True)):
         context = seen if is_mirrored else plain

@@ -353,7 +353,7 @@ def test_a_table_of_very_many_bounds_is_observed_as_it_is_queried(tmp_path):
     facts = [None if k % 11 == 0 else k / 3 - 100 for k in range(3000)]
     pl.DataFrame({"x": facts}).write_parquet(tmp_path / "a.parquet")
     found = observe(table, tmp_path / "a.parquet")
-    many = table.compile().query_many({"x": facts}, "never")
+    many = table.compile().query_many({"x": facts}, unknown="never")
     assert found.hits == tuple(many.hits.tolist())
     assert found.uncovered == int((many.counts == 0).sum())
 

@@ -58,7 +58,7 @@ def test_a_row_is_valid_and_counts_as_in_the_flat_table(tables, air, speed):
 
     flat = outer.flat()
     facts = {name: fact for name, fact in query.facts.items() if fact is not None}
-    flags = compile_table(flat).query(facts, "any").flags
+    flags = compile_table(flat).query(facts, unknown="any").flags
     rows = flat_rows(outer, flat)
     assert query.valid.tolist() == [bool(flags[own].any()) for own in rows]
     for row, own in enumerate(rows):

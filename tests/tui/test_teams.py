@@ -136,7 +136,7 @@ def test_teams_come_back_from_their_file_as_they_were_and_a_program_can_offer_th
     teams = Teams(table, {"Defender": [{"Actor": "Ivy", "chart": "CB", "distance": "1.5"}, {"Actor": "Bo", "distance": "0 ± 3"}]})
     teams.save(path)
     assert Teams.beside(table).sheets["Defender"].texts == teams.sheets["Defender"].texts
-    cast = table.compile().query({}, "any", actors=json.loads(path.read_text())).casting(0)
+    cast = table.compile().query({}, unknown="any", actors=json.loads(path.read_text())).casting(0)
     assert cast["Defender"]["name"] == "Ivy"
     assert cdb.Project.load(tmp_path).tables.keys() == {"catch"}
 

@@ -47,7 +47,7 @@ class Asked:
         try:
             self.compiled = compile_table(self.flat)
             given = {name: fact for name, fact in facts.items() if fact is not None and name in self.compiled.asked}
-            self.explained = self.compiled.explain(given, "any", actors or None)
+            self.explained = self.compiled.explain(given, unknown="any", actors=actors or None)
         except ContextError as error:
             self.fault = self.fault or error.faults[0]
 

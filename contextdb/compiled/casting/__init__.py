@@ -2,7 +2,6 @@
 
 from contextdb.compiled.casting.explaining import CastExplanation
 from contextdb.compiled.casting.facts import Actor, Actors, Prefer
-from contextdb.compiled.casting.many import ManyCastMatches
 from contextdb.compiled.casting.stage import Casting, CastMatches
 
-__all__ = ["Actor", "Actors", "CastExplanation", "CastMatches", "Casting", "ManyCastMatches", "Prefer"]
+__all__ = ["Actor", "Actors", "CastExplanation", "CastMatches", "Casting", "Prefer"]

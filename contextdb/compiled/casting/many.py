@@ -2,75 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, cast
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-import numpy as np
-
-from contextdb.bitmask import Rows, Words, read_only
-from contextdb.cells.facts import Unknown, check_mode
-from contextdb.compiled.batch import Answers
+from contextdb.cells.facts import check_mode
 from contextdb.compiled.batch_columns import Contexts, common_length, facts_of
-from contextdb.compiled.casting.facts import Actors, Ask, Prefer
-from contextdb.compiled.casting.stage import CastMatches, query_with_actors
+from contextdb.compiled.casting.facts import Ask
+from contextdb.compiled.casting.stage import query_with_actors
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.unchanging import Unchanging
-from contextdb.errors import ContextError, Fault, Place, plural
+from contextdb.compiled.many import ListedMatches, one_by_one
+from contextdb.errors import ContextError, Fault, plural
 
 
-@dataclass(frozen=True, eq=False)
-class ManyCastMatches(Unchanging, Answers[CastMatches]):
-    """The answers for N contexts with actors, as `ManyMatches` tells them, and each with its castings: `many[i].casting(row)`."""
+def query_many_with_actors(compiled: CompiledData, contexts: Contexts, ask: Ask) -> ListedMatches:
+    """Answer every context with its actors: one mapping for all, or a sequence of one for each.
 
-    compiled: CompiledData
-    answers: Sequence[CastMatches]
-
-    @cached_property
-    def mirrored(self) -> ManyCastMatches:
-        """The answers with the facts of contexts and actors as a mirror shows them; see `Matches.mirrored`."""
-        return ManyCastMatches(self.compiled, tuple(cast("CastMatches", m.mirrored) for m in self.answers))
-
-    @cached_property
-    def counts(self) -> Rows:
-        """How many rows are valid in each context: int64 [N]."""
-        return read_only(np.array([len(m) for m in self.answers], np.int64))
-
-    @cached_property
-    def hits(self) -> Rows:
-        """In how many contexts each row is valid: int64 [n_rows]."""
-        hits = np.zeros(self.compiled.n_rows, np.int64)
-        for matches in self.answers:
-            hits[matches.indices] += 1
-        return read_only(hits)
-
-    @cached_property
-    def mask(self) -> Words:
-        """The rows of each context as bits: uint64 [N, W]."""
-        masks = np.array([m.mask for m in self.answers], np.uint64)
-        return read_only(masks.reshape(len(self.answers), len(self.compiled.enabled)))
-
-    def lists(self) -> list[Rows]:
-        """The row numbers of each context: a list of int64 arrays."""
-        return [m.indices for m in self.answers]
-
-    def __len__(self) -> int:
-        return len(self.answers)
-
-    def _answer(self, context: int) -> CastMatches:
-        return self.answers[context]
-
-    def __iter__(self) -> Iterator[CastMatches]:
-        return iter(self.answers)
-
-
-def query_many_with_actors(
-    compiled: CompiledData, contexts: Contexts, actors: Actors | Sequence[Actors], prefer: Prefer, unknown: Unknown
-) -> ManyCastMatches:
-    """Answer every context with its actors; raises ContextError as `query`, with the number of the context."""
-    check_mode(unknown)
+    Raises
+    ------
+    ContextError
+        As `query`, with the number of the context.
+    """
+    check_mode(ask.unknown)
     columns = facts_of(contexts)
+    actors: Any = ask.actors
     each: Sequence[Any] | None = None if isinstance(actors, Mapping) else actors
     if each is not None and (not isinstance(each, Sequence) or isinstance(each, (str, bytes))):
         accepted = "a mapping of roles for all contexts, or a list of one for each"
@@ -79,12 +33,8 @@ def query_many_with_actors(
     if each is not None and len(each) != n_contexts:
         found = f"there are actors for {plural(len(each), 'context')}, and facts for {n_contexts:,}."
         raise ContextError(Fault(found, "a mapping of roles for all contexts, or one for each"))
-    answers = []
-    for row in range(n_contexts):
-        offered: Any = actors if each is None else each[row]
-        try:
-            facts = {name: values[row] for name, values in columns.items()}
-            answers.append(query_with_actors(compiled, facts, Ask(offered, prefer, unknown)))
-        except ContextError as error:
-            raise ContextError(*(f.at(Place(row=row, column=f.place.column)) for f in error.faults)) from None
-    return ManyCastMatches(compiled, tuple(answers))
+
+    def answer(context: int, facts: Mapping[str, object]) -> Any:
+        return query_with_actors(compiled, facts, Ask(actors if each is None else each[context], ask.prefer, ask.unknown))
+
+    return one_by_one(compiled, columns, n_contexts, answer)

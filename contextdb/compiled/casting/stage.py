@@ -28,10 +28,12 @@ from contextdb.compiled.casting.facts import Actor, Actors, Ask, Offer, mirrored
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.rules import CastRules
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.matches import SetMatches
+from contextdb.compiled.matches import Answering, SetMatches, Stages
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
 
 Casting = dict[str, Actor]
+CastBy = tuple[tuple[int, "Stage"], ...]
+"""For some rows, as bits, the stage that casts them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,30 +53,36 @@ class Roles:
 class CastMatches(SetMatches):
     """The valid rows for a context and actors. `casting(row)` says who plays what."""
 
-    __slots__ = ("_stage",)
+    __slots__ = ("_cast_by",)
 
-    def __init__(self, bits: int, always: int, stage: Stage) -> None:
-        super().__init__(bits, stage.compiled.answering, always)
-        self._stage = stage
+    def __init__(self, bits: int, always: int, stages: CastBy, table: Answering) -> None:
+        super().__init__(bits, table, always)
+        self._cast_by = stages
+
+    @property
+    def _stages(self) -> CastBy:
+        """Who plays what, for some rows; the first that has a row counts."""
+        return self._cast_by
 
     def casting(self, row: int) -> Casting:
         """The best casting of a valid row, as {role: actor}: most optional roles filled, then by preference, then as offered."""
-        self._require_valid(row)
-        return self._stage.best(row)
+        return self._stage(row).best(row)
 
     def cast(self, row: int) -> dict[str, Offer]:
         """The same as `casting`, each actor with where it was offered."""
-        self._require_valid(row)
-        return dict(self._stage.cast(row))
+        return dict(self._stage(row).cast(row))
 
     def castings(self, row: int) -> list[Casting]:
         """All castings of a valid row that fill as many optional roles as can be, best first."""
-        self._require_valid(row)
-        return self._stage.all(row)
+        return self._stage(row).all(row)
 
-    def _require_valid(self, row: int) -> None:
+    def _stage(self, row: int) -> Stage:
         if require_whole(row, "row") not in self:
             raise ContextError(Fault(f"row {row} is not valid, so nobody is cast for it.", "one of the valid rows, m.indices"))
+        for rows, stage in self._cast_by:
+            if rows >> row & 1:
+                return stage
+        raise ContextError(Fault(f"row {row} is of an answer without actors, so nobody is cast.", "query(facts, actors={...})"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,12 +143,17 @@ class Stage:
         for some_rows, all_rows in plain.values():
             some_bits &= some_rows
             all_bits &= all_rows
-        found = CastMatches(*self.left_by_rules(some_bits, all_bits), self)
+        some_bits, all_bits = self.left_by_rules(some_bits, all_bits)
+        found = self.answer(some_bits, all_bits, ((some_bits, self),), self.compiled.answering)
         if self.compiled.mirroring:
             found.with_mirrored(self.mirrored)
         if self.compiled.is_soft:
             found.with_penalties(lambda: self.penalties(found))
         return found
+
+    def answer(self, bits: int, always: int, stages: Stages, table: Answering) -> CastMatches:
+        """An answer of some rows, with the castings of several."""
+        return CastMatches(bits, always, tuple((rows, stage) for rows, stage in stages if isinstance(stage, Stage)), table)
 
     def mirrored(self) -> CastMatches:
         """The answer with the facts of the context and of the actors as a mirror shows them. The actors stay who they are, and as

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     Sources = Mapping[str, list[tuple[int, ConditionColumn]]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FlatTable(TableData):
     """A table with its inner tables' rows; get one from `Table.flat()`. Its assets are paths, its row numbers those of matches."""
 

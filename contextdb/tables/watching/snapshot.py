@@ -7,13 +7,14 @@ columns that changed are compiled. The disk is touched only to say why a file th
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
+from contextdb.cells.notebook import one_line
 from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import read_bytes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError
+from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, plural
 from contextdb.files.texts import texts_of
 from contextdb.schema.settings import EMPTY, Schema, read_schema
 from contextdb.tables.nesting.links import reached
@@ -26,22 +27,25 @@ Contents = Mapping[Path, bytes]
 Found = Sequence[tuple[str, Path]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Snapshot(Unchanging, ByName[CompiledTable]):
     """One version of a project, compiled: a mapping of compiled tables by name. It never changes, so that a game can ask several
     tables of one and the same version."""
 
     number: int
     """1 for the version that the watch began with, one more for each that came after it."""
-    project: Project = field(repr=False)
-    tables: Mapping[str, CompiledTable] = field(repr=False)
+    project: Project
+    tables: Mapping[str, CompiledTable]
     """Every table compiled, by name."""
     changed: tuple[str, ...]
     """The tables that are new or differ from the version before, in a table inside them too."""
-    digests: Digests = field(repr=False)
+    digests: Digests
     """Of each file, as it was read."""
-    alone: Mapping[str, Table] = field(repr=False)
+    alone: Mapping[str, Table]
     """The tables as their files have them, knowing nothing of each other."""
+
+    def __repr__(self) -> str:
+        return one_line("Snapshot", self.project.folder.name, f"version {self.number} of {plural(len(self), 'table')}")
 
     def __getitem__(self, name: str) -> CompiledTable:
         """One compiled table; a name that is missing raises NoSuchTable, which is a KeyError too, and names the nearest."""

@@ -21,8 +21,9 @@ from pathlib import Path
 from types import TracebackType
 
 from contextdb.cells.arguments import require_callable, require_number, require_path
+from contextdb.cells.notebook import one_line
 from contextdb.compiled.table import CompiledTable
-from contextdb.errors import ContextDBError, Fault, FileError, Place
+from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.schema.settings import Schema
 from contextdb.tables.project import SCHEMA_FILE, ByName, Project, folder_of, table_files
 from contextdb.tables.watching.rest import Rest
@@ -119,6 +120,11 @@ class Watch(ByName[CompiledTable]):
 
     def __len__(self) -> int:
         return len(self._snapshot)
+
+    def __repr__(self) -> str:
+        told = f"version {self._snapshot.number} of {plural(len(self), 'table')}"
+        faults = f", {plural(len(self.faults), 'fault')}" if self.faults else ""
+        return one_line("Watch", self.folder.name, told + faults + (", closed" if self._is_closed.is_set() else ""))
 
     @property
     def faults(self) -> tuple[Fault, ...]:

@@ -1,0 +1,315 @@
+"""The answers of many contexts: what a batch, contexts that were asked one by one, and those with actors have in common.
+
+N contexts, W words a mask. Masks are worked out in blocks, so that counts and hits never need them all at once.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from operator import and_, or_, xor
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb import bitmask
+from contextdb.bitmask import Rows, Words, read_only
+from contextdb.cells.arguments import require_place
+from contextdb.cells.notebook import one_line
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.matches import Join, Matches, minus
+from contextdb.compiled.said_rows import SaidRows
+from contextdb.compiled.unchanging import Unchanging
+from contextdb.errors import ContextError, Fault, Place, WrongType, plural
+
+BLOCK = 2048
+"""Contexts whose masks are worked out together."""
+
+
+class ManyMatches(Unchanging, Sequence[Matches]):
+    """The valid rows of many contexts: a sequence of `Matches`, each as `query` gives it, with or without actors. Results are
+    computed on first use and kept; arrays are read-only. As with `Matches`, `&`, `|`, `-` and `^` join the answers for as many
+    contexts, each with its own; `&` and `-` also take what `only` takes.
+    """
+
+    compiled: CompiledData
+
+    @property
+    @abstractmethod
+    def mirrored(self) -> ManyMatches:
+        """The valid rows of the same contexts with mirrored facts; see `Matches.mirrored`. The same object where no fact of the
+        table changes in a mirror."""
+
+    @abstractmethod
+    def _answer(self, context: int) -> Matches:
+        """The answer of a context by its number, from 0."""
+
+    @abstractmethod
+    def _masks(self, start: int, stop: int) -> Words:
+        """The rows of some contexts as bits."""
+
+    @property
+    def n_rows(self) -> int:
+        """The number of rows of the table, valid or not."""
+        return self.compiled.n_rows
+
+    @property
+    def table_assets(self) -> Sequence[str]:
+        """The assets of all rows of the table, valid or not, without paths; the same object as in each of the answers."""
+        return self.compiled.answering.leaves
+
+    @property
+    def counts(self) -> Rows:
+        """How many rows are valid in each context: int64 [N]."""
+        return self._counts_and_hits[0]
+
+    @property
+    def hits(self) -> Rows:
+        """In how many contexts each row is valid: int64 [n_rows]."""
+        return self._counts_and_hits[1]
+
+    @cached_property
+    def mask(self) -> Words:
+        """The rows of each context as bits: uint64 [N, W]."""
+        return read_only(self._masks(0, len(self)))
+
+    @property
+    def always(self) -> Words:
+        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
+        return self.mask
+
+    @property
+    def codes(self) -> NDArray[np.int32]:
+        """The codes of every context, as `CompiledTable.encode` gives them for one: int32 [N, P]."""
+        raise ContextError(Fault("these answers have no codes.", "an answer of query_many with one value for each fact"))
+
+    @property
+    def penalties(self) -> NDArray[np.float64]:
+        """What each row's soft cells cost in each context: float64 [N, n_rows]; see `Matches.penalties`. Not kept."""
+        costs = np.zeros((len(self), self.n_rows))
+        for context, matches in enumerate(self) if self.compiled.is_soft else ():
+            costs[context] = matches.penalties
+        return read_only(costs)
+
+    def lists(self) -> list[Rows]:
+        """The row numbers of each context: a list of int64 arrays."""
+        found: list[Rows] = []
+        for start in range(0, len(self), BLOCK):
+            flags = bitmask.unpack(self._masks(start, min(start + BLOCK, len(self))), self.n_rows)
+            contexts, rows = np.nonzero(flags)
+            found += np.split(read_only(rows), np.searchsorted(contexts, np.arange(1, len(flags))))
+        return found
+
+    def only(self, rows: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> ManyMatches:
+        """The same answers without the rows that are not among some rows.
+
+        Parameters
+        ----------
+        rows
+            For all contexts alike, as `Matches.only` takes them; or for each context: bool [N, n_rows], or as many answers.
+
+        Raises
+        ------
+        ContextError
+            As `Matches.only`; flags or answers for another number of contexts.
+        """
+        return FewerMatches(self, self._masks_said(rows))
+
+    def _masks_said(self, rows: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> Words:
+        """Some rows, for all contexts or for each: uint64 [1 or N, W]."""
+        if isinstance(rows, ManyMatches):
+            return self._beside(rows).mask
+        if isinstance(rows, np.ndarray) and rows.dtype == np.bool_ and rows.ndim == 2:
+            if rows.shape != (len(self), self.n_rows):
+                found = (
+                    f"there are flags of shape {rows.shape}, for {plural(len(self), 'context')} of {plural(self.n_rows, 'row')}."
+                )
+                raise ContextError(Fault(found, f"one bool for each row of each context: ({len(self)}, {self.n_rows})"))
+            return read_only(bitmask.pack(rows.astype(np.bool_, copy=False)))
+        return bitmask.from_int(self.compiled.answering.bits_of(rows), self.n_rows)[None]
+
+    def __and__(self, other: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> ManyMatches:
+        return self._joined(other, and_) if isinstance(other, ManyMatches) else self.only(other)
+
+    __rand__ = __and__
+    __array_ufunc__ = None
+
+    def __sub__(self, other: SaidRows | NDArray[np.bool_] | Matches | ManyMatches) -> ManyMatches:
+        return self._joined(other, minus) if isinstance(other, ManyMatches) else FewerMatches(self, ~self._masks_said(other))
+
+    def __or__(self, other: ManyMatches) -> ManyMatches:
+        return self._joined(other, or_)
+
+    def __xor__(self, other: ManyMatches) -> ManyMatches:
+        return self._joined(other, xor)
+
+    def _joined(self, other: object, join: Join) -> ManyMatches:
+        if not isinstance(other, ManyMatches):
+            found = f"the answers for many contexts cannot be joined with {type(other).__name__}."
+            raise WrongType(Fault(found, "as many answers of the same table"))
+        return JoinedMatches(self, self._beside(other), join)
+
+    def _beside(self, other: ManyMatches) -> ManyMatches:
+        """Other answers, which must be of the same table and for as many contexts."""
+        self.compiled.answering.require(other.compiled.answering)
+        if len(other) != len(self):
+            found = f"there are answers for {plural(len(other), 'context')}, and for {len(self):,}."
+            raise ContextError(Fault(found, "an answer for each context"))
+        return other
+
+    @overload
+    def __getitem__(self, context: int) -> Matches: ...
+
+    @overload
+    def __getitem__(self, context: slice) -> list[Matches]: ...
+
+    def __getitem__(self, context: int | slice) -> Matches | list[Matches]:
+        """The answer of one context, as `query` gives it, or those of a slice; NoSuchPlace, an IndexError too, where none is."""
+        if isinstance(context, slice):
+            return [self._answer(i) for i in range(*context.indices(len(self)))]
+        return self._answer(require_place(context, len(self), "context"))
+
+    def __iter__(self) -> Iterator[Matches]:
+        return (self._answer(context) for context in range(len(self)))
+
+    def __repr__(self) -> str:
+        return one_line("ManyMatches", self.compiled.name, f"{plural(len(self), 'context')} x {plural(self.n_rows, 'row')}")
+
+    @cached_property
+    def _counts_and_hits(self) -> tuple[Rows, Rows]:
+        counts = np.zeros(len(self), np.int64)
+        hits = np.zeros(self.n_rows, np.int64)
+        for start in range(0, len(self), self._block):
+            masks = self._masks(start, min(start + self._block, len(self)))
+            counts[start : start + len(masks)] = bitmask.count(masks)
+            hits += np.bincount(bitmask.places(masks)[1], minlength=self.n_rows)
+        return read_only(counts), read_only(hits)
+
+    @property
+    def _block(self) -> int:
+        return BLOCK
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ListedMatches(ManyMatches):
+    """The answers of contexts that were asked one by one: with actors, or with facts that are sets."""
+
+    compiled: CompiledData
+    answers: Sequence[Matches]
+
+    @cached_property
+    def mirrored(self) -> ManyMatches:
+        """The valid rows of the same contexts with the facts of contexts and actors as a mirror shows them."""
+        return ListedMatches(self.compiled, tuple(m.mirrored for m in self.answers)) if self.compiled.mirroring else self
+
+    @cached_property
+    def always(self) -> Words:
+        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
+        return read_only(self._stacked([m.always for m in self.answers]))
+
+    def lists(self) -> list[Rows]:
+        """The row numbers of each context: a list of int64 arrays."""
+        return [m.indices for m in self.answers]
+
+    def __len__(self) -> int:
+        return len(self.answers)
+
+    def _answer(self, context: int) -> Matches:
+        return self.answers[context]
+
+    def _masks(self, start: int, stop: int) -> Words:
+        return self._stacked([m.mask for m in self.answers[start:stop]])
+
+    def _stacked(self, masks: Sequence[Words]) -> Words:
+        return np.array(masks, np.uint64).reshape(len(masks), len(self.compiled.enabled))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FewerMatches(ManyMatches):
+    """Answers without the rows that are not among some."""
+
+    whole: ManyMatches
+    others: Words
+    """The rows to keep, for all contexts or for each: uint64 [1 or N, W]."""
+
+    @property
+    def compiled(self) -> CompiledData:  # type: ignore[override]
+        """The table."""
+        return self.whole.compiled
+
+    @cached_property
+    def mirrored(self) -> ManyMatches:
+        """The valid rows of the same contexts with mirrored facts, without the same rows."""
+        return FewerMatches(self.whole.mirrored, self.others) if self.compiled.mirroring else self
+
+    @cached_property
+    def always(self) -> Words:
+        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
+        return read_only(self.whole.always & self.others)
+
+    def __len__(self) -> int:
+        return len(self.whole)
+
+    def __iter__(self) -> Iterator[Matches]:
+        bits = [bitmask.to_int(mask) for mask in self.others]
+        return (one.kept(bits[i if len(bits) > 1 else 0]) for i, one in enumerate(self.whole))
+
+    def _answer(self, context: int) -> Matches:
+        return self.whole[context].kept(bitmask.to_int(self.others[context if len(self.others) > 1 else 0]))
+
+    def _masks(self, start: int, stop: int) -> Words:
+        return self.whole._masks(start, stop) & (self.others[start:stop] if len(self.others) > 1 else self.others)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JoinedMatches(ManyMatches):
+    """The answers of two for the same contexts, each with its own, joined as sets of rows."""
+
+    first: ManyMatches
+    second: ManyMatches
+    join: Join
+
+    @property
+    def compiled(self) -> CompiledData:  # type: ignore[override]
+        """The table."""
+        return self.first.compiled
+
+    @cached_property
+    def mirrored(self) -> ManyMatches:
+        """The answers with mirrored facts, joined in the same way."""
+        return JoinedMatches(self.first.mirrored, self.second.mirrored, self.join) if self.compiled.mirroring else self
+
+    @cached_property
+    def always(self) -> Words:
+        """The rows that hold all values of set-valued facts: uint64 [N, W]."""
+        one, other = self.first.always, self.second.always
+        return read_only(self.mask & (one & other if self.join is and_ else one | other))
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def __iter__(self) -> Iterator[Matches]:
+        return (one.joined(other, self.join) for one, other in zip(self.first, self.second, strict=True))
+
+    def _answer(self, context: int) -> Matches:
+        return self.first[context].joined(self.second[context], self.join)
+
+    def _masks(self, start: int, stop: int) -> Words:
+        masks: Words = self.join(self.first._masks(start, stop), self.second._masks(start, stop))
+        return masks
+
+
+def one_by_one(
+    compiled: CompiledData, columns: Mapping[str, Any], n_contexts: int, answer: Callable[[int, Mapping[str, object]], Matches]
+) -> ListedMatches:
+    """Ask every context by its number and facts; raises ContextError as that does, with the number of the context."""
+    answers = []
+    for context in range(n_contexts):
+        try:
+            answers.append(answer(context, {name: values[context] for name, values in columns.items()}))
+        except ContextError as error:
+            raise ContextError(*(f.at(Place(row=context, column=f.place.column)) for f in error.faults)) from None
+    return ListedMatches(compiled, tuple(answers))

@@ -17,6 +17,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
+from math import ldexp
 from operator import itemgetter
 from typing import Any
 
@@ -26,6 +27,7 @@ from contextdb.cells.kinds import Kind
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.groups import groups_of
 from contextdb.compiled.matches import Answering, Matches
+from contextdb.compiled.ruler import ruler_of
 from contextdb.errors import ContextError
 from contextdb.expressions.rules import WhenRules
 from contextdb.expressions.rules.rules import Unusual
@@ -67,7 +69,7 @@ def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, kee
     With `keep`, which copies a context, the answer knows the facts it was asked with, for the answer in a mirror.
     """
     n_rows = len(answering.assets)
-    names: dict[str, Any] = {"bisect_right": bisect_right, "ldexp": math.ldexp}
+    names: dict[str, Any] = {"bisect_right": bisect_right, "ldexp": ldexp}
     names |= {"new": object.__new__, "Matches": Matches, "answering": answering}
     values = _value_terms([(c, m) for c, m in columns if isinstance(m, ValueMasks)], n_rows, names)
     numbers = [_term(i, c, m, names) for i, (c, m) in enumerate(columns) if not isinstance(m, ValueMasks)]
@@ -121,8 +123,18 @@ def _term(i: int, condition: Condition, masks: NumberMasks | WideMasks | TagMask
     if not isinstance(masks, NumberMasks):
         names[f"f{i}"] = _careful_lookup(condition, masks)
         return f"f{i}({fact})"
-    names[f"b{i}"], names[f"m{i}"] = _straight(condition, masks)
-    return f"m{i}[bisect_right(b{i}, {_exact(i, condition.domain.type, fact, names)})]"
+    bounds, found = _straight(condition, masks)
+    kind = condition.domain.type
+    if kind.exact is None and (ruler := ruler_of(bounds, found)) is not None:
+        names[f"l{i}"], names[f"m{i}"], names[f"f{i}"] = ruler.lasts, ruler.masks, _bisecting(bounds, found)
+        is_on = f"0.0 <= (y := x * {ruler.per_unit!r} - {ruler.start!r}) < {len(ruler.lasts)}.0 and x >= l{i}[k := int(y)]"
+        return f"(m{i}[k] if type(x := {fact}) is float and {is_on} else f{i}(x))"
+    names[f"b{i}"], names[f"m{i}"] = bounds, found
+    return f"m{i}[bisect_right(b{i}, {_exact(i, kind, fact, names)})]"
+
+
+def _bisecting(bounds: list[float], masks: list[int | None]) -> Callable[[Any], int | None]:
+    return lambda fact: masks[bisect_right(bounds, ldexp(fact, 0))]
 
 
 def single_lookup(condition: Condition, masks: ColumnMasks) -> SingleLookup:
@@ -224,7 +236,7 @@ def _shifted(bound: float, turn: float) -> float:
 
 
 def _double(fact: Any) -> float:
-    return math.ldexp(fact, 0)
+    return ldexp(fact, 0)
 
 
 def _wide_lookup(condition: Condition, masks: WideMasks) -> Callable[[Any], int]:

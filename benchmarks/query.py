@@ -3,6 +3,7 @@
     python benchmarks/query.py                      everything, in about five minutes
     python benchmarks/query.py --quick              a rough look at everything
     python benchmarks/query.py --only single batch  some sections
+    python benchmarks/query.py --against PATH       only single queries, beside another checkout of contextdb
     python benchmarks/query.py --json FILE          the same figures for programs
 
 Every engine's answers are compared with a reading of every cell before anything is timed. See `benchmarks/timing.py` for how
@@ -21,7 +22,7 @@ from typing import Any
 if __package__ in (None, ""):
     sys.path[0] = str(Path(__file__).parent.parent)  # not this folder: its coverage.py is no package of that name
 
-from benchmarks import sections, timing
+from benchmarks import against, sections, timing
 
 SECTIONS: dict[str, Callable[[timing.Effort, bool], dict[str, Any]]] = {
     "single": sections.single,
@@ -38,11 +39,15 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer calls, for a rough look")
     parser.add_argument("--only", nargs="+", choices=list(SECTIONS), default=list(SECTIONS), help="sections to run")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to a file")
+    parser.add_argument("--against", type=Path, metavar="PATH", help="compare with the contextdb of another checkout instead")
     options = parser.parse_args()
     report: dict[str, Any] = {"format": 1, "machine": timing.machine(), "versions": timing.versions()}
     print(" · ".join(f"{key} {value}" for key, value in (report["machine"] | report["versions"]).items()))
-    for name in options.only:
-        report[name] = SECTIONS[name](timing.QUICK if options.quick else timing.FULL, options.quick)
+    effort = timing.QUICK if options.quick else timing.FULL
+    if options.against:
+        report["against"] = against.measure(options.against, effort)
+    for name in [] if options.against else options.only:
+        report[name] = SECTIONS[name](effort, options.quick)
     report["load_at_end"] = timing.machine()["load"]
     print(f"\nload at the end {report['load_at_end']}")
     if options.json:

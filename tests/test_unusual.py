@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Callable
 from datetime import date
 from decimal import Decimal
@@ -56,10 +57,18 @@ class Tensor:
     __hash__ = object.__hash__
 
 
+class Number:
+    """What can be made a float of, and is no number."""
+
+    def __float__(self) -> float:
+        return 2.0
+
+
 ODD: list[object] = [
     None, True, "", "x", "Grond", b"x", float("nan"), float("inf"), -1e300, 2**60, 10**400, 1j, object(), Tensor(), [], [1],
     ["Move"], ["Ground"], {1}, {}, (1,), Decimal("NaN"), Decimal("sNaN"), Decimal("1e999"), Fraction(10**400), Fraction(1, 3),
     np.float32(2), np.float64("nan"), np.int64(2), np.bool_(True), np.str_("Ground"), np.array([1.0, 2.0]), np.array("abc"),
+    np.array(2.0), np.array(2), np.array("2.0"), np.array(np.nan), np.array(True), np.array("Ground"), Number(),
     np.void(b"abc"), np.datetime64("2020-01-01"), np.timedelta64(1), np.longdouble("1e4000"), date(2020, 1, 1),
     pl.Series([1.0]), pl.DataFrame({"a": [1]}), pl.col("a"), range(3), print, int, re.compile("x"), cell("Any"), cell("1..2"),
 ]  # fmt: skip
@@ -89,6 +98,27 @@ def test_an_odd_fact_is_answered_or_refused_as_the_careful_way_does(flat_bytes: 
             assert answer(lambda ask=ask, context=context: ask(context).indices.tolist()) == expected, value
 
 
+@WIDTHS
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_an_array_of_no_dimension_is_answered_or_refused_alike_at_every_entrance(flat_bytes: int, name: str):
+    table = compiled(flat_bytes)
+    for value in (np.array(2.0), np.array(2), np.array(np.nan), np.array(True), np.array("Ground"), np.array([2.0])):
+        context = FACTS | {name: value}
+        expected = answer(lambda context=context: table.query_with_care(context).indices.tolist())
+        many = {key: [fact] for key, fact in context.items()}
+        asks = {
+            "query": lambda context=context: table.query(context).indices.tolist(),
+            "live": lambda context=context: table.live(context).matches().indices.tolist(),
+            "codes": lambda context=context: table.query_codes(table.encode(context)).indices.tolist(),
+            "explain": lambda context=context: [row for row in range(2) if table.explain(context).row(row).is_valid],
+            "query_many": lambda many=many: table.query_many(many)[0].indices.tolist(),
+        }
+        for entrance, ask in asks.items():
+            found = answer(ask)
+            assert isinstance(found, str) == isinstance(expected, str), (entrance, value)
+            assert isinstance(found, str) or found == expected, (entrance, value)
+
+
 def test_the_straight_way_raises_each_of_these_exceptions_for_odd_facts_and_no_other():
     raised: set[type[BaseException]] = set()
     for table in (compiled(), compiled(0)):
@@ -113,9 +143,11 @@ def test_a_fault_of_ours_in_a_query_comes_out_as_itself(flat_bytes: int, fault: 
 
 @pytest.mark.parametrize("fault", [AttributeError, AssertionError, IndexError, ZeroDivisionError, NameError])
 def test_a_fault_of_ours_in_a_live_context_comes_out_as_itself(fault: type[Exception]):
-    live = compiled().live(FACTS)
-    with mock.patch("contextdb.compiled.live.bisect_right", side_effect=fault("ours")), pytest.raises(fault, match="ours"):
-        live["speed"] = 3.0
+    with mock.patch("contextdb.compiled.lookup.bisect_right", side_effect=bisect_right) as bisect:
+        live = compiled().live(FACTS)
+        bisect.side_effect = fault("ours")
+        with pytest.raises(fault, match="ours"):
+            live["speed"] = 3.0
 
 
 def test_a_mask_of_ours_that_is_no_integer_shows_in_a_live_context():

@@ -63,6 +63,8 @@ def _as_they_are(spans: Spans) -> Spans:
 def _from_number(value: object) -> float | None:
     if type(value) is float:
         return value + 0.0 if value == value else None
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
     if not isinstance(value, (Real, Decimal, np.integer, np.floating, np.bool_)):
         raise TypeError
     try:

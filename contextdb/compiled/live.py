@@ -1,16 +1,15 @@
 """A context that the game keeps: set what changed, then ask. The cheap way to query every frame.
 
-Most facts stay as they are from one frame to the next. The masks of those are intersected once, and a question costs one `&` for
-each fact that has been moving; a fact that starts to move joins those, and the rest is intersected again.
+Most facts stay as they are from one frame to the next. They are in blocks, whose masks are intersected once and kept: a fact that
+changes makes only its block stale. Facts that move again and again are left out of the blocks, and a question
+costs one `&` for each.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from copy import copy, deepcopy
 from functools import reduce
-from math import ldexp
 from operator import and_
 from typing import Any, Never, Self
 
@@ -23,7 +22,7 @@ from contextdb.compiled.casting.facts import Actors, Ask, Prefer
 from contextdb.compiled.casting.live import LiveActors
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.explain import Explanation, explain
-from contextdb.compiled.lookup import UNUSUAL, SingleLookup
+from contextdb.compiled.lookup import UNUSUAL
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick import pick
@@ -32,7 +31,15 @@ from contextdb.expressions.rules import WhenRules
 from contextdb.expressions.rules.rules import Unusual
 from contextdb.expressions.scalar import Value
 
+BLOCK = 5
+"""Facts in a block."""
+LOOKED_AT = 16
+"""Of so many times that blocks are intersected, one looks for facts that move."""
 MOST_MOVING = 8
+"""At most so many facts are left out of the blocks."""
+
+LiveLookup = tuple[Callable[[Any], int | None] | None, Any, int, int]
+"""What finds the mask of a number, or None and the masks by value; the block of the fact, and its place there."""
 
 _SHARED = frozenset(("_lookups", "_others"))
 """What a context never changes, and shares with its copies."""
@@ -52,18 +59,22 @@ class LiveContext(MutableMapping[str, object]):
         "_alike",
         "_answer",
         "_answering",
+        "_blocks",
         "_cast",
         "_compiled",
+        "_enabled",
         "_facts",
-        "_is_soft",
+        "_is_bound",
         "_keep",
         "_known",
         "_lookups",
         "_masks",
+        "_moved",
         "_moving",
-        "_n_moving",
+        "_n_settled",
         "_odd",
         "_passed",
+        "_stale",
         "_still",
         "_unknown",
     )
@@ -72,15 +83,24 @@ class LiveContext(MutableMapping[str, object]):
         self._compiled = compiled
         self._answering = compiled.answering
         self._unknown = unknown
-        self._lookups: dict[str, SingleLookup] = compiled.single_lookups
+        self._lookups = compiled.once(_lookups)
+        self._enabled = compiled.enabled_bits
         self._facts: dict[str, object] = {}
-        self._masks: dict[str, Any] = {}
-        """The mask of every fact when `_still` was intersected."""
-        self._moving: dict[str, Any] = {}
-        """The masks of the facts that have been moving; None where the value must be read with care."""
-        self._n_moving = -1
-        """How many facts moved when `_still` was intersected."""
-        self._still = 0
+        n_blocks = -(-len(self._lookups) // BLOCK)
+        self._masks = [[compiled.enabled_bits] * BLOCK for _ in range(n_blocks)]
+        """The masks of the facts of each block; all rows for one that moves."""
+        self._blocks = [compiled.enabled_bits] * n_blocks
+        """The masks of each block, intersected."""
+        self._still = compiled.enabled_bits
+        """All of them, intersected."""
+        self._moving: dict[str, int] = {}
+        """The masks of facts that move."""
+        self._stale: dict[str, int] = {}
+        """The facts whose masks have changed since their blocks were intersected, and their blocks."""
+        self._moved: set[str] = set()
+        """Facts that were stale when facts that move were looked for: where all stale ones are among these, they move."""
+        self._n_settled = 0
+        """How often stale blocks were intersected again."""
         self._odd: dict[str, tuple[int, bool]] = {}
         """Facts that are missing or sets: the rows that accept all of it, and whether it is missing."""
         self._cast: LiveActors | None = None
@@ -92,8 +112,8 @@ class LiveContext(MutableMapping[str, object]):
         """For each other name the facts that it is like."""
         self._keep = compiled.keeping(unknown) if compiled.mirroring and not compiled.is_soft else None
         """What keeps the facts of an answer, where it must know them for a mirror alone."""
-        self._is_soft = compiled.is_soft
-        """Whether an answer must know the facts for the costs of soft cells."""
+        self._is_bound = compiled.is_bound
+        """Whether an answer must know the facts, for the costs of soft cells or for a mirror."""
         self._answer = Matches(0, self._answering)
         """The last answer: while the rows stay the same, so does the object."""
         for condition in compiled.conditions:
@@ -102,14 +122,22 @@ class LiveContext(MutableMapping[str, object]):
     def __setitem__(self, name: str, value: Any) -> None:
         """Set one fact. A wrong value raises ContextError, here or when next asked, and names the fact."""
         try:
-            bounds, masks = self._lookups[name]
-            self._moving[name] = masks[value] if bounds is None else masks[bisect_right(bounds, ldexp(value, 0))]
+            find, masks, block, at = self._lookups[name]
+            mask = masks[value] if find is None else find(value)
         except UNUSUAL:  # it is read again with care, which answers it or says what is wrong
+            mask = None
+        if mask is None:
             self._set_carefully(name, value)
-        else:
-            self._facts[name] = value
-            if self._odd:
-                self._odd.pop(name, None)
+            return
+        moving = self._moving
+        if moving and name in moving:
+            moving[name] = mask
+        elif (own := self._masks[block])[at] is not mask:
+            own[at] = mask
+            self._stale[name] = block
+        self._facts[name] = value
+        if self._odd:
+            self._odd.pop(name, None)
 
     def __getitem__(self, name: str) -> object:
         value = self._value(name)
@@ -183,7 +211,8 @@ class LiveContext(MutableMapping[str, object]):
         """An independent context with the same facts and actors, which shares the compiled table and the actors' mappings."""
         new: Self = object.__new__(type(self))
         for name, value in self._state().items():
-            setattr(new, name, copy(value) if type(value) in (dict, set) and name not in _SHARED else value)
+            setattr(new, name, copy(value) if type(value) in (dict, list, set) and name not in _SHARED else value)
+        new._masks = [list(block) for block in self._masks]
         new._cast = copy(self._cast)
         return new
 
@@ -243,28 +272,32 @@ class LiveContext(MutableMapping[str, object]):
         if self._odd:
             if self._cast is not None:
                 return self._cast.query(self.facts)
-            self._read_unusual()
             self._refuse_missing()
-        moving = self._moving
-        if len(moving) != self._n_moving:
-            self._settle()
-        bits = self._still
-        try:
-            for mask in moving.values():
+        if stale := self._stale:
+            self._n_settled += 1
+            if self._moving or self._n_settled % LOOKED_AT == 0:
+                self._look_for_moving()
+            masks, blocks = self._masks, self._blocks
+            for block in stale.values():
+                a, b, c, d, e = masks[block]
+                blocks[block] = a & b & c & d & e
+            stale.clear()
+            bits = self._enabled
+            for mask in blocks:
                 bits &= mask
-        except TypeError:
-            if None not in moving.values():
-                raise
-            self._read_unusual()
-            return self.matches()
+            self._still = bits
+        else:
+            bits = self._still
+        if self._moving:
+            for mask in self._moving.values():
+                bits &= mask
         if self._odd:
             return self._set_matches(bits)
-        if self._keep is not None:
+        if self._is_bound:
             answer = Matches(bits, self._answering)
-            answer._mirrored = self._keep(self._told)
-            return answer
-        if self._is_soft:
-            return self._compiled.bound(Matches(bits, self._answering), self._told, self._unknown)
+            if self._keep is not None:
+                return answer.with_mirrored(self._keep(self._told))
+            return self._compiled.bound(answer, self._told, self._unknown)
         if bits != self._answer.bits:
             self._answer = Matches(bits, self._answering)
         return self._answer
@@ -282,30 +315,36 @@ class LiveContext(MutableMapping[str, object]):
     def __repr__(self) -> str:
         return one_line("LiveContext", self._compiled.name, f"{len(self)} of {plural(len(self._known), 'fact')} set")
 
-    def _settle(self) -> None:
-        """Intersect what stands still; when too many facts have moved, let all of them stand still again."""
-        moving, masks = self._moving, self._masks
-        masks.update(moving)
-        if len(moving) > MOST_MOVING and None not in moving.values():
-            moving.clear()
-        self._n_moving = len(moving)
-        still = {**masks, **dict.fromkeys(moving, -1)}
-        self._still = reduce(and_, still.values(), self._compiled.enabled_bits)
+    def _look_for_moving(self) -> None:
+        """Bring facts that moved back into their blocks, and leave stale ones out if all of them were stale at looks before."""
+        for name, mask in self._moving.items():
+            _, _, block, at = self._lookups[name]
+            self._masks[block][at] = mask
+            self._stale[name] = block
+        self._moving.clear()
+        stale, moved = self._stale, self._moved
+        if stale.keys() <= moved:
+            for name, block in stale.items():
+                own, at = self._masks[block], self._lookups[name][3]
+                self._moving[name], own[at] = own[at], self._enabled
+        else:
+            if len(moved) + len(stale) > MOST_MOVING:
+                moved.clear()
+            if len(stale) <= MOST_MOVING:
+                moved.update(stale)
 
     def _set_carefully(self, name: str, value: object) -> None:
         if name not in self._lookups:
             raise no_condition(name, self._lookups)
         some, every, is_missing = self._compiled.fact_bits(name, value, self._unknown)
-        self._moving[name] = some
+        _, _, block, at = self._lookups[name]
+        self._moving.pop(name, None)
+        self._masks[block][at] = some
+        self._stale[name] = block
         self._facts[name] = value
         self._odd.pop(name, None)
         if is_missing or every != some:
             self._odd[name] = (every, is_missing)
-
-    def _read_unusual(self) -> None:
-        """Read with care the values whose masks were not found in the usual way: NaN, numbers far out."""
-        for name in [n for n, mask in self._moving.items() if mask is None]:
-            self._set_carefully(name, self._facts[name])
 
     def _refuse_missing(self) -> None:
         missing = [c.name for c in self._compiled.conditions if self._odd.get(c.name, (0, False))[1]]
@@ -313,7 +352,7 @@ class LiveContext(MutableMapping[str, object]):
             self._compiled.refuse_missing(missing, self.facts, self._unknown)
 
     def _set_matches(self, bits: int) -> Matches:
-        masks = {**self._masks, **self._moving}
+        masks = {name: self._moving.get(name, self._masks[block][at]) for name, (_, _, block, at) in self._lookups.items()}
         every = (self._odd[n][0] if n in self._odd else m for n, m in masks.items())
         found = self._compiled.matches(bits, reduce(and_, every, self._compiled.enabled_bits))
         return self._compiled.bound(found, kept_facts(self._told), self._unknown)
@@ -438,7 +477,7 @@ class AskingLiveContext(LiveContext):
             return answer
         if self._keep is not None:
             return Matches(left, self._answering).with_mirrored(self._keep(self._told))
-        if self._is_soft:
+        if self._is_bound:
             return self._compiled.bound(Matches(left, self._answering), self._told, self._unknown)
         if left != self._left.bits:
             self._left = Matches(left, self._answering)
@@ -451,6 +490,14 @@ class AskingLiveContext(LiveContext):
                 for number in when.naming[name]:
                     self._truths.pop(number, None)
         self._values, self._are_read = values, True
+
+
+def _lookups(compiled: CompiledData) -> dict[str, LiveLookup]:
+    """For each condition how a live context finds the mask of a usual fact, and where it keeps it."""
+    found: dict[str, LiveLookup] = {}
+    for at, (name, (find, masks)) in enumerate(compiled.single_lookups.items()):
+        found[name] = find, masks, at // BLOCK, at % BLOCK
+    return found
 
 
 def _live_again(

@@ -4,7 +4,8 @@ Reading thirty facts from a dict costs more than intersecting thirty masks, so t
 are joined (`contextdb.compiled.groups`), a nested dict for each group, whose leaves are the masks already intersected:
 `g0[c['a']][c['b']]`. Numbers are bisected.
 
-`ldexp(x, 0)` is the double that any number means, and refuses texts: a float32 would else be compared in its own precision.
+A number that is no float of Python's own is made one by the function that the careful way calls: a float32 would else be
+compared in its own precision.
 
 The function knows only the straight way. A missing fact, NaN, a wrong type, a set of values, a number past 2**53: everything
 unusual ends in one of the exceptions of `UNUSUAL`, and the caller then takes the careful way, which says what is wrong or answers
@@ -26,6 +27,7 @@ from contextdb.cells.kinds import Kind
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.groups import groups_of
 from contextdb.compiled.matches import Answering, Matches
+from contextdb.compiled.ruler import ruler_of
 from contextdb.errors import ContextError
 from contextdb.expressions.rules import WhenRules
 from contextdb.expressions.rules.rules import Unusual
@@ -40,8 +42,7 @@ UNUSUAL = (
     ContextError,  # a wrong fact where facts are read one by one: tags, rules, derived facts
     KeyError,  # a missing fact, a value that no class has
     TypeError,  # a wrong type, one that cannot be hashed, and the mask None
-    ValueError,  # Decimal("sNaN"), an array of texts
-    OverflowError,  # an int past all doubles
+    ValueError,  # Decimal("sNaN"), an int past all doubles
     RuntimeError,  # a tensor of several numbers
 )
 """What an unusual fact raises on the straight way."""
@@ -58,7 +59,8 @@ def ask(c, {names}):
 Column = tuple[Condition, ColumnMasks]
 StraightAsk = Callable[[Mapping[str, object]], Matches]
 Keep = Callable[[Mapping[str, object]], dict[str, object]]
-SingleLookup = tuple[list[float] | None, Any]
+Find = Callable[[Any], int | None]
+SingleLookup = tuple[Find | None, Any]
 
 
 def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, keep: Keep | None = None) -> StraightAsk:
@@ -67,7 +69,7 @@ def build_ask(columns: Sequence[Column], enabled: int, answering: Answering, kee
     With `keep`, which copies a context, the answer knows the facts it was asked with, for the answer in a mirror.
     """
     n_rows = len(answering.assets)
-    names: dict[str, Any] = {"bisect_right": bisect_right, "ldexp": math.ldexp}
+    names: dict[str, Any] = {"bisect_right": bisect_right}
     names |= {"new": object.__new__, "Matches": Matches, "answering": answering}
     values = _value_terms([(c, m) for c, m in columns if isinstance(m, ValueMasks)], n_rows, names)
     numbers = [_term(i, c, m, names) for i, (c, m) in enumerate(columns) if not isinstance(m, ValueMasks)]
@@ -118,45 +120,51 @@ def _group_term(i: int, keys: Sequence[str], members: Sequence[ValueMasks], name
 
 def _term(i: int, condition: Condition, masks: NumberMasks | WideMasks | TagMasks, names: dict[str, Any]) -> str:
     fact = f"c[{condition.name!r}]"
-    if not isinstance(masks, NumberMasks):
-        names[f"f{i}"] = _careful_lookup(condition, masks)
-        return f"f{i}({fact})"
-    names[f"b{i}"], names[f"m{i}"] = _straight(condition, masks)
-    return f"m{i}[bisect_right(b{i}, {_exact(i, condition.domain.type, fact, names)})]"
+    if isinstance(masks, NumberMasks):
+        return _number_term(i, condition, masks, fact, names)
+    names[f"f{i}"] = _careful_lookup(condition, masks)
+    return f"f{i}({fact})"
+
+
+def _number_term(i: int, condition: Condition, masks: NumberMasks, fact: str, names: dict[str, Any]) -> str:
+    bounds, found = _straight(condition, masks)
+    kind = condition.domain.type
+    if kind.exact is None and (ruler := ruler_of(bounds, found)) is not None:
+        names[f"l{i}"], names[f"m{i}"], names[f"f{i}"] = ruler.lasts, ruler.masks, _bisecting(bounds, found, kind.from_python)
+        is_on = f"0.0 <= (y := x * {ruler.per_unit!r} - {ruler.start!r}) < {len(ruler.lasts)}.0 and x >= l{i}[k := int(y)]"
+        return f"(m{i}[k] if type(x := {fact}) is float and {is_on} else f{i}(x))"
+    names[f"b{i}"], names[f"m{i}"] = bounds, found
+    return f"m{i}[bisect_right(b{i}, {_exact(i, kind, fact, names)})]"
+
+
+def _bisecting(bounds: list[float], masks: list[int | None], double: Callable[[Any], Any]) -> Find:
+    return lambda fact: masks[bisect_right(bounds, double(fact))]
 
 
 def single_lookup(condition: Condition, masks: ColumnMasks) -> SingleLookup:
-    """What finds the mask of one fact: bounds to bisect in, or None, and the masks by interval or by value.
+    """What finds the mask of one fact: a function, or None and the masks by value.
 
     An unusual fact finds None or raises one of `UNUSUAL`.
     """
     if isinstance(masks, ValueMasks):
         return None, _leaves(masks, masks.ints)
-    if isinstance(masks, NumberMasks):
-        bounds, ints = _straight(condition, masks)
-        exact = condition.domain.type.exact
-        return (bounds, ints) if exact is None else (None, _Asked(lambda fact: ints[bisect_right(bounds, exact(fact))]))
-    return None, _Asked(_careful_lookup(condition, masks))
+    if not isinstance(masks, NumberMasks):
+        return _careful_lookup(condition, masks), None
+    names: dict[str, Any] = {"bisect_right": bisect_right}
+    term = _number_term(0, condition, masks, "fact", names)
+    found: dict[str, Any] = {}
+    exec(
+        compile(f"def find(fact, {', '.join(f'{n}={n}' for n in names)}): return {term}", "<contextdb lookup>", "exec"),
+        names,
+        found,
+    )
+    return found["find"], None
 
 
 def _exact(i: int, kind: Kind, fact: str, names: dict[str, Any]) -> str:
     """The term that makes a double of a fact, or raises."""
-    if kind.exact is None:
-        return f"ldexp({fact}, 0)"
-    names[f"e{i}"] = kind.exact
-    return f"e{i}({fact})"
-
-
-class _Asked:
-    """A function that is asked like a dict: `asked[fact]`."""
-
-    __slots__ = ("_ask",)
-
-    def __init__(self, ask: Callable[[Any], int | None]) -> None:
-        self._ask = ask
-
-    def __getitem__(self, fact: Any) -> int | None:
-        return self._ask(fact)
+    names[f"e{i}"] = kind.exact or kind.from_python
+    return f"e{i}({fact})" if kind.exact is not None else f"(x if type(x := {fact}) is float else e{i}(x))"
 
 
 def _careful_lookup(condition: Condition, masks: WideMasks | TagMasks) -> Callable[[Any], int]:
@@ -223,17 +231,13 @@ def _shifted(bound: float, turn: float) -> float:
     return near
 
 
-def _double(fact: Any) -> float:
-    return math.ldexp(fact, 0)
-
-
 def _wide_lookup(condition: Condition, masks: WideMasks) -> Callable[[Any], int]:
-    bounds, exact = masks.bound_list, condition.domain.type.exact or _double
+    bounds, exact = masks.bound_list, condition.domain.type.exact or condition.domain.type.from_python
     low, high = (-180.0, 180.0) if condition.domain.type.is_circular else (-EXACT, EXACT)
 
     def lookup(fact: Any) -> int:
         value = exact(fact)
-        if not low <= value < high:
+        if value is None or not low <= value < high:
             raise Unusual
         return masks.bits(bisect_right(bounds, value))
 

@@ -482,13 +482,18 @@ class SetMatches(Matches):
 
 
 def rows_of(bits: int, numbers: Rows) -> Rows:
-    """The rows of an integer mask: int64 [count], read-only. One row, the usual answer, is a view of `numbers`."""
+    """The rows of an integer mask: int64 [count], read-only. One row or two, the usual answers, are a view of `numbers`."""
     top = bits.bit_length() - 1
     if top < 0:
         return numbers[:0]
-    rest = bits ^ (1 << top)
-    if not rest:
+    power = 1 << top
+    if bits == power:
         return numbers[top : top + 1]
+    rest = bits ^ power
+    low = rest.bit_length() - 1
+    power = 1 << low
+    if rest == power:
+        return numbers[low : top + 1 : top - low]
     found = [top]
     while rest:
         if len(found) == FEW:

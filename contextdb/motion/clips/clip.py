@@ -104,7 +104,8 @@ def load_bvh(path: str | PathLike[str], *, metres_per_unit: float = CENTIMETRE, 
     try:
         raw = Path(path).read_bytes()
     except OSError as error:
-        raise FileError(Fault(f"the file cannot be read: {error.strerror or error}.", place=Place(file), rule="file")) from error
+        fault = Fault(f"the file cannot be read: {error.strerror or error}.", place=Place(file), rule="file")
+        raise FileError(fault, errno=error.errno) from error
     stem = Path(path).stem
     return parse_bvh(text_of(raw, file), stem if name is None else name, file=file, metres_per_unit=metres_per_unit, up=up)
 

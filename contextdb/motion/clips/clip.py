@@ -111,13 +111,13 @@ def load_bvh(path: str | PathLike[str], *, metres_per_unit: float = CENTIMETRE, 
 
 
 def parse_bvh(text: str, name: str, *, file: str | None = None, metres_per_unit: float = CENTIMETRE, up: Up = "y") -> Clip:
-    """The clip of a BVH text; `file` is the text's name in messages."""
+    """The clip of a BVH text; `file` is the text's name in messages. Raises ClipError, with each line that cannot be read."""
     skeleton, frame_time_s, values = bvh.read(text, file)
     return Clip(name, skeleton, frame_time_s, values, metres_per_unit, up)
 
 
 def load_clips(paths: Iterable[str | PathLike[str]], *, metres_per_unit: float = CENTIMETRE, up: Up = "y") -> list[Clip]:
-    """Read several BVH files; the faults of all broken ones are reported together."""
+    """Read several BVH files; raises one ClipError with the faults of all that are broken or cannot be read."""
     clips = []
     faults: list[Fault] = []
     for path in paths:

@@ -182,7 +182,7 @@ def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFindin
 
 
 def doubts_of(clips: Iterable[Clip]) -> list[ClipFinding]:
-    """What is doubtful about some clips of one kind: `doubts` of their measures."""
+    """What is doubtful about some clips of one kind: `doubts` of their measures. Raises ContextError for what are no clips."""
     return doubts((clip.name, None, measure(clip)) for clip in clips)
 
 

@@ -91,6 +91,13 @@ def footfalls(clip: Clip, feet: tuple[str, str] | None = None, *, slowest_mps: f
         A foot that moves faster, from frame to frame, is up.
     highest_m : float
         A foot higher above its lowest place in the clip is up.
+
+    Raises
+    ------
+    MotionError
+        The skeleton has no such bones, or none that look like feet.
+    ContextError
+        `clip` is none, `feet` is no pair, or a limit no number from 0 up.
     """
     bones = feet_of(clip.skeleton) if feet is None else feet
     return footfalls_of(poses_of(clip), bones, slowest_mps=slowest_mps, highest_m=highest_m)

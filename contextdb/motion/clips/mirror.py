@@ -72,7 +72,7 @@ def mirrored(moved: Moved, pairs: Pairs) -> Moved:
 
 
 def mirrored_path(path: Trajectory) -> Trajectory:
-    """The same path in a mirror."""
+    """The same path in a mirror; raises ContextError for what is no path."""
     return replace(path, positions=path.positions * FLIPPED_X[:2], headings=-path.headings)
 
 

@@ -55,13 +55,16 @@ class Poses:
 
 
 def poses_of(clip: Clip, rate: float | None = None) -> Poses:
-    """Where all joints of a clip are in each frame, at the clip's own rate or another."""
+    """Where all joints of a clip are in each frame, at the clip's own rate or another.
+
+    Raises ContextError for what is no clip, or no rate above 0.
+    """
     local = local_poses(clip)
     return forward_kinematics(local if rate is None else resampled(local, rate))
 
 
 def local_poses(clip: Clip) -> LocalPoses:
-    """Each joint of a clip against its parent, in metres and y up."""
+    """Each joint of a clip against its parent, in metres and y up. Raises ContextError for what is no clip."""
     positions = _positions(clip) * clip.metres_per_unit
     rotations = _rotations(clip)
     turn = TO_Y_UP[clip.up]
@@ -71,7 +74,10 @@ def local_poses(clip: Clip) -> LocalPoses:
 
 
 def forward_kinematics(local: LocalPoses) -> Poses:
-    """Place all joints in the world: the root first, then level by level, all frames and all joints of a level at once."""
+    """Place all joints in the world: the root first, then level by level, all frames and all joints of a level at once.
+
+    Raises ContextError for what are no local poses.
+    """
     positions, rotations = local.positions.copy(), local.rotations.copy()
     for joints in local.skeleton.levels[1:]:
         parents = local.skeleton.parents[joints]
@@ -82,7 +88,10 @@ def forward_kinematics(local: LocalPoses) -> Poses:
 
 
 def resampled(local: LocalPoses, rate: float) -> LocalPoses:
-    """The same motion with `rate` frames a second, from its first frame on; positions and rotations are blended between frames."""
+    """The same motion with `rate` frames a second, from its first frame on; positions and rotations are blended between frames.
+
+    Raises ContextError for what are no local poses, or no rate above 0.
+    """
     n_frames = len(local.positions)
     if n_frames < 2 or abs(local.rate / rate - 1.0) < SAME_RATE:
         return LocalPoses(local.skeleton, rate, local.positions, local.rotations)

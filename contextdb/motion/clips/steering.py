@@ -108,6 +108,13 @@ def steered_path(
         Seconds ahead.
     rate : float
         Frames a second.
+
+    Raises
+    ------
+    MotionError
+        `past` is empty.
+    ContextError
+        `past` holds something that is no Steered, `wanted` is no pair of numbers, or another argument no number.
     """
     if not past:
         raise MotionError(Fault("there is no body to steer.", "its last moments, at least the present one"))

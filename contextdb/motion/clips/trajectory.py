@@ -83,6 +83,13 @@ def root_trajectory(
     facing_smooth_s : float
         The standard deviation, in seconds, of a Gaussian over the headings of each frame's neighbours on both sides alike: it evens
         out the sway of each step and delays no turn, but begins and ends one sooner and later. Default: 0, none.
+
+    Raises
+    ------
+    MotionError
+        The skeleton has no such bone.
+    ContextError
+        `poses` are none, `facing` is no pair, or `facing_smooth_s` no number from 0 up.
     """
     skeleton = poses.skeleton
     hips = skeleton.hips if root is None else skeleton.index(root)
@@ -113,6 +120,11 @@ def steady_path(
         Seconds before and after time 0.
     rate : float
         Frames a second.
+
+    Raises
+    ------
+    ContextError
+        One of them is no finite number, or `rate` is not above 0.
     """
     now = round(reach_s * rate)
     seconds = (np.arange(2 * now + 1) - now) / rate

@@ -101,7 +101,7 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, 
 
 
 def features_of(clip: Clip, schema: FeatureSchema) -> Features:
-    """The features of every frame of a clip alone: float32 [F, N]; see `clip_features`."""
+    """The features of every frame of a clip alone: float32 [F, N]; raises what `clip_features` raises."""
     return clip_features(clip, schema).features
 
 
@@ -126,6 +126,15 @@ def query_from(
     -------
     float32 array, shape (N,)
         In the schema's units, for `MotionDatabase.search`.
+
+    Raises
+    ------
+    QueryError
+        The clip has no such frame.
+    MotionError
+        As `clip_features`.
+    ContextError
+        `frame` is no whole number, or `wanted` no path.
     """
     features = clip_features(clip, schema, mirrored=mirrored).features
     if not 0 <= frame < len(features):
@@ -137,7 +146,10 @@ def query_from(
 
 
 def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajectory) -> Features:
-    """A query [N] whose trajectory is a wished one instead; the pose stays."""
+    """A query [N] whose trajectory is a wished one instead; the pose stays.
+
+    Raises QueryError for a query of another shape, and ContextError for what is no schema or no path.
+    """
     if np.shape(query) != (schema.n_features,) or not 0 <= wanted.now < len(wanted.headings):
         n_frames = len(wanted.headings)
         found = f"the query has shape {np.shape(query)}, and the path {plural(n_frames, 'frame')} and its present at {wanted.now}."

@@ -157,7 +157,7 @@ RECIPES: dict[str, Recipe] = {recipe.name: recipe for recipe in _recipes()}
 
 
 def make_clip(name: str) -> MadeClip:
-    """Compute one made clip of `RECIPES`; the same every time."""
+    """Compute one made clip of `RECIPES`; the same every time. Raises MotionError for another name, with the nearest."""
     if name not in RECIPES:
         near = nearest(name, RECIPES)
         known = f"one of {plural(len(RECIPES), 'made clip')}, the names of RECIPES"
@@ -177,7 +177,10 @@ def made_clips() -> list[MadeClip]:
 
 
 def write_made_clips(folder: str | PathLike[str]) -> list[Path]:
-    """Write all made clips into a folder that exists, each as NAME.bvh in centimetres, y up; the paths, in order."""
+    """Write all made clips into a folder that exists, each as NAME.bvh in centimetres, y up; the paths, in order.
+
+    Raises FileError where they cannot be written.
+    """
     paths = [Path(folder) / f"{name}.bvh" for name in RECIPES]
     for path in paths:
         write_bvh(make_clip(path.stem).clip, path)
@@ -185,7 +188,7 @@ def write_made_clips(folder: str | PathLike[str]) -> list[Path]:
 
 
 def descriptions(clips: Sequence[MadeClip] | None = None) -> list[Description]:
-    """What a table says of made clips, by default of all."""
+    """What a table says of made clips, by default of all; raises ContextError for what are no made clips."""
     return [describe(made.clip, made.recipe) for made in (made_clips() if clips is None else clips)]
 
 

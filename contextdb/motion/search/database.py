@@ -295,7 +295,7 @@ class MotionDatabase(Searched):
     ) -> list[Hit]:
         """The best frame of each range that costs at most `within` more than the best of all, cheapest first.
 
-        The other parameters are those of `search`.
+        The other parameters are those of `search`, and so is what it raises; QueryError too where `within` is no number from 0 up.
         """
         if not within >= 0.0:
             raise QueryError(Fault(f"the costs may differ by {within!r}.", "a number, 0 or more"))
@@ -328,6 +328,11 @@ class MotionDatabase(Searched):
             None or -1 for a character that plays none.
         tags : TagFilter or bool array, shape (N,), optional
             As for `search`, one for all.
+
+        Raises
+        ------
+        QueryError
+            As `search`; there are not as many masks or current frames as queries.
         """
         wanted = arguments.numbers_of(queries, "the queries")
         if wanted.ndim != 2:
@@ -353,6 +358,11 @@ class MotionDatabase(Searched):
             Whether frames that may not be chosen are among the k too, each with its reason.
         query, valid, **options
             As for `search`.
+
+        Raises
+        ------
+        QueryError
+            As `search`; `k` is no whole number from 0 up.
         """
         chosen = self.filter(valid, **options)
         return candidates.of(self, self._searcher.normalised(query), chosen, k, left_out)
@@ -434,7 +444,10 @@ class MotionDatabase(Searched):
 
 
 def build_databases(sets: Mapping[str, Iterable[Clip]], schema: FeatureSchema) -> dict[str, MotionDatabase]:
-    """Several databases that share one normalisation, fitted to the frames of all, so that a selector can compare their costs."""
+    """Several databases that share one normalisation, fitted to the frames of all, so that a selector can compare their costs.
+
+    Raises MotionError where clips do not have what the schema asks for, and ContextError for what are no clips.
+    """
     parts = {name: parts_of(clips, schema) for name, clips in sets.items()}
     shared = Normalisation.of([part.features for each in parts.values() for part in each], schema)
     return {name: MotionDatabase.from_parts(each, schema, normalisation=shared) for name, each in parts.items()}

@@ -98,7 +98,10 @@ class Controller:
         return replace(self._state, rng=variation.state_of(self._rng))
 
     def restore(self, state: ControllerState) -> None:
-        """Go on from a state of this controller, or of another one with the same selector and settings."""
+        """Go on from a state of this controller, or of another one with the same selector and settings.
+
+        Raises ContextError for what is no state.
+        """
         variation.restore(self._rng, state.rng)
         self._state = replace(state, rng=None)
 

@@ -111,6 +111,7 @@ def build_all(
 
     `tolerates` is called with the name of a database and what is wrong with it or with one of its clips. Where it says True the
     build goes on without. Of the databases of one schema, which share a normalisation, those that are not among `names` take part.
+    Raises what `build` raises.
     """
     root = Path(folder)
     kept = None if cache is None else FeatureCache(root / cache)
@@ -153,6 +154,11 @@ def open_or_build(
     config, folder, assets, progress, names, cache, tolerates
         As for `build_all`. All clips are read, as their contents say whether a saved database is up to date. What is tolerated is
         told of databases that have to be built alone.
+
+    Raises
+    ------
+    MotionError, FileError
+        As `build`. A saved database that cannot be used is built anew.
     """
     root = Path(folder)
     opened = _opened(config, root, Path(root / (saved or "")), assets or {}, names)
@@ -176,7 +182,7 @@ def _opened(
 
 
 def saved_path(folder: Path, name: str) -> Path:
-    """Where a database of a name is saved."""
+    """Where a database of a name is saved. Raises ContextError for what is no path and no name."""
     return folder / file_name(name, SAVED_SUFFIX)
 
 

@@ -14,11 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contextdb.cells.arguments import require_kind, require_real
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip, Up
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import POSITIONS, Skeleton
 
+LEAST_RATE, MOST_RATE = 1e-3, 1e5
+"""Frames a second."""
 SAME_RATE = 1e-4
 """Rates this near, as a share, are the same: files print 1/30 s as 0.033333."""
 TO_Y_UP: dict[Up, Floats] = {
@@ -65,6 +68,7 @@ def poses_of(clip: Clip, rate: float | None = None) -> Poses:
 
 def local_poses(clip: Clip) -> LocalPoses:
     """Each joint of a clip against its parent, in metres and y up. Raises ContextError for what is no clip."""
+    require_kind(clip, Clip, "clip", "a Clip")
     positions = _positions(clip) * clip.metres_per_unit
     rotations = _rotations(clip)
     turn = TO_Y_UP[clip.up]
@@ -78,6 +82,7 @@ def forward_kinematics(local: LocalPoses) -> Poses:
 
     Raises ContextError for what are no local poses.
     """
+    require_kind(local, LocalPoses, "local", "LocalPoses")
     positions, rotations = local.positions.copy(), local.rotations.copy()
     for joints in local.skeleton.levels[1:]:
         parents = local.skeleton.parents[joints]
@@ -92,6 +97,8 @@ def resampled(local: LocalPoses, rate: float) -> LocalPoses:
 
     Raises ContextError for what are no local poses, or no rate above 0.
     """
+    require_kind(local, LocalPoses, "local", "LocalPoses")
+    rate = require_real(rate, "rate", LEAST_RATE, MOST_RATE)
     n_frames = len(local.positions)
     if n_frames < 2 or abs(local.rate / rate - 1.0) < SAME_RATE:
         return LocalPoses(local.skeleton, rate, local.positions, local.rotations)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -167,3 +168,10 @@ def test_a_wrong_argument_ends_in_an_error_that_says_what_was_wrong(name: str):
                 if not isinstance(error, ContextDBError):
                     told[repr(value)] = f"{type(error).__name__}: {error}"
     assert told == {}
+
+
+def test_every_public_call_is_asked_with_wrong_arguments():
+    api = (Path(__file__).parent.parent.parent / "docs" / "api.md").read_text(encoding="utf-8")
+    calls = re.findall(r"`motion\.(?:\w+\.)*(\w+)\(\w", api)
+    assert len(calls) > 40
+    assert [name for name in calls if not any(f"{name}(" in call for call in CALLS)] == []

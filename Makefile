@@ -57,6 +57,7 @@ format: $(VENV)/.dev
 
 docs: $(VENV)/.dev
 	$(PY) tests/test_docs.py --update
+	$(PY) tests/test_api.py --update
 	$(PY) docs/keys.py
 	$(PY) docs/pictures.py
 

@@ -15,11 +15,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from contextdb.cells.facts import cell
+    from contextdb import motion as motion
+    from contextdb.cells.facts import Context, FactSet, Unknown, cell
+    from contextdb.compiled.casting.facts import Actors, Prefer
     from contextdb.compiled.explain import Explanation, Failure, RowExplanation
     from contextdb.compiled.live import LiveContext
     from contextdb.compiled.many import ManyMatches
     from contextdb.compiled.matches import Matches
+    from contextdb.compiled.memory import Rng
     from contextdb.compiled.picker import Pick, Picker
     from contextdb.compiled.table import CompiledTable
     from contextdb.console import __version__ as __version__
@@ -27,77 +30,73 @@ if TYPE_CHECKING:
     from contextdb.errors import (
         ArtefactError,
         CellError,
-        ClipError,
         ContextDBError,
         ContextError,
         Fault,
         FileError,
-        MotionError,
         NoSuchFact,
         NoSuchOutput,
         NoSuchPlace,
         NoSuchTable,
         Place,
         PolicyError,
-        QueryError,
         SchemaError,
         TableError,
         WrongType,
     )
     from contextdb.findings import Finding
+    from contextdb.schema.settings import Schema, TableSettings
     from contextdb.tables.project import Project, load
     from contextdb.tables.table import Table
-    from contextdb.tables.watching import watch
+    from contextdb.tables.watching import Snapshot, Watch, watch
 
+# The same names for the interpreter, by module; tests/test_face.py compares the three lists.
 _HOMES = {
-    "compiled.many": ("ManyMatches",),
-    "compiled.picker": ("Pick", "Picker"),
-    "compiled.table": ("CompiledTable",),
-    "console": ("__version__",),
-    "covering": ("CoverageReport", "Gap", "coverage"),
-    "errors": (
-        "ArtefactError",
-        "CellError",
-        "ClipError",
-        "ContextDBError",
-        "ContextError",
-        "Fault",
-        "FileError",
-        "MotionError",
-        "NoSuchFact",
-        "NoSuchOutput",
-        "NoSuchPlace",
-        "NoSuchTable",
-        "Place",
-        "PolicyError",
-        "QueryError",
-        "SchemaError",
-        "TableError",
-        "WrongType",
-    ),
-    "compiled.explain": ("Explanation", "Failure", "RowExplanation"),
-    "cells.facts": ("cell",),
-    "findings": ("Finding",),
-    "compiled.live": ("LiveContext",),
-    "compiled.matches": ("Matches",),
-    "tables.project": ("Project", "load"),
-    "tables.table": ("Table",),
-    "tables.watching": ("watch",),
+    "cells.facts": "Context FactSet Unknown cell",
+    "compiled.casting.facts": "Actors Prefer",
+    "compiled.explain": "Explanation Failure RowExplanation",
+    "compiled.live": "LiveContext",
+    "compiled.many": "ManyMatches",
+    "compiled.matches": "Matches",
+    "compiled.memory": "Rng",
+    "compiled.picker": "Pick Picker",
+    "compiled.table": "CompiledTable",
+    "console": "__version__",
+    "covering": "CoverageReport Gap coverage",
+    "errors": "ArtefactError CellError ContextDBError ContextError Fault FileError NoSuchFact NoSuchOutput"
+    " NoSuchPlace NoSuchTable Place PolicyError SchemaError TableError WrongType",
+    "findings": "Finding",
+    "schema.settings": "Schema TableSettings",
+    "tables.project": "Project load",
+    "tables.table": "Table",
+    "tables.watching": "Snapshot Watch watch",
 }
-_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
+_OLD = {name: f"contextdb.motion.{name}" for name in ("ClipError", "MotionError", "QueryError")}
+"""Names that go away, and the new ones."""
 
 __all__ = [  # noqa: RUF022
     "load",
     "Project",
+    "Schema",
     "watch",
+    "Watch",
+    "Snapshot",
     "Table",
+    "TableSettings",
     "CompiledTable",
+    "Context",
+    "Unknown",
+    "Actors",
+    "Prefer",
+    "Rng",
     "Matches",
     "ManyMatches",
     "Picker",
     "Pick",
     "LiveContext",
     "cell",
+    "FactSet",
     "coverage",
     "CoverageReport",
     "Gap",
@@ -118,21 +117,31 @@ __all__ = [  # noqa: RUF022
     "WrongType",
     "PolicyError",
     "ArtefactError",
-    "MotionError",
-    "ClipError",
-    "QueryError",
     "Fault",
     "Place",
 ]
 
+if not TYPE_CHECKING:  # a type checker takes every name for one that exists where it sees this
 
-def __getattr__(name: str) -> object:
-    if name not in _HOME_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> object:
+        if name == "motion":
+            return import_module(f"{__name__}.motion")
+        if name in _OLD:
+            return _old(name)
+        if name not in _HOME_OF:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted([*__all__, "__version__", "motion"])
+
+
+def _old(name: str) -> object:
+    from contextdb.errors import warn_of_old
+
+    warn_of_old(f"contextdb.{name}", _OLD[name], levels=4)
+    module, _, attribute = _OLD[name].rpartition(".")
+    return getattr(import_module(module), attribute)

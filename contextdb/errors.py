@@ -1,22 +1,22 @@
 """Every error, worded so that the reader can fix it.
 
 An error carries one or more faults. A fault gives the place (a `Place`), what was found, what is accepted and the nearest
-correction, in that order. One error reports all faults of a file together.
+correction, in that order. One error reports all faults of a file together. In brackets: the built-in error that it is as well.
 
     ContextDBError
-    ├── CellError       a cell whose text does not follow the grammar
-    ├── SchemaError     contextdb.toml has an invalid setting
-    ├── TableError      a table file that cannot be read, or rows that cannot be compiled
-    │   └── NoSuchTable     a name that no table has; also a KeyError
-    ├── FileError       the disk refuses: missing, not permitted, full, changed under us
-    ├── ContextError    facts that a query cannot use, or an invalid argument
-    │   ├── NoSuchFact      a fact that does not exist; also a KeyError
-    │   ├── NoSuchOutput    an output that a table does not have; also a KeyError
-    │   ├── NoSuchPlace     a row, or a place in an answer, that does not exist; also an IndexError
-    │   └── WrongType       an argument of a type that is not accepted; also a TypeError
+    ├── CellError       a cell whose text does not follow the grammar (ValueError)
+    ├── SchemaError     contextdb.toml has an invalid setting (ValueError)
+    ├── TableError      a table file that cannot be read, or rows that cannot be compiled (ValueError)
+    │   └── NoSuchTable     a name that no table has (KeyError)
+    ├── FileError       the disk refuses: missing, not permitted, full, changed under us (OSError)
+    ├── ContextError    facts that a query cannot use, or an invalid argument (ValueError)
+    │   ├── NoSuchFact      a fact that does not exist (KeyError)
+    │   ├── NoSuchOutput    an output that a table does not have (KeyError)
+    │   ├── NoSuchPlace     a row, or a place in an answer, that does not exist (IndexError)
+    │   └── WrongType       an argument of a type that is not accepted (TypeError)
     ├── PolicyError     a table breaks its own policy
-    ├── ArtefactError   a compiled file that is truncated, altered or from another version
-    └── MotionError     clips, features and searches
+    ├── ArtefactError   a compiled file that is truncated, altered or from another version (ValueError)
+    └── MotionError     clips, features and searches (ValueError); these three are public in contextdb.motion
         ├── ClipError   a clip that cannot be read
         └── QueryError  a motion query that cannot be searched with
 """
@@ -24,10 +24,13 @@ correction, in that order. One error reports all faults of a file together.
 from __future__ import annotations
 
 import difflib
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 SHOWN_CHARACTERS = 60
+GONE_IN = "0.2"
+"""The version without what this one warns of: a minor version more than pyproject.toml says."""
 
 
 def row_name(row: int) -> str:
@@ -97,19 +100,19 @@ class ContextDBError(Exception):
     def __str__(self) -> str:
         return "\n".join(str(f) for f in self.faults)  # a KeyError would show its repr
 
-    def __reduce__(self) -> tuple[type[ContextDBError], tuple[Fault, ...]]:
+    def __reduce__(self) -> tuple[object, ...]:
         return type(self), self.faults
 
 
-class CellError(ContextDBError):
+class CellError(ContextDBError, ValueError):
     """A cell whose text does not follow the grammar of its type."""
 
 
-class SchemaError(ContextDBError):
+class SchemaError(ContextDBError, ValueError):
     """contextdb.toml, or a schema given in Python, has an invalid setting."""
 
 
-class TableError(ContextDBError):
+class TableError(ContextDBError, ValueError):
     """A table file that cannot be read, or rows that cannot be compiled."""
 
 
@@ -117,11 +120,23 @@ class NoSuchTable(TableError, KeyError):
     """A name that no table of a project has."""
 
 
-class FileError(ContextDBError):
-    """The file system refuses: a file is missing, not permitted, or the disk is full."""
+class FileError(ContextDBError, OSError):
+    """The file system refuses: a file is missing, not permitted, or the disk is full.
+
+    `filename` and `strerror` are the place and the text of the first fault; `errno` is the number of the system where it refused.
+    """
+
+    def __init__(self, *faults: Fault | str, errno: int | None = None) -> None:
+        super().__init__(*faults)
+        self.errno = errno
+        if self.faults:
+            self.filename, self.strerror = self.faults[0].place.file, self.faults[0].message
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), self.faults, {"errno": self.errno}
 
 
-class ContextError(ContextDBError):
+class ContextError(ContextDBError, ValueError):
     """Facts that a query cannot use: missing, unknown, of the wrong type, or outside the domain."""
 
 
@@ -145,11 +160,11 @@ class PolicyError(ContextDBError):
     """A table breaks its own policy: two rows are valid at once although the policy is "unique"."""
 
 
-class ArtefactError(ContextDBError):
+class ArtefactError(ContextDBError, ValueError):
     """A compiled file that is truncated, altered, or written by another version."""
 
 
-class MotionError(ContextDBError):
+class MotionError(ContextDBError, ValueError):
     """Clips, features or a search that cannot be used."""
 
 
@@ -192,3 +207,12 @@ def some(names: Iterable[str], most: int = 6) -> str:
 def plural(count: int, noun: str) -> str:
     """ "1 row", "2 rows": a count with its noun."""
     return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
+
+
+def warn_of_old(old: str, new: str, levels: int = 3) -> None:
+    """Warn that something goes away in the next minor version, and name the new way.
+
+    `levels`: how many calls the caller of the old way is above, this one counted.
+    """
+    text = f"{old} goes away in contextdb {GONE_IN}. Use {new}."
+    warnings.warn(text, DeprecationWarning, stacklevel=levels)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import contextdb as cdb
+from contextdb import telemetry
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 
@@ -45,6 +46,8 @@ EXPLAINED, EXPLAINED_CAST = COMPILED.explain(FACTS), COMPILED.explain(PLAIN, act
 ANSWERS, CAST_ANSWERS = COMPILED.query_many(MANY), COMPILED.query_many({n: [f] for n, f in PLAIN.items()}, actors=ACTORS)
 SAMPLES = Path(__file__).parent.parent / "tables"
 PROJECT = cdb.Project.load(SAMPLES)
+WATCH = cdb.watch(SAMPLES, poll_s=None)
+RECORDED = str(SAMPLES / "*.nothing")
 
 
 class Odd:
@@ -69,6 +72,8 @@ CALLS: dict[str, Call] = {
     "watch(on_change)": lambda x: cdb.watch(SAMPLES, on_change=x, poll_s=None).close(),  # type: ignore[arg-type]
     "watch(on_error)": lambda x: cdb.watch(SAMPLES, on_error=x, poll_s=None).close(),  # type: ignore[arg-type]
     "project[name]": lambda x: PROJECT[x],  # type: ignore[index]
+    "watch[name]": lambda x: WATCH[x],  # type: ignore[index]
+    "snapshot[name]": lambda x: WATCH.snapshot()[x],  # type: ignore[index]
     "project.with_table(table)": lambda x: PROJECT.with_table(x),  # type: ignore[arg-type]
     "from_columns(columns)": lambda x: Table.from_columns(x),  # type: ignore[arg-type]
     "from_columns(schema)": lambda x: Table.from_columns({"A": ["a"], "speed": ["1"]}, x),  # type: ignore[arg-type]
@@ -94,6 +99,8 @@ CALLS: dict[str, Call] = {
     "with_rows_taken(rows), one": lambda x: TABLE.with_rows_taken([x]),  # type: ignore[list-item]
     "compile(tables)": lambda x: Table.from_columns({"A": ["@inner"]}).compile(x),  # type: ignore[arg-type]
     "compile(tables), one": lambda x: Table.from_columns({"A": ["@inner"]}).compile({"inner": x}),  # type: ignore[dict-item]
+    "flat(tables)": lambda x: Table.from_columns({"A": ["@inner"]}).flat(x),  # type: ignore[arg-type]
+    "flat(tables), one": lambda x: Table.from_columns({"A": ["@inner"]}).flat({"inner": x}),  # type: ignore[dict-item]
     "open(path)": lambda x: cdb.CompiledTable.open(x),  # type: ignore[arg-type]
     "save(path)": lambda x: isinstance(x, (str, Path)) or TABLE.save(x),  # type: ignore[arg-type]
     "save(path), compiled": lambda x: isinstance(x, (str, Path)) or COMPILED.save(x),  # type: ignore[arg-type]
@@ -153,6 +160,13 @@ CALLS: dict[str, Call] = {
     "coverage(max_gaps)": lambda x: cdb.coverage(TABLE, max_gaps=x, work=9, samples=9),  # type: ignore[arg-type]
     "coverage(weights)": lambda x: cdb.coverage(TABLE, weights=x, work=9, samples=9),  # type: ignore[arg-type]
     "coverage(impossible)": lambda x: cdb.coverage(TABLE, impossible=x, work=9, samples=9),  # type: ignore[arg-type]
+    "observe(table)": lambda x: telemetry.observe(x, RECORDED),  # type: ignore[arg-type]
+    "observe(files)": lambda x: telemetry.observe(TABLE, x),  # type: ignore[arg-type]
+    "observe(files), one": lambda x: telemetry.observe(TABLE, [x]),  # type: ignore[list-item]
+    "observe(count)": lambda x: telemetry.observe(TABLE, RECORDED, count=x),  # type: ignore[arg-type]
+    "observe(engine)": lambda x: telemetry.observe(TABLE, RECORDED, engine=x),  # type: ignore[arg-type]
+    "observe(max_gaps)": lambda x: telemetry.observe(TABLE, RECORDED, max_gaps=x),  # type: ignore[arg-type]
+    "observe(resume)": lambda x: telemetry.observe(TABLE, RECORDED, resume=x),  # type: ignore[arg-type]
     **{f"a fact of {name}": lambda x, name=name: COMPILED.query({**FACTS, name: x}) for name in FACTS},  # type: ignore[misc]
     **{f"a live fact of {name}": lambda x, name=name: COMPILED.live({**FACTS, name: x}).matches() for name in FACTS},  # type: ignore[misc]
     **{f"many facts of {name}": lambda x, name=name: list(COMPILED.query_many({**MANY, name: [x]})) for name in FACTS},  # type: ignore[misc]
@@ -183,8 +197,8 @@ def test_a_wrong_argument_ends_in_an_error_that_says_what_was_wrong(name: str):
 
 def test_every_public_method_is_asked_with_wrong_arguments():
     api = (SAMPLES.parent / "docs" / "api.md").read_text(encoding="utf-8")
-    methods = re.findall(r"`(?:Project|Table|CompiledTable|Matches|LiveContext|Explanation)\.(\w+)\(\w", api)
-    assert len(methods) > 20
+    methods = re.findall(r"`(?!motion|help|len)(?:\w+\.)*(\w+)\(\w", api)
+    assert len(methods) > 30
     assert [n for n in methods if not any(f"{n}(" in call for call in CALLS)] == ["prepare"]  # which takes switches alone
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
 from operator import index
 from pathlib import Path
 from typing import Any
@@ -56,6 +58,21 @@ def require_number(value: object, what: str) -> float:
     raise ContextError(*error.faults) if isinstance(value, (int, float)) else error
 
 
+def require_real(value: object, what: str, least: float = -MOST, most: float = MOST) -> float:
+    """A number between two bounds, of numpy's too."""
+    if isinstance(value, Real) and not isinstance(value, bool) and least <= value <= most:  # type: ignore[operator]
+        return float(value)
+    raise _wrong(value, what, f"a number from {least:g} to {most:g}")
+
+
+def require_pair(value: object, kind: type, what: str, accepted: str) -> None:
+    """Raise ContextError for what is no pair of things of a type; numbers are finite."""
+    pair = value if isinstance(value, (tuple, list)) else ()
+    is_whole = len(pair) == 2 and all(isinstance(each, kind) for each in pair)
+    if not is_whole or (kind is Real and not all(math.isfinite(each) for each in pair)):
+        raise _wrong(value, what, accepted)
+
+
 def require_path(value: object, what: str = "path") -> Path:
     """A path as a text or a `Path`, of which the system can make the name of a file.
 
@@ -66,7 +83,7 @@ def require_path(value: object, what: str = "path") -> Path:
     FileError
         It holds a character that no name of a file can hold.
     """
-    if not isinstance(value, (str, Path)):
+    if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
         raise _wrong(value, what, "a text or a pathlib.Path")
     path = Path(value)
     try:
@@ -117,6 +134,14 @@ def require_callable(value: object, what: str) -> None:
     """Raise ContextError for what is neither a function nor None."""
     if value is not None and not callable(value):
         raise _wrong(value, what, "a function, or None")
+
+
+def require_many_of(value: object, kind: type, what: str, accepted: str) -> list[Any]:
+    """Several things of one type, as a list."""
+    listed = list(require_many(value, what, accepted))
+    for each in listed:
+        require_kind(each, kind, f"one of {what}", accepted)
+    return listed
 
 
 def require_kind(value: object, kinds: type | tuple[type, ...], what: str, accepted: str) -> None:

@@ -134,7 +134,7 @@ def _git(folder: Path, *arguments: str, accepts: tuple[int, ...]) -> str:
         done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, check=False)
     except OSError as error:
         fault = Fault(f"git cannot be run: {error.strerror}.", "git on the search path", "to install git")
-        raise FileError(fault) from None
+        raise FileError(fault, errno=error.errno) from None
     if done.returncode not in accepts:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         raise ContextDBError(Fault(f"git {arguments[0]} failed: {said[-1] if said else done.returncode}", place=Place(str(folder))))
@@ -146,4 +146,5 @@ def _placed(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise FileError(Fault(f"the file cannot be written: {error.strerror}.", place=Place(str(path)))) from None
+        fault = Fault(f"the file cannot be written: {error.strerror}.", place=Place(str(path)))
+        raise FileError(fault, errno=error.errno) from None

@@ -110,7 +110,7 @@ class CompiledData(Unchanging):
 
     def way(self, row: int) -> tuple[Step, ...]:
         """The rows of tables that a row comes from, outermost first, each with its file and line; for a table without tables inside
-        one step, the row itself."""
+        one step, the row itself. Raises NoSuchPlace for a row that there is not."""
         row = require_row(row, self.n_rows)
         if self.ways is not None:
             return self.ways.steps(row)
@@ -152,8 +152,13 @@ class CompiledData(Unchanging):
         return self.bound(found, kept_facts(context), unknown) if self.is_bound else found
 
     def encode(self, context: Context, *old: Never, unknown: Unknown = "error") -> NDArray[np.int32]:
-        """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.compiled.stack`. Rules have no
-        codes."""
+        """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.compiled.stack`.
+
+        Raises
+        ------
+        ContextError
+            As `query`; a fact is a set of values; the table has rules, which have no codes.
+        """
         if old:
             return self.encode(context, **by_name("encode", old, unknown=unknown))
         self.refuse_rules("codes do not keep the facts that its rules need")
@@ -181,7 +186,7 @@ class CompiledData(Unchanging):
         """What each row's soft cells cost without actors: float64 [n_rows], the sum of the penalties of those that do not match.
 
         A soft cell whose fact is missing costs nothing with unknown="any", its penalty with "never". A set-valued fact costs
-        nothing where some value of the set matches.
+        nothing where some value of the set matches. Raises what `query` raises.
         """
         costs: NDArray[np.float64] = self.layered_penalties(context, unknown).sum(axis=0)
         return costs

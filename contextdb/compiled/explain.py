@@ -116,8 +116,8 @@ class Explanation:
         return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
 
     def asset(self, asset: str) -> list[RowExplanation]:
-        """Why the rows of this asset, with or without its path, are valid or not; ContextError names the nearest asset when no
-        row has it."""
+        """Why the rows of this asset, with or without its path, are valid or not. Raises ContextError, with the nearest asset,
+        where no row has it."""
         require_text(asset, "asset")
         names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
         found = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
@@ -126,7 +126,10 @@ class Explanation:
         return found
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
-        """The nearest rows that are not valid: those with the fewest failing cells first, then the smallest distance."""
+        """The nearest rows that are not valid: those with the fewest failing cells first, then the smallest distance.
+
+        Raises ContextError where `most` is no whole number.
+        """
         most = require_whole(most, "most")
         rows = np.flatnonzero(self.n_failures)
         if most <= 0:

@@ -240,7 +240,7 @@ class LiveContext(MutableMapping[str, object]):
         """Offer actors for roles from now on, as `query` accepts them; None withdraws them. They are read at the next query.
 
         The mappings are kept, not copied: what the game changes in them counts in the next query. While they do not change, they
-        are not read again.
+        are not read again. What is wrong with them is raised by `matches()`.
         """
         if old:
             return self.actors(actors, **by_name("actors", old, prefer=prefer))

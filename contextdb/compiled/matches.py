@@ -299,11 +299,17 @@ class Matches:
         return self
 
     def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
-        """Who fills which role in a valid row, as {role: actor}; for an answer to a query with actors."""
+        """Who fills which role in a valid row, as {role: actor}; for an answer to a query with actors.
+
+        Raises
+        ------
+        ContextError
+            The query had no actors, or the row is not valid.
+        """
         raise ContextError(Fault("this query had no actors, so nobody is cast.", "query(facts, actors={...})"))
 
     def castings(self, row: int) -> Sequence[Mapping[str, Mapping[str, Any]]]:
-        """All castings of a valid row, best first; for an answer to a query with actors."""
+        """All castings of a valid row, best first; for an answer to a query with actors. Raises what `casting` raises."""
         return [self.casting(row)]
 
     def __len__(self) -> int:

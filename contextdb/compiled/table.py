@@ -124,7 +124,13 @@ class CompiledTable(CompiledData):
         prefer: Prefer = None,
     ) -> LiveContext:
         """Keep a context between frames: `live["speed"] = 3.2`, then `live.matches()`. Actors are offered from then on, as with
-        `LiveContext.actors`."""
+        `LiveContext.actors`.
+
+        Raises
+        ------
+        ContextError
+            A fact cannot be used, or its name looks misspelt. Facts may be missing until `matches()` is called.
+        """
         if old:
             return self.live(facts, **by_name("live", old, unknown=unknown, actors=actors, prefer=prefer))
         check_mode(unknown)
@@ -143,18 +149,20 @@ class CompiledTable(CompiledData):
         batches : bool
             Also the work of the first batches: numba is loaded, where it is installed, and the kernels are compiled or
             read from its cache, which takes about a second.
+
+        Raises nothing: it asks without facts.
         """
         prepare(self, casting, batches)
 
     def query_codes(self, codes: NDArray[np.int32]) -> Matches:
-        """The rows for codes that `encode` made."""
+        """The rows for codes that `encode` made; raises ContextError for other codes."""
         return query_codes(self, codes)
 
     def explain(
         self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
     ) -> Explanation:
         """Why each row is valid or not: the cells that fail and the facts they fail with, nearest rows first. With actors also
-        which role cannot be filled, and whose fact fails."""
+        which role cannot be filled, and whose fact fails. Raises what `query` raises."""
         if old:
             return self.explain(context, **by_name("explain", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
@@ -185,8 +193,25 @@ class CompiledTable(CompiledData):
         actors: Actors | None = None,
         prefer: Prefer = None,
     ) -> str | None:
-        """One asset by the table's policy, for a context, which is asked as in `query`, or for an answer: see
-        `contextdb.compiled.pick.pick`."""
+        """One asset by the table's policy, of a context or of an answer; None where nothing is valid and there is no fallback.
+
+        Parameters
+        ----------
+        context : mapping or Matches
+            The facts, or an answer of this table in this version.
+        rng : random.Random, numpy.random.Generator or int, optional
+            Where chance comes from: one generator a character. A number seeds a new one, for the same pick each time. Default: the
+            table's own.
+        last : str, optional
+            The asset not to repeat, "" for none. Default: what this generator picked last in this table.
+
+        Raises
+        ------
+        ContextError
+            As `query`; the answer is of another table or version, or comes with actors; `rng` or `last` cannot be used.
+        PolicyError
+            The policy is "unique" and several rows are valid.
+        """
         if old:
             return self.pick(context, rng, last, **by_name("pick", old, unknown=unknown, actors=actors, prefer=prefer))
         if isinstance(context, ManyMatches):
@@ -211,10 +236,18 @@ class CompiledTable(CompiledData):
         return Picker(self.name, seed, memory)
 
     def save(self, path: str | Path) -> None:
-        """Write the compiled file for the game, a .safetensors file, atomically."""
+        """Write the compiled file for the game, a .safetensors file, atomically; raises FileError where it cannot be written."""
         save(self, require_path(path))
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
-        """Open a compiled file by memory map. A truncated, altered or foreign file is refused with ArtefactError."""
+        """Open a compiled file by memory map.
+
+        Raises
+        ------
+        ArtefactError
+            The file is truncated, altered, of another program or of a later version.
+        FileError
+            It is missing, or cannot be read.
+        """
         return open_artefact(require_path(path), cls)

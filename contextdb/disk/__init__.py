@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Literal
 
 from contextdb.disk.folder_lock import claim, folder_turn, sweep_in_turn, temporary_name
-from contextdb.errors import Fault, FileError, Place, in_quotes, nearest
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest
 
 TABLE_SUFFIXES = (".csv", ".parquet")
 CASES_SUFFIX = ".cases.csv"
@@ -177,7 +177,8 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         why = "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
-        raise FileError(Fault(f"the folder cannot be made: {why}.", "a folder", place=Place(str(folder)))) from None
+        fault = Fault(f"the folder cannot be made: {why}.", "a folder", place=Place(str(folder)))
+        raise FileError(fault, errno=error.errno) from None
 
 
 def _require_writable(file: Path, old: os.stat_result) -> None:
@@ -220,7 +221,7 @@ def _write_into(file: Path, data: Data) -> None:
         raise
     except OSError as error:
         found = f"it cannot be written into: {error.strerror}."
-        raise FileError(Fault(found, "a file, or a pipe that is read", place=Place(str(file)))) from None
+        raise FileError(Fault(found, "a file, or a pipe that is read", place=Place(str(file))), errno=error.errno) from None
 
 
 def sync_folder(folder: int | None) -> None:
@@ -243,8 +244,10 @@ def refused_writing(file: Path, data: Data) -> AbstractContextManager[None]:
 def _refused(file: Path, why: Callable[[OSError, Path], Fault]) -> Iterator[None]:
     try:
         yield
+    except ContextDBError:  # an OSError or a ValueError too, which names its own place
+        raise
     except OSError as error:
-        raise FileError(why(error, file)) from None
+        raise FileError(why(error, file), errno=error.errno) from None
     except ValueError as error:  # a path with a NUL character
         raise FileError(Fault(f"this is not a valid path: {error}.", "a path", place=Place(str(file)))) from None
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ArtefactError, Fault, Place
+from contextdb.errors import ArtefactError, ContextDBError, Fault, Place
 
 SUFFIX = ".safetensors"
 
@@ -74,6 +74,8 @@ class FileKind:
         """Turn what goes wrong while a file's contents are put together into the error of a file that cannot be used."""
         try:
             yield
+        except ContextDBError:  # a ValueError too, which says itself what is wrong
+            raise
         except _BROKEN as error:
             raise self.refused(path, f"the file does not hold what its header says ({type(error).__name__}).") from error
 

@@ -11,7 +11,7 @@ import polars as pl
 
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES, path_in_quotes, read_bytes, write_atomic
-from contextdb.errors import Fault, FileError, Place, TableError, in_quotes, nearest
+from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes, nearest
 from contextdb.files.csv_rewrite import Origin, rewritten
 from contextdb.files.csv_source import Source, read_csv
 from contextdb.files.parquet import ParquetSource, read_parquet, rewritten_parquet
@@ -67,6 +67,8 @@ def scanned_parquet(path: Path) -> Iterator[pl.LazyFrame]:
     try:
         require_whole_file(path)
         yield pl.scan_parquet(path, glob=False, low_memory=True)
+    except ContextDBError:  # an OSError too where it is a FileError
+        raise
     except (DamagedFrame, pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
         read_texts(path)  # says what is wrong with the file
         raise TableError(Fault(f"cannot read the file: {error}.", "a whole Parquet file", place=Place(str(path)))) from None

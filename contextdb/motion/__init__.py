@@ -9,6 +9,7 @@ A table's query says which assets are valid; this finds the best frame among the
 Metres, seconds, y up; angles are positive to the left. numba makes the search fast and is loaded by the first one.
 """
 
+from contextdb.errors import ClipError, MotionError, QueryError
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
@@ -59,6 +60,7 @@ __all__ = [
     "Channel",
     "Choice",
     "Clip",
+    "ClipError",
     "ClipFeatures",
     "ClipFinding",
     "Controller",
@@ -85,9 +87,11 @@ __all__ = [
     "MatchPlay",
     "MotionConfig",
     "MotionDatabase",
+    "MotionError",
     "Normalisation",
     "Playing",
     "Poses",
+    "QueryError",
     "Reason",
     "Recorder",
     "ReservedTag",

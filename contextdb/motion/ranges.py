@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contextdb.cells.arguments import require_many
 from contextdb.errors import Fault, MotionError, in_quotes, plural
 from contextdb.motion.clips.skeleton import Ints
 
@@ -23,7 +24,7 @@ def frames_between(starts: Ints, stops: Ints) -> Ints:
 
 def check_ranges(starts: ArrayLike, stops: ArrayLike, assets: Sequence[str], n_frames: int) -> tuple[Ints, Ints, tuple[str, ...]]:
     """Starts, stops and assets as arrays of one length, or a MotionError that says which range does not fit."""
-    first, last, names = _whole(starts, "starts"), _whole(stops, "stops"), tuple(assets)
+    first, last, names = _whole(starts, "starts"), _whole(stops, "stops"), tuple(require_many(assets, "assets", "a list of names"))
     if not len(first) == len(last) == len(names):
         counts = f"{plural(len(first), 'start')}, {plural(len(last), 'stop')} and {plural(len(names), 'asset')}"
         raise MotionError(Fault(f"the ranges have {counts}.", "as many of each"))

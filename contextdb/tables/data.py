@@ -162,11 +162,19 @@ class TableData(Unchanging):
             raise TableError(*self.faults)
 
     def with_cell(self, row: int, column: str, text: str) -> Self:
-        """The table with one cell changed; every other column is shared."""
+        """The table with one cell changed; every other column is shared. Raises what `with_cells` raises."""
         return self.with_cells([(row, column, text)])
 
     def with_cells(self, edits: Iterable[tuple[int, str, str]]) -> Self:
-        """The table with some cells changed, given as (row, column, text)."""
+        """The table with some cells changed, given as (row, column, text).
+
+        Raises
+        ------
+        TableError
+            There is no such row or column.
+        ContextError
+            An edit is no row, column and text.
+        """
         changed: dict[int, TextColumn] = {}
         accepted = "a row, a column and a text for each cell"
         for edit in require_many(edits, "edits", accepted):
@@ -180,7 +188,15 @@ class TableData(Unchanging):
         return with_columns(self, [changed.get(i, c) for i, c in enumerate(self.columns)], self.origin)
 
     def with_rows(self, at: int, rows: Sequence[Mapping[str, str]]) -> Self:
-        """The table with new rows before row `at`; columns that a row leaves out are empty (Any)."""
+        """The table with new rows before row `at`; columns that a row leaves out are empty (Any).
+
+        Raises
+        ------
+        TableError
+            There is no such column, or no such place.
+        ContextError
+            A row is no mapping of columns to texts.
+        """
         at, rows = require_whole(at, "at"), list(require_many(rows, "rows", "a list of mappings of columns to texts"))
         for row in rows:
             for name, text in require_mapping(row, "a row of rows", "a mapping of columns to texts").items():
@@ -192,7 +208,15 @@ class TableData(Unchanging):
         return with_columns(self, columns, np.insert(self.origin, at, np.full(len(rows), -1)))
 
     def with_rows_taken(self, rows: Sequence[int] | NDArray[np.int64]) -> Self:
-        """The table of the given rows in the given order: deletes, moves, sorts."""
+        """The table of the given rows in the given order: deletes, moves, sorts.
+
+        Raises
+        ------
+        TableError
+            There is no such row.
+        ContextError
+            `rows` are no whole numbers.
+        """
         numbers = rows.tolist() if isinstance(rows, np.ndarray) else require_many(rows, "rows", "a list of row numbers")
         numbers = [require_whole(row, "a row of rows") for row in require_many(numbers, "rows", "a list of row numbers")]
         if wrong := [row for row in numbers if not 0 <= row < self.n_rows]:

@@ -109,7 +109,7 @@ class Project(Unchanging, ByName[Table]):
         return len(self.tables)
 
     def with_table(self, table: Table) -> Project:
-        """The project with one table in another version, for those too whose rows refer to it."""
+        """The project with one table in another version, for those too whose rows refer to it; raises ContextError for no table."""
         require_kind(table, Table, "table", "a Table")
         return replace(self, tables=around_each_other({**self.tables, table.name: table}))
 

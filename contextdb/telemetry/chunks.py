@@ -133,7 +133,7 @@ def _pieces(path: Path) -> Iterator[bytes]:
             if rest:
                 yield rest
     except OSError as error:
-        raise FileError(Fault(f"the file cannot be read: {error.strerror}.", place=Place(str(path)))) from None
+        raise FileError(Fault(f"the file cannot be read: {error.strerror}.", place=Place(str(path))), errno=error.errno) from None
 
 
 def _cut(raw: bytes) -> int:

@@ -116,10 +116,12 @@ def answers_written(place: Path) -> Iterator[None]:
     """Turn what the system or polars refuses into a `FileError` at that place."""
     try:
         yield
+    except ContextDBError:  # an OSError too where it is a FileError
+        raise
     except (OSError, pl.exceptions.PolarsError) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else _without_paths(str(error))
         fault = Fault(f"the answers cannot be written: {why}.", "room in that folder", place=Place(str(place)))
-        raise FileError(fault) from None
+        raise FileError(fault, errno=getattr(error, "errno", None)) from None
 
 
 def _without_paths(said: str) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from contextdb.cells.arguments import require_many, require_path, require_text
 from contextdb.compiled.classes import TagMasks
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
@@ -80,9 +81,13 @@ def observe(
         Dask is missing or does not answer, or files were not finished on its workers: they are named.
     """
     require_counts(max_gaps=max_gaps)
-    if engine not in ENGINES:
+    if not isinstance(engine, str) or engine not in ENGINES:
         near = nearest(str(engine), ENGINES)
         raise ContextError(Fault(f"there is no engine {in_quotes(str(engine))}.", some(ENGINES), in_quotes(near) if near else ""))
+    if count is not None:
+        require_text(count, "count")
+    if resume is not None:
+        require_path(resume, "resume")
     ready = opened(table)
     compiled, space = ready.compiled, ready.space
     plan = Plan(compiled, count, _tag_factors(space, compiled))
@@ -110,7 +115,8 @@ def _told(gap: SeenGap, ruled: RuledTable) -> SeenGap:
 
 
 def _paths(files: str | Path | Sequence[str | Path]) -> list[Path]:
-    patterns = [files] if isinstance(files, (str, Path)) else list(files)
+    several = [files] if isinstance(files, (str, Path)) else require_many(files, "files", "a path or a glob, or several")
+    patterns = [require_path(each, "one of files") for each in several]
     if not patterns:
         raise FileError(Fault("no file of contexts is given.", "a .csv or .parquet file, or a glob", rule="no-such-path"))
     found = {os.path.realpath(path): path for pattern in patterns for path in context_files(str(pattern))}

@@ -158,7 +158,7 @@ class Journal:
             yield
         except (OSError, ContextDBError) as error:
             self._is_broken = True
-            why = error.strerror if isinstance(error, OSError) else str(error)
+            why = str(error) if isinstance(error, ContextDBError) else error.strerror
             self.problem = Fault(f"unsaved edits are not kept: {why}.", mend="to save often", place=Place(str(self.path)))
 
 

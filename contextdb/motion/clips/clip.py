@@ -10,13 +10,13 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike, fspath
-from pathlib import Path
 from typing import Literal, TextIO, get_args
 
 import numpy as np
 
+from contextdb.cells.arguments import require_kind, require_many, require_path, require_text, require_whole
 from contextdb.disk import write_atomic
-from contextdb.errors import ClipError, Fault, FileError, Place, in_quotes, nearest, some
+from contextdb.errors import ClipError, ContextError, Fault, FileError, Place, in_quotes, nearest, some
 from contextdb.motion.clips import bvh
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
@@ -26,6 +26,8 @@ UPS: tuple[Up, ...] = get_args(Up)
 
 CENTIMETRE = 0.01
 """What one unit of most BVH files is, in metres; the format itself does not say."""
+MOST_DIGITS = 17
+"""A double has no more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,27 +101,31 @@ def load_bvh(path: str | PathLike[str], *, metres_per_unit: float = CENTIMETRE, 
         The text is no BVH: with its line, what was found, what is accepted and the nearest mend.
     FileError
         The file cannot be opened.
+    ContextError
+        `path` is none.
     """
-    file = fspath(path)
+    place = require_path(path)
+    file = str(path)
     try:
-        raw = Path(path).read_bytes()
+        raw = place.read_bytes()
     except OSError as error:
-        raise FileError(Fault(f"the file cannot be read: {error.strerror or error}.", place=Place(file), rule="file")) from error
-    stem = Path(path).stem
-    return parse_bvh(text_of(raw, file), stem if name is None else name, file=file, metres_per_unit=metres_per_unit, up=up)
+        fault = Fault(f"the file cannot be read: {error.strerror or error}.", place=Place(file), rule="file")
+        raise FileError(fault, errno=error.errno) from error
+    return parse_bvh(text_of(raw, file), place.stem if name is None else name, file=file, metres_per_unit=metres_per_unit, up=up)
 
 
 def parse_bvh(text: str, name: str, *, file: str | None = None, metres_per_unit: float = CENTIMETRE, up: Up = "y") -> Clip:
-    """The clip of a BVH text; `file` is the text's name in messages."""
+    """The clip of a BVH text; `file` is the text's name in messages. Raises ClipError, with each line that cannot be read."""
+    require_text(text, "text")
     skeleton, frame_time_s, values = bvh.read(text, file)
     return Clip(name, skeleton, frame_time_s, values, metres_per_unit, up)
 
 
 def load_clips(paths: Iterable[str | PathLike[str]], *, metres_per_unit: float = CENTIMETRE, up: Up = "y") -> list[Clip]:
-    """Read several BVH files; the faults of all broken ones are reported together."""
+    """Read several BVH files; raises one ClipError with the faults of all that are broken or cannot be read."""
     clips = []
     faults: list[Fault] = []
-    for path in paths:
+    for path in require_many(paths, "paths", "a list of paths"):
         try:
             clips.append(load_bvh(path, metres_per_unit=metres_per_unit, up=up))
         except (ClipError, FileError) as error:
@@ -139,7 +145,15 @@ def write_bvh(clip: Clip, target: str | PathLike[str] | TextIO, *, digits: int =
     ------
     FileError
         The disk refuses; the old file is then whole.
+    ContextError
+        `clip` is none, `target` neither a path nor an open file, or `digits` no whole number from 0 to 17.
     """
+    require_kind(clip, Clip, "clip", "a Clip")
+    digits = require_whole(digits, "digits")
+    if not 0 <= digits <= MOST_DIGITS:
+        raise ContextError(Fault(f"{digits} digits behind the point.", f"0 to {MOST_DIGITS}"))
+    if not hasattr(target, "write"):
+        require_path(target, "target")
     text = bvh.write(clip.skeleton, clip.frame_time_s, clip.values, digits)
     if not isinstance(target, (str, PathLike)):
         target.write(text)

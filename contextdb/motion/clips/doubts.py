@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from contextdb.cells.arguments import require_many_of
 from contextdb.errors import plural
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
@@ -182,8 +183,8 @@ def doubts(clips: Iterable[tuple[str, str | None, Measures]]) -> list[ClipFindin
 
 
 def doubts_of(clips: Iterable[Clip]) -> list[ClipFinding]:
-    """What is doubtful about some clips of one kind: `doubts` of their measures."""
-    return doubts((clip.name, None, measure(clip)) for clip in clips)
+    """What is doubtful about some clips of one kind: `doubts` of their measures. Raises ContextError for what are no clips."""
+    return doubts((clip.name, None, measure(clip)) for clip in require_many_of(clips, Clip, "clips", "a list of Clip"))
 
 
 def grouped(findings: Iterable[ClipFinding], n_clips: int) -> Iterator[str]:

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cells.arguments import require_kind, require_number, require_pair
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.poses import Poses, poses_of
@@ -91,7 +92,18 @@ def footfalls(clip: Clip, feet: tuple[str, str] | None = None, *, slowest_mps: f
         A foot that moves faster, from frame to frame, is up.
     highest_m : float
         A foot higher above its lowest place in the clip is up.
+
+    Raises
+    ------
+    MotionError
+        The skeleton has no such bones, or none that look like feet.
+    ContextError
+        `clip` is none, `feet` is no pair, or a limit no number from 0 up.
     """
+    require_kind(clip, Clip, "clip", "a Clip")
+    if feet is not None:
+        require_pair(feet, str, "feet", "the names of two bones, left and right")
+    slowest_mps, highest_m = require_number(slowest_mps, "slowest_mps"), require_number(highest_m, "highest_m")
     bones = feet_of(clip.skeleton) if feet is None else feet
     return footfalls_of(poses_of(clip), bones, slowest_mps=slowest_mps, highest_m=highest_m)
 

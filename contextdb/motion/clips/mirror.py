@@ -24,6 +24,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from contextdb.cells.arguments import require_kind, require_many, require_pair
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.own_axes import own_axes
 from contextdb.motion.clips.poses import LocalPoses, Poses
@@ -55,7 +56,10 @@ def mirrored(moved: Moved, pairs: Pairs) -> Moved:
     ------
     MotionError
         The pairs do not fit the skeleton; all faults together.
+    ContextError
+        `moved` are no poses, or `pairs` no pairs of names.
     """
+    require_kind(moved, (LocalPoses, Poses), "moved", "LocalPoses or Poses")
     skeleton = moved.skeleton
     partners = partners_of(skeleton, pairs)
     turns = own_axes(skeleton, partners).turns
@@ -72,7 +76,8 @@ def mirrored(moved: Moved, pairs: Pairs) -> Moved:
 
 
 def mirrored_path(path: Trajectory) -> Trajectory:
-    """The same path in a mirror."""
+    """The same path in a mirror; raises ContextError for what is no path."""
+    require_kind(path, Trajectory, "path", "a Trajectory")
     return replace(path, positions=path.positions * FLIPPED_X[:2], headings=-path.headings)
 
 
@@ -84,10 +89,15 @@ def partners_of(skeleton: Skeleton, pairs: Pairs) -> Ints:
     MotionError
         A bone that the skeleton lacks (the nearest is reported), a pattern that fits no bone, a bone in two pairs, or bones whose
         parents do not change places as they do.
+    ContextError
+        `skeleton` is none, or `pairs` are no pairs of names.
     """
+    require_kind(skeleton, Skeleton, "skeleton", "a Skeleton")
+    accepted = 'pairs of names, such as ("LeftFoot", "RightFoot")'
     faults: list[Fault] = []
     partners = np.arange(skeleton.n_joints)
-    for pair in pairs:
+    for pair in require_many(pairs, "pairs", accepted):
+        require_pair(pair, str, "one of pairs", accepted)
         for left, right in _named_by(pair, skeleton, faults):
             taken = [bone for bone in (left, right) if partners[skeleton.index(bone)] != skeleton.index(bone)]
             faults += [Fault(f"mirror: the bone {in_quotes(bone)} is in two pairs.", "each bone in one pair") for bone in taken]

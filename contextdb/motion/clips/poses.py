@@ -14,11 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contextdb.cells.arguments import require_kind, require_real
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip, Up
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import POSITIONS, Skeleton
 
+LEAST_RATE, MOST_RATE = 1e-3, 1e5
+"""Frames a second."""
 SAME_RATE = 1e-4
 """Rates this near, as a share, are the same: files print 1/30 s as 0.033333."""
 TO_Y_UP: dict[Up, Floats] = {
@@ -55,13 +58,17 @@ class Poses:
 
 
 def poses_of(clip: Clip, rate: float | None = None) -> Poses:
-    """Where all joints of a clip are in each frame, at the clip's own rate or another."""
+    """Where all joints of a clip are in each frame, at the clip's own rate or another.
+
+    Raises ContextError for what is no clip, or no rate above 0.
+    """
     local = local_poses(clip)
     return forward_kinematics(local if rate is None else resampled(local, rate))
 
 
 def local_poses(clip: Clip) -> LocalPoses:
-    """Each joint of a clip against its parent, in metres and y up."""
+    """Each joint of a clip against its parent, in metres and y up. Raises ContextError for what is no clip."""
+    require_kind(clip, Clip, "clip", "a Clip")
     positions = _positions(clip) * clip.metres_per_unit
     rotations = _rotations(clip)
     turn = TO_Y_UP[clip.up]
@@ -71,7 +78,11 @@ def local_poses(clip: Clip) -> LocalPoses:
 
 
 def forward_kinematics(local: LocalPoses) -> Poses:
-    """Place all joints in the world: the root first, then level by level, all frames and all joints of a level at once."""
+    """Place all joints in the world: the root first, then level by level, all frames and all joints of a level at once.
+
+    Raises ContextError for what are no local poses.
+    """
+    require_kind(local, LocalPoses, "local", "LocalPoses")
     positions, rotations = local.positions.copy(), local.rotations.copy()
     for joints in local.skeleton.levels[1:]:
         parents = local.skeleton.parents[joints]
@@ -82,7 +93,12 @@ def forward_kinematics(local: LocalPoses) -> Poses:
 
 
 def resampled(local: LocalPoses, rate: float) -> LocalPoses:
-    """The same motion with `rate` frames a second, from its first frame on; positions and rotations are blended between frames."""
+    """The same motion with `rate` frames a second, from its first frame on; positions and rotations are blended between frames.
+
+    Raises ContextError for what are no local poses, or no rate above 0.
+    """
+    require_kind(local, LocalPoses, "local", "LocalPoses")
+    rate = require_real(rate, "rate", LEAST_RATE, MOST_RATE)
     n_frames = len(local.positions)
     if n_frames < 2 or abs(local.rate / rate - 1.0) < SAME_RATE:
         return LocalPoses(local.skeleton, rate, local.positions, local.rotations)

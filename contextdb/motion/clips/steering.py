@@ -13,12 +13,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
+from contextdb.cells.arguments import require_many_of, require_pair, require_real
 from contextdb.errors import Fault, MotionError
+from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.clips.trajectory import MOST_REACH_S, Trajectory
 from contextdb.motion.reading import as_number
 
 STANDING_MPS = 0.1
@@ -108,9 +111,21 @@ def steered_path(
         Seconds ahead.
     rate : float
         Frames a second.
+
+    Raises
+    ------
+    MotionError
+        `past` is empty.
+    ContextError
+        `past` holds something that is no Steered, `wanted` is no pair of numbers, or another argument no number.
     """
-    if not past:
+    accepted = "a list of Steered, the body at its last moments"
+    if not require_many_of(past, Steered, "past", accepted):
         raise MotionError(Fault("there is no body to steer.", "its last moments, at least the present one"))
+    require_pair(wanted, Real, "wanted", "two numbers, x and z in metres a second")
+    if facing is not None:
+        require_real(facing, "facing")
+    rate, reach_s = require_real(rate, "rate", LEAST_RATE, MOST_RATE), require_real(reach_s, "reach_s", 0.0, MOST_REACH_S)
     future = [past[-1].moved(i / rate, wanted, facing) for i in range(1, math.ceil(reach_s * rate) + 1)]
     bodies = [*past, *future]
     headings: Floats = np.unwrap([body.heading for body in bodies])

@@ -14,10 +14,13 @@ from functools import cached_property
 
 import numpy as np
 
+from contextdb.cells.arguments import require_kind, require_pair, require_real, require_text
 from contextdb.motion.clips import quaternions
-from contextdb.motion.clips.poses import Poses
+from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE, Poses
 from contextdb.motion.clips.quaternions import Floats
 
+MOST_SMOOTH_S = MOST_REACH_S = 3600.0
+"""An hour: more is a slip."""
 STANDING_MPS = 0.05
 """Slower than this at its end, a path is taken to end there; faster, to go straight on."""
 LEAST_DEVIATION = 0.1
@@ -83,7 +86,20 @@ def root_trajectory(
     facing_smooth_s : float
         The standard deviation, in seconds, of a Gaussian over the headings of each frame's neighbours on both sides alike: it evens
         out the sway of each step and delays no turn, but begins and ends one sooner and later. Default: 0, none.
+
+    Raises
+    ------
+    MotionError
+        The skeleton has no such bone.
+    ContextError
+        `poses` are none, `facing` is no pair, or `facing_smooth_s` no number from 0 up.
     """
+    require_kind(poses, Poses, "poses", "Poses")
+    if facing is not None:
+        require_pair(facing, str, "facing", "the names of two bones, left and right")
+    if root is not None:
+        require_text(root, "root")
+    require_real(facing_smooth_s, "facing_smooth_s", 0.0, MOST_SMOOTH_S)
     skeleton = poses.skeleton
     hips = skeleton.hips if root is None else skeleton.index(root)
     pair = skeleton.facing_pair if facing is None else (skeleton.index(facing[0]), skeleton.index(facing[1]))
@@ -113,7 +129,15 @@ def steady_path(
         Seconds before and after time 0.
     rate : float
         Frames a second.
+
+    Raises
+    ------
+    ContextError
+        One of them is no finite number, or `rate` is not above 0.
     """
+    speed_mps, turn_dps = require_real(speed_mps, "speed_mps"), require_real(turn_dps, "turn_dps")
+    strafe_deg = require_real(strafe_deg, "strafe_deg")
+    rate, reach_s = require_real(rate, "rate", LEAST_RATE, MOST_RATE), require_real(reach_s, "reach_s", 0.0, MOST_REACH_S)
     now = round(reach_s * rate)
     seconds = (np.arange(2 * now + 1) - now) / rate
     headings = np.deg2rad(turn_dps) * seconds

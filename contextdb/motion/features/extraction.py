@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cells.arguments import require_kind, require_whole
 from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, nearest, plural, some
 from contextdb.motion.clips import mirror, own_axes, quaternions
 from contextdb.motion.clips.clip import Clip
@@ -78,7 +79,11 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, 
     MotionError
         The skeleton lacks a bone of the schema (the nearest is named) or cannot be mirrored by its pairs, the clip's numbers are
         too large to be a body, or a custom channel has no function or one that does not give what it should.
+    ContextError
+        `clip` or `schema` is none.
     """
+    require_kind(clip, Clip, "clip", "a Clip")
+    require_kind(schema, FeatureSchema, "schema", "a FeatureSchema")
     faults = list(_faults(clip.skeleton, schema, mirrored))
     if faults:
         raise MotionError(*(fault.at(Place(clip.name)) for fault in faults))
@@ -101,7 +106,7 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, 
 
 
 def features_of(clip: Clip, schema: FeatureSchema) -> Features:
-    """The features of every frame of a clip alone: float32 [F, N]; see `clip_features`."""
+    """The features of every frame of a clip alone: float32 [F, N]; raises what `clip_features` raises."""
     return clip_features(clip, schema).features
 
 
@@ -126,9 +131,18 @@ def query_from(
     -------
     float32 array, shape (N,)
         In the schema's units, for `MotionDatabase.search`.
+
+    Raises
+    ------
+    QueryError
+        The clip has no such frame.
+    MotionError
+        As `clip_features`.
+    ContextError
+        `frame` is no whole number, or `wanted` no path.
     """
     features = clip_features(clip, schema, mirrored=mirrored).features
-    if not 0 <= frame < len(features):
+    if not 0 <= require_whole(frame, "frame") < len(features):
         found = f"there is no frame {frame} in {clip.name}."
         raise QueryError(
             Fault(found, f"0 to {len(features) - 1}: it has {plural(len(features), 'frame')} at {schema.rate:g} a second")
@@ -137,7 +151,12 @@ def query_from(
 
 
 def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajectory) -> Features:
-    """A query [N] whose trajectory is a wished one instead; the pose stays."""
+    """A query [N] whose trajectory is a wished one instead; the pose stays.
+
+    Raises QueryError for a query of another shape, and ContextError for what is no schema or no path.
+    """
+    require_kind(schema, FeatureSchema, "schema", "a FeatureSchema")
+    require_kind(wanted, Trajectory, "wanted", "a Trajectory, such as steady_path(1.4)")
     if np.shape(query) != (schema.n_features,) or not 0 <= wanted.now < len(wanted.headings):
         n_frames = len(wanted.headings)
         found = f"the query has shape {np.shape(query)}, and the path {plural(n_frames, 'frame')} and its present at {wanted.now}."

@@ -18,6 +18,7 @@ from typing import Literal
 
 import numpy as np
 
+from contextdb.cells.arguments import require_many_of, require_path, require_text
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, plural
 from contextdb.motion.clips.clip import CENTIMETRE, Clip, write_bvh
 from contextdb.motion.clips.feet import Footfalls
@@ -157,8 +158,8 @@ RECIPES: dict[str, Recipe] = {recipe.name: recipe for recipe in _recipes()}
 
 
 def make_clip(name: str) -> MadeClip:
-    """Compute one made clip of `RECIPES`; the same every time."""
-    if name not in RECIPES:
+    """Compute one made clip of `RECIPES`; the same every time. Raises MotionError for another name, with the nearest."""
+    if require_text(name, "name") not in RECIPES:
         near = nearest(name, RECIPES)
         known = f"one of {plural(len(RECIPES), 'made clip')}, the names of RECIPES"
         raise MotionError(Fault(f"there is no made clip {in_quotes(name)}.", known, in_quotes(near) if near else ""))
@@ -177,16 +178,20 @@ def made_clips() -> list[MadeClip]:
 
 
 def write_made_clips(folder: str | PathLike[str]) -> list[Path]:
-    """Write all made clips into a folder that exists, each as NAME.bvh in centimetres, y up; the paths, in order."""
-    paths = [Path(folder) / f"{name}.bvh" for name in RECIPES]
+    """Write all made clips into a folder that exists, each as NAME.bvh in centimetres, y up; the paths, in order.
+
+    Raises FileError where they cannot be written.
+    """
+    paths = [require_path(folder, "folder") / f"{name}.bvh" for name in RECIPES]
     for path in paths:
         write_bvh(make_clip(path.stem).clip, path)
     return paths
 
 
 def descriptions(clips: Sequence[MadeClip] | None = None) -> list[Description]:
-    """What a table says of made clips, by default of all."""
-    return [describe(made.clip, made.recipe) for made in (made_clips() if clips is None else clips)]
+    """What a table says of made clips, by default of all; raises ContextError for what are no made clips."""
+    given = made_clips() if clips is None else require_many_of(clips, MadeClip, "clips", "a list of MadeClip")
+    return [describe(made.clip, made.recipe) for made in given]
 
 
 def describe(clip: Clip, recipe: Recipe) -> Description:

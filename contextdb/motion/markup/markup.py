@@ -22,10 +22,11 @@ from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 
 from contextdb import disk
+from contextdb.cells.arguments import require_path
 from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural
 from contextdb.motion.clips.bvh_words import number_fault
 from contextdb.motion.markup import file as markup_file
@@ -76,7 +77,7 @@ class Markup:
         FileError
             The file is missing, or cannot be read.
         """
-        file = fspath(path)
+        file = str(require_path(path))
         return cls.parse(markup_file.text_of(disk.read_bytes(Path(path)), file), file)
 
     @classmethod

@@ -21,6 +21,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.cells.arguments import require_kind, require_many, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
 from contextdb.motion.arguments import HasAssets, Valid
 from contextdb.motion.clips.feet import feet_of
@@ -77,7 +78,8 @@ def pose_schema(
     SchemaError
         A weight or a rate that is out of range, or a bone named twice.
     """
-    named = list(bones) if bones is not None else [*feet_of(skeleton), skeleton.names[skeleton.hips]]
+    require_kind(skeleton, Skeleton, "skeleton", "a Skeleton")
+    named = _texts(bones, "bones") if bones is not None else [*feet_of(skeleton), skeleton.names[skeleton.hips]]
     named += hands_of(skeleton) if hands else ()
     faults = [skeleton.missing_bone(bone) for bone in named if bone not in skeleton]
     if faults:
@@ -135,12 +137,19 @@ def best_start(
     QueryError
         An asset that the database lacks, with the nearest that it has, or a part that is none; or as from a search.
     """
+    require_kind(database, MotionDatabase, "database", "a MotionDatabase")
     if assets is None or hasattr(assets, "assets"):
         valid = cast("Valid | None", assets)
     else:
-        valid = _ranges_of(database, [assets] if isinstance(assets, str) else list(assets))
+        valid = _ranges_of(
+            database, [assets] if isinstance(assets, str) else list(require_many(assets, "assets", "names of assets"))
+        )
     bias = None if within is None else _outside(database, within)
     return database.search(query, valid, tags, bias=bias, in_match_range=True, penalties=penalties)
+
+
+def _texts(names: object, what: str) -> list[str]:
+    return [require_text(name, f"one of {what}") for name in require_many(names, what, "a list of names")]
 
 
 def _ranges_of(database: MotionDatabase, names: list[str]) -> NDArray[np.bool_]:
@@ -188,7 +197,7 @@ def _check_names(database: MotionDatabase, names: list[str]) -> None:
     known = dict.fromkeys(database.assets)
     faults = []
     for name in names:
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             near = nearest(str(name), known)
             found = f"the database has no asset {in_quotes(str(name))}."
             faults.append(Fault(found, some(known) or "none: it is empty", in_quotes(near) if near else ""))

@@ -83,8 +83,8 @@ class Candidates:
 
 def of(database: Searched, query: Floats, chosen: Filter, k: int, with_left_out: bool) -> Candidates:
     """The k best frames for a normalised query."""
-    if k < 0:
-        raise QueryError(Fault(f"{k} candidates were requested.", "0 or more"))
+    if isinstance(k, bool) or not isinstance(k, (int, np.integer)) or k < 0:
+        raise QueryError(Fault(f"{k!r} candidates were requested.", "a whole number, 0 or more"))
     lay, kinds = database.layout, database.marks.kinds
     why = chosen.why(lay.frame_ranges, kinds)
     in_ranges = lay.frames

@@ -16,11 +16,13 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from numbers import Real
 from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_number, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Flags, Valid
@@ -150,6 +152,9 @@ class MotionDatabase(Searched):
         end_s: float = 0.0,
     ) -> MotionDatabase:
         """The database of some clips whose features are known, one range each."""
+        require_kind(biases, Biases, "biases", "Biases")
+        require_kind(markup, (Markup, type(None)), "markup", "a Markup, or None")
+        require_number(end_s, "end_s")
         shared = Normalisation.of([part.features for part in parts], schema) if normalisation is None else normalisation
         lengths = np.array([len(part.features) for part in parts], np.int64)
         stops = np.cumsum(lengths)
@@ -295,9 +300,9 @@ class MotionDatabase(Searched):
     ) -> list[Hit]:
         """The best frame of each range that costs at most `within` more than the best of all, cheapest first.
 
-        The other parameters are those of `search`.
+        The other parameters are those of `search`, and so is what it raises; QueryError too where `within` is no number from 0 up.
         """
-        if not within >= 0.0:
+        if not isinstance(within, Real) or not within >= 0.0:
             raise QueryError(Fault(f"the costs may differ by {within!r}.", "a number, 0 or more"))
         chosen = self.filter(valid, **options)
         best = float(self._searcher.least(query, chosen, math.inf, 1)[1][0])
@@ -328,12 +333,18 @@ class MotionDatabase(Searched):
             None or -1 for a character that plays none.
         tags : TagFilter or bool array, shape (N,), optional
             As for `search`, one for all.
+
+        Raises
+        ------
+        QueryError
+            As `search`; there are not as many masks or current frames as queries.
         """
         wanted = arguments.numbers_of(queries, "the queries")
         if wanted.ndim != 2:
             raise QueryError(Fault(f"the queries have shape {wanted.shape}.", f"queries x {self.n_features} features"))
         masks = arguments.for_each(valid, len(wanted))
-        playing: Sequence[int | None] = [None] * len(wanted) if current is None else list(current)
+        playing: Sequence[int | None]
+        playing = [None] * len(wanted) if current is None else list(require_many(current, "current", "one frame, or None, a query"))
         if len(playing) != len(wanted):
             raise QueryError(Fault(f"{plural(len(playing), 'current frame')} for {len(wanted)} queries.", "one for each query"))
         answers = zip(*self._searcher.least_of_each(wanted, self._filters.make_each(masks, playing, tags)), strict=True)
@@ -353,6 +364,11 @@ class MotionDatabase(Searched):
             Whether frames that may not be chosen are among the k too, each with its reason.
         query, valid, **options
             As for `search`.
+
+        Raises
+        ------
+        QueryError
+            As `search`; `k` is no whole number from 0 up.
         """
         chosen = self.filter(valid, **options)
         return candidates.of(self, self._searcher.normalised(query), chosen, k, left_out)
@@ -434,8 +450,12 @@ class MotionDatabase(Searched):
 
 
 def build_databases(sets: Mapping[str, Iterable[Clip]], schema: FeatureSchema) -> dict[str, MotionDatabase]:
-    """Several databases that share one normalisation, fitted to the frames of all, so that a selector can compare their costs."""
-    parts = {name: parts_of(clips, schema) for name, clips in sets.items()}
+    """Several databases that share one normalisation, fitted to the frames of all, so that a selector can compare their costs.
+
+    Raises MotionError where clips do not have what the schema asks for, and ContextError for what are no clips.
+    """
+    given = require_mapping(sets, "sets", "a mapping of names to lists of Clip")
+    parts = {name: parts_of(clips, schema) for name, clips in given.items()}
     shared = Normalisation.of([part.features for each in parts.values() for part in each], schema)
     return {name: MotionDatabase.from_parts(each, schema, normalisation=shared) for name, each in parts.items()}
 
@@ -450,7 +470,10 @@ def parts_of(
     parts = []
     faults: list[Fault] = []
     seen: set[str] = set()
-    for clip in clips:
+    for name in () if isinstance(mirror, bool) else require_many(mirror, "mirror", "True, False, or the names of clips"):
+        require_text(name, "one of mirror")
+    for clip in require_many(clips, "clips", "a list of Clip"):
+        require_kind(clip, Clip, "one of clips", "a Clip")
         if clip.name in seen:
             faults.append(
                 Fault(f"two clips are named {in_quotes(clip.name)}.", "a different name for each asset", rule="duplicate")

@@ -13,6 +13,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.cells.arguments import require_many_of
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Flags, Valid
@@ -25,6 +26,7 @@ from contextdb.motion.search.filters import NO_FLAGS, Biases, Filter, Kinds
 Tags = TagFilter | ArrayLike
 Penalties = Mapping[str, float] | NDArray[np.floating]
 
+NO_SKIP: tuple[Skip, ...] = ()
 MOST_FILTERS, MOST_TABLES = 64, 16
 """What is kept of tag filters and tables; past that all are forgotten and it begins again."""
 
@@ -75,7 +77,7 @@ class FilterMaker:
             self._kinds_of(tags or ANY_TAGS if is_filter else ANY_TAGS, in_match_range),  # type: ignore[arg-type]
             NO_FLAGS if is_filter else arguments.flags_of(tags, self.n_frames, "tags", "frame"),
             arguments.bias_of(bias, self.n_frames),
-            tuple(skip),
+            () if skip is NO_SKIP else tuple(require_many_of(skip, Skip, "skip", "a list of Skip")),
             arguments.current_of(current, self.n_frames),
             self.biases.continuing,
         )

@@ -19,6 +19,7 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
+from contextdb.cells.arguments import require_kind
 from contextdb.errors import Fault, MotionError, QueryError
 from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
@@ -63,6 +64,8 @@ class Controller:
     ------
     MotionError
         The settings ask for variation, and there is no generator.
+    ContextError
+        `selector` or `settings` are none.
     """
 
     def __init__(
@@ -73,6 +76,8 @@ class Controller:
         rng: Rng | None = None,
         clock: Clock | None = None,
     ) -> None:
+        require_kind(selector, Selector, "selector", "a Selector")
+        require_kind(settings, ControllerSettings, "settings", "ControllerSettings")
         if settings.variation is not None and rng is None:
             raise MotionError(Fault("the settings request variation, but there is no generator.", "rng=random.Random(seed)"))
         self.selector, self.settings, self.recorder = selector, settings, recorder
@@ -98,7 +103,11 @@ class Controller:
         return replace(self._state, rng=variation.state_of(self._rng))
 
     def restore(self, state: ControllerState) -> None:
-        """Go on from a state of this controller, or of another one with the same selector and settings."""
+        """Go on from a state of this controller, or of another one with the same selector and settings.
+
+        Raises ContextError for what is no state.
+        """
+        require_kind(state, ControllerState, "state", "a ControllerState, what `state` gives")
         variation.restore(self._rng, state.rng)
         self._state = replace(state, rng=None)
 

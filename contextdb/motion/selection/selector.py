@@ -22,6 +22,7 @@ from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
+from contextdb.cells.arguments import require_many_of
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
 from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.search.candidates import Candidates
@@ -68,7 +69,7 @@ class Selector:
     """
 
     def __init__(self, entries: Sequence[Entry], tags: Sequence[str] = ()) -> None:
-        self.entries: tuple[Entry, ...] = tuple(entries)
+        self.entries: tuple[Entry, ...] = tuple(require_many_of(entries, Entry, "entries", "a list of Entry"))
         _check_entries(self.entries)
         loaded = {entry.name: entry.database for entry in self.entries if entry.database is not None}
         known = (tag for database in loaded.values() for tag in database.marks.tags)
@@ -185,7 +186,7 @@ class Selector:
 
     def _check_names(self, names: Iterable[str]) -> None:
         for name in names:
-            if name not in self.names:
+            if not isinstance(name, str) or name not in self.names:
                 near = nearest(str(name), self.names)
                 found = f"the selector has no database {in_quotes(str(name))}."
                 raise QueryError(Fault(found, some(self.names), in_quotes(near) if near else ""))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
+from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
 from contextdb.errors import ArtefactError, Fault, FileError, in_quotes, plural
 from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.features.normalisation import Normalisation
@@ -92,6 +93,8 @@ def build(
     ------
     MotionError, FileError
         With every fault of all clips and of all markup.
+    ContextError
+        An argument of another type.
     """
     built = build_all(config, folder, assets, progress, names=names, cache=cache)
     return {name: each.database for name, each in built.items()}
@@ -111,9 +114,10 @@ def build_all(
 
     `tolerates` is called with the name of a database and what is wrong with it or with one of its clips. Where it says True the
     build goes on without. Of the databases of one schema, which share a normalisation, those that are not among `names` take part.
+    Raises what `build` raises.
     """
-    root = Path(folder)
-    kept = None if cache is None else FeatureCache(root / cache)
+    root = _checked(config, folder, assets, names)
+    kept = None if cache is None else FeatureCache(root / require_path(cache, "cache"))
     faults, built = Faults(tolerates), {}
     inputs = Inputs.of(config, root, assets or {}, names, faults)
     extracted = _extract_all(inputs.files, kept, progress, faults)
@@ -153,9 +157,14 @@ def open_or_build(
     config, folder, assets, progress, names, cache, tolerates
         As for `build_all`. All clips are read, as their contents say whether a saved database is up to date. What is tolerated is
         told of databases that have to be built alone.
+
+    Raises
+    ------
+    MotionError, FileError
+        As `build`. A saved database that cannot be used is built anew.
     """
-    root = Path(folder)
-    opened = _opened(config, root, Path(root / (saved or "")), assets or {}, names)
+    root = _checked(config, folder, assets, names)
+    opened = _opened(config, root, root / (require_path(saved, "saved") if saved else ""), assets or {}, names)
     missing = [name for name, database in opened.items() if database is None]
     built = build_all(config, root, assets, progress, names=missing, cache=cache, tolerates=tolerates) if missing else {}
     kept = {name: built[name].database if database is None and name in built else database for name, database in opened.items()}
@@ -176,8 +185,18 @@ def _opened(
 
 
 def saved_path(folder: Path, name: str) -> Path:
-    """Where a database of a name is saved."""
-    return folder / file_name(name, SAVED_SUFFIX)
+    """Where a database of a name is saved. Raises ContextError for what is no path and no name."""
+    return require_path(folder, "folder") / file_name(require_text(name, "name"), SAVED_SUFFIX)
+
+
+def _checked(config: object, folder: object, assets: object, names: object) -> Path:
+    """The folder, after a look at what was given with it."""
+    require_kind(config, MotionConfig, "config", "a MotionConfig")
+    if assets is not None:
+        require_mapping(assets, "assets", "a mapping of tables to assets")
+    for name in () if names is None else require_many(names, "names", "a list of databases"):
+        require_text(name, "one of names")
+    return require_path(folder, "folder")
 
 
 def _open(path: Path, digest: str) -> MotionDatabase | None:

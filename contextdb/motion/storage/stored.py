@@ -29,6 +29,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from contextdb.cells.arguments import require_kind, require_path
 from contextdb.errors import Fault, MotionError, SchemaError, in_quotes
 from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
 from contextdb.motion.features.normalisation import Normalisation
@@ -69,7 +70,11 @@ def save_database(database: MotionDatabase, path: str | PathLike[str], *, inputs
         The schema was made in Python and could not be read back.
     FileError
         The disk refuses.
+    ContextError
+        `database` is none, or `path` is none.
     """
+    require_kind(database, MotionDatabase, "database", "a MotionDatabase")
+    path = require_path(path)
     tensors: Tensors = {
         "starts": database.starts,
         "stops": database.stops,
@@ -124,7 +129,7 @@ def open_database(path: str | PathLike[str], *, verify: bool = False) -> MotionD
     The arrays are private views of the file: a file that is replaced changes nothing, as long as it is replaced by a new one, as
     `save_database` does, and not written into.
     """
-    file = Path(path)
+    file = require_path(path)
     tensors, metadata = read_tensors(file, STORED, writeable=True)  # as built ones are: the compiled search tells the two apart
     with STORED.reading(file):
         small, large = _divided(tensors)
@@ -145,7 +150,7 @@ def inputs_of(path: str | PathLike[str]) -> str:
     ArtefactError, FileError
         As `open_database` does for a file that is no motion database of this layout.
     """
-    file = Path(path)
+    file = require_path(path)
     metadata = read_tensors(file, STORED)[1]
     with STORED.reading(file):
         return metadata["inputs"]

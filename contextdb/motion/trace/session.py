@@ -27,6 +27,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
+from contextdb.cells.arguments import require_path
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ArtefactError, Fault, MotionError, Place, in_quotes, plural
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
@@ -152,7 +153,7 @@ class Trace(Sequence[Decision]):
         FileError
             The file cannot be read.
         """
-        return cls.from_bytes(read_bytes(Path(path)), str(path))
+        return cls.from_bytes(read_bytes(require_path(path)), str(path))
 
     @classmethod
     def from_bytes(cls, raw: bytes, file: str = "") -> Trace:

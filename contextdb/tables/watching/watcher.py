@@ -230,10 +230,12 @@ class Watch(ByName[CompiledTable]):
 
 def _require_folder(folder: Path) -> None:
     """Raise FileError for a folder that cannot be listed: its tables are not gone because nobody can see them."""
+    place = folder_of(folder)
     try:
-        os.listdir(folder_of(folder))
+        os.listdir(place)
     except OSError as error:
-        raise FileError(Fault(f"the folder cannot be read: {error.strerror}.", place=Place(str(folder)))) from None
+        fault = Fault(f"the folder cannot be read: {error.strerror}.", place=Place(str(folder)))
+        raise FileError(fault, errno=error.errno) from None
 
 
 def _log(error: ContextDBError) -> None:

@@ -1,0 +1,177 @@
+"""Wrong arguments: no public call of `contextdb.motion` ends in an error that does not say what was wrong."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contextdb import motion
+from contextdb.errors import ContextDBError
+
+
+class Odd:
+    """Something that no function expects."""
+
+
+WRONG: list[object] = [
+    None, True, 0, -1, 1, 99, 2**70, 1.5, -0.5, float("nan"), float("inf"), "", "x", "a\0b", "\ud800", b"x", [], [5], ["x"],
+    [[]], [None], {}, {5: 5}, {"x": 5}, {"x": [5]}, (1, 2), (1, 2, 3), ("x", "y"), {1}, np.zeros((2, 2)), np.arange(3), np.zeros(0),
+    Odd(), Odd, Path("none"),
+]  # fmt: skip
+CLIP = motion.make_clip("idle").clip
+LOCAL, POSES = motion.local_poses(CLIP), motion.poses_of(CLIP, 30.0)
+PATH = motion.root_trajectory(POSES)
+CHANNELS = [{"type": "trajectory", "what": "position", "at": [0.2]}, {"type": "position", "bone": "Hips"}]
+SCHEMA = motion.FeatureSchema.from_dict("pose", {"rate": 30, "channels": CHANNELS})
+PARTS = [motion.clip_features(CLIP, SCHEMA)]
+DATABASE = motion.MotionDatabase.from_features(np.eye(4, 2), [0, 2], [2, 4], ["a", "b"])
+SELECTOR = motion.Selector([motion.Entry("only", DATABASE)])
+QUERY = [0.0, 1.0]
+STEERED = [motion.Steered()]
+CONFIG = motion.MotionConfig()
+MARKUP = motion.Markup()
+Call = Callable[[object], object]
+CALLS: dict[str, Call] = {
+    "load_bvh(path)": lambda x: motion.load_bvh(x),
+    "load_bvh(metres_per_unit)": lambda x: motion.parse_bvh("", "a", metres_per_unit=x),
+    "load_clips(paths)": lambda x: motion.load_clips(x),
+    "load_clips(paths), one": lambda x: motion.load_clips([x]),
+    "parse_bvh(text)": lambda x: motion.parse_bvh(x, "a"),
+    "write_bvh(clip)": lambda x: motion.write_bvh(x, "/nowhere/x.bvh"),
+    "write_bvh(target)": lambda x: isinstance(x, (str, Path)) or motion.write_bvh(CLIP, x),
+    "write_bvh(digits)": lambda x: motion.write_bvh(CLIP, "/nowhere/x.bvh", digits=x),
+    "poses_of(clip)": lambda x: motion.poses_of(x),
+    "poses_of(rate)": lambda x: motion.poses_of(CLIP, x),
+    "local_poses(clip)": lambda x: motion.local_poses(x),
+    "resampled(local)": lambda x: motion.resampled(x, 30.0),
+    "resampled(rate)": lambda x: motion.resampled(LOCAL, x),
+    "forward_kinematics(local)": lambda x: motion.forward_kinematics(x),
+    "root_trajectory(poses)": lambda x: motion.root_trajectory(x),
+    "root_trajectory(root)": lambda x: motion.root_trajectory(POSES, x),
+    "root_trajectory(facing)": lambda x: motion.root_trajectory(POSES, facing=x),
+    "root_trajectory(facing_smooth_s)": lambda x: motion.root_trajectory(POSES, facing_smooth_s=x),
+    "footfalls(clip)": lambda x: motion.footfalls(x),
+    "footfalls(feet)": lambda x: motion.footfalls(CLIP, x),
+    "footfalls(slowest_mps)": lambda x: motion.footfalls(CLIP, slowest_mps=x),
+    "footfalls(highest_m)": lambda x: motion.footfalls(CLIP, highest_m=x),
+    "mirrored(moved)": lambda x: motion.mirrored(x, [("LeftFoot", "RightFoot")]),
+    "mirrored(pairs)": lambda x: motion.mirrored(POSES, x),
+    "mirrored_path(path)": lambda x: motion.mirrored_path(x),
+    "partners_of(skeleton)": lambda x: motion.partners_of(x, []),
+    "partners_of(pairs)": lambda x: motion.partners_of(CLIP.skeleton, x),
+    "doubts_of(clips)": lambda x: motion.doubts_of(x),
+    "doubts_of(clips), one": lambda x: motion.doubts_of([x]),
+    "make_clip(name)": lambda x: motion.make_clip(x),
+    "write_made_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_made_clips(x),
+    "descriptions(clips)": lambda x: x is None or motion.descriptions(x),
+    "descriptions(clips), one": lambda x: motion.descriptions([x]),
+    "clip_features(clip)": lambda x: motion.clip_features(x, SCHEMA),
+    "clip_features(schema)": lambda x: motion.clip_features(CLIP, x),
+    "features_of(clip)": lambda x: motion.features_of(x, SCHEMA),
+    "features_of(schema)": lambda x: motion.features_of(CLIP, x),
+    "query_from(schema)": lambda x: motion.query_from(x, CLIP),
+    "query_from(clip)": lambda x: motion.query_from(SCHEMA, x),
+    "query_from(frame)": lambda x: motion.query_from(SCHEMA, CLIP, x),
+    "query_from(wanted)": lambda x: motion.query_from(SCHEMA, CLIP, 0, x),
+    "with_path(schema)": lambda x: motion.with_path(x, PARTS[0].features[0], PATH),
+    "with_path(query)": lambda x: motion.with_path(SCHEMA, x, PATH),
+    "with_path(wanted)": lambda x: motion.with_path(SCHEMA, PARTS[0].features[0], x),
+    "steady_path(speed_mps)": lambda x: motion.steady_path(x),
+    "steady_path(turn_dps)": lambda x: motion.steady_path(1.0, x),
+    "steady_path(strafe_deg)": lambda x: motion.steady_path(1.0, strafe_deg=x),
+    "steady_path(reach_s)": lambda x: motion.steady_path(1.0, reach_s=x),
+    "steady_path(rate)": lambda x: motion.steady_path(1.0, rate=x),
+    "steered_path(past)": lambda x: motion.steered_path(x, (0.0, 1.0)),
+    "steered_path(past), one": lambda x: motion.steered_path([x], (0.0, 1.0)),
+    "steered_path(wanted)": lambda x: motion.steered_path(STEERED, x),
+    "steered_path(facing)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), x),
+    "steered_path(reach_s)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), reach_s=x),
+    "steered_path(rate)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), rate=x),
+    "build(config)": lambda x: motion.build(x, "none"),
+    "build(folder)": lambda x: motion.build(CONFIG, x),
+    "build(assets)": lambda x: motion.build(CONFIG, "none", x),
+    "build(names)": lambda x: motion.build(CONFIG, "none", names=x),
+    "build_all(config)": lambda x: motion.build_all(x, "none"),
+    "open_or_build(config)": lambda x: motion.open_or_build(x, "none"),
+    "open_or_build(folder)": lambda x: motion.open_or_build(CONFIG, x),
+    "open_or_build(names)": lambda x: motion.open_or_build(CONFIG, "none", names=x),
+    "build_databases(sets)": lambda x: motion.build_databases(x, SCHEMA),
+    "build_databases(sets), one": lambda x: motion.build_databases({"a": [x]}, SCHEMA),
+    "build_databases(schema)": lambda x: motion.build_databases({"a": [CLIP]}, x),
+    "save_database(database)": lambda x: motion.save_database(x, "/nowhere/x.safetensors"),
+    "save_database(path)": lambda x: isinstance(x, (str, Path)) or motion.save_database(DATABASE, x),
+    "open_database(path)": lambda x: motion.open_database(x),
+    "saved_path(folder)": lambda x: motion.saved_path(x, "loco"),
+    "saved_path(name)": lambda x: motion.saved_path(Path("none"), x),
+    "inputs_of(path)": lambda x: motion.inputs_of(x),
+    "MotionDatabase.build(clips)": lambda x: motion.MotionDatabase.build(x, SCHEMA),
+    "MotionDatabase.build(clips), one": lambda x: motion.MotionDatabase.build([x], SCHEMA),
+    "MotionDatabase.build(schema)": lambda x: motion.MotionDatabase.build([CLIP], x),
+    "MotionDatabase.build(mirror)": lambda x: motion.MotionDatabase.build([CLIP], SCHEMA, mirror=x),
+    "MotionDatabase.build(biases)": lambda x: motion.MotionDatabase.build([CLIP], SCHEMA, biases=x),
+    "MotionDatabase.build(end_s)": lambda x: motion.MotionDatabase.build([CLIP], SCHEMA, end_s=x),
+    "from_features(features)": lambda x: motion.MotionDatabase.from_features(x, [0], [2], ["a"]),
+    "from_features(starts)": lambda x: motion.MotionDatabase.from_features(np.eye(4, 2), x, [2], ["a"]),
+    "from_features(stops)": lambda x: motion.MotionDatabase.from_features(np.eye(4, 2), [0], x, ["a"]),
+    "from_features(assets)": lambda x: motion.MotionDatabase.from_features(np.eye(4, 2), [0], [2], x),
+    "from_features(assets), one": lambda x: motion.MotionDatabase.from_features(np.eye(4, 2), [0], [2], [x]),
+    "search(query)": lambda x: DATABASE.search(x),
+    "search(valid)": lambda x: DATABASE.search(QUERY, x),
+    "search(tags)": lambda x: DATABASE.search(QUERY, tags=x),
+    "search(current)": lambda x: DATABASE.search(QUERY, current=x),
+    "search(bias)": lambda x: DATABASE.search(QUERY, bias=x),
+    "search(skip)": lambda x: DATABASE.search(QUERY, skip=x),
+    "search(skip), one": lambda x: DATABASE.search(QUERY, skip=[x]),
+    "search(penalties)": lambda x: DATABASE.search(QUERY, penalties=x),
+    "search_many(queries)": lambda x: DATABASE.search_many(x),
+    "search_many(valid)": lambda x: DATABASE.search_many([QUERY], x),
+    "search_many(current)": lambda x: DATABASE.search_many([QUERY], current=x),
+    "search_many(tags)": lambda x: DATABASE.search_many([QUERY], tags=x),
+    "best_of_ranges(within)": lambda x: DATABASE.best_of_ranges(QUERY, x),
+    "candidates(query)": lambda x: DATABASE.candidates(x),
+    "candidates(k)": lambda x: DATABASE.candidates(QUERY, x),
+    "Selector(entries)": lambda x: motion.Selector(x),
+    "Selector(entries), one": lambda x: motion.Selector([x]),
+    "Selector.search(valid)": lambda x: SELECTOR.search(QUERY, x),
+    "Selector.search(bias)": lambda x: SELECTOR.search(QUERY, bias=x),
+    "Selector.search(among)": lambda x: SELECTOR.search(QUERY, among=x),
+    "Controller(selector)": lambda x: motion.Controller(x),
+    "Controller(settings)": lambda x: motion.Controller(SELECTOR, x),
+    "Controller.update(dt_s)": lambda x: motion.Controller(SELECTOR).update(x, QUERY),
+    "Controller.update(query)": lambda x: motion.Controller(SELECTOR).update(0.1, x),
+    "Controller.update(valid)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, x),
+    "Controller.restore(state)": lambda x: motion.Controller(SELECTOR).restore(x),
+    "Markup.load(path)": lambda x: motion.Markup.load(x),
+    "Trace.load(path)": lambda x: motion.Trace.load(x),
+    "best_start(database)": lambda x: motion.best_start(x, QUERY),
+    "best_start(query)": lambda x: motion.best_start(DATABASE, x),
+    "best_start(assets)": lambda x: motion.best_start(DATABASE, QUERY, x),
+    "pose_schema(skeleton)": lambda x: motion.pose_schema(x),
+    "pose_schema(bones)": lambda x: motion.pose_schema(CLIP.skeleton, x),
+    "pose_schema(rate)": lambda x: motion.pose_schema(CLIP.skeleton, rate=x),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_wrong_argument_ends_in_an_error_that_says_what_was_wrong(name: str):
+    told = {}
+    for value in WRONG:
+        with contextlib.suppress(ContextDBError):
+            try:
+                CALLS[name](value)
+            except Exception as error:
+                if not isinstance(error, ContextDBError):
+                    told[repr(value)] = f"{type(error).__name__}: {error}"
+    assert told == {}
+
+
+def test_every_public_call_is_asked_with_wrong_arguments():
+    api = (Path(__file__).parent.parent.parent / "docs" / "api.md").read_text(encoding="utf-8")
+    calls = re.findall(r"`motion\.(?:\w+\.)*(\w+)\(\w", api)
+    assert len(calls) > 40
+    assert [name for name in calls if not any(f"{name}(" in call for call in CALLS)] == []

@@ -1,0 +1,146 @@
+"""docs/api.md is the interface: every name on it exists, every public name is on it, and its signatures are those of the code.
+
+`python tests/test_api.py --update` writes the signatures of the code into the first columns.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import contextdb as cdb
+from contextdb import motion, telemetry
+
+DOCS = Path(__file__).parent.parent / "docs"
+API = DOCS / "api.md"
+MODULES: dict[str, ModuleType] = {"motion": motion, "telemetry": telemetry}
+FORMS = ('project["jog"]', "len(table)")
+"""Names on the page that are uses of a class, not attributes."""
+CODE = re.compile(r"`([^`]+)`")
+FIRST_CELL = re.compile(r"^\| (`.*?) \|", re.MULTILINE)
+NAME = re.compile(r"(\.?[\w.]+)(\(.*\))?")
+
+
+def names_in(text: str) -> Iterator[tuple[str, bool]]:
+    """The names in the first cells of the tables, in full, and whether each is written as a call."""
+    owner = ""
+    for cell in FIRST_CELL.findall(text):
+        for written in CODE.findall(cell):
+            if written not in FORMS:
+                match = NAME.fullmatch(written)
+                assert match, f"{written} is not a name"
+                name = owner + match[1] if match[1].startswith(".") else match[1]
+                owner = name.rpartition(".")[0]
+                yield name, match[2] is not None
+
+
+def value_of(name: str) -> object:
+    """What a name of the page is; a field of a dataclass or an attribute that instances have gives None."""
+    first, *rest = name.split(".")
+    value: object = MODULES.get(first) or getattr(cdb, first)
+    for part in rest:
+        if isinstance(value, type) and not hasattr(value, part):
+            is_field = dataclasses.is_dataclass(value) and part in {f.name for f in dataclasses.fields(value)}
+            assert is_field or re.search(rf"\bself\.{part}\b", inspect.getsource(value)), f"there is no {name}"
+            return None
+        value = getattr(value, part)
+    return value
+
+
+def is_call(value: object) -> bool:
+    return inspect.isfunction(value) or inspect.ismethod(value)
+
+
+def signature_of(call: object) -> str:
+    """Parameters and defaults as the page writes them: without types, "..." for a default that is no plain value."""
+    parameters = list(inspect.signature(call).parameters.values())  # type: ignore[arg-type]
+    parts, is_keyword = [], False
+    for parameter in parameters:
+        if parameter.name == "self":
+            continue
+        if parameter.kind is parameter.KEYWORD_ONLY and not is_keyword:
+            parts.append("*")
+            is_keyword = True
+        star = {parameter.VAR_POSITIONAL: "*", parameter.VAR_KEYWORD: "**"}.get(parameter.kind, "")
+        parts.append(f"{star}{parameter.name}{_default(parameter.default)}")
+    return f"({', '.join(parts)})"
+
+
+def _default(value: object) -> str:
+    if value is inspect.Parameter.empty:
+        return ""
+    if isinstance(value, str):
+        return f'="{value}"'
+    return f"={value!r}" if value is None or isinstance(value, (bool, int, float)) or value == () else "=..."
+
+
+def with_signatures(text: str) -> str:
+    """The page with the signatures of the code."""
+    owner = ""
+
+    def written(match: re.Match[str]) -> str:
+        nonlocal owner
+        found = NAME.fullmatch(match[1])
+        if match[1] in FORMS or not found:
+            return match[0]
+        name = owner + found[1] if found[1].startswith(".") else found[1]
+        owner = name.rpartition(".")[0]
+        value = value_of(name)
+        return f"`{found[1]}{signature_of(value)}`" if is_call(value) else match[0]
+
+    return FIRST_CELL.sub(lambda cell: CODE.sub(written, cell[0]), text)
+
+
+PAGE = API.read_text(encoding="utf-8")
+NAMES = dict(names_in(PAGE))
+CALLS = [name for name in NAMES if is_call(value_of(name))]
+
+
+def test_every_name_on_the_page_exists():
+    assert len(NAMES) > 200
+    for name in NAMES:
+        value_of(name)  # fails, with the name, where there is none
+
+
+def test_every_public_name_is_on_the_page():
+    public = [*cdb.__all__, *(f"{where}.{name}" for where, module in MODULES.items() for name in module.__all__)]
+    assert [name for name in public if name not in NAMES] == []
+
+
+def test_the_signatures_on_the_page_are_those_of_the_code():
+    assert with_signatures(PAGE) == PAGE, "run: python tests/test_api.py --update"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_public_name_has_a_docstring_and_a_call_says_what_it_raises(name: str):
+    value = value_of(name)
+    if not (is_call(value) or isinstance(value, (type, property)) or hasattr(value, "func")):
+        return  # a constant, a field or a type: said on the page
+    said = inspect.getdoc(value) or ""
+    assert said, f"{name} has no docstring"
+    if name in CALLS and signature_of(value) != "()":
+        assert re.search(r"\b[Rr]aise|Never fails", said), f"{name} does not say what it raises"
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_the_pages_use_public_names_alone(page: Path):
+    text = page.read_text(encoding="utf-8")
+    found = re.findall(r"\b(?:cdb\.)?(motion\.|telemetry\.|cdb\.)([A-Za-z]\w*)\b", code_of(text))
+    names = {f"{where.removeprefix('cdb.')}{name}" for where, name in found} - {"motion"}
+    assert sorted(name for name in names if name not in NAMES) == []
+
+
+def code_of(text: str) -> str:
+    """The Python in the blocks of a page."""
+    return "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+
+
+if __name__ == "__main__" and "--update" in sys.argv:
+    API.write_text(with_signatures(PAGE), encoding="utf-8")

@@ -53,7 +53,7 @@ def pack(
     """What a database gives every search, as sizes and addresses: handing over twenty arrays takes longer than some searches."""
     channels = np.array([0, *(columns.stop for columns in slices)], np.int64)
     feature_weights = np.repeat(weights, np.diff(channels)).astype(np.float32)
-    is_one_kind = not kinds.any()
+    kept_kinds = kinds if kinds.any() else kinds[:0]
     lay = layout
     arrays = (
         *(
@@ -70,11 +70,11 @@ def pack(
             lay.range_boxes,
             lay.range_order,
         ),
-        *(lay.kinds_of_boxes(kinds), kinds, offset, scale, channels, weights, feature_weights),
+        *(lay.kinds_of_boxes(kinds), kept_kinds, offset, scale, channels, weights, feature_weights),
     )
     kept = tuple(np.ascontiguousarray(array) for array in arrays)
     sizes = (lay.n_features, len(lay.box_starts), len(lay.lows), len(lay.cluster_lows), len(lay.range_boxes), len(lay.range_order))
-    numbers = [*sizes, 0 if is_one_kind else len(kinds), len(weights), *(array.ctypes.data for array in kept)]
+    numbers = [*sizes, len(kept_kinds), len(weights), *(array.ctypes.data for array in kept)]
     return Pack(np.array(numbers, np.int64), kept)
 
 

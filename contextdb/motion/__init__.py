@@ -3,6 +3,7 @@
     BVH clips ─► features ─► MotionDatabase ─► search(query, valid) ─► Hit
     markup ───────────────────────┘   Selector: priority databases in order ─► Choice
                                       Controller: one character in time ─► Decision ─► Trace
+                                      ControllerGroup: a crowd of them, searched for at once
                                       MatchNode, MatchGate: one-offs that end at a target
 
 A table's query says which assets are valid; this finds the best frame among theirs. It takes masks and names, never a table.
@@ -36,6 +37,7 @@ from contextdb.motion.search.database import Hit, MotionDatabase, build_database
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
@@ -62,6 +64,7 @@ __all__ = [
     "ClipFeatures",
     "ClipFinding",
     "Controller",
+    "ControllerGroup",
     "ControllerSettings",
     "ControllerState",
     "CustomFunction",

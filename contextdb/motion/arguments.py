@@ -5,7 +5,7 @@ from __future__ import annotations
 import numbers
 from collections.abc import Sequence
 from types import NoneType
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,8 +28,15 @@ class HasAssets(Protocol):
         """The valid assets."""
 
 
-Valid: TypeAlias = HasAssets | ArrayLike
-ValidForMany: TypeAlias = Valid | Sequence[Valid | None]
+class ValidRanges(NamedTuple):
+    """What a mask means to one database: which of its ranges may play, bool [R], and their biases, float64 [R]."""
+
+    flags: Flags
+    biases: Floats
+
+
+Valid: TypeAlias = HasAssets | ArrayLike | ValidRanges
+ValidForMany: TypeAlias = Valid | Sequence["Valid | None"]
 """One for all queries, or one for each."""
 Currents: TypeAlias = Sequence[int | None] | NDArray[np.integer]
 

@@ -19,11 +19,11 @@ from functools import cached_property
 from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
 from contextdb.motion import arguments
-from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany
+from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
@@ -380,6 +380,11 @@ class MotionDatabase(Searched):
         """The features of one frame in the schema's units, as a query has them: float64 [F]."""
         return self.normalisation.undo(self.layout.take(np.array([self._number(frame)]))[0])
 
+    def raw_many(self, frames: Sequence[int] | NDArray[np.integer]) -> Floats:
+        """The features of many frames in the schema's units, the poses of a crowd: float64 [Q, F]."""
+        numbers = np.array([self._number(frame) for frame in frames], np.int64)
+        return self.normalisation.undo(self.layout.take(numbers))
+
     def normalised(self, query: ArrayLike) -> Floats:
         """A query [F] in the schema's units, checked, as costs are computed with it: float64."""
         return self._searcher.normalised(query)
@@ -426,6 +431,10 @@ class MotionDatabase(Searched):
     def filter(self, valid: Valid | None = None, **options: Unpack[SearchOptions]) -> Filter:
         """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`."""
         return self._filters.make(valid, **options)
+
+    def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
+        """What the masks of n characters mean to this database, see `search_many`: each serves as `valid` of `search`."""
+        return self._filters.valid_of_each(valid, n)
 
     @cached_property
     def _filters(self) -> FilterMaker:

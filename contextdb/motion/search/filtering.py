@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
-from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany
+from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import ANY_TAGS, Marks, TagFilter
@@ -83,29 +83,40 @@ class FilterMaker:
 
     def make_many(self, n: int, valid: ValidForMany | None, current: Currents | None, tags: Tags | None) -> ManyFilters:
         """The filters of n searches; see `MotionDatabase.search_many` for what is given."""
-        ranges, range_biases = self.ranges_of_many(valid, n)
-        return ManyFilters(self.make(None, tags), ranges, range_biases, arguments.currents_of(current, n, self.n_frames))
+        ranges, biases = self._ranges_of_many(valid, n)
+        return ManyFilters(
+            self.make(None, tags),
+            ranges,
+            self._range_biases[None] if biases is None else biases,
+            arguments.currents_of(current, n, self.n_frames),
+        )
 
-    def ranges_of_many(self, valid: ValidForMany | None, n: int) -> tuple[Flags, Floats]:
-        """Which ranges may play in each of n searches, bool [n, R], and the biases of ranges, float64 [n, R]; or [1, R], the same
-        for all."""
+    def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
+        """What the masks of n searches mean, read once, to be given to searches as `valid`."""
+        ranges, biases = self._ranges_of_many(valid, n)
+        all_biases = [self._range_biases] * n if biases is None else biases
+        return [ValidRanges(ranges[i if len(ranges) > 1 else 0], all_biases[i if len(all_biases) > 1 else 0]) for i in range(n)]
+
+    def _ranges_of_many(self, valid: ValidForMany | None, n: int) -> tuple[Flags, Floats | None]:
+        """Which ranges may play in each of n searches, bool [n, R], and the biases of ranges, float64 [n, R], None where they are
+        those of the database; or [1, R], the same for all."""
         n_ranges = len(self.assets)
         if not arguments.is_one_for_each(valid):
-            flags, biases = self._ranges(cast("Valid | None", valid))
-            return flags[None], biases[None]
+            ranges, biases = self._ranges(cast("Valid | None", valid))
+            return ranges[None], None if biases is self._range_biases else biases[None]
         each = cast("Sequence[Valid | None]", valid)
         if len(each) != n:
             raise QueryError(Fault(f"{plural(len(each), 'mask')} for {n} queries.", "one for all, or one for each query"))
         if isinstance(each, np.ndarray):
-            return arguments.flags_of(each, (n, n_ranges), "valid", "range"), self._range_biases[None]
+            return arguments.flags_of(each, (n, n_ranges), "valid", "range"), None
         if (of_table := self._of_answers(each)) is not None:
-            return of_table, self._range_biases[None]
+            return of_table, None
         masks = list(each)
         known = {id(mask): self._ranges(mask) for mask in masks}
-        ranges, all_biases = [known[id(mask)][0] for mask in masks], [known[id(mask)][1] for mask in masks]
+        all_biases = [known[id(mask)][1] for mask in masks]
         are_plain = all(biases is self._range_biases for biases in all_biases)
-        flags = np.array(ranges, np.bool_).reshape(n, n_ranges)
-        return flags, self._range_biases[None] if are_plain else np.array(all_biases).reshape(n, n_ranges)
+        flags = np.array([known[id(mask)][0] for mask in masks], np.bool_).reshape(n, n_ranges)
+        return flags, None if are_plain else np.array(all_biases).reshape(n, n_ranges)
 
     def _of_answers(self, answers: Sequence[Any]) -> Flags | None:
         """The ranges of many answers of one table at once; None where they are not, or have costs of their own."""
@@ -126,6 +137,8 @@ class FilterMaker:
         """Which ranges may play, bool [R], and the biases of ranges, float64 [R]."""
         if valid is None:
             return self._all_ranges, self._range_biases
+        if isinstance(valid, ValidRanges):
+            return valid.flags, valid.biases
         if type(valid) is np.ndarray and valid.dtype == np.bool_ and valid.shape == self._all_ranges.shape:
             return np.ascontiguousarray(valid), self._range_biases
         if not hasattr(valid, "assets"):

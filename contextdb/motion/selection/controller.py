@@ -15,7 +15,7 @@ DoNotChoose, NextNaturalOnly and root motion weight of EA's talk.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
 
@@ -28,6 +28,7 @@ from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection import variation
 from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValid
+from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
@@ -40,6 +41,23 @@ from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
 
 Clock = Callable[[], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """Half an update: what is to be searched, and why; `wanted` is None where nothing is."""
+
+    step: Step
+    cause: Trigger | None
+    wanted: Asked | None
+    context: Mapping[str, object] | None
+
+    @property
+    def query(self) -> Floats:
+        """The query, checked: float64 [F]."""
+        return self.step.query
+
+
 DEFAULT_SETTINGS = ControllerSettings()
 
 
@@ -139,27 +157,43 @@ class Controller:
         QueryError
             A time, query, mask, tag or name that does not fit. The controller then stands where it stood.
         """
-        dt_s = _seconds(dt_s)
         asked = Asked(valid, tags, None, bias, among, None, penalties)
-        step = Step.of(self.selector, self.settings, self._state, dt_s, self._checked(query), asked)
-        decision = self._decided(step, step.trigger(force, interrupt), context)
+        asking = self.ask(dt_s, query, asked, context, force, interrupt)
+        if asking.wanted is None:
+            return self.answer(asking)
+        began_s = self.now_s()
+        choice = self.selector.search(asking.query, **asking.wanted.options())
+        return self.answer(asking, choice, (self.now_s() - began_s) * 1e6)
+
+    def ask(
+        self, dt_s: float, query: ArrayLike, asked: Asked, context: Mapping[str, object] | None, force: bool, interrupt: bool
+    ) -> Asking:
+        """The first half of an update: move what plays on, and say what is to be searched. Changes nothing."""
+        step = Step.of(self.selector, self.settings, self._state, _seconds(dt_s), self._checked(query), asked)
+        cause = step.trigger(force, interrupt)
+        return Asking(step, cause, None if cause is None else step.wanted(cause), context)
+
+    def answer(self, asking: Asking, choice: Choice | None = None, search_us: float = 0.0) -> Decision:
+        """The second half: decide by what the selector chose, None where nothing was to be searched."""
+        decision = self._decided(asking, choice, search_us if self._clock else None)
         if self.recorder is not None:
             self.recorder.record(decision)
-        self._state = self._state_after(step, decision)
+        self._state = self._state_after(asking.step, decision)
         return decision
 
-    def _decided(self, step: Step, cause: Trigger | None, context: Mapping[str, object] | None) -> Decision:
-        search_us: float | None = None
+    def now_s(self) -> float:
+        """What the clock says; 0 without one."""
+        return self._clock() if self._clock else 0.0
+
+    def _decided(self, asking: Asking, choice: Choice | None, search_us: float | None) -> Decision:
+        step, cause, wanted = asking.step, asking.cause, asking.wanted
         candidates: tuple[tuple[str, Candidates], ...] = ()
         filters: tuple[tuple[str, Filter], ...] = ()
-        if cause is None:
+        if cause is None or wanted is None or choice is None:
             assert step.ongoing is not None, "without anything playing there is a cause to search"
             outcome = step.unsearched(step.ongoing)
         else:
-            wanted = step.wanted(cause)
-            began_s = self._clock() if self._clock else 0.0
-            outcome = step.searched(cause, wanted, self._rng)
-            search_us = (self._clock() - began_s) * 1e6 if self._clock else None
+            outcome = step.searched(cause, wanted, choice, self._rng)
             candidates = self._candidates(step.query, wanted)
             filters = self._filters(wanted, candidates)
         return Decision(
@@ -173,10 +207,10 @@ class Controller:
             cost=outcome.cost,
             continuing_cost=outcome.continuing_cost,
             choice=outcome.choice,
-            context=context,
+            context=asking.context,
             query=step.query,
             candidates=candidates,
-            search_us=search_us,
+            search_us=None if cause is None else search_us,
             root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
             root_weight=self._root_weight(outcome.playing),
             filters=filters,

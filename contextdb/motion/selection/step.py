@@ -119,9 +119,8 @@ class Step:
         """What plays, plays on."""
         return Outcome(_onward(ongoing), trigger.not_due(self.due_s), ongoing.playing)
 
-    def searched(self, cause: Trigger, asked: Asked, rng: Rng | None) -> Outcome:
-        """Search, and choose: to play on, to jump, or, when nothing is found, to make do with what there is."""
-        choice = self.selector.search(self.query, **asked.options())
+    def searched(self, cause: Trigger, asked: Asked, choice: Choice, rng: Rng | None) -> Outcome:
+        """What is made of the selector's choice: to play on, to jump, or, when nothing is found, to make do with what there is."""
         if not choice:
             return self._nothing_else(cause, choice)
         continuing = self._continuing_cost(asked, choice)

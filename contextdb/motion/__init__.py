@@ -13,6 +13,8 @@ Metres, seconds, y up; angles are positive to the left. numba makes the search f
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
+from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.motion.clips.many_steered import ManySteered, steered_paths
 from contextdb.motion.clips.mirror import mirrored, mirrored_path, partners_of
 from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, local_poses, poses_of, resampled
 from contextdb.motion.clips.skeleton import Skeleton
@@ -20,6 +22,7 @@ from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, steady_path
 from contextdb.motion.features.channels import Channel
 from contextdb.motion.features.extraction import ClipFeatures, clip_features, features_of, query_from, with_path
+from contextdb.motion.features.many_queries import with_paths
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.made.recipes import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
@@ -79,6 +82,8 @@ __all__ = [
     "LeftOut",
     "LocalPoses",
     "MadeClip",
+    "ManySteered",
+    "ManyTrajectories",
     "Mark",
     "Marks",
     "Markup",
@@ -140,7 +145,9 @@ __all__ = [
     "saved_path",
     "steady_path",
     "steered_path",
+    "steered_paths",
     "with_path",
+    "with_paths",
     "write_bvh",
     "write_made_clips",
 ]

@@ -92,6 +92,12 @@ def refuse_infinite(values: Floats, told: Floats, names: Sequence[str]) -> None:
         raise QueryError(Fault(f"no frame can be compared with the query: {listed}{more}.", "finite numbers that fit a float32"))
 
 
+def are_finite(values: Floats) -> bool:
+    """Whether all are finite as float32."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(values.astype(np.float32)).all())
+
+
 def frame_of(frame: object, n_frames: int, what: str) -> int:
     """A frame's number, checked."""
     if isinstance(frame, bool) or not isinstance(frame, numbers.Integral) or not 0 <= int(frame) < n_frames:

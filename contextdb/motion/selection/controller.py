@@ -96,6 +96,7 @@ class Controller:
         self.selector, self.settings, self.recorder = selector, settings, recorder
         self._rng, self._clock = rng, clock
         self._state = ControllerState()
+        self._moved: tuple[object, Ongoing | None] | None = None
 
     @property
     def playing(self) -> Playing | None:
@@ -107,8 +108,15 @@ class Controller:
 
         A query with the pose of the last update lags behind, and the frame that it fits best is always one that steps back.
         """
-        ongoing = Ongoing.of(self._state.playing, self.selector, self.settings.rate, _seconds(dt_s))
+        ongoing = self._ongoing(_seconds(dt_s))
         return None if ongoing is None else ongoing.playing
+
+    def _ongoing(self, dt_s: float) -> Ongoing | None:
+        """What plays, moved on; the last is kept, for an update mostly follows what was asked of `upcoming`."""
+        asked = (self._state.playing, self.selector, self.settings.rate, dt_s)
+        if self._moved is None or self._moved[0] != asked:
+            self._moved = asked, Ongoing.of(*asked)
+        return self._moved[1]
 
     @property
     def state(self) -> ControllerState:
@@ -158,7 +166,7 @@ class Controller:
             A time, query, mask, tag or name that does not fit. The controller then stands where it stood.
         """
         asked = Asked(valid, tags, None, bias, among, None, penalties)
-        asking = self.ask(dt_s, query, asked, context, force, interrupt)
+        asking = self.ask(dt_s, self.checked(query), asked, context, force, interrupt)
         if asking.wanted is None:
             return self.answer(asking)
         began_s = self.now_s()
@@ -166,10 +174,11 @@ class Controller:
         return self.answer(asking, choice, (self.now_s() - began_s) * 1e6)
 
     def ask(
-        self, dt_s: float, query: ArrayLike, asked: Asked, context: Mapping[str, object] | None, force: bool, interrupt: bool
+        self, dt_s: float, query: Floats, asked: Asked, context: Mapping[str, object] | None, force: bool, interrupt: bool
     ) -> Asking:
-        """The first half of an update: move what plays on, and say what is to be searched. Changes nothing."""
-        step = Step.of(self.selector, self.settings, self._state, _seconds(dt_s), self._checked(query), asked)
+        """The first half of an update, of a `checked` query: move what plays on, say what is to be searched. Changes nothing."""
+        dt_s = _seconds(dt_s)
+        step = Step.of(self.selector, self.settings, self._state, dt_s, query, asked, self._ongoing(dt_s))
         cause = step.trigger(force, interrupt)
         return Asking(step, cause, None if cause is None else step.wanted(cause), context)
 
@@ -243,7 +252,7 @@ class Controller:
     def _root_weight(self, playing: Playing | None) -> float:
         return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)
 
-    def _checked(self, query: ArrayLike) -> Floats:
+    def checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""
         for database in self.selector.databases.values():
             return arguments.query_of(query, database.feature_names)

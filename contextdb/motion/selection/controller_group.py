@@ -167,14 +167,21 @@ class ControllerGroup(Sequence[Controller]):
             strict=True,
         )
         asking = []
+        are_checked = self._have_width(wanted.shape[1]) and arguments.are_finite(wanted)
         for i, (controller, query, own_tags, own_bias, own_among, own_penalties, context, forced, interrupted) in enumerate(each):
             try:
                 asked = Asked(masks[controller.selector][i], own_tags, None, own_bias, own_among, None, own_penalties)
-                asking.append(controller.ask(dt_s, query, asked, context, forced, interrupted))
+                own_query = query if are_checked else controller.checked(query)
+                asking.append(controller.ask(dt_s, own_query, asked, context, forced, interrupted))
             except QueryError as error:
                 raise QueryError(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
         answers = self._searched(asking)
         return [controller.answer(*given) for controller, given in zip(self, answers, strict=True)]
+
+    def _have_width(self, n_features: int) -> bool:
+        """Whether queries of so many features fit all databases."""
+        selectors = {controller.selector for controller in self}
+        return all(database.n_features == n_features for selector in selectors for database in selector.databases.values())
 
     def _searched(self, asking: Sequence[Asking]) -> list[tuple[Asking, Choice | None, float]]:
         """What is asked, the selector's choice, None where nothing was to be searched, and the microseconds of its share."""

@@ -51,11 +51,17 @@ class Step:
 
     @classmethod
     def of(
-        cls, selector: Selector, settings: ControllerSettings, state: ControllerState, dt_s: float, query: Floats, asked: Asked
+        cls,
+        selector: Selector,
+        settings: ControllerSettings,
+        state: ControllerState,
+        dt_s: float,
+        query: Floats,
+        asked: Asked,
+        ongoing: Ongoing | None,
     ) -> Step:
-        """An update that moves what plays on by some time."""
+        """An update that moved what plays on by some time, to `ongoing`."""
         now_s, for_s = state.time_s + dt_s, settings.history_s
-        ongoing = Ongoing.of(state.playing, selector, settings.rate, dt_s)
         name, spans = ("", ()) if ongoing is None else (ongoing.database, ongoing.move.spans)
         history = remembered(state.history, name, spans, now_s, for_s)
         return cls(selector, settings, state, dt_s, query, asked, ongoing, history)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.search.layout import Layout
-from contextdb.motion.search.simd import bounds_at_most, costs_at_most
+from contextdb.motion.search.simd import bounds_at_most, costs_at_most, lowest
 
 _options: dict[str, Any] = {"cache": True, "nogil": True, "boundscheck": False, "error_model": "numpy"}
 
@@ -108,14 +108,6 @@ def _budget(best, bias):
     if bias == np.inf:
         return -1.0
     return best - bias + 1e-15 * (abs(best) + abs(bias)) if best < np.inf else np.inf
-
-
-@njit(**_options)
-def _lowest(mask):
-    lane = 0
-    while not (mask >> lane) & 1:
-        lane += 1
-    return lane
 
 
 @njit(inline="always", **_options)
@@ -332,7 +324,7 @@ def search(
                 continue
             mask = _bounded(lows, highs, group, narrow, narrow_weights, n_features, totals, limit)
             while mask:
-                lane = _lowest(mask)
+                lane = lowest(mask)
                 mask &= mask - 1
                 box = group * LANES + lane
                 if box >= n_boxes or not ranges[box_ranges[box]]:
@@ -350,7 +342,7 @@ def search(
                     continue
                 passing = _passing(blocks, box, narrow, narrow_weights, n_features, frame_totals, own_limit)
                 while passing:
-                    lane = _lowest(passing)
+                    lane = lowest(passing)
                     passing &= passing - 1
                     frame = start + lane
                     if lane >= count or frame == current or (flags.shape[0] and not flags[frame]) or _is_skipped(frame, skips):

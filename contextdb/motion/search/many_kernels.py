@@ -22,11 +22,11 @@ from contextdb.motion.search.kernels import (
     _is_skipped,
     _least_of,
     _limit,
-    _lowest,
     _options,
     _passing,
     _prepare,
 )
+from contextdb.motion.search.simd import lowest
 
 _given = {
     "start": types.i8,
@@ -98,10 +98,10 @@ def _groups_of(bits, cluster):
 @njit(inline="always", **_options)
 def _least_lane(mask, totals):
     """The lane of the least total among those of a mask: looked at first, it spares most others."""
-    least = _lowest(mask)
+    least = lowest(mask)
     mask &= mask - 1
     while mask:
-        lane = _lowest(mask)
+        lane = lowest(mask)
         mask &= mask - 1
         if totals[lane] < totals[least]:
             least = lane
@@ -219,7 +219,7 @@ def search_block(
                 mask = _bounded(lows, highs, group, narrow[i], narrow_weights, n_features, totals, limits[i])
                 mask &= np.int64(bits[i, group])
                 while mask:
-                    lane = _lowest(mask)
+                    lane = lowest(mask)
                     mask &= mask - 1
                     box = group * LANES + lane
                     kind = box_kinds[box]
@@ -251,4 +251,4 @@ def search_block(
                                 bests[own], best_frames[own], best_ranges[own] = total, frame, box_ranges[box]
                                 limit = _limit(_budget(total, least_of_box), sizes[i], n_features)
                                 limits[i] = _limit(_budget(total, leasts[i]), sizes[i], n_features)
-                        lane = _lowest(passing) if passing else 0
+                        lane = lowest(passing) if passing else 0

@@ -17,6 +17,7 @@ import random
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ from contextdb.motion import (
     Biases,
     Controller,
     ControllerGroup,
+    ControllerSettings,
     Decision,
     Entry,
     FeatureSchema,
@@ -113,26 +115,28 @@ def _print(title: str, found: dict[str, Figures]) -> None:
 
 def _picks(n_rounds: int) -> dict[str, Any]:
     """Query and pick for every agent: in a loop, and by query_many and pick_many."""
-    works = {}
+    works: dict[str, tuple[Work, Work]] = {}
     for times in TABLE_SIZES:
         compiled, columns = _moves(times), _facts(N_AGENTS)
         contexts = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-        picker, dice, last = compiled.picker(seed=0), random.Random(0), [""] * N_AGENTS
-
-        def singly(compiled: Any = compiled, contexts: Any = contexts, dice: Any = dice, last: Any = last) -> object:
-            for i, facts in enumerate(contexts):
-                last[i] = compiled.pick(compiled.query(facts), rng=dice, last=last[i])
-            return last
-
-        def together(compiled: Any = compiled, columns: Any = columns, picker: Any = picker) -> Any:
-            return picker.pick_many(compiled.query_many(columns))
-
+        picker = compiled.picker(seed=0)
+        together = partial(_picked_together, compiled, picker, columns)
         _check_picks(together(), compiled, contexts)
-        singly()
+        singly = partial(_picked_one_by_one, compiled, contexts, random.Random(0), [""] * N_AGENTS)
         works[f"{compiled.n_rows:,} rows: query and pick"] = singly, together
     found = _in_turns(works, N_AGENTS, n_rounds)
     _print(f"Picks of {N_AGENTS:,} agents, tables like locomotion; microseconds an agent", found)
     return found
+
+
+def _picked_one_by_one(compiled: Any, contexts: Sequence[dict[str, Any]], dice: random.Random, last: list[str]) -> object:
+    for i, facts in enumerate(contexts):
+        last[i] = compiled.pick(compiled.query(facts), rng=dice, last=last[i])
+    return last
+
+
+def _picked_together(compiled: Any, picker: Any, columns: dict[str, list[Any]]) -> Any:
+    return picker.pick_many(compiled.query_many(columns))
 
 
 def _moves(times: int) -> Any:
@@ -243,7 +247,10 @@ def _made() -> tuple[FeatureSchema, Selector]:
     loco = MotionDatabase.build(clips, schema, **shared)
     worn = [clip for clip in clips if clip.name.endswith("_tired")]
     tired = MotionDatabase.build(worn, schema, normalisation=loco.normalisation, **shared)
-    return schema, Selector([Entry("loco_tired", tired, 2.75), Entry("loco", loco)])
+    selector = Selector([Entry("loco_tired", tired, 2.75), Entry("loco", loco)])
+    selector.search(np.zeros(schema.n_features))
+    selector.search_many(np.zeros((2, schema.n_features)))
+    return schema, selector
 
 
 class _Crowd:
@@ -251,8 +258,9 @@ class _Crowd:
 
     def __init__(self, schema: FeatureSchema, selector: Selector, n: int) -> None:
         self.schema, self.n = schema, n
-        self.group = ControllerGroup([Controller(selector) for _ in range(n)])
-        self.alone = [Controller(selector) for _ in range(n)]
+        settings = ControllerSettings(search_every_s=60.0)  # a search when it is forced, and when a clip has ended
+        self.group = ControllerGroup([Controller(selector, settings) for _ in range(n)])
+        self.alone = [Controller(selector, settings) for _ in range(n)]
         self.moves, self.ticks, self.rng = _moves(1), count(), np.random.default_rng(2)
         self.past = [ManySteered.of([Steered()] * n)]
         self._turn_sticks()
@@ -260,7 +268,12 @@ class _Crowd:
     def _turn_sticks(self) -> None:
         speeds, ways = self.rng.uniform(0.0, 4.0, self.n), self.rng.uniform(-np.pi, np.pi, self.n)
         self.sticks = np.stack((speeds * np.sin(ways), speeds * np.cos(ways)), axis=1)
-        self.facts = _facts(self.n) | {"speed": speeds.tolist(), "style": ["normal"] * self.n}
+        self.facts = {
+            "gait": np.select([speeds < 0.3, speeds < 2.0], ["Idle", "Walk"], "Run").tolist(),
+            "speed": speeds,
+            "direction": np.zeros(self.n),
+            "style": ["normal"] * self.n,
+        }
 
     def works(self) -> dict[str, tuple[Work, Work]]:
         """Paths and queries, made one by one and together."""
@@ -285,21 +298,21 @@ class _Crowd:
         """Updates in which the characters search, and in which they do not."""
         times: dict[bool, list[tuple[float, float]]] = {True: [], False: []}
         with timing.no_collection():
-            for _ in range(n_ticks):
-                queries = self._step()
-                singly, together, searched = self._updated(queries, self.moves.query_many(self.facts))
-                if not 0.01 < searched < 0.5:
-                    times[searched > 0.5].append((singly, together))
-        return {f"updates {'with' if how else 'without'} a search": _figures(own) for how, own in times.items()}
+            for tick in range(n_ticks):
+                is_forced = tick % 2 == 0
+                singly, together, searched = self._updated(self._step(), self.moves.query_many(self.facts), is_forced)
+                if is_forced or searched < 0.05:
+                    times[is_forced].append((singly, together))
+        return {f"updates {'with' if how else 'without'} a search": _figures(own) for how, own in times.items() if own}
 
-    def _updated(self, queries: Any, many: Any) -> tuple[float, float, float]:
+    def _updated(self, queries: Any, many: Any, force: bool) -> tuple[float, float, float]:
         """Update all: microseconds a character one by one and together, and the share that searched."""
         each = list(zip(self.alone, queries, many, strict=True))
         for controller in self.alone:
             controller.upcoming(DT_S)
         decisions: list[list[Decision]] = [[], []]
-        together = timing.timed(lambda _: decisions[0].extend(self.group.update(DT_S, queries, many)), [None])
-        singly = timing.timed(lambda _: decisions[1].extend(one.update(DT_S, query, valid) for one, query, valid in each), [None])
+        together = timing.timed(lambda _: decisions[0].extend(self.group.update(DT_S, queries, many, force=force)), [None])
+        singly = timing.timed(lambda _: decisions[1].extend(one.update(DT_S, q, v, force=force) for one, q, v in each), [None])
         if [decision.playing for decision in decisions[0]] != [decision.playing for decision in decisions[1]]:
             raise AssertionError("a group does not decide as its controllers do alone.")
         searched = sum(decision.searched for decision in decisions[0])

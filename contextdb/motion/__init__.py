@@ -3,6 +3,7 @@
     BVH clips ─► features ─► MotionDatabase ─► search(query, valid) ─► Hit
     markup ───────────────────────┘   Selector: priority databases in order ─► Choice
                                       Controller: one character in time ─► Decision ─► Trace
+                                      ControllerGroup: a crowd of them, searched for at once
                                       MatchNode, MatchGate: one-offs that end at a target
 
 A table's query says which assets are valid; this finds the best frame among theirs. It takes masks and names, never a table.
@@ -13,6 +14,8 @@ from contextdb.errors import ClipError, MotionError, QueryError
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
+from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.motion.clips.many_steered import ManySteered, steered_paths
 from contextdb.motion.clips.mirror import mirrored, mirrored_path, partners_of
 from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics, local_poses, poses_of, resampled
 from contextdb.motion.clips.skeleton import Skeleton
@@ -20,6 +23,7 @@ from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, steady_path
 from contextdb.motion.features.channels import Channel
 from contextdb.motion.features.extraction import ClipFeatures, clip_features, features_of, query_from, with_path
+from contextdb.motion.features.many_queries import with_paths
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.made.recipes import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
@@ -37,6 +41,7 @@ from contextdb.motion.search.database import Hit, MotionDatabase, build_database
 from contextdb.motion.search.filters import Biases
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
@@ -64,6 +69,7 @@ __all__ = [
     "ClipFeatures",
     "ClipFinding",
     "Controller",
+    "ControllerGroup",
     "ControllerSettings",
     "ControllerState",
     "CustomFunction",
@@ -78,6 +84,8 @@ __all__ = [
     "LeftOut",
     "LocalPoses",
     "MadeClip",
+    "ManySteered",
+    "ManyTrajectories",
     "Mark",
     "Marks",
     "Markup",
@@ -141,7 +149,9 @@ __all__ = [
     "saved_path",
     "steady_path",
     "steered_path",
+    "steered_paths",
     "with_path",
+    "with_paths",
     "write_bvh",
     "write_made_clips",
 ]

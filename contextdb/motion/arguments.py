@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Sequence
-from typing import Protocol, TypeAlias, cast
+from types import NoneType
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +28,17 @@ class HasAssets(Protocol):
         """The valid assets."""
 
 
-Valid: TypeAlias = HasAssets | ArrayLike
+class ValidRanges(NamedTuple):
+    """What a mask means to one database: which of its ranges may play, bool [R], and their biases, float64 [R]."""
+
+    flags: Flags
+    biases: Floats
+
+
+Valid: TypeAlias = HasAssets | ArrayLike | ValidRanges
+ValidForMany: TypeAlias = Valid | Sequence["Valid | None"]
+"""One for all queries, or one for each."""
+Currents: TypeAlias = Sequence[int | None] | NDArray[np.integer]
 
 
 def array_of(values: object, what: str, error: type[MotionError] = QueryError) -> NDArray[np.generic]:
@@ -46,9 +57,11 @@ def numbers_of(values: object, what: str) -> Floats:
     return array_of(values, what).astype(np.float64)
 
 
-def flags_of(values: object, n_wanted: int, what: str, of: str) -> Flags:
-    """A bool array of one length; numbers are refused, for they possible as indices."""
-    accepted = f"{'Matches, or ' if what == 'valid' else ''}one bool for each of {plural(n_wanted, of)}"
+def flags_of(values: object, wanted: int | tuple[int, int], what: str, of: str) -> Flags:
+    """A bool array of one shape; numbers are refused, for they possible as indices."""
+    shape = (wanted,) if isinstance(wanted, int) else wanted
+    each = f"one bool for each of {plural(shape[-1], of)}{', for each query' if len(shape) > 1 else ''}"
+    accepted = f"Matches, or {each}" if what == "valid" else each
     if hasattr(values, "lists"):  # a table's answers for many contexts
         raise QueryError(Fault(f"{what} holds the answers for many contexts.", accepted, "to give that of one: many[i]"))
     try:
@@ -57,9 +70,9 @@ def flags_of(values: object, n_wanted: int, what: str, of: str) -> Flags:
         raise QueryError(Fault(f"{what} has rows of different lengths.", accepted)) from None
     if array.dtype != np.bool_ and array.size:
         raise QueryError(Fault(f"{what} has type {array.dtype}.", accepted))
-    if array.shape != (n_wanted,):
+    if array.shape != shape:
         raise QueryError(Fault(f"{what} has shape {array.shape}.", accepted))
-    return array.astype(np.bool_)
+    return np.ascontiguousarray(array, np.bool_)
 
 
 def query_of(query: object, names: Sequence[str]) -> Floats:
@@ -79,6 +92,12 @@ def refuse_infinite(values: Floats, told: Floats, names: Sequence[str]) -> None:
         listed = ", ".join(f"{in_quotes(names[i])} is {told[i]:g}" for i in wrong[:3])
         more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
         raise QueryError(Fault(f"no frame can be compared with the query: {listed}{more}.", "finite numbers that fit a float32"))
+
+
+def are_finite(values: Floats) -> bool:
+    """Whether all are finite as float32."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(values.astype(np.float32)).all())
 
 
 def frame_of(frame: object, n_frames: int, what: str) -> int:
@@ -111,21 +130,29 @@ def bias_of(bias: object, n_frames: int) -> Floats:
     return array
 
 
-def for_each(valid: Valid | Sequence[Valid | None] | None, n_queries: int) -> list[Valid | None]:
-    """One mask for each query, from one for all or from as many as there are queries."""
-    if not _is_one_for_each(valid):
-        return [cast("Valid | None", valid)] * n_queries
-    each = list(cast("Sequence[Valid | None]", valid))
-    if len(each) != n_queries:
-        raise QueryError(Fault(f"{plural(len(each), 'mask')} for {n_queries} queries.", "one for all, or one for each query"))
-    return each
+def currents_of(current: Currents | None, n: int, n_frames: int) -> NDArray[np.int64]:
+    """The current frame of each of n searches, -1 for none: int64 [n]."""
+    if current is None:
+        return np.full(n, -1, np.int64)
+    if len(current) != n:
+        raise QueryError(Fault(f"{plural(len(current), 'current frame')} for {n} queries.", "one for each query"))
+    if isinstance(current, np.ndarray):
+        are_plain = current.dtype.kind == "i" and current.ndim == 1
+    else:
+        are_plain = set(map(type, current)) <= {int, NoneType}
+    if are_plain:
+        frames = np.array([-1 if frame is None else frame for frame in current], np.int64)
+        if not n or (frames.min() >= -1 and frames.max() < n_frames):
+            return frames
+    return np.array([current_of(frame, n_frames) for frame in current], np.int64)
 
 
-def _is_one_for_each(valid: object) -> bool:
+def is_one_for_each(valid: object) -> bool:
+    """Whether there is one mask for each query, and not one for all."""
     if isinstance(valid, np.ndarray):
         return valid.ndim == 2
     if hasattr(valid, "lists"):  # a table's answers for many contexts
         return True
     if not isinstance(valid, (list, tuple)) or hasattr(valid, "assets"):
         return False
-    return any(mask is None or hasattr(mask, "assets") or np.ndim(mask) for mask in valid)
+    return not valid or any(mask is None or hasattr(mask, "assets") or np.ndim(mask) for mask in valid)

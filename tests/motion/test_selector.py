@@ -289,3 +289,54 @@ def test_the_best_of_each_range_is_had_of_one_database():
 def test_what_a_selector_cannot_be_asked_with_is_refused(given, message):
     with pytest.raises(QueryError, match=message):
         SELECTOR.search([9.0], **given)
+
+
+# ---- many characters at once
+
+
+@st.composite
+def chains(draw):
+    """Up to three databases of two assets, with thresholds, some of them not loaded."""
+    places = st.lists(st.integers(-4, 4), min_size=1, max_size=5)
+    entries = []
+    for name in "abc"[: draw(st.integers(1, 3))]:
+        made = draw(st.one_of(st.none(), st.builds(lambda walk, run: line(walk=walk, run=run), places, places)))
+        entries.append(Entry(name, made, draw(st.sampled_from([None, 0.0, 2.0, 10.0]))))
+    return Selector(entries)
+
+
+@given(chains(), st.data())
+def test_many_choices_are_those_of_each_search_alone(selector, data):
+    n = data.draw(st.integers(0, 5))
+    queries = np.array(data.draw(st.lists(st.integers(-5, 5), min_size=n, max_size=n)), float).reshape(n, 1)
+    table = Table.from_columns({"Asset": ["walk", "run"], "speed": ["<2", ">1"]}, {"speed": {"type": "number"}}).compile()
+    many = table.query_many({"speed": data.draw(st.lists(st.sampled_from([0.0, 1.5, 3.0]), min_size=n, max_size=n))})
+    name = data.draw(st.sampled_from(selector.names))
+    currents = st.one_of(st.none(), st.just((name, 0)), st.sampled_from([selector.search([0.0])]))
+    given = {
+        "current": data.draw(st.lists(currents, min_size=n, max_size=n)),
+        "among": data.draw(st.sampled_from([None, [name]])),
+        "penalties": data.draw(st.sampled_from([None, {"walk": 3.0}])),
+    }
+    for valid, each in ((many, list(many)), (list(many), list(many)), ({name: many}, [{name: one} for one in many])):
+        singly = [
+            selector.search(query, own, current=now, among=given["among"], penalties=given["penalties"])
+            for query, own, now in zip(queries, each, given["current"], strict=True)
+        ]
+        assert selector.search_many(queries, valid, **given) == singly
+    assert selector.search_many(queries) == [selector.search(query) for query in queries]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"queries": [0.0]}, r"the queries have shape \(1,\)"),
+        ({"valid": {"jgo": None}}, r'the selector has no database "jgo".*Did you mean "jog"\?'),
+        ({"valid": [None]}, "1 mask for 2 queries"),
+        ({"current": [None]}, "1 current frame for 2 characters"),
+        ({"among": ["x"]}, 'the selector has no database "x"'),
+    ],
+)
+def test_many_choices_that_cannot_be_made_are_refused(given, message):
+    with pytest.raises(QueryError, match=message):
+        SELECTOR.search_many(**{"queries": [[0.0], [1.0]], **given})

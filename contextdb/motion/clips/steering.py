@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from numbers import Real
+from typing import TypeVar
 
 import numpy as np
 
@@ -28,6 +29,8 @@ STANDING_MPS = 0.1
 """Asked to go slower than this, a body keeps its facing."""
 
 Ground = tuple[float, float]
+Number = TypeVar("Number", float, Floats)
+"""Formulas of springs serve one body, and many in arrays."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,24 +77,35 @@ class Steered:
     def _along(self, axis: int, dt_s: float, wanted: float) -> tuple[float, float, float]:
         """Position, velocity and acceleration on one axis."""
         damping = 2.0 * math.log(2.0) / self.velocity_halflife_s
-        apart = self.velocity[axis] - wanted
-        drift = self.acceleration[axis] + apart * damping
-        left = math.exp(-damping * dt_s)
-        position = left * (-drift / damping**2 - (apart + drift * dt_s) / damping)
-        position += drift / damping**2 + apart / damping + wanted * dt_s + self.position[axis]
-        return position, left * (apart + drift * dt_s) + wanted, left * (self.acceleration[axis] - drift * damping * dt_s)
+        own = self.position[axis], self.velocity[axis], self.acceleration[axis]
+        return moved_along(*own, wanted, damping, math.exp(-damping * dt_s), dt_s)
 
     def _turned(self, dt_s: float, wanted: float) -> tuple[float, float]:
         """Heading and turn rate, on the shorter way to a heading."""
         damping = 2.0 * math.log(2.0) / self.heading_halflife_s
         apart = -math.remainder(wanted - self.heading, 2.0 * math.pi)
-        drift = self.turn_rate + apart * damping
-        left = math.exp(-damping * dt_s)
-        goal = self.heading - apart
-        return goal + left * (apart + drift * dt_s), left * (self.turn_rate - drift * damping * dt_s)
+        return turned(self.heading, self.turn_rate, apart, damping, math.exp(-damping * dt_s), dt_s)
 
     def _facing(self, wanted: Ground) -> float:
         return math.atan2(*wanted) if math.hypot(*wanted) >= STANDING_MPS else self.heading
+
+
+def moved_along(
+    position: Number, velocity: Number, acceleration: Number, wanted: Number, damping: Number, left: Number, dt_s: Number
+) -> tuple[Number, Number, Number]:
+    """Position, velocity and acceleration after a time; `left` is exp(-damping x time)."""
+    apart = velocity - wanted
+    drift = acceleration + apart * damping
+    moved = left * (-drift / damping**2 - (apart + drift * dt_s) / damping)
+    moved += drift / damping**2 + apart / damping + wanted * dt_s + position
+    return moved, left * (apart + drift * dt_s) + wanted, left * (acceleration - drift * damping * dt_s)
+
+
+def turned(heading: Number, turn_rate: Number, apart: Number, damping: Number, left: Number, dt_s: Number) -> tuple[Number, Number]:
+    """Heading and turn rate after a time; `apart` is how far the heading is past the one that is asked for."""
+    drift = turn_rate + apart * damping
+    goal = heading - apart
+    return goal + left * (apart + drift * dt_s), left * (turn_rate - drift * damping * dt_s)
 
 
 def steered_path(

@@ -255,10 +255,11 @@ def _trajectory_features(channel: Channel, path: Trajectory, frames: Ints) -> Fl
     points = [after_seconds(path, at, seconds) for seconds in channel.at] + [
         along_path(path, at, metres) for metres in channel.along
     ]
-    return np.concatenate([_point_features(channel, path, frames, point) for point in points], axis=1)
+    return np.concatenate([point_features(channel, path, frames, point) for point in points], axis=1)
 
 
-def _point_features(channel: Channel, path: Trajectory, frames: Ints, points: PathPoints) -> Floats:
+def point_features(channel: Channel, path: Trajectory, frames: Ints, points: PathPoints) -> Floats:
+    """What a channel says of one point for each of some frames of a path."""
     headings = path.headings[frames]
     match channel.what:
         case "position":

@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from numbers import Real
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_number, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
 from contextdb.motion import arguments
-from contextdb.motion.arguments import Flags, Valid
+from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
@@ -43,6 +43,7 @@ from contextdb.motion.search.cost import weights_of_features
 from contextdb.motion.search.filtering import FilterMaker, Penalties, SearchOptions, Tags
 from contextdb.motion.search.filters import NO_BIAS, Biases, Filter
 from contextdb.motion.search.layout import Features, Layout
+from contextdb.motion.search.many_filters import ManyFilters, together
 from contextdb.motion.search.searched import Searched
 from contextdb.motion.search.searcher import Searcher
 
@@ -317,11 +318,13 @@ class MotionDatabase(Searched):
     def search_many(
         self,
         queries: ArrayLike,
-        valid: Valid | Sequence[Valid | None] | None = None,
-        current: Sequence[int | None] | NDArray[np.integer] | None = None,
+        valid: ValidForMany | None = None,
+        current: Currents | None = None,
         tags: Tags | None = None,
     ) -> list[Hit]:
-        """Search for many characters at once: one `Hit` for each query, in order.
+        """Search for many characters at once: one `Hit` for each query, in order, the same as `search` gives for each alone.
+
+        The frames are read once for many queries, and on all cores that this process may use.
 
         Parameters
         ----------
@@ -342,13 +345,22 @@ class MotionDatabase(Searched):
         wanted = arguments.numbers_of(queries, "the queries")
         if wanted.ndim != 2:
             raise QueryError(Fault(f"the queries have shape {wanted.shape}.", f"queries x {self.n_features} features"))
-        masks = arguments.for_each(valid, len(wanted))
-        playing: Sequence[int | None]
-        playing = [None] * len(wanted) if current is None else list(require_many(current, "current", "one frame, or None, a query"))
-        if len(playing) != len(wanted):
-            raise QueryError(Fault(f"{plural(len(playing), 'current frame')} for {len(wanted)} queries.", "one for each query"))
-        answers = zip(*self._searcher.least_of_each(wanted, self._filters.make_each(masks, playing, tags)), strict=True)
-        return [self._hit(*answer) for answer in answers]
+        filters = self._filters.make_many(len(wanted), valid, current, tags)
+        return self._hits(*self._searcher.least_of_many(wanted, filters))
+
+    def search_each(self, queries: Floats, asked: Sequence[Mapping[str, Any]]) -> list[Hit]:
+        """Search for many characters at once, each with parameters of `search` of its own; queries [Q, F]. Exact, as `search_many`.
+
+        Those that share tags, and give no biases of frames, are searched together.
+        """
+        filters = [self._filters.make(**each) for each in asked]
+        found: list[Hit] = [NOTHING] * len(filters)
+        for numbers in together(filters):
+            many = ManyFilters.of([filters[i] for i in numbers])
+            hits = self._hits(*self._searcher.least_of_many(queries[numbers], many))
+            for i, hit in zip(numbers, hits, strict=True):
+                found[i] = hit
+        return found
 
     def candidates(
         self, query: ArrayLike, k: int = 10, valid: Valid | None = None, *, left_out: bool = False, **options: Unpack[SearchOptions]
@@ -382,6 +394,11 @@ class MotionDatabase(Searched):
     def raw(self, frame: Hit | int) -> Floats:
         """The features of one frame in the schema's units, as a query has them: float64 [F]."""
         return self.normalisation.undo(self.layout.take(np.array([self._number(frame)]))[0])
+
+    def raw_many(self, frames: Sequence[int] | NDArray[np.integer]) -> Floats:
+        """The features of many frames in the schema's units, the poses of a crowd: float64 [Q, F]."""
+        numbers = np.array([self._number(frame) for frame in frames], np.int64)
+        return self.normalisation.undo(self.layout.take(numbers))
 
     def normalised(self, query: ArrayLike) -> Floats:
         """A query [F] in the schema's units, checked, as costs are computed with it: float64."""
@@ -430,6 +447,10 @@ class MotionDatabase(Searched):
         """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`."""
         return self._filters.make(valid, **options)
 
+    def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
+        """What the masks of n characters mean to this database, see `search_many`: each serves as `valid` of `search`."""
+        return self._filters.valid_of_each(valid, n)
+
     @cached_property
     def _filters(self) -> FilterMaker:
         return FilterMaker(self.n_frames, self.assets, self.mirrored, self.marks, self.biases)
@@ -441,6 +462,11 @@ class MotionDatabase(Searched):
     def _hit(self, found: int, frame: int, total: float) -> Hit:
         """The answer for a range, or for -1, none."""
         return Hit(self.assets[found], found, frame, total) if found >= 0 else NOTHING
+
+    def _hits(self, ranges: Ints, frames: Ints, totals: Floats) -> list[Hit]:
+        assets = self.assets
+        each = zip(ranges.tolist(), frames.tolist(), totals.tolist(), strict=True)
+        return [Hit(assets[i], i, frame, total) if i >= 0 else NOTHING for i, frame, total in each]
 
     def _number(self, frame: Hit | int) -> int:
         number = arguments.frame_of(frame.frame if isinstance(frame, Hit) else frame, self.n_frames, "frame")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, TypedDict
+from typing import Any, TypedDict, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,12 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from contextdb.cells.arguments import require_many_of
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
-from contextdb.motion.arguments import Flags, Valid
+from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import ANY_TAGS, Marks, TagFilter
 from contextdb.motion.search.filters import NO_FLAGS, Biases, Filter, Kinds
+from contextdb.motion.search.many_filters import ManyFilters
+from contextdb.motion.search.table_ranges import TableRanges, masks_of
 
 Tags = TagFilter | ArrayLike
 Penalties = Mapping[str, float] | NDArray[np.floating]
@@ -52,7 +53,7 @@ class FilterMaker:
         self._range_biases: Floats = np.where(marks.looping, biases.base + biases.looping, biases.base)
         self._least_bias = float(self._range_biases.min(initial=np.inf))
         self._kinds: dict[tuple[TagFilter, bool], Kinds] = {}
-        self._rows: dict[int, tuple[Sequence[str], Ints, Ints]] = {}
+        self._tables: dict[int, TableRanges] = {}
 
     def make(
         self,
@@ -82,20 +83,54 @@ class FilterMaker:
             self.biases.continuing,
         )
 
-    def make_each(self, valid: Sequence[Valid | None], current: Sequence[int | None], tags: Tags | None) -> list[Filter]:
-        """The filters for many characters; those that are given the same mask share what it says."""
-        shared = self.make(None, tags)
-        ranges = {id(mask): self._ranges(mask) for mask in valid}
-        return [
-            shared._replace(
-                ranges=ranges[id(mask)][0],
-                is_whole=ranges[id(mask)][0] is self._all_ranges,
-                range_biases=ranges[id(mask)][1],
-                least_of_ranges=self._least_of(ranges[id(mask)][1]),
-                current=arguments.current_of(frame, self.n_frames),
-            )
-            for mask, frame in zip(valid, current, strict=True)
-        ]
+    def make_many(self, n: int, valid: ValidForMany | None, current: Currents | None, tags: Tags | None) -> ManyFilters:
+        """The filters of n searches; see `MotionDatabase.search_many` for what is given."""
+        ranges, biases = self._ranges_of_many(valid, n)
+        return ManyFilters(
+            self.make(None, tags),
+            ranges,
+            self._range_biases[None] if biases is None else biases,
+            arguments.currents_of(current, n, self.n_frames),
+        )
+
+    def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
+        """What the masks of n searches mean, read once, to be given to searches as `valid`."""
+        ranges, biases = self._ranges_of_many(valid, n)
+        all_biases = [self._range_biases] * n if biases is None else biases
+        return [ValidRanges(ranges[i if len(ranges) > 1 else 0], all_biases[i if len(all_biases) > 1 else 0]) for i in range(n)]
+
+    def _ranges_of_many(self, valid: ValidForMany | None, n: int) -> tuple[Flags, Floats | None]:
+        """Which ranges may play in each of n searches, bool [n, R], and the biases of ranges, float64 [n, R], None where they are
+        those of the database; or [1, R], the same for all."""
+        n_ranges = len(self.assets)
+        if not arguments.is_one_for_each(valid):
+            ranges, biases = self._ranges(cast("Valid | None", valid))
+            return ranges[None], None if biases is self._range_biases else biases[None]
+        each = cast("Sequence[Valid | None]", valid)
+        if len(each) != n:
+            raise QueryError(Fault(f"{plural(len(each), 'mask')} for {n} queries.", "one for all, or one for each query"))
+        if isinstance(each, np.ndarray):
+            return arguments.flags_of(each, (n, n_ranges), "valid", "range"), None
+        if (of_table := self._of_answers(each)) is not None:
+            return of_table, None
+        masks = list(each)
+        known = {id(mask): self._ranges(mask) for mask in masks}
+        all_biases = [known[id(mask)][1] for mask in masks]
+        are_plain = all(biases is self._range_biases for biases in all_biases)
+        flags = np.array([known[id(mask)][0] for mask in masks], np.bool_).reshape(n, n_ranges)
+        return flags, None if are_plain else np.array(all_biases).reshape(n, n_ranges)
+
+    def _of_answers(self, answers: Sequence[Any]) -> Flags | None:
+        """The ranges of many answers of one table at once; None where they are not, or have costs of their own."""
+        if (found := masks_of(answers)) is None:
+            return None
+        flags = self._table_ranges(found[0]).valid_of_many(found[1])
+        if self._has_mirrored:
+            seen = answers.mirrored if hasattr(answers, "mirrored") else [getattr(each, "mirrored", each) for each in answers]
+            if (in_mirror := masks_of(seen)) is None:
+                return None
+            flags = np.where(self.mirrored, self._table_ranges(in_mirror[0]).valid_of_many(in_mirror[1]), flags)
+        return flags
 
     def _least_of(self, range_biases: Floats) -> float:
         return self._least_bias if range_biases is self._range_biases else float(range_biases.min(initial=np.inf))
@@ -104,6 +139,8 @@ class FilterMaker:
         """Which ranges may play, bool [R], and the biases of ranges, float64 [R]."""
         if valid is None:
             return self._all_ranges, self._range_biases
+        if isinstance(valid, ValidRanges):
+            return valid.flags, valid.biases
         if type(valid) is np.ndarray and valid.dtype == np.bool_ and valid.shape == self._all_ranges.shape:
             return np.ascontiguousarray(valid), self._range_biases
         if not hasattr(valid, "assets"):
@@ -119,30 +156,22 @@ class FilterMaker:
     def _of_answer(self, answer: Any) -> tuple[Flags, Floats | None]:
         """The ranges of the valid assets of a table's answer, and what each costs beside, None where nothing does; of several valid
         rows of one asset, the cheapest counts."""
-        flags = np.zeros(len(self.assets), np.bool_)
         if not hasattr(answer, "table_assets"):
+            flags = np.zeros(len(self.assets), np.bool_)
             for name in set(answer.assets):
                 flags[self._ranges_of_asset.get(name, [])] = True
             return flags, None
-        rows, ranges = self._rows_of_table(answer.table_assets)
-        valid = answer.flags[rows]
-        flags[ranges[valid]] = True
-        if not getattr(answer, "has_penalties", False):
-            return flags, None
-        least = np.full(len(self.assets), np.inf)
-        np.minimum.at(least, ranges[valid], answer.penalties[rows[valid]])
-        return flags, least
+        return self._table_ranges(answer.table_assets).valid(answer)
 
-    def _rows_of_table(self, table_assets: Sequence[str]) -> tuple[Ints, Ints]:
-        """The pairs of a table's rows and the ranges of their assets: two int64 arrays."""
-        known = self._rows.get(id(table_assets))
-        if known is None or known[0] is not table_assets:
-            pairs = [(row, i) for row, asset in enumerate(table_assets) for i in self._ranges_of_asset.get(asset, ())]
-            rows, ranges = np.array(pairs, np.int64).reshape(-1, 2).T.copy()
-            if len(self._rows) >= MOST_TABLES:
-                self._rows.clear()
-            known = self._rows[id(table_assets)] = (table_assets, rows, ranges)
-        return known[1], known[2]
+    def _table_ranges(self, table_assets: Sequence[str]) -> TableRanges:
+        """Which ranges play the assets of a table's rows."""
+        known = self._tables.get(id(table_assets))
+        if known is None or known.assets is not table_assets:
+            known = TableRanges.of(table_assets, self._ranges_of_asset, len(self.assets))
+            if len(self._tables) >= MOST_TABLES:
+                self._tables.clear()
+            self._tables[id(table_assets)] = known
+        return known
 
     def _range_penalties(self, penalties: Penalties) -> Floats:
         if isinstance(penalties, Mapping):

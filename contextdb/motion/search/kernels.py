@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.search.layout import Layout
-from contextdb.motion.search.simd import bounds_at_most, costs_at_most
+from contextdb.motion.search.simd import bounds_at_most, costs_at_most, lowest
 
 _options: dict[str, Any] = {"cache": True, "nogil": True, "boundscheck": False, "error_model": "numpy"}
 
@@ -53,7 +53,7 @@ def pack(
     """What a database gives every search, as sizes and addresses: handing over twenty arrays takes longer than some searches."""
     channels = np.array([0, *(columns.stop for columns in slices)], np.int64)
     feature_weights = np.repeat(weights, np.diff(channels)).astype(np.float32)
-    is_one_kind = not kinds.any()
+    kept_kinds = kinds if kinds.any() else kinds[:0]
     lay = layout
     arrays = (
         *(
@@ -70,11 +70,11 @@ def pack(
             lay.range_boxes,
             lay.range_order,
         ),
-        *(lay.kinds_of_boxes(kinds), kinds, offset, scale, channels, weights, feature_weights),
+        *(lay.kinds_of_boxes(kinds), kept_kinds, offset, scale, channels, weights, feature_weights),
     )
     kept = tuple(np.ascontiguousarray(array) for array in arrays)
     sizes = (lay.n_features, len(lay.box_starts), len(lay.lows), len(lay.cluster_lows), len(lay.range_boxes), len(lay.range_order))
-    numbers = [*sizes, 0 if is_one_kind else len(kinds), len(weights), *(array.ctypes.data for array in kept)]
+    numbers = [*sizes, len(kept_kinds), len(weights), *(array.ctypes.data for array in kept)]
     return Pack(np.array(numbers, np.int64), kept)
 
 
@@ -108,14 +108,6 @@ def _budget(best, bias):
     if bias == np.inf:
         return -1.0
     return best - bias + 1e-15 * (abs(best) + abs(bias)) if best < np.inf else np.inf
-
-
-@njit(**_options)
-def _lowest(mask):
-    lane = 0
-    while not (mask >> lane) & 1:
-        lane += 1
-    return lane
 
 
 @njit(inline="always", **_options)
@@ -332,7 +324,7 @@ def search(
                 continue
             mask = _bounded(lows, highs, group, narrow, narrow_weights, n_features, totals, limit)
             while mask:
-                lane = _lowest(mask)
+                lane = lowest(mask)
                 mask &= mask - 1
                 box = group * LANES + lane
                 if box >= n_boxes or not ranges[box_ranges[box]]:
@@ -350,7 +342,7 @@ def search(
                     continue
                 passing = _passing(blocks, box, narrow, narrow_weights, n_features, frame_totals, own_limit)
                 while passing:
-                    lane = _lowest(passing)
+                    lane = lowest(passing)
                     passing &= passing - 1
                     frame = start + lane
                     if lane >= count or frame == current or (flags.shape[0] and not flags[frame]) or _is_skipped(frame, skips):

@@ -5,8 +5,11 @@ N frames, F features, R ranges.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
+from itertools import pairwise
 from types import ModuleType
 from typing import Any
 
@@ -21,9 +24,14 @@ from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.search import scan
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.search.layout import Layout
+from contextdb.motion.search.many_filters import ManyFilters
 
 MOST_KINDS = 65536
 """With more kinds of frames than this, every frame is scanned."""
+BLOCK_QUERIES = 256
+"""So many queries at most go through the frames together."""
+THREAD_QUERIES = 32
+"""Fewer queries than this are not worth a second thread."""
 
 
 class Searcher:
@@ -65,10 +73,25 @@ class Searcher:
             self.normalised(query)  # says what is wrong
         return found, totals, frames
 
-    def least_of_each(self, queries: Floats, filters: Sequence[Filter]) -> tuple[list[int], list[int], list[float]]:
-        """For each query [Q, F] and its filter the best frame's range (-1 for none), its number and its total."""
-        found = [self.least(query, chosen, np.inf, 1) for query, chosen in zip(queries, filters, strict=True)]
-        return [i for i, _, _ in found], [int(frames[0]) for _, _, frames in found], [float(totals[0]) for _, totals, _ in found]
+    def least_of_many(self, queries: Floats, filters: ManyFilters) -> tuple[Ints, Ints, Floats]:
+        """For each query [Q, F] and its filter the best frame's range (-1 for none), its number and its total: arrays [Q]."""
+        n = len(queries)
+        totals, frames, ranges = np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
+        if self._compiled_for_many is None or queries.shape[1:] != self._shape:
+            found = [self.least(query, chosen, np.inf, 1) for query, chosen in zip(queries, filters.each(), strict=True)]
+            for i, (at, total, frame) in enumerate(found):
+                ranges[i], totals[i], frames[i] = at, total[0], frame[0]
+            return ranges, frames, totals
+        kernels, arrays = self._compiled_for_many
+        shared = filters.shared
+        of_kinds = (shared.kinds.allowed, shared.kinds.biases, shared.kinds.playable)
+        of_ranges = (filters.ranges, filters.range_biases, filters.least_of_ranges)
+        of_frames = (shared.frames, shared.frame_biases, *filters.skip_spans, filters.currents, shared.continuing)
+        given = (*arrays, queries, *of_ranges, *of_kinds, *of_frames, totals, frames, ranges)
+        in_blocks(n, lambda start, stop: kernels.search_block(start, stop, *given))
+        for i in np.flatnonzero(ranges == kernels.REFUSED)[:1]:
+            self.normalised(queries[i])  # says what is wrong
+        return ranges, frames, totals
 
     def normalised(self, query: ArrayLike) -> Floats:
         """A query [F], checked and normalised: float64."""
@@ -86,6 +109,13 @@ class Searcher:
         offset, scale = self.normalisation.offset, self.normalisation.scale
         return kernels, kernels.pack(self.layout, self.kinds.astype(np.uint16), offset, scale, self.slices, self.weights)
 
+    @property
+    def _compiled_for_many(self) -> tuple[ModuleType, tuple[NDArray[Any], ...]] | None:
+        """The kernels for many queries and the database's arrays; None where they cannot be used."""
+        if self._compiled is None or (kernels := load_many_kernels()) is None:
+            return None
+        return kernels, self._compiled[1].arrays
+
 
 @cache
 def load_kernels() -> ModuleType | None:
@@ -98,3 +128,33 @@ def load_kernels() -> ModuleType | None:
     kernels.search.compile(kernels.SIGNATURE)
     kernels.search.disable_compile()
     return kernels
+
+
+@cache
+def load_many_kernels() -> ModuleType | None:
+    """The compiled search for many queries; None where `load_kernels` gives none."""
+    if load_kernels() is None:
+        return None
+    from contextdb.motion.search import many_kernels
+
+    announce(many_kernels.search_block)
+    many_kernels.search_block.compile(many_kernels.SIGNATURE)
+    many_kernels.search_block.disable_compile()
+    return many_kernels
+
+
+def in_blocks(n: int, work: Callable[[int, int], object]) -> None:
+    """Do some work for 0 … n - 1 in blocks, on as many cores as this process may use."""
+    n_threads = max(1, min(_n_cores(), n // THREAD_QUERIES))
+    n_blocks = n_threads * max(1, -(-n // (n_threads * BLOCK_QUERIES)))
+    cuts = [n * i // n_blocks for i in range(n_blocks + 1)]
+    if n_threads == 1:
+        for start, stop in pairwise(cuts):
+            work(start, stop)
+        return
+    with ThreadPoolExecutor(n_threads) as pool:
+        list(pool.map(work, cuts[:-1], cuts[1:]))
+
+
+def _n_cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,7 +1,7 @@
-"""Two steps of the search on 16 numbers at once, as numba intrinsics.
+"""Steps of the search on 16 numbers at once, as numba intrinsics.
 
 Written as vector instructions, because the compiler makes none of loops over 16 numbers that may overlap in memory; a machine
-without registers of that width works on them in parts. Both work in float32 and answer with a mask: bit i says whether lane i is at
+without registers of that width works on them in parts. They work in float32 and answer with a mask: bit i says whether lane i is at
 most the limit. Rounding is the caller's concern: a limit has to be so much higher that no lane is missed.
 """
 
@@ -17,7 +17,6 @@ from numba.extending import intrinsic
 LANES = 16
 _I32, _I64 = ir.IntType(32), ir.IntType(64)
 _LANES = ir.VectorType(ir.FloatType(), LANES)
-_ZEROS = ir.Constant(_LANES, [0.0] * LANES)
 _ROUNDING = ("contract", "nsz")
 """Multiply and add may be one instruction."""
 
@@ -57,13 +56,22 @@ def bounds_at_most(typing, lows, highs, group, query, weights, start, stop, tota
         with cgutils.for_range_slice(builder, arguments[5], arguments[6], _I64(1), _I64) as (feature, _):
             offset = builder.add(base, builder.mul(feature, _I64(LANES)))
             wanted = lanes.everywhere(3, feature)
-            below = builder.fsub(lanes.load(0, offset), wanted)
-            above = builder.fsub(wanted, lanes.load(1, offset))
-            lanes.add_square(total, lanes.everywhere(4, feature), lanes.greater(lanes.greater(below, above), _ZEROS))
+            nearest = lanes.less(lanes.greater(wanted, lanes.load(0, offset)), lanes.load(1, offset))
+            lanes.add_square(total, lanes.everywhere(4, feature), builder.fsub(wanted, nearest))
         return lanes.keep(total, 7, arguments[8])
 
     integer = types.int64
     return integer(lows, highs, integer, query, weights, integer, integer, totals, types.float32), generate
+
+
+@intrinsic
+def lowest(typing, mask):
+    """The lowest bit of an int64 mask that is set."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
+
+    return types.int64(types.int64), generate
 
 
 class _Lanes:
@@ -101,6 +109,9 @@ class _Lanes:
 
     def greater(self, left: Any, right: Any) -> Any:
         return self.builder.select(self.builder.fcmp_ordered(">", left, right), left, right)
+
+    def less(self, left: Any, right: Any) -> Any:
+        return self.builder.select(self.builder.fcmp_ordered("<", left, right), left, right)
 
     def add_square(self, total: Any, weight: Any, values: Any) -> None:
         """Add weight x values² to what `total` points to."""

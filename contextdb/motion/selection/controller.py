@@ -15,7 +15,7 @@ DoNotChoose, NextNaturalOnly and root motion weight of EA's talk.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
 
@@ -29,6 +29,7 @@ from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection import variation
 from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValid
+from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
@@ -41,6 +42,23 @@ from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
 
 Clock = Callable[[], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """Half an update: what is to be searched, and why; `wanted` is None where nothing is."""
+
+    step: Step
+    cause: Trigger | None
+    wanted: Asked | None
+    context: Mapping[str, object] | None
+
+    @property
+    def query(self) -> Floats:
+        """The query, checked: float64 [F]."""
+        return self.step.query
+
+
 DEFAULT_SETTINGS = ControllerSettings()
 
 
@@ -83,6 +101,7 @@ class Controller:
         self.selector, self.settings, self.recorder = selector, settings, recorder
         self._rng, self._clock = rng, clock
         self._state = ControllerState()
+        self._moved: tuple[object, Ongoing | None] | None = None
 
     @property
     def playing(self) -> Playing | None:
@@ -94,8 +113,15 @@ class Controller:
 
         A query with the pose of the last update lags behind, and the frame that it fits best is always one that steps back.
         """
-        ongoing = Ongoing.of(self._state.playing, self.selector, self.settings.rate, _seconds(dt_s))
+        ongoing = self._ongoing(_seconds(dt_s))
         return None if ongoing is None else ongoing.playing
+
+    def _ongoing(self, dt_s: float) -> Ongoing | None:
+        """What plays, moved on; the last is kept, for an update mostly follows what was asked of `upcoming`."""
+        asked = (self._state.playing, self.selector, self.settings.rate, dt_s)
+        if self._moved is None or self._moved[0] != asked:
+            self._moved = asked, Ongoing.of(*asked)
+        return self._moved[1]
 
     @property
     def state(self) -> ControllerState:
@@ -148,27 +174,44 @@ class Controller:
         QueryError
             A time, query, mask, tag or name that does not fit. The controller then stands where it stood.
         """
-        dt_s = _seconds(dt_s)
         asked = Asked(valid, tags, None, bias, among, None, penalties)
-        step = Step.of(self.selector, self.settings, self._state, dt_s, self._checked(query), asked)
-        decision = self._decided(step, step.trigger(force, interrupt), context)
+        asking = self.ask(dt_s, self.checked(query), asked, context, force, interrupt)
+        if asking.wanted is None:
+            return self.answer(asking)
+        began_s = self.now_s()
+        choice = self.selector.search(asking.query, **asking.wanted.options())
+        return self.answer(asking, choice, (self.now_s() - began_s) * 1e6)
+
+    def ask(
+        self, dt_s: float, query: Floats, asked: Asked, context: Mapping[str, object] | None, force: bool, interrupt: bool
+    ) -> Asking:
+        """The first half of an update, of a `checked` query: move what plays on, say what is to be searched. Changes nothing."""
+        dt_s = _seconds(dt_s)
+        step = Step.of(self.selector, self.settings, self._state, dt_s, query, asked, self._ongoing(dt_s))
+        cause = step.trigger(force, interrupt)
+        return Asking(step, cause, None if cause is None else step.wanted(cause), context)
+
+    def answer(self, asking: Asking, choice: Choice | None = None, search_us: float = 0.0) -> Decision:
+        """The second half: decide by what the selector chose, None where nothing was to be searched."""
+        decision = self._decided(asking, choice, search_us if self._clock else None)
         if self.recorder is not None:
             self.recorder.record(decision)
-        self._state = self._state_after(step, decision)
+        self._state = self._state_after(asking.step, decision)
         return decision
 
-    def _decided(self, step: Step, cause: Trigger | None, context: Mapping[str, object] | None) -> Decision:
-        search_us: float | None = None
+    def now_s(self) -> float:
+        """What the clock says; 0 without one."""
+        return self._clock() if self._clock else 0.0
+
+    def _decided(self, asking: Asking, choice: Choice | None, search_us: float | None) -> Decision:
+        step, cause, wanted = asking.step, asking.cause, asking.wanted
         candidates: tuple[tuple[str, Candidates], ...] = ()
         filters: tuple[tuple[str, Filter], ...] = ()
-        if cause is None:
+        if cause is None or wanted is None or choice is None:
             assert step.ongoing is not None, "without anything playing there is a cause to search"
             outcome = step.unsearched(step.ongoing)
         else:
-            wanted = step.wanted(cause)
-            began_s = self._clock() if self._clock else 0.0
-            outcome = step.searched(cause, wanted, self._rng)
-            search_us = (self._clock() - began_s) * 1e6 if self._clock else None
+            outcome = step.searched(cause, wanted, choice, self._rng)
             candidates = self._candidates(step.query, wanted)
             filters = self._filters(wanted, candidates)
         return Decision(
@@ -182,10 +225,10 @@ class Controller:
             cost=outcome.cost,
             continuing_cost=outcome.continuing_cost,
             choice=outcome.choice,
-            context=context,
+            context=asking.context,
             query=step.query,
             candidates=candidates,
-            search_us=search_us,
+            search_us=None if cause is None else search_us,
             root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
             root_weight=self._root_weight(outcome.playing),
             filters=filters,
@@ -218,7 +261,7 @@ class Controller:
     def _root_weight(self, playing: Playing | None) -> float:
         return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)
 
-    def _checked(self, query: ArrayLike) -> Floats:
+    def checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""
         for database in self.selector.databases.values():
             return arguments.query_of(query, database.feature_names)

@@ -24,10 +24,13 @@ from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import require_many_of
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
+from contextdb.motion import arguments
+from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import NOTHING, Hit, MotionDatabase
 from contextdb.motion.selection.asked import Among, Asked, Current, OfPenalties, OfTags, OfValid, Options
+from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.known_tags import with_tags
 
@@ -136,6 +139,58 @@ class Selector:
             if entry.threshold is not None and hit.cost < entry.threshold:
                 return _choice(self.entries, hits, among, entry.name)
         return _choice(self.entries, hits, among, None)
+
+    def search_many(
+        self,
+        queries: ArrayLike,
+        valid: OfValidForMany | None = None,
+        tags: OfTags | None = None,
+        current: Sequence[Current | None] | None = None,
+        *,
+        among: Among | None = None,
+        penalties: OfPenalties | None = None,
+    ) -> list[Choice]:
+        """Choose for many characters at once: one `Choice` for each query, in order, the same as `search` makes for each alone.
+
+        Each database is searched once, for all characters that no database before it has satisfied.
+
+        Parameters
+        ----------
+        queries : float array, shape (Q, F)
+        valid : optional
+            As for `MotionDatabase.search_many`: one for all, or one for each query, such as what `query_many` answers; or a mapping
+            of database name to either.
+        current : sequence of Q Choices or (database name, frame), optional
+            None for a character that plays nothing.
+        tags, among, penalties
+            As for `search`, one for all.
+        """
+        wanted = arguments.numbers_of(queries, "the queries")
+        if wanted.ndim != 2:
+            raise QueryError(Fault(f"the queries have shape {wanted.shape}.", "queries x features"))
+        playing = each_of(current, len(wanted), "current frame", is_one=current is None)
+        masks = valid_of_each(self.databases, valid, len(wanted))
+        asked = [Asked(mask, tags, now, None, among, None, penalties) for mask, now in zip(masks, playing, strict=True)]
+        return self.search_each(wanted, asked)
+
+    def search_each(self, queries: Floats, asked: Sequence[Asked]) -> list[Choice]:
+        """Choose for many characters at once, each with parameters of `search` of its own; queries [Q, F]."""
+        for each in asked:
+            self._check_names(each.databases())
+        among = [self.among(each.among) for each in asked]
+        hits: list[dict[str, Hit]] = [{} for _ in asked]
+        stopped: list[str | None] = [None for _ in asked]
+        for entry in self.entries:
+            database = self.databases.get(entry.name)
+            numbers = [i for i, names in enumerate(among) if entry.name in names and stopped[i] is None]
+            if database is None or not numbers:
+                continue
+            found = database.search_each(queries[numbers], [asked[i].of(entry.name) for i in numbers])
+            for i, hit in zip(numbers, found, strict=True):
+                hits[i][entry.name] = hit
+                if entry.threshold is not None and hit.cost < entry.threshold:
+                    stopped[i] = entry.name
+        return [_choice(self.entries, *each) for each in zip(hits, among, stopped, strict=True)]
 
     def candidates(
         self, query: ArrayLike, k: int = 10, *, left_out: bool = False, **options: Unpack[Options]

@@ -51,11 +51,17 @@ class Step:
 
     @classmethod
     def of(
-        cls, selector: Selector, settings: ControllerSettings, state: ControllerState, dt_s: float, query: Floats, asked: Asked
+        cls,
+        selector: Selector,
+        settings: ControllerSettings,
+        state: ControllerState,
+        dt_s: float,
+        query: Floats,
+        asked: Asked,
+        ongoing: Ongoing | None,
     ) -> Step:
-        """An update that moves what plays on by some time."""
+        """An update that moved what plays on by some time, to `ongoing`."""
         now_s, for_s = state.time_s + dt_s, settings.history_s
-        ongoing = Ongoing.of(state.playing, selector, settings.rate, dt_s)
         name, spans = ("", ()) if ongoing is None else (ongoing.database, ongoing.move.spans)
         history = remembered(state.history, name, spans, now_s, for_s)
         return cls(selector, settings, state, dt_s, query, asked, ongoing, history)
@@ -119,9 +125,8 @@ class Step:
         """What plays, plays on."""
         return Outcome(_onward(ongoing), trigger.not_due(self.due_s), ongoing.playing)
 
-    def searched(self, cause: Trigger, asked: Asked, rng: Rng | None) -> Outcome:
-        """Search, and choose: to play on, to jump, or, when nothing is found, to make do with what there is."""
-        choice = self.selector.search(self.query, **asked.options())
+    def searched(self, cause: Trigger, asked: Asked, choice: Choice, rng: Rng | None) -> Outcome:
+        """What is made of the selector's choice: to play on, to jump, or, when nothing is found, to make do with what there is."""
         if not choice:
             return self._nothing_else(cause, choice)
         continuing = self._continuing_cost(asked, choice)

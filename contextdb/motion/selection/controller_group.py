@@ -1,0 +1,219 @@
+"""A crowd: many characters that are updated together, each decided as its own controller decides.
+
+An update asks every controller first what is to be searched, searches for all of them at once, and hands each its answer; the rules
+are those of `contextdb.motion.selection.controller`, and there is no second copy of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from contextdb.errors import Fault, MotionError, Place, QueryError, plural
+from contextdb.motion import arguments
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags
+from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
+from contextdb.motion.selection.choice import Choice
+from contextdb.motion.selection.controller import Asking, Controller
+from contextdb.motion.selection.controller_state import ControllerState
+from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.selection.selector import Selector
+
+Flag = bool | Sequence[bool] | NDArray[np.bool_]
+
+
+class ControllerGroup(Sequence[Controller]):
+    """The controllers of a crowd, in order: a sequence, with whose numbers queries, masks and decisions go.
+
+    Parameters
+    ----------
+    controllers : iterable of Controller
+        Each once. They may have different selectors and settings; those of one selector are searched for together.
+
+    Raises
+    ------
+    MotionError
+        The same controller twice.
+    """
+
+    def __init__(self, controllers: Iterable[Controller] = ()) -> None:
+        self._controllers: list[Controller] = []
+        for controller in controllers:
+            self.add(controller)
+
+    def add(self, controller: Controller) -> None:
+        """Take one more character, as the last."""
+        if any(own is controller for own in self._controllers):
+            raise MotionError(Fault("the group has this controller already.", "a controller of its own for each character"))
+        self._controllers.append(controller)
+
+    def remove(self, controller: Controller) -> None:
+        """Let a character go; those after it move up by one."""
+        kept = [own for own in self._controllers if own is not controller]
+        if len(kept) == len(self._controllers):
+            raise MotionError(Fault("the group does not have this controller.", "one that was added"))
+        self._controllers = kept
+
+    @overload
+    def __getitem__(self, i: int) -> Controller: ...
+
+    @overload
+    def __getitem__(self, i: slice) -> list[Controller]: ...
+
+    def __getitem__(self, i: int | slice) -> Controller | list[Controller]:
+        return self._controllers[i]
+
+    def __len__(self) -> int:
+        return len(self._controllers)
+
+    def __iter__(self) -> Iterator[Controller]:
+        return iter(self._controllers)
+
+    def __repr__(self) -> str:
+        return f"<ControllerGroup: {plural(len(self), 'character')}>"
+
+    @property
+    def playing(self) -> list[Playing | None]:
+        """What each plays now."""
+        return [controller.playing for controller in self]
+
+    @property
+    def states(self) -> list[ControllerState]:
+        """Where each is, to come back to with `restore`."""
+        return [controller.state for controller in self]
+
+    def restore(self, states: Sequence[ControllerState]) -> None:
+        """Go on from the states of as many characters."""
+        for controller, state in zip(self, each_of(states, len(self), "state", is_one=False), strict=True):
+            controller.restore(state)
+
+    def upcoming(self, dt_s: float) -> list[Playing | None]:
+        """What each plays in some seconds if it plays on; see `Controller.upcoming`."""
+        return [controller.upcoming(dt_s) for controller in self]
+
+    def poses(self, dt_s: float) -> Floats:
+        """The features of each one's upcoming frame, in the schema's units, for `with_paths` to give them paths: float64 [Q, F].
+
+        Zeros for a character that plays nothing.
+        """
+        frames: dict[int, tuple[Selector, str, list[int], list[int]]] = {}
+        for i, (controller, playing) in enumerate(zip(self, self.upcoming(dt_s), strict=True)):
+            if playing is not None:
+                database = controller.selector.databases[playing.database]
+                found = frames.setdefault(id(database), (controller.selector, playing.database, [], []))
+                found[2].append(i)
+                found[3].append(playing.frame)
+        widths = {database.n_features for controller in self for database in controller.selector.databases.values()}
+        if len(widths) > 1:
+            raise MotionError(Fault(f"the databases have {sorted(widths)} features.", "databases of one schema"))
+        poses = np.zeros((len(self), max(widths, default=0)))
+        for selector, name, numbers, at in frames.values():
+            poses[numbers] = selector.databases[name].raw_many(at)
+        return poses
+
+    def update(
+        self,
+        dt_s: float,
+        queries: ArrayLike,
+        valid: OfValidForMany | None = None,
+        tags: OfTags | Sequence[OfTags | None] | None = None,
+        contexts: Sequence[Mapping[str, object] | None] | None = None,
+        *,
+        bias: Mapping[str, ArrayLike] | Sequence[Mapping[str, ArrayLike] | None] | None = None,
+        penalties: OfPenalties | Sequence[OfPenalties | None] | None = None,
+        among: Among | Sequence[Among | None] | None = None,
+        force: Flag = False,
+        interrupt: Flag = False,
+    ) -> list[Decision]:
+        """Update every character as `Controller.update` does; the decision of each, in order.
+
+        Parameters
+        ----------
+        dt_s : float
+            Seconds since the last update, for all.
+        queries : float array, shape (Q, F)
+        valid : optional
+            As for `Selector.search_many`: one for all; one for each, such as what `query_many` answers; or a mapping of database
+            name to either.
+        tags, bias, penalties, among, force, interrupt : optional
+            As for `Controller.update`: one for all, or a list of one for each.
+        contexts : sequence of Q mappings, optional
+            The facts of the moment, for the recorders alone.
+
+        Raises
+        ------
+        QueryError
+            What does not fit, with the number of the character. All then stand where they stood.
+        """
+        n = len(self)
+        wanted = arguments.numbers_of(queries, "the queries")
+        if wanted.ndim != 2 or len(wanted) != n:
+            raise QueryError(Fault(f"the queries have shape {wanted.shape}.", f"one for each of {plural(n, 'character')}"))
+        masks = {selector: valid_of_each(selector.databases, valid, n) for selector in {each.selector for each in self}}
+        each = zip(
+            self,
+            wanted,
+            _each(tags, n, "tag filter"),
+            _each(bias, n, "bias"),
+            _each_among(among, n),
+            _each(penalties, n, "penalty"),
+            _each(contexts, n, "context"),
+            _each_flag(force, n, "flag to force"),
+            _each_flag(interrupt, n, "flag to interrupt"),
+            strict=True,
+        )
+        asking = []
+        are_checked = self._have_width(wanted.shape[1]) and arguments.are_finite(wanted)
+        for i, (controller, query, own_tags, own_bias, own_among, own_penalties, context, forced, interrupted) in enumerate(each):
+            try:
+                asked = Asked(masks[controller.selector][i], own_tags, None, own_bias, own_among, None, own_penalties)
+                own_query = query if are_checked else controller.checked(query)
+                asking.append(controller.ask(dt_s, own_query, asked, context, forced, interrupted))
+            except QueryError as error:
+                raise QueryError(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
+        answers = self._searched(asking)
+        return [controller.answer(*given) for controller, given in zip(self, answers, strict=True)]
+
+    def _have_width(self, n_features: int) -> bool:
+        """Whether queries of so many features fit all databases."""
+        selectors = {controller.selector for controller in self}
+        return all(database.n_features == n_features for selector in selectors for database in selector.databases.values())
+
+    def _searched(self, asking: Sequence[Asking]) -> list[tuple[Asking, Choice | None, float]]:
+        """What is asked, the selector's choice, None where nothing was to be searched, and the microseconds of its share."""
+        found: list[tuple[Asking, Choice | None, float]] = [(each, None, 0.0) for each in asking]
+        of_selector: dict[Selector, list[int]] = {}
+        for i, controller in enumerate(self):
+            if asking[i].wanted is not None:
+                of_selector.setdefault(controller.selector, []).append(i)
+        for selector, numbers in of_selector.items():
+            began_s = self[numbers[0]].now_s()
+            wanted = [asking[i].wanted for i in numbers]
+            choices = selector.search_each(
+                np.array([asking[i].query for i in numbers]), [each for each in wanted if each is not None]
+            )
+            each_us = (self[numbers[0]].now_s() - began_s) * 1e6 / len(numbers)
+            for i, choice in zip(numbers, choices, strict=True):
+                found[i] = asking[i], choice, each_us
+        return found
+
+
+def _each(given: object, n: int, what: str) -> Sequence[object]:
+    """Lists are of one for each, everything else is for all."""
+    return each_of(given, n, what, is_one=not isinstance(given, (list, tuple)))
+
+
+def _each_among(among: object, n: int) -> Sequence[object]:
+    """Names are for all, lists of names and many answers of a table one for each."""
+    is_for_each = hasattr(among, "lists") or (
+        isinstance(among, (list, tuple)) and not hasattr(among, "assets") and not all(isinstance(name, str) for name in among)
+    )
+    return each_of(among, n, "choice of databases", is_one=not is_for_each)
+
+
+def _each_flag(given: Flag, n: int, what: str) -> Sequence[bool]:
+    return each_of(given, n, what, is_one=np.ndim(given) == 0)

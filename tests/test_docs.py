@@ -1,6 +1,6 @@
 """README.md and docs/ show what the commands really print.
 
-Each document is one session, run from top to bottom beside a fresh copy of tables/:
+Each document is one session, run from top to bottom beside fresh copies of tables/ and examples/:
 
 - In a ```console block, lines that begin with `$ ` are commands (a `\\` at the end continues them) and the lines under each are its
   output, standard error included. Commands are `contextdb …`, `python …`, and `echo $?`, the last exit code.
@@ -168,7 +168,8 @@ def commands(lines: list[str], block: Block) -> Iterator[Step]:
 def session(in_processes: bool = True) -> Iterator[Session]:
     """A session beside a fresh copy of tables/."""
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(ROOT / "tables", Path(folder) / "tables")
+        for name in ("tables", "examples"):
+            shutil.copytree(ROOT / name, Path(folder) / name, ignore=shutil.ignore_patterns("__pycache__"))
         yield Session(Path(folder), in_processes)
 
 

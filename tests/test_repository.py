@@ -12,8 +12,8 @@ import contextdb
 
 ROOT = Path(__file__).parent.parent
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-SOURCES = sorted(p for folder in ("contextdb", "tui", "tests", "benchmarks") for p in (ROOT / folder).rglob("*.py"))
-PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("tables/**/*.toml")]
+SOURCES = sorted(p for folder in ("contextdb", "tui", "tests", "benchmarks", "examples") for p in (ROOT / folder).rglob("*.py"))
+PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("tables/**/*.toml"), *ROOT.glob("examples/**/*.toml")]
 TEXTS = [*SOURCES, *PAGES, ROOT / "Makefile", ROOT / "pyproject.toml"]
 SOMEBODYS_FOLDER = re.compile(r"(?<![\w.])/(home|root|Users|tmp|work)/")
 

@@ -563,3 +563,17 @@ def test_a_workbook_carries_the_types_of_outputs_along(tmp_path: Path):
     assert set(after.settings.typed) == set(before.settings.typed)
     assert after.settings.fallback_outputs == before.settings.fallback_outputs
     assert after.compile().outputs.of_row(0) == before.compile().outputs.of_row(0)
+
+
+def test_a_hot_reload_takes_over_outputs_that_changed(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[tables.t]\noutputs = { n = { type = "int" } }\n')
+    (tmp_path / "t.csv").write_text("Asset,n\nA,1\n")
+    with cdb.watch(tmp_path, poll_s=None, settle_s=0.0) as watch:
+        before = watch["t"]
+        (tmp_path / "t.csv").write_text("Asset,n\nA,12\n")
+        watch.poll()
+        assert (before.outputs.of_row(0), watch["t"].outputs.of_row(0)) == ({"n": 1}, {"n": 12})
+        (tmp_path / "t.csv").write_text("Asset,n\nA,x\n")
+        watch.poll()
+        assert watch["t"].outputs.of_row(0) == {"n": 12}
+        assert [fault.rule for fault in watch.faults] == ["unreadable-output"]

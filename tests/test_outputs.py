@@ -18,6 +18,7 @@ from running import run
 from strategies import examples
 
 import contextdb as cdb
+from contextdb.commands.check_command import check_path
 from contextdb.compiled.stubs import stubs_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.files.tensors import read_tensors, write_tensors
@@ -429,6 +430,14 @@ def test_a_table_inside_with_another_type_is_refused():
     assert error.value.faults[0].rule == "unlike-outputs"
 
 
+def test_check_reports_tables_inside_each_other_whose_outputs_differ(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[tables.low]\noutputs = { n = { type = "int" } }\n[tables.outer]\noutputs = ["n"]\n')
+    (tmp_path / "low.csv").write_text("Asset,n\nA,1\n")
+    (tmp_path / "outer.csv").write_text("Asset,n\n@low,1\n")
+    found = [f for f in check_path(str(tmp_path)).findings if f.level == "error"]
+    assert [(f.rule, f.column) for f in found] == [("unlike-outputs", "n")]
+
+
 # ---- contextdb.toml
 
 TOML = """
@@ -477,6 +486,7 @@ def test_settings_come_back_from_what_the_file_says_of_them(drawn):
         ('outputs = { a = { type = "numbers", size = 0 } }', "size = 0: there are no cells of so many numbers"),
         ('outputs = { a = { type = "bool", max = 1 } }', 'max = 1 has no place here: its type is "bool"'),
         ('outputs = { a = { type = "int", min = 2, max = 1 } }', "min = 2 is above max = 1.*Did you mean min = 1 and max = 2"),
+        ('outputs = { a = { type = "number", min = inf } }', "min = inf leaves no number"),
         ('outputs = { a = { type = "int", min = 0.5 } }', "an int has whole bounds.*Did you mean min = 1"),
         ('outputs = { a = { type = "int", default = 1.5 } }', "default = 1.5: this is not a whole number"),
         ('outputs = { a = { type = "int", default = true } }', "default = true: this is not a number"),

@@ -182,7 +182,9 @@ def _bound_faults(path: tuple[str, ...], kind: str, bounds: Said) -> Iterator[Fo
             Fault(f"{about} {_said('min', low)} is above {_said('max', high)}.", "a min that is not above max", mend),
         )
     for key, bound in bounds.items():
-        if kind == "int" and math.isfinite(bound) and bound != math.floor(bound):
+        if bound == (math.inf if key == "min" else -math.inf):
+            yield (*path, key), Fault(f"{about} {_said(key, bound)} leaves no number.", "a finite number", "to leave it out")
+        elif kind == "int" and math.isfinite(bound) and bound != math.floor(bound):
             mend = _said(key, math.ceil(bound) if key == "min" else math.floor(bound))
             yield (*path, key), Fault(f"{about} {_said(key, bound)}: an int has whole bounds.", "a whole number", mend)
 

@@ -374,6 +374,12 @@ def test_rows_that_are_no_numbers_are_refused():
         table_of("damage", "3").compile().outputs.of([True], "damage")
 
 
+def test_outputs_are_shown_in_one_line():
+    said = "<Outputs: damage (int), scale (number), loud (bool), element (enum), at (numbers)>"
+    assert repr(table_of("damage", "3").compile().outputs) == said
+    assert repr(Table.from_columns({"Asset": ["a"]}).compile().outputs) == "<Outputs: none>"
+
+
 def test_rows_of_any_shape_give_outputs_of_that_shape():
     outputs = table_of("damage", "3").compile().outputs
     assert outputs.of([[0, -1]], "damage").tolist() == [[3, 0]]

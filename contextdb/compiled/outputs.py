@@ -19,14 +19,14 @@ from contextdb.cells.arguments import require_row, require_text
 from contextdb.cells.outputs import Output, OutputValue
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
-from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, in_quotes, nearest, shown, some
 
 Column = NDArray[Any]
 OutputCells = Column | TextColumn
 """R + 1 values: bool, int64, float64 or float64 [R + 1, size]; texts of an enum or a text."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Outputs(Unchanging):
     """The outputs of a compiled table: a table without outputs has none, which is not an error.
 
@@ -53,6 +53,9 @@ class Outputs(Unchanging):
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
+
+    def __repr__(self) -> str:
+        return f"<Outputs: {', '.join(f'{shown(o.name)} ({o.kind})' for o in self.declared) or 'none'}>"
 
     def column(self, name: str) -> Column:
         """The output of every row, read-only: bool, int64 or float64 [n_rows], for `numbers` float64 [n_rows, size], for enum and

@@ -15,7 +15,6 @@ import numpy as np
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
-from contextdb.cells.words import truth_of
 from contextdb.columns import TextColumn
 from contextdb.errors import CellError, Fault, Place, SchemaError, TableError, in_quotes, plural, row_name, shown
 from contextdb.expressions import assumption_faults
@@ -26,6 +25,7 @@ from contextdb.schema.sections import condition_to_dict, differences, has_place,
 from contextdb.schema.settings import conditions_from_dict
 from contextdb.tables.changes import CameFrom, Cells, Change, Columns, Edit, Rows, Sections
 from contextdb.tables.merging.building import edit_to
+from contextdb.tables.plain_columns import plain_fault
 from contextdb.tables.table import Table
 
 Job = Literal["condition", "output", PlainJob]
@@ -50,16 +50,13 @@ def check_cell(table: Table, column: str, text: str) -> Fault | None:
     for one in table.conditions:
         if one.condition.name == column:
             return check_text(one.condition, text)
-    if column == settings.enabled and text.strip() and truth_of(text) is None:
-        return Fault(f"cannot read {in_quotes(text)}.", '"True" or "False"', rule="unreadable-cell")
     if column == settings.when and table.when is not None:
         return check_rule(text, table.known_conditions) or unwritable(text)
     if text.strip() and (output := settings.output(column)) is not None:
         return output.fault(text) or unwritable(text)
-    if column in [getattr(settings, job) for job in get_args(PlainJob)] and text.strip():
-        alone = Columns(((column, column),)).apply(table.with_rows_taken([]))
-        faults = Cells({column: {0: text}}).apply(Rows(np.array([-1])).apply(alone)).faults
-        return replace(faults[0], place=Place(column=column)) if faults else unwritable(text)
+    for job in get_args(PlainJob):
+        if column == getattr(settings, job):
+            return plain_fault(job, column, text) or unwritable(text)
     return unwritable(text)
 
 

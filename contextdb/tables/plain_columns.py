@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from contextdb.cells.words import truth_of
 from contextdb.columns import TextColumn
 from contextdb.compiled.pick_columns import NOTHING, PickColumns
 from contextdb.errors import Fault, Place, in_quotes
+from contextdb.schema.jobs import PlainJob
 from contextdb.schema.settings import TableSettings
 
 
@@ -32,52 +34,63 @@ class PlainColumns:
     def read(cls, columns: Sequence[TextColumn], settings: TableSettings) -> PlainColumns:
         """Read those of some columns that the settings give these jobs."""
         faults: list[tuple[int, Fault]] = []
-        enabled = _plain_column(columns, settings.enabled, _enabled, True, '"True" or "False"', faults)
-        priorities = _plain_column(columns, settings.priority, _priority, 0, "a whole number", faults)
-        weights = _plain_column(columns, settings.weight, _weight, 1.0, "a number from 0 up", faults)
-        once = _resting_column(columns, settings.once, truth_of, '"True" or "False"', faults)
-        seconds = _resting_column(columns, settings.cooldown_s, _weight, "a number of seconds from 0 up", faults)
-        turns = _resting_column(columns, settings.cooldown_turns, _turns, "a whole number of picks from 0 up", faults)
+        of: dict[str, NDArray[np.float64] | None] = {job: _read(columns, settings, job, faults) for job in get_args(PlainJob)}
+        n_rows = columns[0].n_rows if columns else 0
+
+        def filled(job: PlainJob) -> NDArray[np.float64]:
+            values = of[job]
+            return np.full(n_rows, READERS[job].empty) if values is None else values
+
+        once, turns = of["once"], of["cooldown_turns"]
         resting = PickColumns(
             None,
             None if once is None else once.astype(np.bool_),
-            seconds,
+            of["cooldown_s"],
             None if turns is None else turns.astype(np.int64),
         )
-        return cls(enabled.astype(np.bool_), priorities.astype(np.int64), weights.astype(np.float64), tuple(faults), resting)
+        enabled, priorities = filled("enabled").astype(np.bool_), filled("priority").astype(np.int64)
+        return cls(enabled, priorities, filled("weight"), tuple(faults), resting)
 
 
-def _resting_column(
-    columns: Sequence[TextColumn],
-    name: str | None,
-    read: Callable[[str], float | None],
-    accepted: str,
-    faults: list[tuple[int, Fault]],
+@dataclass(frozen=True)
+class Reader:
+    """How the cells of a job are read: a number for a text, None for one that cannot be read, what an empty cell means, and what is
+    accepted."""
+
+    read: Callable[[str], float | None]
+    empty: float
+    accepted: str
+
+    def number(self, text: str) -> float | None:
+        """What a cell says; None for one that cannot be read."""
+        return self.read(text.strip()) if text.strip() else self.empty
+
+    def fault(self, column: str, text: str) -> Fault:
+        """That a cell cannot be read."""
+        return Fault(f"cannot read {in_quotes(text)}.", self.accepted, place=Place(column=column), rule="unreadable-cell")
+
+
+def plain_fault(job: PlainJob, column: str, text: str) -> Fault | None:
+    """Why a cell of a column with a job cannot be read."""
+    reader = READERS[job]
+    return reader.fault(column, text) if reader.number(text) is None else None
+
+
+def _read(
+    columns: Sequence[TextColumn], settings: TableSettings, job: PlainJob, faults: list[tuple[int, Fault]]
 ) -> NDArray[np.float64] | None:
-    """A column that says how long rows rest; an empty cell is not at all."""
-    return None if name is None else _plain_column(columns, name, read, 0, accepted, faults)
-
-
-def _plain_column(
-    columns: Sequence[TextColumn],
-    name: str | None,
-    read: Callable[[str], float | None],
-    default: float,
-    accepted: str,
-    faults: list[tuple[int, Fault]],
-) -> NDArray[np.float64]:
-    """Read a column of plain values; an empty cell is the default."""
+    """What the cells of the column with a job say; None where no column has it."""
+    name: str | None = getattr(settings, job)
     if name is None:
-        return np.full(columns[0].n_rows if columns else 0, default)
-    column = next(c for c in columns if c.name == name)
-    values = [default if not t.strip() else read(t.strip()) for t in column.texts]
-    for row in np.flatnonzero(np.array([v is None for v in values], np.bool_)[column.codes]).tolist() if values else ():
-        fault = Fault(f"cannot read {in_quotes(column[row])}.", accepted, place=Place(column=name), rule="unreadable-cell")
-        faults.append((row, fault))
-    return np.array([default if v is None else v for v in values], np.float64)[column.codes]
+        return None
+    reader, column = READERS[job], next(c for c in columns if c.name == name)
+    values = [reader.number(text) for text in column.texts]
+    wrong = np.array([value is None for value in values], np.bool_)
+    faults += [(row, reader.fault(name, column[row])) for row in np.flatnonzero(wrong[column.codes]).tolist() if values]
+    return np.array([reader.empty if value is None else value for value in values], np.float64)[column.codes]
 
 
-def _enabled(text: str) -> float | None:
+def _truth(text: str) -> float | None:
     return truth_of(text)
 
 
@@ -100,3 +113,13 @@ def _weight(text: str) -> float | None:
     except ValueError:
         return None
     return value if 0.0 <= value < math.inf else None
+
+
+READERS: dict[PlainJob, Reader] = {
+    "enabled": Reader(_truth, True, '"True" or "False"'),
+    "priority": Reader(_priority, 0, "a whole number"),
+    "weight": Reader(_weight, 1.0, "a number from 0 up"),
+    "once": Reader(_truth, False, '"True" or "False"'),
+    "cooldown_s": Reader(_weight, 0.0, "a number of seconds from 0 up"),
+    "cooldown_turns": Reader(_turns, 0, "a whole number of picks from 0 up"),
+}

@@ -120,12 +120,12 @@ class ShownTable:
         return self.text_fault(column, text) or edits.check_cell(self.table, texts.name, text)
 
     def text_fault(self, column: int, text: str) -> Fault | None:
-        """What is wrong with a text of a column that is not a condition: a row's own rule, an output, a table that is to be in a
-        row."""
+        """What is wrong with a text of a column that is not a condition: a table that is to be in a row, or what a column with
+        another job cannot say."""
         name, table = self.table.columns[column].name, self.table
-        if name == table.settings.when or table.settings.output(name) is not None:
-            return edits.check_cell(table, name, text)
-        return self.inner_fault(text) if name == table.asset_column else None
+        if name == table.asset_column:
+            return self.inner_fault(text)
+        return edits.check_cell(table, name, text)
 
     def missing_output(self, column: int) -> Output | None:
         """The output that a column is, if its cells may not be empty."""

@@ -17,6 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import contextdb as cdb
+from contextdb.compiled import choosing
+from contextdb.compiled import picker as picker_module
 from contextdb.compiled.chance import uniform, uniforms
 from contextdb.compiled.pick import Outcome, pick_row
 from contextdb.compiled.table import CompiledTable
@@ -232,6 +234,20 @@ def test_a_character_picks_the_same_whoever_is_asked_with_it_and_in_whatever_ord
         alone = few.pick_many(table.query_many({"x": [True] * 2}), who=[9, 4]).tolist()
         among = more.pick_many(table.query_many({"x": [True] * 4}), who=[1, 4, 7, 9]).tolist()
         assert alone == [among[3], among[1]]
+
+
+def test_runs_of_very_different_length_are_drawn_a_part_at_a_time(monkeypatch):
+    weights = [str(1 + row % 7) for row in range(70)]
+    table = table_of(x=["True"] * 69 + ["Any"], y=["True"] * 40 + ["Any"] * 30, weight=weights)
+    rng = random.Random(1)
+    many = table.query_many({name: [rng.random() < 0.5 for _ in range(60)] for name in "xy"})
+    alone = table.picker(5, 0)
+    expected = [-1 if (row := alone.pick(one, who=i).row) is None else row for i, one in enumerate(many)]
+    assert table.picker(5, 0).pick_many(many).tolist() == expected
+    monkeypatch.setattr(choosing, "MOST_PADDED", 100)
+    assert table.picker(5, 0).pick_many(many).tolist() == expected
+    monkeypatch.setattr(picker_module, "MOST_PAIRS", 200)
+    assert table.picker(5, 0).pick_many(many).tolist() == expected
 
 
 # ---- memory

@@ -92,8 +92,9 @@ def places(masks: Words) -> tuple[Rows, Rows]:
     """
     at, word = np.nonzero(masks)
     octets = masks[at, word].astype("<u8").view(np.uint8).reshape(-1, 8)
-    pair, bit = np.nonzero(np.unpackbits(octets, axis=1, bitorder="little"))
-    return at[pair], 64 * word[pair] + bit
+    held = np.flatnonzero(np.unpackbits(octets, bitorder="little").view(np.bool_))
+    pair = held >> 6
+    return at[pair], 64 * word[pair] + (held & 63)
 
 
 def read_only(array: Array) -> Array:

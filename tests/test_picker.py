@@ -17,6 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import contextdb as cdb
+from contextdb.compiled import choosing
+from contextdb.compiled import picker as picker_module
 from contextdb.compiled.chance import uniform, uniforms
 from contextdb.compiled.pick import Outcome, pick_row
 from contextdb.compiled.table import CompiledTable
@@ -234,6 +236,20 @@ def test_a_character_picks_the_same_whoever_is_asked_with_it_and_in_whatever_ord
         assert alone == [among[3], among[1]]
 
 
+def test_runs_of_very_different_length_are_drawn_a_part_at_a_time(monkeypatch):
+    weights = [str(1 + row % 7) for row in range(70)]
+    table = table_of(x=["True"] * 69 + ["Any"], y=["True"] * 40 + ["Any"] * 30, weight=weights)
+    rng = random.Random(1)
+    many = table.query_many({name: [rng.random() < 0.5 for _ in range(60)] for name in "xy"})
+    alone = table.picker(5, 0)
+    expected = [-1 if (row := alone.pick(one, who=i).row) is None else row for i, one in enumerate(many)]
+    assert table.picker(5, 0).pick_many(many).tolist() == expected
+    monkeypatch.setattr(choosing, "MOST_PADDED", 100)
+    assert table.picker(5, 0).pick_many(many).tolist() == expected
+    monkeypatch.setattr(picker_module, "MOST_PAIRS", 200)
+    assert table.picker(5, 0).pick_many(many).tolist() == expected
+
+
 # ---- memory
 
 
@@ -294,6 +310,12 @@ def test_a_row_rests_for_seconds():
     picker, matches = table.picker(), table.query({"x": True})
     times = [0.0, 1.0, 2.4999, 2.5, 4.0, 5.0]
     assert [picker.pick(matches, time_s=t).row for t in times] == [0, None, None, 0, None, 0]
+
+
+def test_a_row_that_rests_for_turns_alone_does_not_look_at_the_time():
+    table = table_of(fallback="silence", asset=["hello"], cooldown_turns=["1"])
+    picker, matches = table.picker(), table.query({"x": True})
+    assert [picker.pick(matches, time_s=t).row for t in (5.0, 6.0, None, 1.0, 0.0)] == [0, None, 0, None, 0]
 
 
 def test_each_character_rests_on_its_own():

@@ -126,12 +126,12 @@ class Choosing:
             taken = self.taken[depth, rows[kept]]
             starts = starts_of(contexts[kept], taken)
             of, at = contexts[kept][starts], rows[kept][starts]
-            counts = np.diff(starts_of(of), append=len(of))
+            counts = _lengths(starts_of(of), len(of))
             if len(of) == len(counts):  # nothing to choose
                 continue
             hit = np.zeros(len(of), np.bool_)
             hit[_by_weight(self.weights[depth, at], counts, chance(depth, of[starts_of(of)]))] = True
-            kept = kept[np.repeat(hit, np.diff(starts, append=len(kept)))]
+            kept = kept[np.repeat(hit, _lengths(starts, len(kept)))]
         return kept
 
     def _refuse_several(self, depth: int, contexts: Rows, rows: Rows, starts: Rows, is_one: bool) -> None:
@@ -213,22 +213,41 @@ def highest(numbers: NDArray[Any], starts: Rows) -> Flags:
     if not len(numbers):
         return np.zeros(0, np.bool_)
     highest = np.maximum.reduceat(numbers, starts)
-    return np.asarray(numbers == np.repeat(highest, np.diff(starts, append=len(numbers))))
+    return np.asarray(numbers == np.repeat(highest, _lengths(starts, len(numbers))))
 
 
 def _by_weight(weights: Floats, counts: Rows, chance: Floats) -> Rows:
-    """The place that chance hits in each run of so many weights, as `hit` gives it for one."""
+    """The place that chance hits in each run of so many weights, as a picker finds it for one."""
     firsts = np.cumsum(counts) - counts
+    if len(counts) * int(counts.max(initial=0)) <= MOST_PADDED:
+        return np.asarray(firsts + _hits(weights, counts, chance))
     found = np.empty(len(counts), np.int64)
     order = np.argsort(counts, kind="stable")
     while len(order):
         most = max(1, MOST_PADDED // int(counts[order[-1]]))
         own, order = order[-most:], order[:-most]
-        width = int(counts[own[-1]])
-        places = np.arange(width)
-        is_there = places < counts[own, None]
-        padded = np.where(is_there, weights[np.where(is_there, firsts[own, None] + places, 0)], 0.0)
-        sums = np.cumsum(padded / padded.max(axis=1, keepdims=True), axis=1)
-        hits = (sums <= (chance[own] * sums[:, -1])[:, None]).sum(axis=1)
-        found[own] = firsts[own] + np.minimum(hits, counts[own] - 1)
+        at = np.repeat(firsts[own] - (np.cumsum(counts[own]) - counts[own]), counts[own])
+        found[own] = firsts[own] + _hits(weights[at + np.arange(len(at))], counts[own], chance[own])
     return found
+
+
+def _hits(weights: Floats, counts: Rows, chance: Floats) -> Rows:
+    """The same, counted from the beginning of each run. Sums are those of Python's own additions, one after the other."""
+    if not len(counts):
+        return counts
+    is_there = np.arange(int(counts.max())) < counts[:, None]
+    padded = np.zeros(is_there.shape)
+    padded[is_there] = weights
+    padded /= padded.max(axis=1, keepdims=True)
+    sums = np.cumsum(padded, axis=1)
+    hits = (sums <= (chance * sums[:, -1])[:, None]).sum(axis=1)
+    places: Rows = np.minimum(hits, counts - 1)
+    return places
+
+
+def _lengths(starts: Rows, stop: int) -> Rows:
+    """How long each run is, the last one up to `stop`."""
+    lengths = np.empty_like(starts)
+    lengths[:-1] = starts[1:] - starts[:-1]
+    lengths[-1:] = stop - starts[-1:]
+    return lengths

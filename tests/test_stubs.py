@@ -116,6 +116,13 @@ MODULES: dict[str, tuple[dict[str, CompiledTable], str]] = {
         + 'context: facts.JogFactsWithActors = {"speed": 1.0}\n    live = table.live(context)\n'
         + f"    actors: facts.JogActors = {{{CAST}}}\n    table.query(context, actors=actors)\n    live.actors(actors)\n",
     ),
+    "own data of actors": (
+        {"jog": with_role("jog")},
+        "class Ours(facts.JogDefenderActor):\n    mass: float\n\n"
+        + LIVE
+        + 'ann: Ours = {"height": 1.8, "name of": "CB", "mass": 80.0}\n    given: facts.JogActors = {"Defender": [ann]}\n'
+        + "    live.actors(given)\n",
+    ),
     "slip in actor": ({"jog": with_role("jog")}, 'actor: facts.JogDefenderActor = {"heigth": 1.8, "name of": "CB"}\n'),
     "no plain fact": ({"jog": with_role("jog")}, 'context: facts.JogFactsWithActors = {"Defender.height": 1.8}\n'),
     "odd names": (ODD, ""),
@@ -151,7 +158,20 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     return found
 
 
-RIGHT = ["context", "numpy", "sets", "some", "live", "actors", "samples", "names", "one fact", "no facts", "odd names"]
+RIGHT = [
+    "context",
+    "numpy",
+    "sets",
+    "some",
+    "live",
+    "actors",
+    "samples",
+    "names",
+    "one fact",
+    "no facts",
+    "odd names",
+    "own data of actors",
+]
 
 
 @pytest.mark.parametrize("name", RIGHT)

@@ -102,7 +102,7 @@ def footfalls(clip: Clip, feet: tuple[str, str] | None = None, *, slowest_mps: f
     """
     require_kind(clip, Clip, "clip", "a Clip")
     if feet is not None:
-        require_pair(feet, str, "feet", "the names of two bones, left and right")
+        require_pair(feet, "feet", "the names of two bones, left and right")
     slowest_mps, highest_m = require_number(slowest_mps, "slowest_mps"), require_number(highest_m, "highest_m")
     bones = feet_of(clip.skeleton) if feet is None else feet
     return footfalls_of(poses_of(clip), bones, slowest_mps=slowest_mps, highest_m=highest_m)

@@ -13,11 +13,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from numbers import Real
 
 import numpy as np
 
-from contextdb.cells.arguments import require_many_of, require_pair, require_real
+from contextdb.cells.arguments import require_many_of, require_point, require_real
 from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
@@ -64,7 +63,7 @@ class Steered:
         Raises ContextError where `wanted` is no pair of numbers, or another argument no number.
         """
         require_real(dt_s, "dt_s", 0.0)
-        require_pair(wanted, Real, "wanted", "two numbers, x and z in metres a second")
+        require_point(wanted, "wanted", "two numbers, x and z in metres a second")
         if facing is not None:
             require_real(facing, "facing")
         return self._moved(dt_s, wanted, facing)
@@ -132,7 +131,7 @@ def steered_path(
     accepted = "a list of Steered, the body at its last moments"
     if not require_many_of(past, Steered, "past", accepted):
         raise MotionError(Fault("there is no body to steer.", "its last moments, at least the present one"))
-    require_pair(wanted, Real, "wanted", "two numbers, x and z in metres a second")
+    require_point(wanted, "wanted", "two numbers, x and z in metres a second")
     if facing is not None:
         require_real(facing, "facing")
     rate, reach_s = require_real(rate, "rate", LEAST_RATE, MOST_RATE), require_real(reach_s, "reach_s", 0.0, MOST_REACH_S)

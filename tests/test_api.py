@@ -21,7 +21,7 @@ from contextdb import motion, telemetry
 DOCS = Path(__file__).parent.parent / "docs"
 API = DOCS / "api.md"
 MODULES: dict[str, ModuleType] = {"motion": motion, "telemetry": telemetry}
-FORMS = ('project["jog"]', "len(table)")
+FORMS = ('project["jog"]', "len(table)", "Matches[0]", "Matches[1:]", "a & b", "a \\| b", "a - b", "a ^ b", "many & other")
 """Names on the page that are uses of a class, not attributes."""
 CODE = re.compile(r"`([^`]+)`")
 FIRST_CELL = re.compile(r"^\| (`.*?) \|", re.MULTILINE)

@@ -178,7 +178,7 @@ def test_a_column_of_days_that_nobody_declares_is_read_as_dates():
 def test_stubs_say_that_a_fact_is_a_date():
     text = stubs_of({"t": table().compile()})
     assert "\nimport datetime\n" in text
-    assert "'day': datetime.date,  # 2026-01-01..2026-12-31\n" in text
+    assert "'day': datetime.date | cdb.FactSet,  # 2026-01-01..2026-12-31\n" in text
 
 
 def test_dmn_keeps_type_bounds_and_cells():

@@ -28,7 +28,9 @@ BUILT_IN: dict[type[ContextDBError], tuple[type[Exception], ...]] = {
     errors.FileError: (OSError,),
     errors.ContextError: (ValueError,),
     errors.NoSuchFact: (ValueError, KeyError),
+    errors.NoSuchOutput: (ValueError, KeyError),
     errors.NoSuchPlace: (ValueError, IndexError),
+    errors.WrongType: (ValueError, TypeError),
     errors.PolicyError: (),
     errors.ArtefactError: (ValueError,),
     errors.MotionError: (ValueError,),
@@ -49,7 +51,7 @@ KINDS = pytest.mark.parametrize("kind", [ContextDBError, *BUILT_IN, EngineError,
 def test_every_error_says_which_built_in_error_it_is():
     ours = {e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, ContextDBError)}
     assert ours == {ContextDBError, *BUILT_IN}
-    kinds = (ValueError, OSError, KeyError, IndexError)
+    kinds = (ValueError, OSError, KeyError, IndexError, TypeError)
     assert {e: tuple(k for k in kinds if issubclass(e, k)) for e in BUILT_IN} == BUILT_IN
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import re
 
 import pytest
 from running import ROOT
@@ -80,3 +81,12 @@ def test_the_public_modules_have_the_names_that_they_list():
         module = importlib.import_module(name)
         assert len(set(module.__all__)) == len(module.__all__)
         assert all(getattr(module, public) is not None for public in module.__all__)
+
+
+def test_no_code_or_page_of_ours_uses_an_old_name():
+    old = re.compile(rf"\b(?:cdb|contextdb)\.(?:{'|'.join(OLD)})\b(?! goes)|from contextdb import [^#\n]*\b(?:{'|'.join(OLD)})\b")
+    folders = [ROOT / name for name in ("contextdb", "tui", "tests", "benchmarks", "docs")]
+    files = [path for folder in folders for path in folder.rglob("*.*") if path.suffix in (".py", ".md")]
+    assert len(files) > 500
+    tests = {ROOT / "tests" / name for name in ("test_face.py", "test_stubs.py")}
+    assert [path.name for path in files if path not in tests and old.search(path.read_text(encoding="utf-8"))] == []

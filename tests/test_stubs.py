@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import get_args, get_type_hints
 
+import numpy as np
 import pytest
 
+import contextdb as cdb
 from contextdb.compiled.stubs import stubs_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError
@@ -44,48 +47,181 @@ def names_in(text: str) -> dict[str, object]:
     return module
 
 
-def judged(folder: Path, stubs: str, use: str = "") -> list[str]:
-    """What mypy says, in strict mode, of the stubs and of a module that uses them."""
-    (folder / "facts.py").write_text(stubs, encoding="utf-8")
-    (folder / "use.py").write_text(f"import facts\n{use}", encoding="utf-8")
-    options = ["--strict", "--no-error-summary", "--cache-dir", str(folder / "cache")]
-    out, err, _ = api.run([*options, str(folder / "facts.py"), str(folder / "use.py")])
+def with_role(name: str) -> CompiledTable:
+    """A table of the fact "speed" and three of roles."""
+    schema: dict[str, dict[str, object]] = {
+        "speed": {"type": "number"},
+        "Defender.height": {"type": "number"},
+        "Defender.name of": {"type": "enum", "values": ["CB"]},
+        "Receiver.tags": {"type": "tags", "values": ["InAir"]},
+    }
+    return compiled(schema, name)
+
+
+WRONG = [
+    ('"ok": True, ', "", 'Missing key "ok"'),
+    ('"ok"', '"okay"', 'Extra key "okay"'),
+    ('"n": 3', '"n": 3.5', 'item "n" has type "int | '),
+    ('"speed": 2.5', '"speed": "fast"', 'item "speed" has type "float | '),
+    ('"Half Air"', '"Water"', "Literal['Ground', 'Half Air']"),
+    ('{"Move", ', '{"Swim", ', "Literal['Move', 'Move.Run', 'InAir']"),
+]
+VALUES: dict[str, object] = {"type": "enum", "values": ["a'b\"", "x\ny", "Größe", "\\"]}
+ODD_NAMES = ("class", "Class", "a.b", "a b", "3", "…", "None", "Literal", "ﬁ", "fi", "np", "cdb", "AnyNumber", "Defender.class")
+ODD_TABLES = ("jog", "Jog", "jog facts", "jog live", "jog some facts", "-", "2 tables", "表")
+ODD = {name: compiled({c: VALUES | {"description": c} for c in ODD_NAMES}, name) for name in ODD_TABLES}
+SAMPLES = Project.load(ROOT / "tables").compile()
+PLAIN = {"jog": compiled(SCHEMA)}
+LIVE = "from contextdb import CompiledTable\n\ndef f(table: CompiledTable, live: facts.JogLive) -> None:\n    "
+NUMPY = (
+    CONTEXT.replace("True", "np.True_")
+    .replace('"n": 3', '"n": np.int64(3)')
+    .replace("2.5", "np.float32(2.5)")
+    .replace("90", "np.int8(90)")
+)
+SETS = (
+    CONTEXT.replace('"n": 3', '"n": cdb.cell("1..4")')
+    .replace("2.5", 'cdb.cell("2 ± 1")')
+    .replace('"Half Air"', 'cdb.cell("not Ground")')
+)
+CAST = '"Defender": [{"height": 1.8, "name of": "CB", "id": 21, "name": "Ann"}], "Receiver": [{"tags": ["InAir"]}]'
+MODULES: dict[str, tuple[dict[str, CompiledTable], str]] = {
+    "context": (PLAIN, f"context: facts.JogFacts = {CONTEXT}\n"),
+    **{
+        f"wrong {i}": (PLAIN, f"context: facts.JogFacts = {CONTEXT.replace(right, no)}\n") for i, (right, no, _) in enumerate(WRONG)
+    },
+    "numpy": (PLAIN, f"import numpy as np\ncontext: facts.JogFacts = {NUMPY}\n"),
+    "sets": (PLAIN, f"import contextdb as cdb\ncontext: facts.JogFacts = {SETS}\n"),
+    "some": (
+        PLAIN,
+        LIVE
+        + 'some: facts.JogSomeFacts = {"speed": 1.0, "state": None}\n    table.query(some, unknown="any")\n    live.update(some)\n',
+    ),
+    "slip in some": (PLAIN, 'some: facts.JogSomeFacts = {"sped": 1.0}\n'),
+    "live": (
+        PLAIN,
+        LIVE
+        + 'live = table.live()\n    live["speed"] = 1\n    live["state"] = None\n    del live["n"]\n'
+        + "    live.copy().matches().assets\n",
+    ),
+    "slip in live": (PLAIN, LIVE + 'live["speeed"] = 1.0\n'),
+    "value in live": (PLAIN, LIVE + 'live["state"] = "Water"\n'),
+    "slip in update": (PLAIN, LIVE + 'live.update({"sped": 1.0})\n'),
+    "slip in del": (PLAIN, LIVE + 'del live["sped"]\n'),
+    "one fact": ({"jog": compiled({"n": SCHEMA["n"]})}, LIVE + 'live = table.live()\n    live["n"] = 1\n'),
+    "no facts": ({"jog": compiled({})}, LIVE + "live = table.live()\n    context: facts.JogFacts = {}\n"),
+    "actors": (
+        {"jog": with_role("jog")},
+        LIVE
+        + 'context: facts.JogFactsWithActors = {"speed": 1.0}\n    live = table.live(context)\n'
+        + f"    actors: facts.JogActors = {{{CAST}}}\n    table.query(context, actors=actors)\n    live.actors(actors)\n",
+    ),
+    "own data of actors": (
+        {"jog": with_role("jog")},
+        "class Ours(facts.JogDefenderActor):\n    mass: float\n\n"
+        + LIVE
+        + 'ann: Ours = {"height": 1.8, "name of": "CB", "mass": 80.0}\n    given: facts.JogActors = {"Defender": [ann]}\n'
+        + "    live.actors(given)\n",
+    ),
+    "slip in actor": ({"jog": with_role("jog")}, 'actor: facts.JogDefenderActor = {"heigth": 1.8, "name of": "CB"}\n'),
+    "no plain fact": ({"jog": with_role("jog")}, 'context: facts.JogFactsWithActors = {"Defender.height": 1.8}\n'),
+    "odd names": (ODD, ""),
+    "samples": (SAMPLES, ""),
+    "names": (
+        {},
+        "import contextdb as cdb\nfrom contextdb import motion\n"
+        "def f(a: cdb.Snapshot, b: cdb.Watch, c: cdb.Context, d: cdb.Unknown, e: cdb.Actors, f: cdb.Prefer, g: cdb.Rng,\n"
+        "      h: cdb.TableSettings, i: cdb.Schema, j: cdb.FactSet, k: motion.QueryError, l: cdb.motion.ClipError) -> str:\n"
+        '    j = cdb.cell("1..2")\n    return cdb.__version__\n',
+    ),
+    "misspelt": ({}, "import contextdb as cdb\ncdb.Projectt\n"),
+    "old": ({}, "import contextdb as cdb\ncdb.QueryError\n"),
+}
+"""What mypy reads in one run: for each name some tables, whose types are the module `facts`, and Python that uses them."""
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    """What mypy says of each of MODULES, in strict mode."""
+    folder = tmp_path_factory.mktemp("typed")
+    for i, (tables, use) in enumerate(MODULES.values()):
+        (folder / f"facts_{i}.py").write_text(stubs_of(tables), encoding="utf-8")
+        (folder / f"use_{i}.py").write_text(f"import facts_{i} as facts\n{use}", encoding="utf-8")
+    options = ["--strict", "--no-error-summary", "--hide-error-context", "--cache-dir", str(folder / "cache")]
+    out, err, _ = api.run([*options, *map(str, sorted(folder.glob("*.py")))])
     assert err == ""
-    return [line.partition("error: ")[2] for line in out.splitlines() if "error: " in line]
+    found: dict[str, list[str]] = {name: [] for name in MODULES}
+    for line in out.splitlines():
+        file, _, told = line.partition(": error: ")
+        if told:
+            found[list(MODULES)[int(re.findall(r"_(\d+)\.py", file)[-1])]].append(told)
+    return found
 
 
-def test_mypy_accepts_a_context_that_a_query_answers(tmp_path: Path):
-    table = compiled(SCHEMA)
-    assert table.query(eval(CONTEXT)).assets == ["a"]
-    assert judged(tmp_path, stubs_of({"jog": table}), f"context: facts.JogFacts = {CONTEXT}\n") == []
+RIGHT = [
+    "context",
+    "numpy",
+    "sets",
+    "some",
+    "live",
+    "actors",
+    "samples",
+    "names",
+    "one fact",
+    "no facts",
+    "odd names",
+    "own data of actors",
+]
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_mypy_accepts_what_a_query_accepts(said: dict[str, list[str]], name: str):
+    assert said[name] == []
+
+
+@pytest.mark.parametrize("context", [CONTEXT, NUMPY, SETS])
+def test_a_query_answers_the_contexts_that_mypy_accepts(context: str):
+    assert compiled(SCHEMA).query(eval(context, {"np": np, "cdb": cdb})).assets == ["a"]
+    assert with_role("jog").query({"speed": 1.0}, actors=eval(f"{{{CAST}}}")).assets == ["a"]
+
+
+@pytest.mark.parametrize(("number", "right", "wrong", "told"), [(i, *row) for i, row in enumerate(WRONG)])
+def test_mypy_refuses_a_context_that_a_query_refuses(said: dict[str, list[str]], number: int, right: str, wrong: str, told: str):
+    assert right in CONTEXT
+    with pytest.raises(ContextError):
+        compiled(SCHEMA).query(eval(CONTEXT.replace(right, wrong)))
+    assert any(told in line for line in said[f"wrong {number}"]), said[f"wrong {number}"]
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "said"),
+    ("name", "told"),
     [
-        ('"ok": True, ', "", 'Missing key "ok"'),
-        ('"ok"', '"okay"', 'Extra key "okay"'),
-        ('"n": 3', '"n": 3.5', 'item "n" has type "int"'),
-        ('"speed": 2.5', '"speed": "fast"', 'item "speed" has type "float"'),
-        ('"Half Air"', '"Water"', "Literal['Ground', 'Half Air']"),
-        ('{"Move", ', '{"Swim", ', "Literal['Move', 'Move.Run', 'InAir']"),
+        ("slip in some", 'Extra key "sped"'),
+        ("slip in live", "No overload variant"),
+        ("value in live", "No overload variant"),
+        ("slip in update", 'Extra key "sped"'),
+        ("slip in del", "incompatible type \"Literal['sped']\""),
+        ("slip in actor", 'Missing key "height"'),
+        ("no plain fact", 'Missing key "speed"'),
+        ("misspelt", 'no attribute "Projectt"; maybe "Project"?'),
+        ("old", 'no attribute "QueryError"'),
     ],
 )
-def test_mypy_refuses_a_context_that_a_query_refuses(tmp_path: Path, right: str, wrong: str, said: str):
-    assert right in CONTEXT
-    table, context = compiled(SCHEMA), CONTEXT.replace(right, wrong)
-    with pytest.raises(ContextError):
-        table.query(eval(context))
-    found = judged(tmp_path, stubs_of({"jog": table}), f"context: facts.JogFacts = {context}\n")
-    assert any(said in line for line in found), found
+def test_mypy_refuses_slips(said: dict[str, list[str]], name: str, told: str):
+    assert any(told in line for line in said[name]), said[name]
+
+
+def test_a_table_without_roles_has_no_types_of_actors():
+    names = {name for name in names_in(stubs_of({"jog": compiled({"n": SCHEMA["n"]})})) if name.startswith("Jog")}
+    assert names == {"JogFacts", "JogSomeFacts", "JogFact", "JogLive"}
 
 
 def test_bounds_units_and_descriptions_stand_behind_the_facts_on_one_line():
     lines = stubs_of({"jog": compiled(SCHEMA)}).splitlines()
-    assert "        'speed': float,  # 0..9.5 m/s" in lines
-    assert "        'n': int,  # -3.." in lines
-    assert "        'heading': float,  # degrees" in lines
-    assert "        'ok': bool,  # two\\nlines # and more" in lines
+    assert "        'speed': AnyNumber,  # 0..9.5 m/s" in lines
+    assert "        'n': AnyWhole,  # -3.." in lines
+    assert "        'heading': AnyNumber,  # degrees" in lines
+    assert "        'ok': bool | np.bool,  # two\\nlines # and more" in lines
 
 
 def test_a_table_needs_the_facts_that_a_derived_one_is_computed_from():
@@ -102,27 +238,14 @@ def test_a_table_needs_the_facts_that_a_derived_one_is_computed_from():
 def test_a_condition_of_several_tables_has_one_type():
     state = {"state": SCHEMA["state"]}
     text = stubs_of({"jog": compiled(state), "run": compiled(state, "run")})
-    assert text.count("Literal[\n") == 1
+    assert text.count("TypeAlias = Literal[\n") == 1
     assert get_args(names_in(text)["State"]) == ("Ground", "Half Air")
 
 
-def test_names_that_are_none_in_python_or_stand_twice_are_made_so(tmp_path: Path):
-    values = {"type": "enum", "values": ["a'b\"", "x\ny", "Größe", "\\"]}
-    schema = {
-        name: values | {"description": name} for name in ("class", "Class", "a.b", "a b", "3", "…", "None", "Literal", "ﬁ", "fi")
-    }
-    tables = {name: compiled(schema, name) for name in ("jog", "Jog", "jog facts", "-", "2 tables", "表")}
-    text = stubs_of(tables)
-    assert judged(tmp_path, text) == []
-    assert get_type_hints(names_in(text)["JogFacts"]).keys() == schema.keys()
+def test_names_that_are_none_in_python_or_stand_twice_are_made_so():
+    hints = get_type_hints(names_in(stubs_of(ODD))["JogFacts"])
+    assert list(hints) == list(ODD_NAMES)
 
 
-def test_the_sample_tables_have_stubs_that_mypy_accepts(tmp_path: Path):
-    tables = Project.load(ROOT / "tables").compile()
-    text = stubs_of(tables)
-    assert judged(tmp_path, text) == []
-    assert text == stubs_of(Project.load(ROOT / "tables").compile())
-
-
-def test_a_table_without_conditions_asks_for_no_facts(tmp_path: Path):
-    assert judged(tmp_path, stubs_of({"jog": compiled({})}), "context: facts.JogFacts = {}\n") == []
+def test_the_types_of_the_sample_tables_are_the_same_every_time():
+    assert stubs_of(SAMPLES) == stubs_of(Project.load(ROOT / "tables").compile())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -60,16 +59,23 @@ def require_number(value: object, what: str) -> float:
 
 def require_real(value: object, what: str, least: float = -MOST, most: float = MOST) -> float:
     """A number between two bounds, of numpy's too."""
-    if isinstance(value, Real) and not isinstance(value, bool) and least <= value <= most:  # type: ignore[operator]
-        return float(value)
+    is_number = type(value) is float or (isinstance(value, Real) and not isinstance(value, bool))
+    if is_number and least <= value <= most:  # type: ignore[operator]
+        return float(value)  # type: ignore[arg-type]
     raise _wrong(value, what, f"a number from {least:g} to {most:g}")
 
 
-def require_pair(value: object, kind: type, what: str, accepted: str) -> None:
-    """Raise ContextError for what is no pair of things of a type; numbers are finite."""
-    pair = value if isinstance(value, (tuple, list)) else ()
-    is_whole = len(pair) == 2 and all(isinstance(each, kind) for each in pair)
-    if not is_whole or (kind is Real and not all(math.isfinite(each) for each in pair)):
+def require_point(value: object, what: str, accepted: str) -> None:
+    """Raise ContextError for what is no pair of finite numbers."""
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise _wrong(value, what, accepted)
+    for each in value:
+        require_real(each, f"one of {what}")
+
+
+def require_pair(value: object, what: str, accepted: str) -> None:
+    """Raise ContextError for what is no pair of texts."""
+    if not (isinstance(value, (tuple, list)) and len(value) == 2 and all(isinstance(each, str) for each in value)):
         raise _wrong(value, what, accepted)
 
 

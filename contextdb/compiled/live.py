@@ -303,7 +303,7 @@ class LiveContext(MutableMapping[str, object]):
         return self._answer
 
     def pick(self, rng: Rng | int | None = None, last: str | None = None) -> str | None:
-        """One asset by the table's policy for the facts as they are now; see `CompiledTable.pick`."""
+        """One asset by the table's policy for the facts as they are now; takes and raises what `CompiledTable.pick` does."""
         return pick(self._compiled, self.matches(), rng, last)
 
     def explain(self) -> Explanation:

@@ -518,7 +518,7 @@ def minus(rows: Bits, others: Bits) -> Bits:
 
 def _costs_of_both(first: Matches, second: Matches) -> NDArray[np.float64]:
     """What the soft cells of each row cost in the first answer, and of those that only the second holds in that."""
-    return np.where(second.flags & ~first.flags, second.penalties, first.penalties)
+    return np.where(second.flags & ~first.flags, second.layered_penalties, first.layered_penalties)
 
 
 def _slots(matches: Matches) -> dict[str, Any]:

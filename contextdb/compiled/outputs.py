@@ -59,7 +59,7 @@ class Outputs(Unchanging):
 
     def column(self, name: str) -> Column:
         """The output of every row, read-only: bool, int64 or float64 [n_rows], for `numbers` float64 [n_rows, size], for enum and
-        text an array of str."""
+        text an array of str. Raises NoSuchOutput for a name that no output has."""
         return self._values(name)[:-1]
 
     def of(self, rows: ArrayLike, name: str) -> Column:
@@ -99,7 +99,8 @@ class Outputs(Unchanging):
         return read_only(np.asarray(values[rows], values.dtype))
 
     def of_row(self, row: int) -> dict[str, OutputValue]:
-        """All outputs of a row as Python has them: bool, int, float, str, and for `numbers` a tuple of float."""
+        """All outputs of a row as Python has them: bool, int, float, str, and for `numbers` a tuple of float. Raises
+        NoSuchPlace for a row that the table does not have."""
         if self.cells:
             require_row(row, len(self._values(self.names[0])) - 1)
         return self._of(row)

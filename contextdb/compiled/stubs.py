@@ -1,7 +1,8 @@
 """Facts and outputs of compiled tables as Python types, so that an editor completes names and values and a type checker knows them.
 
-For each table a TypedDict of the facts that it asks for, and where it has outputs one of those of a row; for each condition and
-output with declared values a Literal of them. The text is a module that imports typing alone. Nothing here touches the disk.
+For each table a TypedDict of the facts that it asks for, those of `stub_contexts`, and where it has outputs one of those of a row;
+for each condition and output with declared values a Literal of them. The text is a module that imports typing, numpy and contextdb.
+Nothing here touches the disk.
 """
 
 from __future__ import annotations
@@ -18,14 +19,22 @@ from contextdb.cells.domains import Domain
 from contextdb.cells.outputs import Output
 from contextdb.cells.words import format_number
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.stub_contexts import NUMBERS, accepted, contexts_of
 from contextdb.errors import shown
 
 _HEAD = '''"""The facts that each table asks for, as types. Written by `contextdb compile --stubs`: do not edit."""
 
 from __future__ import annotations
 
-{imports}from typing import Literal, TypeAlias, TypedDict
-'''
+{imports}from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NotRequired, Protocol, TypeAlias, TypedDict, overload
+
+import contextdb as cdb
+import numpy as np
+{numbers}'''
+_TAKEN = (
+    "Any AnyNumber AnyWhole Literal Mapping NotRequired Protocol Sequence TypeAlias TypedDict annotations cdb datetime np overload"
+)
 
 
 _OUTPUTS = {"bool": "bool", "int": "int", "number": "float", "text": "str", "numbers": "tuple[{}]"}
@@ -43,18 +52,19 @@ def stubs_of(tables: Mapping[str, CompiledData]) -> str:
                 literals[condition] = names.of(condition.name)
                 parts.append(_literal(literals[condition], condition))
         parts.append(_facts(names.of(f"{table.name} facts"), table, literals))
+        parts += contexts_of(table.name, {c.name: _type(c, literals.get(c)) for c in table.asked.values()}, names.of)
         if len(table.outputs):
             parts.append(_outputs(names, table))
     modules = {c.domain.type.annotation.rpartition(".")[0] for table in tables.values() for c in table.asked.values()}
     imports = "".join(f"import {module}\n" for module in sorted(modules - {""}))
-    return _HEAD.format(imports=imports) + "".join(f"\n{part}" for part in parts)
+    return _HEAD.format(imports=imports, numbers=NUMBERS) + "".join(f"\n{part}" for part in parts)
 
 
 @dataclass
 class _Names:
     """Names of types: each is given once."""
 
-    taken: set[str] = field(default_factory=lambda: {"Literal", "TypeAlias", "TypedDict", "annotations"})
+    taken: set[str] = field(default_factory=lambda: set(_TAKEN.split()))
 
     def of(self, text: str) -> str:
         """A name of Python like the text: "Defender.DepthChart" gives DefenderDepthChart."""
@@ -118,7 +128,7 @@ def _type(condition: Condition, literal: str | None) -> str:
     if condition.domain.type.is_tags:
         tag = literal or "str"
         return f"set[{tag}] | frozenset[{tag}] | list[{tag}] | tuple[{tag}, ...]"
-    return literal or condition.domain.type.annotation
+    return accepted(literal or condition.domain.type.annotation, is_tags=False)
 
 
 def _comment(condition: Condition) -> str:

@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.cells.arguments import require_many
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, plural, some
 from contextdb.motion.clips.quaternions import Floats
 
@@ -134,12 +135,13 @@ def currents_of(current: Currents | None, n: int, n_frames: int) -> NDArray[np.i
     """The current frame of each of n searches, -1 for none: int64 [n]."""
     if current is None:
         return np.full(n, -1, np.int64)
+    if not isinstance(current, np.ndarray):
+        current = list(require_many(current, "current", "one frame, or None, a query"))
+    elif current.ndim != 1:
+        raise QueryError(Fault(f"the current frames have shape {current.shape}.", "one for each query"))
     if len(current) != n:
         raise QueryError(Fault(f"{plural(len(current), 'current frame')} for {n} queries.", "one for each query"))
-    if isinstance(current, np.ndarray):
-        are_plain = current.dtype.kind == "i" and current.ndim == 1
-    else:
-        are_plain = set(map(type, current)) <= {int, NoneType}
+    are_plain = current.dtype.kind == "i" if isinstance(current, np.ndarray) else set(map(type, current)) <= {int, NoneType}
     if are_plain:
         frames = np.array([-1 if frame is None else frame for frame in current], np.int64)
         if not n or (frames.min() >= -1 and frames.max() < n_frames):

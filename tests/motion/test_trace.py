@@ -143,7 +143,7 @@ def test_decisions_are_a_sequence_wherever_the_chunks_end(n, tmp_path):
         assert len(each) == n
         assert [decision.tick for decision in each[2:-1]] == list(range(n))[2:-1]
         assert [decision.tick for decision in each.brief()] == list(range(n))
-        with pytest.raises(IndexError, match=f"there is no decision {n}: there are {n}"):
+        with pytest.raises(IndexError, match=f"there is no decision {n} among {n:,}"):
             each[n]
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from numbers import Real
 from os import PathLike, fspath
 from typing import Literal, TextIO, get_args
 
@@ -185,6 +186,11 @@ def _no_text(found: str, line: int, file: str) -> ClipError:
 def _faults(clip: Clip) -> Iterable[Fault]:
     """What is wrong with a clip made in Python, or with the unit and axis given for a file."""
     unit = clip.metres_per_unit
+    require_kind(clip.skeleton, Skeleton, "skeleton", "a Skeleton")
+    require_kind(clip.values, np.ndarray, "values", "a float64 array, frames x channels")
+    require_kind(unit, Real, "metres_per_unit", "a number above 0")
+    require_kind(clip.frame_time_s, Real, "frame_time_s", "a number above 0")
+    require_text(clip.name, "name")
     if not math.isfinite(unit) or unit <= 0.0:
         yield Fault(f"metres_per_unit is {unit!r}.", "a number above 0, such as 0.01 for centimetres")
     if clip.up not in UPS:

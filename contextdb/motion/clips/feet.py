@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.arguments import require_kind, require_number, require_pair
+from contextdb.cells.arguments import require_kind, require_number, require_pair, require_text
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.poses import Poses, poses_of
@@ -74,7 +74,7 @@ class Footfalls:
         return times[(times > 0.0) & (times < self.duration_s)]
 
     def _of(self, foot: str) -> Floats:
-        if foot not in self.down:
+        if require_text(foot, "foot") not in self.down:
             near = nearest(foot, self.feet)
             raise MotionError(Fault(f"there is no foot {in_quotes(foot)}.", some(self.feet), in_quotes(near) if near else ""))
         return self.down[foot]
@@ -102,7 +102,7 @@ def footfalls(clip: Clip, feet: tuple[str, str] | None = None, *, slowest_mps: f
     """
     require_kind(clip, Clip, "clip", "a Clip")
     if feet is not None:
-        require_pair(feet, str, "feet", "the names of two bones, left and right")
+        require_pair(feet, "feet", "the names of two bones, left and right")
     slowest_mps, highest_m = require_number(slowest_mps, "slowest_mps"), require_number(highest_m, "highest_m")
     bones = feet_of(clip.skeleton) if feet is None else feet
     return footfalls_of(poses_of(clip), bones, slowest_mps=slowest_mps, highest_m=highest_m)

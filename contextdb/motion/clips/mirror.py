@@ -97,7 +97,7 @@ def partners_of(skeleton: Skeleton, pairs: Pairs) -> Ints:
     faults: list[Fault] = []
     partners = np.arange(skeleton.n_joints)
     for pair in require_many(pairs, "pairs", accepted):
-        require_pair(pair, str, "one of pairs", accepted)
+        require_pair(pair, "one of pairs", accepted)
         for left, right in _named_by(pair, skeleton, faults):
             taken = [bone for bone in (left, right) if partners[skeleton.index(bone)] != skeleton.index(bone)]
             faults += [Fault(f"mirror: the bone {in_quotes(bone)} is in two pairs.", "each bone in one pair") for bone in taken]

@@ -13,12 +13,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from numbers import Real
 from typing import TypeVar
 
 import numpy as np
 
-from contextdb.cells.arguments import require_many_of, require_pair, require_real
+from contextdb.cells.arguments import require_many_of, require_point, require_real
 from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
@@ -62,7 +61,17 @@ class Steered:
                 raise MotionError(Fault(f"{name} is {getattr(self, name)!r}.", "seconds above 0, such as 0.27"))
 
     def moved(self, dt_s: float, wanted: Ground, facing: float | None = None) -> Steered:
-        """The body some seconds later, when the stick asks for a velocity and a heading; by default, to face where it goes."""
+        """The body some seconds later, when the stick asks for a velocity and a heading; by default, to face where it goes.
+
+        Raises ContextError where `wanted` is no pair of numbers, or another argument no number.
+        """
+        require_real(dt_s, "dt_s", 0.0)
+        require_point(wanted, "wanted", "two numbers, x and z in metres a second")
+        if facing is not None:
+            require_real(facing, "facing")
+        return self._moved(dt_s, wanted, facing)
+
+    def _moved(self, dt_s: float, wanted: Ground, facing: float | None) -> Steered:
         x, z = (self._along(axis, dt_s, wanted[axis]) for axis in (0, 1))
         heading, turn_rate = self._turned(dt_s, self._facing(wanted) if facing is None else facing)
         return replace(
@@ -136,11 +145,11 @@ def steered_path(
     accepted = "a list of Steered, the body at its last moments"
     if not require_many_of(past, Steered, "past", accepted):
         raise MotionError(Fault("there is no body to steer.", "its last moments, at least the present one"))
-    require_pair(wanted, Real, "wanted", "two numbers, x and z in metres a second")
+    require_point(wanted, "wanted", "two numbers, x and z in metres a second")
     if facing is not None:
         require_real(facing, "facing")
     rate, reach_s = require_real(rate, "rate", LEAST_RATE, MOST_RATE), require_real(reach_s, "reach_s", 0.0, MOST_REACH_S)
-    future = [past[-1].moved(i / rate, wanted, facing) for i in range(1, math.ceil(reach_s * rate) + 1)]
+    future = [past[-1]._moved(i / rate, wanted, facing) for i in range(1, math.ceil(reach_s * rate) + 1)]
     bodies = [*past, *future]
     headings: Floats = np.unwrap([body.heading for body in bodies])
     return Trajectory(rate, np.array([body.position for body in bodies]), headings, len(past) - 1)

@@ -96,7 +96,7 @@ def root_trajectory(
     """
     require_kind(poses, Poses, "poses", "Poses")
     if facing is not None:
-        require_pair(facing, str, "facing", "the names of two bones, left and right")
+        require_pair(facing, "facing", "the names of two bones, left and right")
     if root is not None:
         require_text(root, "root")
     require_real(facing_smooth_s, "facing_smooth_s", 0.0, MOST_SMOOTH_S)

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, some
 from contextdb.motion.clips.mirror import Pairs, pattern_fault
 from contextdb.motion.clips.poses import Poses
@@ -125,6 +126,8 @@ class FeatureSchema:
             twice, or weights that are all zero.
         """
         faults: list[Fault] = []
+        require_text(name, "name")
+        require_mapping(mapping, "mapping", 'a mapping such as {"rate": 30, "channels": [...]}')
         schema = _read_schema(cls, name, mapping, faults, file)
         if faults:
             raise SchemaError(*faults)

@@ -26,7 +26,7 @@ from os import PathLike
 from pathlib import Path
 
 from contextdb import disk
-from contextdb.cells.arguments import require_path
+from contextdb.cells.arguments import require_many, require_path, require_text
 from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural
 from contextdb.motion.clips.bvh_words import number_fault
 from contextdb.motion.markup import file as markup_file
@@ -61,7 +61,7 @@ class Markup:
     file: str | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "spans", tuple(self.spans))
+        object.__setattr__(self, "spans", tuple(require_many(self.spans, "spans", "a list of Span")))
         if not all(isinstance(span, Span) for span in self.spans):
             raise MotionError(Fault("the spans are not a list of spans.", "a Span each"))
         _refuse(_span_faults(self.spans, self.file, {}))
@@ -83,7 +83,7 @@ class Markup:
     @classmethod
     def parse(cls, text: str, file: str | None = None) -> Markup:
         """The markup of a text; `file` is its name in messages. A header alone is no markup, and no fault."""
-        rows = markup_file.rows_of(text, file)
+        rows = markup_file.rows_of(require_text(text, "text"), file)
         read = [_span_of(row) for row in rows.rows]
         spans = tuple(span for span, _ in read)
         by_span = {i: wrong for i, (_, wrong) in enumerate(read) if wrong}

@@ -23,6 +23,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contextdb.cells.arguments import require_kind
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes
 from contextdb.motion.arguments import Valid
 from contextdb.motion.clips.quaternions import Floats
@@ -155,6 +156,7 @@ class MatchNode:
     def __init__(
         self, database: MotionDatabase, *, position_weight: float = 1.0, rotation_weight: float = 1.0, rate: float | None = None
     ) -> None:
+        require_kind(database, MotionDatabase, "database", "a MotionDatabase")
         self.database = database
         self.rate = _rate_of(database, rate)
         self.position_weight = _weight(position_weight, "position_weight")

@@ -22,7 +22,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_number, require_text
+from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_number, require_text, require_whole
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, plural, some
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
@@ -420,13 +420,14 @@ class MotionDatabase(Searched):
 
     def range_of(self, frame: int) -> int:
         """The range that holds a frame, or -1 for a frame between ranges."""
-        return self.layout.range_of(frame)
+        return self.layout.range_of(require_whole(frame, "frame"))
 
     def with_weights(self, weights: Mapping[str, float]) -> MotionDatabase:
         """The same database with some channels weighed otherwise; nothing is rebuilt, the features are shared."""
         changed = self.weights.copy()
-        for name, weight in weights.items():
-            if name not in self.channel_names:
+        for name, weight in require_mapping(weights, "weights", "a mapping of channels to weights").items():
+            require_kind(weight, Real, "one of weights", "a number, 0 or more")
+            if require_text(name, "one of weights") not in self.channel_names:
                 near = nearest(name, self.channel_names)
                 found = f"there is no channel {in_quotes(name)}."
                 raise MotionError(Fault(found, some(self.channel_names), in_quotes(near) if near else ""))

@@ -18,11 +18,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_many_of
+from contextdb.cells.arguments import require_kind, require_many_of, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
 from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
@@ -274,6 +275,9 @@ def _check_entries(entries: Sequence[Entry]) -> None:
     if not names:
         raise MotionError(Fault("the selector has no database.", "at least one Entry"))
     for entry in entries:
+        require_text(entry.name, "the name of an Entry")
+        require_kind(entry.database, (MotionDatabase, type(None)), "the database of an Entry", "a MotionDatabase, or None")
+        require_kind(entry.threshold, (Real, type(None)), "the threshold of an Entry", "a number, or None")
         if names.count(entry.name) > 1:
             raise MotionError(Fault(f"the database {in_quotes(entry.name)} appears twice in the selector.", "each once"))
         if entry.threshold is not None and math.isnan(entry.threshold):

@@ -12,6 +12,7 @@ import math
 import random
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import TypeAlias
 
 import numpy as np
@@ -43,7 +44,7 @@ class Variation:
     memory: int = 1
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.within) and self.within >= 0.0):
+        if not isinstance(self.within, Real) or not (math.isfinite(self.within) and self.within >= 0.0):
             raise MotionError(Fault(f"variation within {self.within!r} of the best cost.", "a cost, 0 or more, such as 0.05"))
         if not isinstance(self.memory, int) or self.memory < 0:
             raise MotionError(Fault(f"variation with a memory of {self.memory!r}.", "a whole number of assets, 0 or more"))

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
+from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, some
 from contextdb.motion.clips import clip as clips
 from contextdb.motion.clips.clip import Clip
@@ -79,6 +80,7 @@ class MotionConfig:
             With every fault of all sections.
         """
         faults: list[Fault] = []
+        require_mapping(mapping, "mapping", 'a mapping such as {"features": {...}, "databases": {...}}')
         parts = {section: _named_parts(mapping, section, faults, file) for section in SECTIONS}
         schemas = dict(_read_schemas(parts["features"], faults, file))
         databases = {
@@ -155,7 +157,7 @@ class ControllerOptions(TypedDict, total=False):
 
 def _known(section: str, name: str, parts: Mapping[str, Part], file: str | None) -> Part:
     """The part of a name, or a SchemaError with the nearest name."""
-    if name not in parts:
+    if require_text(name, "name") not in parts:
         near = nearest(name, parts)
         found = f"there is no [{section}.{name}]."
         raise SchemaError(Fault(found, some(parts), in_quotes(near) if near else "", Place(file)))

@@ -24,10 +24,9 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
-from contextdb.cells.arguments import require_path
+from contextdb.cells.arguments import require_kind, require_mapping, require_path, require_place, require_text
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ArtefactError, Fault, MotionError, Place, in_quotes, plural
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
@@ -74,6 +73,11 @@ class Trace(Sequence[Decision]):
         for what, number, least in (("n_candidates", n_candidates, 0), ("most", most, 1)):
             if isinstance(number, bool) or not isinstance(number, int) or number < least:
                 raise MotionError(Fault(f"{what} is {number!r}.", f"a whole number, {least} or more"))
+        for name, each in require_mapping(
+            {} if databases is None else databases, "databases", "a mapping of names to databases"
+        ).items():
+            require_text(name, "one of databases")
+            require_kind(each, MotionDatabase, "one of databases", "a MotionDatabase")
         self.n_candidates, self.most, self.n_forgotten = n_candidates, most, 0
         self.about: Mapping[str, Mapping[str, object]] = {name: _about(each) for name, each in (databases or {}).items()}
         self._databases = dict(databases or {})
@@ -83,7 +87,8 @@ class Trace(Sequence[Decision]):
         self._file = ""
 
     def record(self, decision: Decision) -> None:
-        """Keep a decision."""
+        """Keep a decision; raises ContextError for what is none."""
+        require_kind(decision, Decision, "decision", "a Decision")
         packed = _packed(row_of(decision, self._events_of))
         self.n_forgotten += len(self._rows) == self.most
         self._rows.append(packed)
@@ -125,7 +130,7 @@ class Trace(Sequence[Decision]):
         FileError
             The disk refuses; the old file is then whole.
         """
-        write_atomic(Path(path), self.to_bytes(timings=timings))
+        write_atomic(require_path(path), self.to_bytes(timings=timings))
 
     def to_bytes(self, *, timings: bool = True) -> bytes:
         """The bytes of the file that `save` writes."""
@@ -158,6 +163,7 @@ class Trace(Sequence[Decision]):
     @classmethod
     def from_bytes(cls, raw: bytes, file: str = "") -> Trace:
         """Read the bytes of a saved session; `file` is its name in messages."""
+        require_kind(raw, bytes, "raw", "the bytes of a saved session")
         trace = cls()
         trace._loaded, trace.about = _read(raw, file)
         trace._file = file
@@ -184,10 +190,7 @@ class Trace(Sequence[Decision]):
         return told
 
     def _place(self, index: int) -> int:
-        place = index + len(self) if index < 0 else index
-        if not 0 <= place < len(self):
-            raise IndexError(f"there is no decision {index}: there are {len(self)}")
-        return place
+        return require_place(index, len(self), "decision")
 
     def _decision(self, place: int) -> Decision:
         return self._decision_of(self._row(place), place)

@@ -1,0 +1,87 @@
+"""The types of contexts that do not hold every fact: some facts, those next to actors, the actors, and a context that is kept.
+
+For a table "jog" of the facts "speed" and "Defender.height":
+
+    JogSomeFacts          some of the facts, or None for a missing one: for unknown="any" and "never", and for `live.update`
+    JogFact               a Literal of their names
+    JogLive               a live context: `live: JogLive = compiled.live()`; its names and values are checked
+    JogFactsWithActors    "speed", and "Defender.height" only where the game gives it itself
+    JogDefenderActor      "height", of an actor who is offered as Defender
+    JogActors             what `actors=` accepts
+
+The last three are written for tables with roles alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+from contextdb.compiled.casting.roles import role_of
+from contextdb.errors import shown
+
+NUMBERS = """
+AnyNumber: TypeAlias = float | np.floating[Any] | np.integer[Any] | cdb.FactSet
+AnyWhole: TypeAlias = int | np.integer[Any] | cdb.FactSet
+"""
+WIDER = {"float": "AnyNumber", "int": "AnyWhole", "bool": "bool | np.bool"}
+"""What is accepted where the annotation of a type says less. A bool has no set of values besides Any."""
+OF_ACTORS = {"id": "NotRequired[object]", "name": "NotRequired[str]"}
+
+NameOf = Callable[[str], str]
+
+
+def accepted(annotation: str, is_tags: bool) -> str:
+    """The type of a fact: its values, numpy's too, and for other types than bool and tags a set of them, `cdb.cell(...)`."""
+    if is_tags or annotation == "bool":
+        return WIDER.get(annotation, annotation)
+    return WIDER.get(annotation) or f"{annotation} | cdb.FactSet"
+
+
+def contexts_of(table: str, facts: Mapping[str, str], name_of: NameOf) -> Iterator[str]:
+    """The types of a table's contexts; `facts` are the types of its facts by name."""
+    some = name_of(f"{table} some facts")
+    yield typed_dict(some, f"table {table}, some facts", {name: f"{kind} | None" for name, kind in facts.items()}, is_total=False)
+    roles = dict.fromkeys(role_of(name) for name in facts if role_of(name))
+    actors = name_of(f"{table} actors") if roles else ""
+    if roles:
+        besides = {name: f"NotRequired[{kind}]" if role_of(name) else kind for name, kind in facts.items()}
+        yield typed_dict(name_of(f"{table} facts with actors"), f"table {table}, where actors are given", besides)
+        of_role = {role: name_of(f"{table} {role} actor") for role in roles}
+        for role, name in of_role.items():
+            own = {fact.partition(".")[2]: kind for fact, kind in facts.items() if role_of(fact) == role}
+            yield typed_dict(name, f"table {table}, an actor who is offered as {role}", {**OF_ACTORS, **own})
+        yield f"{actors}: TypeAlias = Mapping[str, Sequence[{' | '.join(of_role.values())}]]\n"
+    yield from _live(table, facts, name_of, some, actors)
+
+
+def typed_dict(name: str, comment: str, fields: Mapping[str, str], is_total: bool = True) -> str:
+    """A TypedDict with keys that need not be names of Python."""
+    lines = "".join(f"        {key!r}: {kind},\n" for key, kind in fields.items())
+    total = "" if is_total else "    total=False,\n"
+    return f"# {shown(comment, 200)}\n{name} = TypedDict(\n    {name!r},\n    {{\n{lines}    }},\n{total})\n"
+
+
+def _live(table: str, facts: Mapping[str, str], name_of: NameOf, some: str, actors: str) -> Iterator[str]:
+    name = name_of(f"{table} live")
+    lines = [f"class {name}(Protocol):"]
+    if facts:
+        fact = name_of(f"{table} fact")
+        yield f"# table {shown(table, 200)}, the names of its facts\n{fact}: TypeAlias = Literal[{_listed(facts)}]\n"
+        kinds = list(dict.fromkeys(facts.values()))
+        for kind in kinds:
+            lines += ["    @overload"] if len(kinds) > 1 else []
+            named = _listed(own for own in facts if facts[own] == kind)
+            lines.append(f"    def __setitem__(self, name: Literal[{named}], value: {kind} | None, /) -> None: ...")
+        lines.append(f"    def __getitem__(self, name: {fact}, /) -> object: ...")
+        lines.append(f"    def __delitem__(self, name: {fact}, /) -> None: ...")
+    lines.append(f"    def update(self, facts: {some}, /) -> None: ...")
+    if actors:
+        lines.append(f"    def actors(self, actors: {actors} | None, *, prefer: cdb.Prefer = None) -> None: ...")
+    lines.append("    def matches(self) -> cdb.Matches: ...")
+    lines.append(f"    def copy(self) -> {name}: ...")
+    lines += ["    @property", "    def facts(self) -> dict[str, object]: ..."]
+    yield f"# table {shown(table, 200)}, a live context\n" + "\n".join(lines) + "\n"
+
+
+def _listed(names: Mapping[str, str] | Iterator[str]) -> str:
+    return ", ".join(map(repr, names))

@@ -113,6 +113,13 @@ def test_a_weight_turned_to_zero_hides_no_frame_from_many_at_the_ends_of_float32
 
 
 @engines
+def test_frames_without_features_cost_nothing_and_the_lowest_that_may_play_wins(engine):
+    database = by(engine, MotionDatabase.from_features(np.zeros((40, 0)), [0, 20], [20, 40], ["a", "b"]))
+    hits = database.search_many(np.zeros((2, 0)), [None, np.array([False, True])])
+    assert [(hit.frame, hit.cost) for hit in hits] == [(0, 0.0), (20, 0.0)]
+
+
+@engines
 def test_one_query_that_is_no_number_is_named_and_nobody_is_answered(engine):
     database = by(engine, MotionDatabase.from_features(np.arange(4.0)[:, None], [0], [4], ["a"]))
     with pytest.raises(QueryError, match='"feature 0" is nan'):

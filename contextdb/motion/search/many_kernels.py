@@ -2,8 +2,8 @@
 `contextdb.motion.search.kernels`, which is where each step is explained.
 
 Q queries, M = 1 or Q masks, P = 1 or Q rows of range biases. The frames are gone through once: each cluster of boxes is compared
-with all queries of a block before the next cluster is read, so that what is read stays in the processor's cache. Costs are computed,
-and ties decided, as for a query alone: the answer is the same to the last bit.
+with all queries of a block before the next cluster is read, so that it stays in the processor's cache. Costs are computed, and ties
+decided, as for a query alone: the answer is the same to the last bit.
 """
 
 from __future__ import annotations
@@ -229,12 +229,12 @@ def search_block(
                     limit = _limit(_budget(bests[own], least_of_box), sizes[i], n_features)
                     if totals[lane] > limit:
                         continue
-                    passing = _passing(blocks, box, narrow[i], narrow_weights, n_features, frame_totals, limit)
+                    passing = _passing(blocks, box, narrow[i], narrow_weights, n_features, frame_totals, limit) & ((1 << count) - 1)
                     lane = _least_lane(passing, frame_totals) if passing else 0
                     while passing:
                         passing &= ~(1 << lane)
                         frame = box_start + lane
-                        is_free = lane < count and frame != playing[i] and not frame_totals[lane] > limit
+                        is_free = frame != playing[i] and not frame_totals[lane] > limit
                         if is_free and flags.shape[0]:
                             is_free = flags[frame]
                         kind = kinds[frame] if is_free and kinds.shape[0] else 0

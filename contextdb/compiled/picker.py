@@ -228,7 +228,8 @@ class Picker:
     def forget(self, who: int | Sequence[int] | NDArray[np.integer[Any]] | None = None) -> None:
         """Forget what all characters picked, or some: nothing rests, and nothing was picked lately. Their chance goes on.
 
-        Raises ContextError for what is no number of a character."""
+        Raises ContextError for what is no number of a character.
+        """
         if who is None:
             self._picked.forget(slice(None))
             return

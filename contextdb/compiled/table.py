@@ -175,7 +175,8 @@ class CompiledTable(CompiledData):
         """What each row's soft cells cost in a search: float64 [n_rows], the sum of the penalties of those that do not match.
 
         A soft cell whose fact is missing costs nothing with unknown="any", its penalty with "never". A set-valued fact costs
-        nothing where some value of the set matches. With actors a row costs what it does with its best casting. Raises what `query` raises.
+        nothing where some value of the set matches. With actors a row costs what it does with its best casting.
+        Raises what `query` raises.
         """
         if old:
             return self.penalties(context, **by_name("penalties", old, unknown=unknown, actors=actors, prefer=prefer))

@@ -103,6 +103,8 @@ def are_finite(values: Floats) -> bool:
 
 def frame_of(frame: object, n_frames: int, what: str) -> int:
     """A frame's number, checked."""
+    if type(frame) is int and 0 <= frame < n_frames:  # the usual one, spared the abstract class
+        return frame
     if isinstance(frame, bool) or not isinstance(frame, numbers.Integral) or not 0 <= int(frame) < n_frames:
         accepted = f"a whole number from 0 to {n_frames - 1}" if n_frames else "none: the database has no frames"
         raise QueryError(Fault(f"the {what} is {frame!r}.", accepted))
@@ -113,6 +115,8 @@ def current_of(current: object, n_frames: int) -> int:
     """The current frame, -1 for none: None, or -1, the frame of a miss."""
     if current is None or (type(current) is int and current == -1):
         return -1
+    if type(current) is int:
+        return frame_of(current, n_frames, "current frame")
     is_none = isinstance(current, numbers.Integral) and not isinstance(current, bool) and current == -1
     return -1 if is_none else frame_of(current, n_frames, "current frame")
 

@@ -33,6 +33,7 @@ DATABASE = motion.MotionDatabase.from_features(np.eye(4, 2), [0, 2], [2, 4], ["a
 SELECTOR = motion.Selector([motion.Entry("only", DATABASE)])
 QUERY = [0.0, 1.0]
 STEERED = [motion.Steered()]
+MANY_STEERED = motion.ManySteered.of(STEERED)
 CONFIG = motion.MotionConfig()
 FALLS = motion.footfalls(CLIP)
 NODE = motion.MatchNode(motion.MotionDatabase.build([CLIP], SCHEMA))
@@ -92,6 +93,16 @@ CALLS: dict[str, Call] = {
     "steered_path(wanted)": lambda x: motion.steered_path(STEERED, x),
     "steered_path(facing)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), x),
     "steered_path(reach_s)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), reach_s=x),
+    "steered_paths(past)": lambda x: motion.steered_paths(x, [(0.0, 1.0)]),
+    "steered_paths(past), one": lambda x: motion.steered_paths([x], [(0.0, 1.0)]),
+    "steered_paths(wanted)": lambda x: motion.steered_paths([MANY_STEERED], x),
+    "steered_paths(facing)": lambda x: motion.steered_paths([MANY_STEERED], [(0.0, 1.0)], x),
+    "steered_paths(reach_s)": lambda x: motion.steered_paths([MANY_STEERED], [(0.0, 1.0)], reach_s=x),
+    "steered_paths(rate)": lambda x: motion.steered_paths([MANY_STEERED], [(0.0, 1.0)], rate=x),
+    "with_paths(schema)": lambda x: motion.with_paths(x, PARTS[0].features[:1], [PATH]),
+    "with_paths(queries)": lambda x: motion.with_paths(SCHEMA, x, [PATH]),
+    "with_paths(wanted)": lambda x: motion.with_paths(SCHEMA, PARTS[0].features[:1], x),
+    "with_paths(wanted), one": lambda x: motion.with_paths(SCHEMA, PARTS[0].features[:1], [x]),
     "steered_path(rate)": lambda x: motion.steered_path(STEERED, (0.0, 1.0), rate=x),
     "build(config)": lambda x: motion.build(x, "none"),
     "build(folder)": lambda x: motion.build(CONFIG, x),
@@ -195,6 +206,18 @@ CALLS: dict[str, Call] = {
     "MotionConfig.controller()": lambda x: CONFIG.controller(x, {}),
     "Footfalls.is_down(foot)": lambda x: FALLS.is_down(x, 0.1),
     "MotionDatabase.channel_costs()": lambda x: DATABASE.channel_costs(x, QUERY),
+    "MotionDatabase.raw_many(frames)": lambda x: DATABASE.raw_many(x),
+    "MotionDatabase.raw_many(frames), one": lambda x: DATABASE.raw_many([x]),
+    "Selector.search_many(queries)": lambda x: SELECTOR.search_many(x),
+    "Selector.search_many(valid)": lambda x: SELECTOR.search_many([QUERY], x),
+    "Selector.search_many(current)": lambda x: SELECTOR.search_many([QUERY], current=x),
+    "Selector.search_many(tags)": lambda x: SELECTOR.search_many([QUERY], tags=x),
+    "ControllerGroup(controllers)": lambda x: motion.ControllerGroup(x),
+    "ControllerGroup(controllers), one": lambda x: motion.ControllerGroup([x]),
+    "ManySteered.of(bodies)": lambda x: motion.ManySteered.of(x),
+    "ManySteered.of(bodies), one": lambda x: motion.ManySteered.of([x]),
+    "ManySteered.moved(dt_s)": lambda x: MANY_STEERED.moved(x, [(0.0, 1.0)]),
+    "ManySteered.moved(wanted)": lambda x: MANY_STEERED.moved(0.1, x),
     "MotionDatabase.raw()": lambda x: DATABASE.raw(x),
     "MotionDatabase.range_of()": lambda x: DATABASE.range_of(x),
     "MotionDatabase.frame_at()": lambda x: DATABASE.frame_at(x, 0.1),

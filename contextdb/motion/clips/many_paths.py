@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb.cells.arguments import require_many_of
 from contextdb.errors import Fault, QueryError
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import STANDING_MPS, PathPoints, Trajectory
@@ -52,6 +53,7 @@ class ManyTrajectories:
     @classmethod
     def of(cls, paths: Sequence[Trajectory]) -> ManyTrajectories:
         """Single paths together; they have one rate, one length and one present."""
+        paths = require_many_of(paths, Trajectory, "paths", "a list of Trajectory")
         if not paths:
             return cls(1.0, np.zeros((0, 1, 2)), np.zeros((0, 1)))
         first = paths[0]

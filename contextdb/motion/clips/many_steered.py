@@ -9,10 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contextdb.cells.arguments import require_many_of, require_real
 from contextdb.errors import Fault, MotionError
+from contextdb.motion import arguments
 from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import STANDING_MPS, Steered, moved_along, turned
+from contextdb.motion.clips.trajectory import MOST_REACH_S
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +43,8 @@ class ManySteered:
 
     @classmethod
     def of(cls, bodies: Sequence[Steered]) -> ManySteered:
-        """Single bodies together; `[Steered()] * n` are n at rest."""
+        """Single bodies together; `[Steered()] * n` are n at rest. Raises ContextError for anything else."""
+        bodies = require_many_of(bodies, Steered, "bodies", "a list of Steered")
         pairs = [
             np.array([getattr(b, name) for b in bodies], float).reshape(-1, 2) for name in ("position", "velocity", "acceleration")
         ]
@@ -56,7 +61,8 @@ class ManySteered:
 
     def moved(self, dt_s: float, wanted: ArrayLike, facing: ArrayLike | None = None) -> ManySteered:
         """The bodies some seconds later, when the sticks ask for velocities [Q, 2] and headings [Q]; by default, to face where they
-        go."""
+        go. Raises MotionError for shapes that do not fit, ContextError for what is no number of seconds."""
+        require_real(dt_s, "dt_s", 0.0)
         place, speed, change, heading, turn_rate = self._at(np.array([dt_s]), *self._asked(wanted, facing))
         return replace(
             self,
@@ -82,14 +88,14 @@ class ManySteered:
 
     def _asked(self, wanted: ArrayLike, facing: ArrayLike | None) -> tuple[Floats, Floats]:
         """The velocities and headings that the sticks ask for, checked."""
-        velocities = np.asarray(wanted, np.float64)
+        velocities = arguments.numbers_of(wanted, "wanted")
         if velocities.shape != self.positions.shape:
             found = f"the velocities that are asked for have shape {velocities.shape}."
             raise MotionError(Fault(found, f"{self.positions.shape}, x and z for each body"))
         if facing is None:
             is_going = np.hypot(velocities[:, 0], velocities[:, 1]) >= STANDING_MPS
             return velocities, np.where(is_going, np.arctan2(velocities[:, 0], velocities[:, 1]), self.headings)
-        headings = np.asarray(facing, np.float64)
+        headings = arguments.numbers_of(facing, "facing")
         if headings.shape != self.headings.shape:
             raise MotionError(Fault(f"the facing has shape {headings.shape}.", f"{self.headings.shape}, a heading for each body"))
         return velocities, headings
@@ -112,7 +118,14 @@ def steered_paths(
         Seconds ahead.
     rate : float
         Frames a second.
+
+    Raises
+    ------
+    MotionError
+        There is no moment, the moments are of different numbers of bodies, or an argument cannot be used.
     """
+    past = require_many_of(past, ManySteered, "past", "a list of ManySteered, the last of them now")
+    rate, reach_s = require_real(rate, "rate", LEAST_RATE, MOST_RATE), require_real(reach_s, "reach_s", 0.0, MOST_REACH_S)
     if not past:
         raise MotionError(Fault("there is no body to steer.", "its last moments, at least the present one"))
     present = past[-1]

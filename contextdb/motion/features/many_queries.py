@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contextdb.cells.arguments import require_kind
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
 from contextdb.motion.clips.many_paths import ManyTrajectories
@@ -31,7 +32,13 @@ def with_paths(schema: FeatureSchema, queries: ArrayLike, wanted: ManyTrajectori
     -------
     float32 array, shape (Q, N)
         For `MotionDatabase.search_many`.
+
+    Raises
+    ------
+    QueryError
+        There is not one path for each query, or an argument cannot be used.
     """
+    require_kind(schema, FeatureSchema, "schema", "a FeatureSchema")
     paths = wanted if isinstance(wanted, ManyTrajectories) else ManyTrajectories.of(wanted)
     changed = arguments.array_of(queries, "the queries").astype(np.float32)
     if changed.shape != (len(paths), schema.n_features):

@@ -392,12 +392,14 @@ class MotionDatabase(Searched):
         return dict(zip(self.channel_names, found[:, 0].tolist(), strict=True))
 
     def raw(self, frame: Hit | int) -> Floats:
-        """The features of one frame in the schema's units, as a query has them: float64 [F]."""
+        """The features of one frame in the schema's units, as a query has them: float64 [F]. Raises QueryError for a frame
+        that is in no range."""
         return self.normalisation.undo(self.layout.take(np.array([self._number(frame)]))[0])
 
     def raw_many(self, frames: Sequence[int] | NDArray[np.integer]) -> Floats:
-        """The features of many frames in the schema's units, the poses of a crowd: float64 [Q, F]."""
-        numbers = np.array([self._number(frame) for frame in frames], np.int64)
+        """The features of many frames in the schema's units, the poses of a crowd: float64 [Q, F]. Raises QueryError for a
+        frame that is in no range."""
+        numbers = np.array([self._number(frame) for frame in require_many(frames, "frames", "a list of frames")], np.int64)
         return self.normalisation.undo(self.layout.take(numbers))
 
     def normalised(self, query: ArrayLike) -> Floats:

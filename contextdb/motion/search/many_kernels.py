@@ -1,9 +1,9 @@
 """Numba kernels: the exact search for many queries at once, each with its own mask. Arrays only; shapes as in
 `contextdb.motion.search.kernels`, which is where each step is explained.
 
-Q queries, M = 1 or Q masks, P = 1 or Q rows of range biases. The frames are gone through once: each group of boxes is compared with
-all queries of a block before the next group is read, so that what is read stays in the processor's cache. Costs are computed, and
-ties decided, as for a query alone: the answer is the same to the last bit.
+Q queries, M = 1 or Q masks, P = 1 or Q rows of range biases. The frames are gone through once: each cluster of boxes is compared
+with all queries of a block before the next cluster is read, so that it stays in the processor's cache. Costs are computed, and ties
+decided, as for a query alone: the answer is the same to the last bit.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def search_block(
     )
     totals, frame_totals = np.empty(LANES, np.float32), np.empty(LANES, np.float32)
     sizes, leasts, limits = np.empty(n), np.empty(n), np.empty(n, np.float32)
-    bits, playing, opened = np.zeros((n, n_groups), np.uint16), np.empty(n, np.int64), np.empty(n, np.int64)
+    bits, playing = np.zeros((n, n_groups), np.uint16), np.empty(n, np.int64)
     least_kind = _least_of(kind_biases, 0, kind_biases.shape[0])
     least_frame = _least_of(frame_biases, 0, frame_biases.shape[0]) if frame_biases.shape[0] else 0.0
 
@@ -206,16 +206,13 @@ def search_block(
 
     for cluster in range(cluster_lows.shape[0]):
         for i in range(n):
-            opened[i] = _groups_of(bits[i], cluster)
-            if opened[i]:
-                opened[i] &= _bounded(
-                    cluster_lows, cluster_highs, cluster, narrow[i], narrow_weights, n_features, totals, limits[i]
-                )
-        for group in range(cluster * LANES, min((cluster + 1) * LANES, n_groups)):
-            for i in range(n):
-                if not (opened[i] >> (group % LANES)) & 1:
-                    continue
-                own, biased = start + i, min(start + i, range_biases.shape[0] - 1)
+            groups = _groups_of(bits[i], cluster)
+            if groups:
+                groups &= _bounded(cluster_lows, cluster_highs, cluster, narrow[i], narrow_weights, n_features, totals, limits[i])
+            own, biased = start + i, min(start + i, range_biases.shape[0] - 1)
+            while groups:
+                group = cluster * LANES + lowest(groups)
+                groups &= groups - 1
                 mask = _bounded(lows, highs, group, narrow[i], narrow_weights, n_features, totals, limits[i])
                 mask &= np.int64(bits[i, group])
                 while mask:
@@ -232,12 +229,12 @@ def search_block(
                     limit = _limit(_budget(bests[own], least_of_box), sizes[i], n_features)
                     if totals[lane] > limit:
                         continue
-                    passing = _passing(blocks, box, narrow[i], narrow_weights, n_features, frame_totals, limit)
+                    passing = _passing(blocks, box, narrow[i], narrow_weights, n_features, frame_totals, limit) & ((1 << count) - 1)
                     lane = _least_lane(passing, frame_totals) if passing else 0
                     while passing:
                         passing &= ~(1 << lane)
                         frame = box_start + lane
-                        is_free = lane < count and frame != playing[i] and not frame_totals[lane] > limit
+                        is_free = frame != playing[i] and not frame_totals[lane] > limit
                         if is_free and flags.shape[0]:
                             is_free = flags[frame]
                         kind = kinds[frame] if is_free and kinds.shape[0] else 0

@@ -7,6 +7,7 @@ most the limit. Rounding is the caller's concern: a limit has to be so much high
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -32,11 +33,12 @@ def costs_at_most(typing, blocks, box, query, weights, start, stop, totals, limi
     def generate(context, builder, signature, arguments):
         lanes = _Lanes(context, builder, signature, arguments)
         base = builder.mul(builder.mul(arguments[1], lanes.size(0, 1)), _I64(LANES))
-        total = cgutils.alloca_once_value(builder, lanes.load(6, _I64(0)))
-        with cgutils.for_range_slice(builder, arguments[4], arguments[5], _I64(1), _I64) as (feature, _):
+
+        def apart(feature: Any) -> tuple[Any, Any]:
             values = lanes.load(0, builder.add(base, builder.mul(feature, _I64(LANES))))
-            lanes.add_square(total, lanes.everywhere(3, feature), builder.fsub(values, lanes.everywhere(2, feature)))
-        return lanes.keep(total, 6, arguments[7])
+            return lanes.everywhere(3, feature), builder.fsub(values, lanes.everywhere(2, feature))
+
+        return lanes.keep(lanes.squares(arguments[4], arguments[5], apart, 6), 6, arguments[7])
 
     integer = types.int64
     return integer(blocks, integer, query, weights, integer, integer, totals, types.float32), generate
@@ -52,13 +54,14 @@ def bounds_at_most(typing, lows, highs, group, query, weights, start, stop, tota
     def generate(context, builder, signature, arguments):
         lanes = _Lanes(context, builder, signature, arguments)
         base = builder.mul(builder.mul(arguments[2], lanes.size(0, 1)), _I64(LANES))
-        total = cgutils.alloca_once_value(builder, lanes.load(7, _I64(0)))
-        with cgutils.for_range_slice(builder, arguments[5], arguments[6], _I64(1), _I64) as (feature, _):
+
+        def apart(feature: Any) -> tuple[Any, Any]:
             offset = builder.add(base, builder.mul(feature, _I64(LANES)))
             wanted = lanes.everywhere(3, feature)
             nearest = lanes.less(lanes.greater(wanted, lanes.load(0, offset)), lanes.load(1, offset))
-            lanes.add_square(total, lanes.everywhere(4, feature), builder.fsub(wanted, nearest))
-        return lanes.keep(total, 7, arguments[8])
+            return lanes.everywhere(4, feature), builder.fsub(wanted, nearest)
+
+        return lanes.keep(lanes.squares(arguments[5], arguments[6], apart, 7), 7, arguments[8])
 
     integer = types.int64
     return integer(lows, highs, integer, query, weights, integer, integer, totals, types.float32), generate
@@ -113,6 +116,24 @@ class _Lanes:
     def less(self, left: Any, right: Any) -> Any:
         return self.builder.select(self.builder.fcmp_ordered("<", left, right), left, right)
 
+    def squares(self, start: Any, stop: Any, apart: Callable[[Any], tuple[Any, Any]], array: int) -> Any:
+        """An array's lanes and the weight x values² of features start … stop - 1, which `apart` gives, added up.
+
+        Two sums take turns, so that an addition need not wait for the one before it.
+        """
+        builder = self.builder
+        sums = [
+            cgutils.alloca_once_value(builder, value) for value in (self.load(array, _I64(0)), ir.Constant(_LANES, [0.0] * LANES))
+        ]
+        last = builder.sub(stop, _I64(1))
+        with cgutils.for_range_slice(builder, start, last, _I64(2), _I64) as (feature, _):
+            for i, total in enumerate(sums):
+                self.add_square(total, *apart(builder.add(feature, _I64(i))))
+        is_odd = builder.trunc(builder.sub(stop, start), ir.IntType(1))
+        with builder.if_then(is_odd):
+            self.add_square(sums[0], *apart(last))
+        return builder.fadd(builder.load(sums[0]), builder.load(sums[1]), flags=_ROUNDING)
+
     def add_square(self, total: Any, weight: Any, values: Any) -> None:
         """Add weight x values² to what `total` points to."""
         builder = self.builder
@@ -120,9 +141,8 @@ class _Lanes:
         square = builder.fmul(weighted, values, flags=_ROUNDING)
         builder.store(builder.fadd(builder.load(total), square, flags=_ROUNDING), total)
 
-    def keep(self, total: Any, array: int, limit: Any) -> Any:
-        """Store what `total` points to into an array; gives the mask of its lanes that are at most `limit`."""
-        values = self.builder.load(total)
+    def keep(self, values: Any, array: int, limit: Any) -> Any:
+        """Store lanes into an array; gives the mask of those that are at most `limit`."""
         self.builder.store(values, self.builder.bitcast(self.start(array), _LANES.as_pointer())).align = 4
         passes = self.builder.fcmp_unordered("<=", values, self.spread(limit))  # true of NaN: 0 x inf, where float32 ends
         return self.builder.zext(self.builder.bitcast(passes, ir.IntType(LANES)), _I64)

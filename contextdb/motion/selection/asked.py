@@ -50,10 +50,10 @@ class Asked:
 
     def __post_init__(self) -> None:
         for what in ("bias", "skip", "penalties"):
-            if not isinstance(given := getattr(self, what), (Mapping, NoneType)):
+            if not isinstance(given := getattr(self, what), (NoneType, dict, Mapping)):
                 accepted = f"{'a mapping of assets to costs, or ' if what == 'penalties' else ''}a mapping of databases"
                 raise QueryError(Fault(f"{what} is a {type(given).__name__}.", accepted))
-        if not isinstance(self.tags, (TagFilter, Mapping, NoneType)):
+        if not isinstance(self.tags, (NoneType, TagFilter, Mapping)):
             raise QueryError(Fault(f"tags is a {type(self.tags).__name__}.", "a TagFilter, or a mapping of databases"))
         if not isinstance(self.current, (Choice, NoneType)) and not _is_pair(self.current):
             raise QueryError(Fault(f"what plays now is {self.current!r}.", 'a Choice, or such as ("jog", 120)'))
@@ -61,8 +61,8 @@ class Asked:
     def of(self, name: str) -> dict[str, Any]:
         """What one database is given, by the names of the parameters of `MotionDatabase.search`."""
         return {
-            "valid": self.valid.get(name) if isinstance(self.valid, Mapping) else self.valid,
-            "tags": self.tags.get(name) if isinstance(self.tags, Mapping) else self.tags,
+            "valid": self.valid.get(name) if isinstance(self.valid, (dict, Mapping)) else self.valid,
+            "tags": self.tags if isinstance(self.tags, (NoneType, TagFilter)) else self.tags.get(name),
             "current": self._current_in(name),
             "bias": self.bias.get(name) if self.bias else None,
             "skip": self.skip.get(name, ()) if self.skip else (),
@@ -84,7 +84,7 @@ class Asked:
     def databases(self) -> Iterator[str]:
         """Every name of a database in it, but for those in `among` and `current`."""
         for given in (self.valid, self.tags, self.bias, self.skip):
-            if isinstance(given, Mapping):
+            if given is not None and isinstance(given, (dict, Mapping)):
                 yield from given
         if self.penalties and not _are_of_assets(self.penalties):
             yield from self.penalties

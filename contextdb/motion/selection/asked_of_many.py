@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias, TypeVar, cast
 
+from contextdb.cells.arguments import require_many
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion.arguments import Valid, ValidForMany
 from contextdb.motion.search.database import MotionDatabase
@@ -18,6 +19,8 @@ def each_of(given: Any, n: int, what: str, *, is_one: bool) -> Sequence[Any]:
     """What each of n characters is given: the same, or one of as many as there are characters."""
     if is_one:
         return [given] * n
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        given = list(require_many(given, what, f"one {what} for each character"))
     if len(given) != n:
         raise QueryError(Fault(f"{plural(len(given), what)} for {plural(n, 'character')}.", "one for all, or one for each"))
     return cast("Sequence[Any]", given)

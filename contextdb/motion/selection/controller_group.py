@@ -12,6 +12,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contextdb.cells.arguments import require_many_of
 from contextdb.errors import Fault, MotionError, Place, QueryError, plural
 from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
@@ -42,7 +43,7 @@ class ControllerGroup(Sequence[Controller]):
 
     def __init__(self, controllers: Iterable[Controller] = ()) -> None:
         self._controllers: list[Controller] = []
-        for controller in controllers:
+        for controller in require_many_of(controllers, Controller, "controllers", "a list of Controller"):
             self.add(controller)
 
     def add(self, controller: Controller) -> None:

@@ -165,6 +165,11 @@ class Selector:
             None for a character that plays nothing.
         tags, among, penalties
             As for `search`, one for all.
+
+        Raises
+        ------
+        QueryError
+            As `search`; not one of each for each query.
         """
         wanted = arguments.numbers_of(queries, "the queries")
         if wanted.ndim != 2:

@@ -141,3 +141,22 @@ def _mixed(x: Array) -> Array:
     x = (x ^ (x >> shift)) * np.uint64(0xFF51AFD7ED558CCD)
     x = (x ^ (x >> shift)) * np.uint64(0xC4CEB9FE1A85EC53)
     return np.asarray(x ^ (x >> shift))
+
+
+def drop_inner(part: Part, depth: int, n: int, scratch: Part) -> bool:
+    """Close the boxes that lie within others; see `count_kernels`."""
+    opened, listed = scratch[0][depth], scratch[2]
+    limits, sides, wider = part[1], part[5], part[6]
+    boxes = bitmask.rows(opened)
+    around = np.full((len(boxes), len(opened)), ALL, np.uint64)
+    for factor in listed[depth + 1, :n].tolist():
+        side = sides[factor, boxes]
+        around &= np.where((side < 0)[:, None], ~limits[factor], wider[side])
+    left = was = bitmask.to_int(opened)
+    for box, others in zip(boxes.tolist(), around, strict=True):
+        own = 1 << box
+        if (left & ~own) & bitmask.to_int(others):
+            left &= ~own
+    if left != was:
+        opened[:] = bitmask.from_int(left, 64 * len(opened))
+    return left != was

@@ -145,8 +145,8 @@ def _mixed(x: Array) -> Array:
 
 def drop_inner(part: Part, depth: int, n: int, scratch: Part) -> bool:
     """Close the boxes that lie within others; see `count_kernels`."""
-    opened, listed = scratch[0][depth], scratch[2]
     limits, sides, wider = part[1], part[5], part[6]
+    opened, listed = scratch[0][depth, : limits.shape[1]], scratch[2]  # there is room for larger parts
     boxes = bitmask.rows(opened)
     around = np.full((len(boxes), len(opened)), ALL, np.uint64)
     for factor in listed[depth + 1, :n].tolist():

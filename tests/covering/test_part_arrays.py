@@ -50,6 +50,7 @@ def test_the_boxes_within_others_by_numpy_are_those_of_the_loops(n_boxes: int, n
     found = []
     for drop_inner in (count_kernels.drop_inner, part_arrays.drop_inner):
         scratch = scratch_of(part, int(np.diff(table[4]).max()))
+        scratch = (np.pad(scratch[0], ((0, 0), (0, 2))), *scratch[1:])  # room for larger parts
         scratch[2][1, :n_listed] = default_rng(1).permutation(len(part[0]))[:n_listed]
         found.append((drop_inner(part, 0, n_listed, scratch), scratch[0][0].tolist()))
     assert found[0] == found[1]

@@ -160,3 +160,16 @@ def drop_inner(part: Part, depth: int, n: int, scratch: Part) -> bool:
     if left != was:
         opened[:] = bitmask.from_int(left, 64 * len(opened))
     return left != was
+
+
+def first_holders(part: Part, alike: Array, found: Array) -> None:
+    """Write for each box the first one that holds it whole and is not like it; see `search_kernels`."""
+    limits, sides, wider, n_boxes = part[1], part[5], part[6], len(part[9])
+    around = np.repeat(bitmask.full(n_boxes)[None], n_boxes, axis=0)
+    for factor in range(len(limits)):
+        side = sides[factor]
+        around &= np.where((side < 0)[:, None], ~limits[factor], wider[side])
+    for box, others in enumerate(around):
+        holders = bitmask.rows(others)
+        unlike = holders[alike[holders] != alike[box]]
+        found[box] = unlike[0] if len(unlike) else -1

@@ -10,6 +10,7 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from enum import IntEnum
+from functools import cache
 from pathlib import Path
 from time import monotonic
 from typing import IO, Any, TypeVar
@@ -124,6 +125,14 @@ def was_compiled(loop: Any) -> bool:
     """Whether a numba function is compiled: in this process, or in numba's cache on this machine."""
     folder, module = Path(loop.stats.cache_path or ""), loop.py_func.__module__.rpartition(".")[2]
     return bool(loop.signatures) or any(folder.glob(f"{module}.{loop.py_func.__qualname__}-*.nbi"))
+
+
+@cache
+def has_numba() -> bool:
+    """Whether numba is installed: to try to import what needs it costs milliseconds each time where it is not."""
+    from importlib.util import find_spec
+
+    return find_spec("numba") is not None
 
 
 def announce(loop: Any) -> None:

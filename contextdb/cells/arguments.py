@@ -10,6 +10,9 @@ from operator import index
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from contextdb.errors import ContextError, Fault, FileError, NoSuchPlace, Place, WrongType, in_quotes, plural
 
 MOST = 1e9
@@ -134,6 +137,18 @@ def require_many(value: object, what: str, accepted: str) -> Iterable[Any]:
     if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
         raise _wrong(value, what, accepted)
     return value
+
+
+def require_numbers(value: object, what: str) -> NDArray[np.float64]:
+    """An array of real numbers, as float64."""
+    accepted = "real numbers, in rows of one length"
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise ContextError(Fault(f"{what} has rows of different lengths.", accepted)) from None
+    if array.dtype.kind not in "fiub" and array.size:
+        raise ContextError(Fault(f"{what} is an array of {array.dtype}.", accepted))
+    return array.astype(np.float64)
 
 
 def require_callable(value: object, what: str) -> None:

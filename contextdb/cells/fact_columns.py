@@ -22,7 +22,8 @@ def as_series(given: Any, listed: pl.DataType) -> pl.Series | None:
     try:
         if is_typed:
             return pl.Series(given, nan_to_null=False)
-        return pl.Series(list(given), dtype=listed, strict=True, nan_to_null=False) if len(given) else None
+        items = given.tolist() if isinstance(given, np.ndarray) else list(given)
+        return pl.Series(items, dtype=listed, strict=True, nan_to_null=False) if items else None
     except (TypeError, ValueError, OverflowError, pl.exceptions.PolarsError, pl.exceptions.PanicException):
         return None
 

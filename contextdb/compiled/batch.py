@@ -41,7 +41,7 @@ from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMa
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import BLOCK, ManyMatches, one_by_one
 from contextdb.compiled.matches import Matches
-from contextdb.console import announce
+from contextdb.console import announce, has_numba
 from contextdb.errors import ContextError, Fault, Place, plural
 from contextdb.expressions.rules import ManyRules
 
@@ -221,7 +221,7 @@ def load_kernels(work: int = MUCH_WORK) -> ModuleType | None:
     """The compiled kernels; None where numba is not installed, or where they are not loaded yet and the work is too little for
     it."""
     is_loaded = "contextdb.compiled.kernels" in sys.modules
-    if work < MUCH_WORK and not is_loaded:
+    if not is_loaded and (work < MUCH_WORK or not has_numba()):
         return None
     try:
         from contextdb.compiled import kernels

@@ -16,6 +16,7 @@ from contextdb.cells.facts import read_fact
 from contextdb.cells.mirroring import kept_fact, mirrored_fact
 from contextdb.cells.sets import Cell
 from contextdb.compiled.classes import ValueMasks
+from contextdb.compiled.text_arrays import classes_of_texts, is_text_array
 from contextdb.errors import ContextError, Fault, Place
 
 Contexts = Mapping[str, Sequence[object] | NDArray[Any]] | pl.DataFrame
@@ -97,6 +98,8 @@ def mirrored_column(given: Any, condition: Condition) -> Any:
 def plain_values(given: Any, masks: ValueMasks) -> Codes | None:
     """Class numbers int32 [1, N] of a column of plain values, -1 where missing; None when it must be read fact by fact."""
     is_truth = masks.values == (False, True)
+    if not is_truth and is_text_array(given) and (classes := classes_of_texts(given, masks.values)) is not None:  # type: ignore[arg-type]
+        return _of_known(classes, masks)
     series = as_series(given, pl.Boolean() if is_truth else pl.String())
     if series is None:
         return None
@@ -104,17 +107,41 @@ def plain_values(given: Any, masks: ValueMasks) -> Codes | None:
         if series.dtype != pl.Boolean:
             return None
         return _codes_of(series.cast(pl.Int32))
-    if isinstance(series.dtype, (pl.Categorical, pl.Enum)):
+    if isinstance(series.dtype, pl.Enum):
+        return _of_enum(series, masks)
+    if isinstance(series.dtype, pl.Categorical):
         series = series.cast(pl.String)
     if series.dtype != pl.String:
         return None
     found = series.cast(pl.Enum([str(v) for v in masks.values]), strict=False)
     if masks.has_others:
-        codes = found.to_physical().cast(pl.Int32).fill_null(len(masks.values))
-        return pl.select(pl.when(series.is_null()).then(-1).otherwise(codes).cast(pl.Int32)).to_series().to_numpy()[None]
+        codes = found.to_physical().cast(pl.Int32).fill_null(len(masks.values)).to_numpy()
+        return (np.where(series.is_null().to_numpy(), np.int32(-1), codes) if series.null_count() else codes)[None]
     if found.null_count() > series.null_count():
         return None
     return _codes_of(found.to_physical().cast(pl.Int32))
+
+
+def _of_enum(series: pl.Series, masks: ValueMasks) -> Codes | None:
+    """Classes of a polars Enum: each of its categories is looked up once."""
+    categories = series.dtype.categories.to_list()  # type: ignore[attr-defined]
+    missing = len(categories)
+    classes = np.array([masks.class_of.get(text, -1) for text in categories] + [0], np.int32)
+    numbers = series.to_physical().cast(pl.Int32).fill_null(missing).to_numpy()
+    found = _of_known(classes.take(numbers), masks)
+    if found is not None and series.null_count():
+        found[0, numbers == missing] = -1
+    return found
+
+
+def _of_known(classes: NDArray[np.int32], masks: ValueMasks) -> Codes | None:
+    """Classes where -1 is a text that is no value: the class of all others, or None where there is none."""
+    is_other = classes < 0
+    if is_other.any():
+        if not masks.has_others:
+            return None
+        classes[is_other] = len(masks.values)
+    return classes[None]
 
 
 def _codes_of(classes: pl.Series) -> Codes:

@@ -42,6 +42,7 @@ from contextdb.cells.sets import (
     plain_parts,
 )
 from contextdb.columns import Codes
+from contextdb.compiled.ruler import Ruler
 
 FLAT_BYTES = 2 << 20
 """A number column whose masks would take more is kept in two digits."""
@@ -102,6 +103,11 @@ class NumberMasks:
     def ints(self) -> list[int]:
         """Every mask as a Python integer, the missing one last."""
         return [bitmask.to_int(m) for m in self.masks]
+
+    @cached_property
+    def rulers(self) -> dict[bool, Ruler | None]:
+        """The rulers that look-ups have made, on a line and on a circle: a column that is compiled once more keeps them."""
+        return {}
 
     def codes(self, fact: float | None) -> tuple[int, ...]:
         """The number of the fact's mask; None is a missing fact."""

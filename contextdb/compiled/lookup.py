@@ -129,7 +129,12 @@ def _term(i: int, condition: Condition, masks: NumberMasks | WideMasks | TagMask
 def _number_term(i: int, condition: Condition, masks: NumberMasks, fact: str, names: dict[str, Any]) -> str:
     bounds, found = _straight(condition, masks)
     kind = condition.domain.type
-    if kind.exact is None and (ruler := ruler_of(bounds, found)) is not None:
+    ruler = None
+    if kind.exact is None:
+        if kind.is_circular not in masks.rulers:
+            masks.rulers[kind.is_circular] = ruler_of(bounds, found)
+        ruler = masks.rulers[kind.is_circular]
+    if ruler is not None:
         names[f"l{i}"], names[f"m{i}"], names[f"f{i}"] = ruler.lasts, ruler.masks, _bisecting(bounds, found, kind.from_python)
         is_on = f"0.0 <= (y := x * {ruler.per_unit!r} - {ruler.start!r}) < {len(ruler.lasts)}.0 and x >= l{i}[k := int(y)]"
         return f"(m{i}[k] if type(x := {fact}) is float and {is_on} else f{i}(x))"

@@ -55,7 +55,7 @@ def _per_unit(inner: NDArray[np.float64]) -> float | None:
     if power is None or abs(power) > 15:
         return None
     found: float | None = None
-    for per_unit in (factor * 10.0**p for p in (power - 1, power, power + 1) for factor in (1.0, 2.0, 5.0)):
+    for per_unit in (factor * 10.0**p for p in (power, power + 1) for factor in (1.0, 2.0, 5.0)):
         at = inner * per_unit
         stretch = at // 1.0
         n_stretches = stretch[-1] - stretch[0] + 1.0

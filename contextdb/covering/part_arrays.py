@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,9 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.covering.kernels import ALL
+
+MOST_KEPT = 4096
+"""Parts of a count have many factors in common: the groups of so many are kept."""
 
 Array = NDArray[Any]
 Part = tuple[Array, ...]
@@ -42,7 +46,7 @@ def part_of(boxes: Array, factors: Array, weights: Array, salts: Array, table: P
         wider.append(_held_by_all(accepted[:, ordered], held))
         sizes.append(_summed(accepted[:, ordered], shares))
         own_hashes = hashes[known[ordered]]
-        marks.append(np.stack([_mixed(own_hashes[:, 0] ^ salts[factor]), _mixed(own_hashes[:, 1] + salts[factor])], axis=1))
+        marks.append(np.stack([own_hashes[:, 0] ^ salts[factor], own_hashes[:, 1] + salts[factor]], axis=1))
         n_sides += len(ordered)
     return (
         np.array(free, np.int64),
@@ -53,7 +57,7 @@ def part_of(boxes: Array, factors: Array, weights: Array, salts: Array, table: P
         np.array(sides, np.int32).reshape(-1, len(boxes)),
         _joined(wider, np.zeros((0, n_words), np.uint64)),
         _joined(sizes, np.zeros(0)),
-        _joined(marks, np.zeros((0, 2), np.uint64)),
+        _mixed(_joined(marks, np.zeros((0, 2), np.uint64))),
         boxes,
     )
 
@@ -65,35 +69,51 @@ def _joined(parts: list[Array], nothing: Array) -> Array:
 def _groups(known: Array, weights: Array, table: Part) -> tuple[Array, Array]:
     """For each group of classes that the cells cannot distinguish which cells accept it, bool [G, cells], and its share."""
     _, runs, first, _, _ = table
-    turns = np.zeros((len(weights) + 1, len(known)), np.int8)
-    has_cell = np.flatnonzero(known >= 0)
-    begin, end = first[known[has_cell]], first[known[has_cell] + 1]
+    has_any = bool(known[0] < 0)
+    limited = known[int(has_any) :]
+    begin, end = first[limited], first[limited + 1]
     n_runs = end - begin
-    column = np.repeat(has_cell, n_runs)
-    run = np.arange(n_runs.sum()) + np.repeat(begin - (np.cumsum(n_runs) - n_runs), n_runs)
-    turns[runs[run, 0], column] += 1
-    turns[runs[run, 1], column] -= 1
-    turns[0, known < 0] = 1
+    own_runs = runs[np.arange(n_runs.sum()) + np.repeat(begin - (np.cumsum(n_runs) - n_runs), n_runs)]
+    return _groups_of(own_runs.astype(np.int64).tobytes(), n_runs.astype(np.int64).tobytes(), has_any, weights.tobytes())
+
+
+@lru_cache(MOST_KEPT)
+def _groups_of(own_runs: bytes, own_counts: bytes, has_any: bool, own_weights: bytes) -> tuple[Array, Array]:
+    """The same from the runs of each cell, as bytes: int64 [runs, 2], and how many each has, int64 [cells]. Before them comes, with
+    `has_any`, a cell that accepts everything."""
+    runs, n_runs = np.frombuffer(own_runs, np.int64).reshape(-1, 2), np.frombuffer(own_counts, np.int64)
+    weights = np.frombuffer(own_weights, np.float64)
+    turns = np.zeros((len(weights) + 1, len(n_runs) + has_any), np.int8)
+    column = np.repeat(np.arange(len(n_runs)) + has_any, n_runs)
+    turns[runs[:, 0], column] += 1
+    turns[runs[:, 1], column] -= 1
+    turns[0, : int(has_any)] = 1
     accepted = np.cumsum(turns[:-1], axis=0, dtype=np.int8)[weights != 0.0] != 0
-    own = weights[weights != 0.0].tolist()
-    place: dict[bytes, int] = {}
+    own = weights[weights != 0.0]
+    if not len(own):
+        return accepted, own
     packed = np.packbits(accepted, axis=1)
-    group = [place.setdefault(row.tobytes(), len(place)) for row in packed]
-    shares = [0.0] * len(place)
-    for g, weight in zip(group, own, strict=True):
-        shares[g] += weight
-    total = 0.0
-    for weight in own:
-        total += weight
-    _, chosen = np.unique(group, return_index=True)
-    return accepted[chosen], np.array(shares) / total if total else np.array(shares)
+    is_head = np.ones(len(packed), np.bool_)  # of a run of classes that the same cells accept
+    is_head[1:] = (packed[1:] != packed[:-1]).any(axis=1)
+    heads = np.flatnonzero(is_head)
+    place: dict[bytes, int] = {}
+    group_of_run = np.array([place.setdefault(row.tobytes(), len(place)) for row in packed[heads]])
+    shares = np.bincount(group_of_run[np.cumsum(is_head) - 1], own)
+    chosen = heads[_first_places(group_of_run, len(place))]
+    return bitmask.read_only(accepted[chosen]), bitmask.read_only(shares / np.cumsum(own)[-1])
+
+
+def _first_places(numbers: Array, n: int) -> Array:
+    """Where each of the numbers 0 … n - 1 comes first; all of them come."""
+    first = np.empty(n, np.int64)
+    first[numbers[::-1]] = np.arange(len(numbers) - 1, -1, -1)
+    return first
 
 
 def _in_order_of_appearance(code: Array, is_limited: Array) -> Array:
     """A number for each cell that limits its box, in the order of the boxes; -1 for the others."""
     numbers = np.full(len(is_limited), -1, np.int64)
-    _, first = np.unique(code, return_index=True)
-    ordered = np.argsort(first, kind="stable")
+    ordered = np.argsort(_first_places(code, len(is_limited)), kind="stable")
     kept = ordered[is_limited[ordered]]
     numbers[kept] = np.arange(len(kept))
     return numbers
@@ -121,3 +141,35 @@ def _mixed(x: Array) -> Array:
     x = (x ^ (x >> shift)) * np.uint64(0xFF51AFD7ED558CCD)
     x = (x ^ (x >> shift)) * np.uint64(0xC4CEB9FE1A85EC53)
     return np.asarray(x ^ (x >> shift))
+
+
+def drop_inner(part: Part, depth: int, n: int, scratch: Part) -> bool:
+    """Close the boxes that lie within others; see `count_kernels`."""
+    limits, sides, wider = part[1], part[5], part[6]
+    opened, listed = scratch[0][depth, : limits.shape[1]], scratch[2]  # there is room for larger parts
+    boxes = bitmask.rows(opened)
+    around = np.full((len(boxes), len(opened)), ALL, np.uint64)
+    for factor in listed[depth + 1, :n].tolist():
+        side = sides[factor, boxes]
+        around &= np.where((side < 0)[:, None], ~limits[factor], wider[side])
+    left = was = bitmask.to_int(opened)
+    for box, others in zip(boxes.tolist(), around, strict=True):
+        own = 1 << box
+        if (left & ~own) & bitmask.to_int(others):
+            left &= ~own
+    if left != was:
+        opened[:] = bitmask.from_int(left, 64 * len(opened))
+    return left != was
+
+
+def first_holders(part: Part, alike: Array, found: Array) -> None:
+    """Write for each box the first one that holds it whole and is not like it; see `search_kernels`."""
+    limits, sides, wider, n_boxes = part[1], part[5], part[6], len(part[9])
+    around = np.repeat(bitmask.full(n_boxes)[None], n_boxes, axis=0)
+    for factor in range(len(limits)):
+        side = sides[factor]
+        around &= np.where((side < 0)[:, None], ~limits[factor], wider[side])
+    for box, others in enumerate(around):
+        holders = bitmask.rows(others)
+        unlike = holders[alike[holders] != alike[box]]
+        found[box] = unlike[0] if len(unlike) else -1

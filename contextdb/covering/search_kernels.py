@@ -24,7 +24,7 @@ from contextdb.covering.count_kernels import (
     open_all,
     split,
 )
-from contextdb.covering.kernels import ALL, NONE, ONE, lowest_bit, njit, options
+from contextdb.covering.kernels import ALL, IS_COMPILED, NONE, ONE, lowest_bit, njit, options
 from contextdb.covering.part_kernels import part_of
 
 FIRST = 1e9
@@ -104,3 +104,7 @@ def first_holders(part, alike, found):
                 rest &= rest - ONE
                 if alike[j] != alike[i]:
                     found[i] = j
+
+
+if not IS_COMPILED:
+    from contextdb.covering.part_arrays import first_holders as first_holders

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words
-from contextdb.console import announce
+from contextdb.console import announce, has_numba
 from contextdb.telemetry.number_classes import NumberClasses
 
 KeyWords = NDArray[np.uint64]
@@ -113,12 +113,14 @@ def rows_of(masks: Words) -> NDArray[np.int64]:
         kernels.list_rows(masks, found)
         return found
     blocks = (masks[start : start + NUMPY_BLOCK] for start in range(0, len(masks), NUMPY_BLOCK))
-    return np.concatenate([np.zeros(0, np.int64), *(np.nonzero(bitmask.unpack(b, 64 * b.shape[1]))[1] for b in blocks)])
+    return np.concatenate([np.zeros(0, np.int64), *(bitmask.places(b)[1] for b in blocks)])
 
 
 def load_kernels() -> ModuleType | None:
     """The compiled kernels; None where numba is not installed."""
     is_loaded = "contextdb.telemetry.kernels" in sys.modules
+    if not is_loaded and not has_numba():
+        return None
     try:
         from contextdb.telemetry import kernels
     except ImportError:

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_many_of, require_real
+from contextdb.cells.arguments import require_many_of, require_numbers, require_real
 from contextdb.errors import Fault, MotionError
-from contextdb.motion import arguments
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
@@ -88,14 +87,14 @@ class ManySteered:
 
     def _asked(self, wanted: ArrayLike, facing: ArrayLike | None) -> tuple[Floats, Floats]:
         """The velocities and headings that the sticks ask for, checked."""
-        velocities = arguments.numbers_of(wanted, "wanted")
+        velocities = require_numbers(wanted, "wanted")
         if velocities.shape != self.positions.shape:
             found = f"the velocities that are asked for have shape {velocities.shape}."
             raise MotionError(Fault(found, f"{self.positions.shape}, x and z for each body"))
         if facing is None:
             is_going = np.hypot(velocities[:, 0], velocities[:, 1]) >= STANDING_MPS
             return velocities, np.where(is_going, np.arctan2(velocities[:, 0], velocities[:, 1]), self.headings)
-        headings = arguments.numbers_of(facing, "facing")
+        headings = require_numbers(facing, "facing")
         if headings.shape != self.headings.shape:
             raise MotionError(Fault(f"the facing has shape {headings.shape}.", f"{self.headings.shape}, a heading for each body"))
         return velocities, headings

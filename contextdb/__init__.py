@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from contextdb.tables.project import Project, load
     from contextdb.tables.table import Table
     from contextdb.tables.watching import watch
+    from contextdb.telemetry.link import Link, link
 
 _HOMES = {
     "compiled.batch": ("ManyMatches",),
@@ -77,6 +78,7 @@ _HOMES = {
     "tables.project": ("Project", "load"),
     "tables.table": ("Table",),
     "tables.watching": ("watch",),
+    "telemetry.link": ("Link", "link"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -84,6 +86,8 @@ __all__ = [  # noqa: RUF022
     "load",
     "Project",
     "watch",
+    "link",
+    "Link",
     "Table",
     "CompiledTable",
     "Matches",

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +84,8 @@ class CompiledData(Unchanging):
     declared: frozenset[str] = frozenset()
     """Conditions the project declares. A fact with one of these names belongs to another table; it is not a typo."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
+    heard: ClassVar[Any] = None
+    """Who hears of questions and picks, while somebody listens: the `Ears` of `contextdb.compiled.heard`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_ask", self._build_and_ask)  # a plain attribute: the way of every query
@@ -141,6 +143,8 @@ class CompiledData(Unchanging):
     def query_with_care(self, context: Context, unknown: Unknown = "error") -> Matches:
         """What is unusual in a context read once more, slowly: this answers it or says what is wrong."""
         found = self.matches(*self._bits_carefully(context, unknown))
+        if self.heard is not None:
+            self.heard.asked(context, found)
         return self.bound(found, kept_facts(context), unknown) if self.is_bound else found
 
     def encode(self, context: Context, unknown: Unknown = "error") -> NDArray[np.int32]:

@@ -43,11 +43,13 @@ class LiveContext(MutableMapping[str, object]):
     """
 
     __slots__ = (
+        "__weakref__",
         "_alike",
         "_answer",
         "_answering",
         "_cast",
         "_compiled",
+        "_ears",
         "_facts",
         "_is_soft",
         "_keep",
@@ -61,6 +63,9 @@ class LiveContext(MutableMapping[str, object]):
         "_still",
         "_unknown",
     )
+
+    _ears: Any
+    """Who hears of its questions: set only while somebody listens, see `contextdb.compiled.heard`."""
 
     def __init__(self, compiled: CompiledData, unknown: Unknown = "error") -> None:
         self._compiled = compiled
@@ -248,7 +253,7 @@ class LiveContext(MutableMapping[str, object]):
             if None not in moving.values():
                 raise
             self._read_unusual()
-            return self.matches()
+            return LiveContext.matches(self)
         if self._odd:
             return self._set_matches(bits)
         if self._keep is not None:

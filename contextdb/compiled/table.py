@@ -69,7 +69,10 @@ class CompiledTable(CompiledData):
         With set-valued facts the answer holds the rows that may match; `Matches.always` those that match for every value.
         """
         if actors is not None:
-            return query_with_actors(self, context, Ask(actors, prefer, unknown))
+            cast = query_with_actors(self, context, Ask(actors, prefer, unknown))
+            if self.heard is not None:
+                self.heard.asked(context, cast, actors)
+            return cast
         if unknown != "error":
             return super().query(context, unknown)
         try:  # as there, without a call more: the way of every question

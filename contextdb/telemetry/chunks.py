@@ -65,12 +65,11 @@ def chunks_of(path: Path, wanted: Collection[str], table: str) -> Iterator[tuple
 
 
 def _recorded_chunks(path: Path, wanted: Collection[str], table: str) -> Iterator[tuple[Sequence[str], Chunk]]:
-    n_rows = n_lines = 0
+    n_rows = 0
     for piece in pieces_of(path, table):
         names, frame = piece.frame(wanted)
-        yield names, Chunk(len(piece.facts), frame, n_rows, True, piece.share_done, piece.raw, piece.starts, n_lines)
+        yield names, Chunk(len(piece.facts), frame, n_rows, True, piece.share_done, piece.raw, piece.starts, piece.lines_before)
         n_rows += len(piece.facts)
-        n_lines += piece.raw.count(b"\n")
 
 
 def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[Sequence[str], Chunk]]:

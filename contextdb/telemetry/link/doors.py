@@ -119,8 +119,8 @@ def doors() -> Iterator[tuple[str, Path]]:
     """The name of each game that listens, and where; what killed games left is deleted."""
     folder = runtime_folder()
     with turn(folder):
-        found = sorted(path for path in folder.iterdir() if path.suffix in (SOCKET, PORT) and NAME.fullmatch(path.stem))
-        left = [path for path in found if not _is_free(path)]
+        paths = [path for path in folder.iterdir() if path.suffix in (SOCKET, PORT) and NAME.fullmatch(path.stem)]
+        left = [path for path in sorted(paths, key=lambda path: path.stem) if not _is_free(path)]
     for path in left:
         yield path.stem, path
 

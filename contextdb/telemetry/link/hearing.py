@@ -145,6 +145,6 @@ def no_game(name: str | None, running: Sequence[Game]) -> ContextDBError:
     if name is None:
         return ContextDBError(Fault("no game is running.", 'a game that calls contextdb.link("game")', rule="no-such-game"))
     near = nearest(name, names)
-    accepted = some(names) if names else "no game is running"
-    fault = Fault(f"no game {in_quotes(name)} is running.", accepted, in_quotes(near) if near else "", rule="no-such-game")
+    found = f"no game {in_quotes(name)} is running{'' if names else ', nor any other'}."
+    fault = Fault(found, some(names) if names else "", in_quotes(near) if near else "", rule="no-such-game")
     return ContextDBError(fault)

@@ -39,6 +39,9 @@ class Piece:
     asked: Sequence[str]
     """The facts that the game's version of the table asks for."""
     share_done: float
+    offset: int = 0
+    """Where in the file `raw` begins."""
+    lines_before: int = 0
 
     def frame(self, wanted: Collection[str]) -> tuple[Sequence[str], pl.DataFrame]:
         """The names of all facts, and the wanted ones as texts, null where one is missing."""
@@ -61,13 +64,18 @@ def pieces_of(path: Path, table: str) -> Iterator[Piece]:
     """
     reader = _Reader(path, table)
     size = max(1, path.stat().st_size) if path.exists() else 1
-    n_bytes = 0
+    n_bytes = n_lines = n_rows = 0
     for raw, is_last in _blocks(path):
-        n_bytes += len(raw)
         starts, facts = reader.read(raw, is_last)
-        if raw or not n_bytes:
-            yield Piece(raw, starts, facts, reader.tables.get(table, ()), min(1.0, n_bytes / size))
+        n_rows += len(facts)
+        if facts:
+            share_done = min(1.0, (n_bytes + len(raw)) / size)
+            yield Piece(raw, starts, facts, reader.tables.get(table, ()), share_done, n_bytes, n_lines)
+        n_bytes += len(raw)
+        n_lines += raw.count(b"\n")
     reader.end()
+    if not n_rows:
+        yield Piece(b"", [], [], reader.tables.get(table, ()), 1.0, n_bytes, n_lines)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,14 +114,12 @@ def indexed(path: Path, table: str) -> Recorded:
     starts: list[int] = []
     stops: list[int] = []
     names: dict[str, None] = {}
-    before = 0
     for piece in pieces_of(path, table):
         for at, facts in zip(piece.starts, piece.facts, strict=True):
             end = piece.raw.find(b"\n", at)
-            starts.append(before + at)
-            stops.append(before + (len(piece.raw) if end < 0 else end))
+            starts.append(piece.offset + at)
+            stops.append(piece.offset + (len(piece.raw) if end < 0 else end))
             names |= dict.fromkeys(facts)
-        before += len(piece.raw)
     return Recorded(path, starts, stops, tuple(names))
 
 

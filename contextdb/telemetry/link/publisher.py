@@ -12,19 +12,21 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 from contextdb.console import __version__
 from contextdb.telemetry.link.doors import Door, is_same_user
 from contextdb.telemetry.link.lines import END, FORMAT, HEADER, TABLES, dumped
 from contextdb.telemetry.link.listeners import FileListener, Listener, SocketListener
-from contextdb.telemetry.link.ring import Moment, Moments, Ring, newest
+from contextdb.telemetry.link.ring import Entry, Moment, Moments, Ring, newest
 from contextdb.telemetry.link.taps import Tap, Taps
 
 PIECE_S = 0.0003
 """So long it works before it rests."""
 REST_S = 0.0005
+MOST_WELCOMES = 32
+"""Between two ticks; who connects then waits for the next."""
 MOST_LISTENERS = 16
 """Who connects when there are so many is sent away."""
 
@@ -51,11 +53,12 @@ class Publisher:
         self.began_s = time.monotonic()
         self._began_unix_s = time.time()
         self._every_s = every_s
-        self._moments = Moments()
         self._listeners: list[SocketListener] = []
         self._is_closing = False
         self._pid = os.getpid()
         self._pace = Pace()
+        self._moments = Moments(self._pace)
+        self._n_welcomes = 0
         self._told = taps.sources()
         self._ears, self._mouth = socket.socketpair()
         self._ears.setblocking(False)
@@ -94,9 +97,11 @@ class Publisher:
         try:
             next_s = time.monotonic()
             while not self._is_closing:
-                self._serve(None if not self.is_heard and not self._listeners else max(0.0, next_s - time.monotonic()))
+                is_idle = not (self.is_heard or self._listeners or self._n_welcomes)
+                self._serve(None if is_idle else max(0.0, next_s - time.monotonic()))
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self._every_s
+                    self._welcome_again()
                     self._tick()
             self._tick()
         except Exception:
@@ -138,6 +143,9 @@ class Publisher:
 
     def _welcome(self) -> None:
         """Take a connection; a stranger's, and one too many, is closed."""
+        self._n_welcomes += 1
+        if self._n_welcomes == MOST_WELCOMES:
+            self._selector.unregister(self.door.server)
         try:
             connection, _ = self.door.server.accept()
         except OSError:  # it has gone, or there are no numbers for files left
@@ -154,6 +162,12 @@ class Publisher:
         self._listeners.append(listener)
         self._selector.register(connection, selectors.EVENT_READ, listener)
         listener.send()
+
+    def _welcome_again(self) -> None:
+        """Take connections again where there were too many."""
+        if self._n_welcomes >= MOST_WELCOMES:
+            self._selector.register(self.door.server, selectors.EVENT_READ)
+        self._n_welcomes = 0
 
     def _send_away(self) -> None:
         """Close the connections of those that are gone."""
@@ -191,17 +205,18 @@ class Publisher:
         if lost := self.ring.lost():
             for listener in listeners:
                 listener.lose(lost)
-        for moment, takers in self._shared_out(self._moments.of(entries), listeners):
+        for moment, takers in self._shared_out(entries, listeners):
             takers = [one for one in takers if one.has_room or one.lose(1)]  # type: ignore[func-returns-value]
             if takers:
                 self._offer(moment, takers)
                 self._pace()
 
-    def _shared_out(self, moments: list[Moment], listeners: list[Listener]) -> Iterable[tuple[Moment, list[Listener]]]:
+    def _shared_out(self, entries: list[Entry], listeners: list[Listener]) -> Iterator[tuple[Moment, list[Listener]]]:
         """Each moment with those that want it."""
-        new = set(map(id, newest(moments)))
-        for moment in moments:
-            is_new = id(moment) in new
+        kept = newest(entries, self._pace)
+        numbers = {entry[0] for entry in kept}
+        for moment in self._moments.of(entries if any(one.wants_every for one in listeners) else kept):
+            is_new = moment.number in numbers
             takers = [one for one in listeners if (is_new or one.wants_every) and one.wants(moment)]
             if takers:
                 yield moment, takers

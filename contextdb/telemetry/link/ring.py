@@ -7,7 +7,7 @@ are counted, since every entry has a number.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from typing import Any, NamedTuple
@@ -17,7 +17,13 @@ from contextdb.compiled.casting.facts import Actors
 from contextdb.compiled.matches import Matches
 from contextdb.telemetry.link.lines import ASK, DECISION, PICK, Line, dumped, sent_facts
 
-MOST_ENTRIES = 1 << 13
+MOST_ENTRIES = 1 << 11
+"""Between two looks of the link's thread. More would have left the processor's cache when they go, and cost the game twice as
+much."""
+MOST_RECORDED = 1 << 15
+"""The same where a file takes every question."""
+AT_ONCE = 128
+"""Entries that are looked through without a rest."""
 UNNAMED = object()
 """Who picks in a table of which only live contexts are watched: a pick of another answer is nobody's."""
 
@@ -76,8 +82,9 @@ class Ring:
                 taken.append(entries.popleft())
             except IndexError:  # nobody else takes any, but it is no fault either
                 break
-        self._taken += len(taken)
-        self._behind = max([self._behind, *(entry[0] + 1 for entry in taken)])
+        if taken:
+            self._taken += len(taken)
+            self._behind = max(self._behind, taken[-1][0] + 1)
         return taken
 
     def lost(self) -> int:
@@ -96,6 +103,8 @@ class Ring:
 class Moment:
     """What becomes one line: a question, with the pick of its answer; a pick alone; or a decision."""
 
+    number: int
+    """That of its entry."""
     time_s: float
     who: str | None
     source: Source | None
@@ -145,32 +154,42 @@ def _of_role(role: str, asked: Mapping[str, Condition]) -> dict[str, Condition]:
 
 
 class Moments:
-    """Makes moments of entries: a pick joins the question whose answer it was made of."""
+    """Makes moments of entries: a pick joins the question whose answer it was made of. `pace` is called now and then."""
 
-    def __init__(self) -> None:
+    def __init__(self, pace: Callable[[], None]) -> None:
+        self._pace = pace
         self._before: dict[int, Moment] = {}
         """The questions of the last entries by the identity of their answers, which they keep."""
 
-    def of(self, entries: Iterable[Entry]) -> list[Moment]:
+    def of(self, entries: Sequence[Entry]) -> list[Moment]:
         """The moments, in their order."""
         asked: dict[int, Moment] = {}
         moments: list[Moment] = []
-        for _, time_s, who, source, what, answer in entries:
-            if isinstance(what, Picked):
-                moments += self._picked(time_s, who, source, what, answer, asked)
+        for at, (number, time_s, who, source, what, answer) in enumerate(entries):
+            if at % AT_ONCE == 0:
+                self._pace()
+            if type(what) is Picked:
+                moments += self._picked(number, time_s, who, source, what, answer, asked)
                 continue
             name = None if who is None else str(who)
             if source is None:
-                moments.append(Moment(time_s, name, None, decision=what))
+                moments.append(Moment(number, time_s, name, None, decision=what))
                 continue
-            facts, actors = what if isinstance(what, WithActors) else (what, None)
-            moments.append(Moment(time_s, name, source, facts, actors, answer))
+            facts, actors = what if type(what) is WithActors else (what, None)
+            moments.append(Moment(number, time_s, name, source, facts, actors, answer))
             asked[id(answer)] = moments[-1]
         self._before = asked
         return moments
 
     def _picked(
-        self, time_s: float, who: object, source: Source | None, pick: Picked, answer: Matches | None, asked: dict[int, Moment]
+        self,
+        number: int,
+        time_s: float,
+        who: object,
+        source: Source | None,
+        pick: Picked,
+        answer: Matches | None,
+        asked: dict[int, Moment],
     ) -> Iterator[Moment]:
         """A moment for a pick, unless it joins one that is there."""
         own = asked.get(id(answer))
@@ -181,22 +200,29 @@ class Moments:
         if before is None and who is UNNAMED:
             return
         name = before.who if before is not None else None if who is None else str(who)
-        yield Moment(time_s, name, source, answer=answer, pick=pick)
+        yield Moment(number, time_s, name, source, answer=answer, pick=pick)
 
 
-def newest(moments: Iterable[Moment]) -> list[Moment]:
-    """Of each character and table the newest question and the newest pick, of each character the newest decision."""
-    kept: list[Moment] = []
-    seen: set[tuple[str | None, str | None]] = set()
-    picked: set[tuple[str | None, str | None]] = set()
-    for moment in reversed(list(moments)):
-        key = (moment.who, moment.table)
-        is_new = key not in (seen if moment.pick is None else picked)
-        if is_new:
-            kept.append(moment)
-        if moment.pick is not None:
-            picked.add(key)
-        if moment.pick is None or moment.facts is not None:
-            seen.add(key)
-    kept.reverse()
-    return kept
+def newest(entries: Sequence[Entry], pace: Callable[[], None]) -> list[Entry]:
+    """Of each character and table the newest question, and the newest that was picked from; of each character the newest decision.
+    With them the newest pick of each answer, unless its question is an older one."""
+    picks: dict[int, Entry] = {}
+    answers: set[int] = set()
+    asked: dict[tuple[object, Source | None], Entry] = {}
+    picked: dict[tuple[object, Source | None], Entry] = {}
+    for at, entry in enumerate(reversed(entries)):
+        if at % AT_ONCE == 0:
+            pace()
+        answer = id(entry[5])
+        if type(entry[4]) is Picked:
+            picks.setdefault(answer, entry)
+            continue
+        answers.add(answer)
+        key = (entry[2], entry[3])
+        asked.setdefault(key, entry)
+        if answer in picks:
+            picked.setdefault(key, entry)
+    kept = {entry[0]: entry for entry in (*asked.values(), *picked.values())}
+    own = {id(entry[5]) for entry in kept.values()}
+    kept |= {entry[0]: entry for answer, entry in picks.items() if answer in own or answer not in answers}
+    return [kept[number] for number in sorted(kept)]

@@ -62,7 +62,7 @@ class TableTap:
         self._compiled = weakref.ref(compiled)
         self._ring, self._who, self._name = ring, who_of(who), None if callable(who) else who
         self._keep = compiled.keep
-        self._is_named = callable(who)
+        self._is_named, self._is_mirroring = callable(who), bool(compiled.mirroring)
         self.is_watched = is_watched
         """Whether the table itself is watched, and not only a live context of it, whose picks it tells of."""
         made_ready(compiled)
@@ -99,8 +99,7 @@ class TableTap:
 
         def ask_and_tell(context: Context) -> Matches:
             answer = ask(context)
-            if type(context) is not InMirror:
-                append((next(numbers), now(), name, source, keep(context), answer))
+            append((next(numbers), now(), name, source, keep(context), answer))
             return answer
 
         def ask_and_tell_who(context: Context) -> Matches:
@@ -109,7 +108,7 @@ class TableTap:
                 append((next(numbers), now(), who_asks(), source, keep(context), answer))
             return answer
 
-        return ask_and_tell_who if self._is_named else ask_and_tell
+        return ask_and_tell_who if self._is_named or self._is_mirroring else ask_and_tell
 
     def asked(self, context: Context, answer: Matches, actors: Actors | None = None) -> None:
         """Tell of a question that was answered with care, or with actors."""

@@ -26,6 +26,12 @@ class Wanted:
     every: bool = False
     """Every question, not only the newest of each character and table."""
 
+    def takes(self, line: Line) -> bool:
+        """Whether a line is asked for: a game written in C sends all of them."""
+        if self.who and "who" in line and line["who"] not in self.who:
+            return False
+        return not self.tables or "table" not in line or line["table"] in self.tables
+
 
 def hear(path: Path, wanted: Wanted = Wanted()) -> Hearing:
     """Listen to a game.
@@ -46,6 +52,7 @@ class Hearing:
     def __init__(self, path: Path, connection: socket.socket, wanted: Wanted) -> None:
         self._connection = connection
         self._place = Place(str(path))
+        self._wanted = wanted
         self._rest = b""
         self._waiting: list[tuple[bytes, Line]] = []
         try:
@@ -96,7 +103,8 @@ class Hearing:
         if len(self._rest) > MOST_BYTES:
             raise ContextDBError(Fault("a line of the game does not end.", "lines of JSON", place=self._place))
         try:
-            return [(raw + b"\n", read_line(raw)) for raw in whole]
+            lines = [(raw + b"\n", read_line(raw)) for raw in whole]
+            return [(raw, line) for raw, line in lines if self._wanted.takes(line)]
         except ValueError as error:
             raise ContextDBError(Fault(f"a line of the game cannot be read: {error}", place=self._place)) from None
 

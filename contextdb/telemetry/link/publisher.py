@@ -59,6 +59,8 @@ class Publisher:
         self._pace = Pace()
         self._moments = Moments(self._pace)
         self._n_welcomes = 0
+        self.is_heard = False
+        """Whether somebody listens, or a file takes the lines, and all taps are open."""
         self._told = taps.sources()
         self._ears, self._mouth = socket.socketpair()
         self._ears.setblocking(False)
@@ -70,11 +72,6 @@ class Publisher:
             self._open_taps()
         self._thread = threading.Thread(target=self._run, name="contextdb.link", daemon=True)
         self._thread.start()
-
-    @property
-    def is_heard(self) -> bool:
-        """Whether somebody listens, or a file takes the lines."""
-        return self.taps.are_open
 
     def close(self) -> None:
         """Send what is there, hang up, and close the taps."""
@@ -97,7 +94,7 @@ class Publisher:
         try:
             next_s = time.monotonic()
             while not self._is_closing:
-                is_idle = not (self.is_heard or self._listeners or self._n_welcomes)
+                is_idle = not (self.taps.are_open or self._listeners or self._n_welcomes)
                 self._serve(None if is_idle else max(0.0, next_s - time.monotonic()))
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self._every_s
@@ -201,7 +198,8 @@ class Publisher:
 
     def _publish(self, listeners: list[Listener]) -> None:
         """Send the moments since the last time."""
-        entries = self.ring.take()
+        with self.lock:
+            entries = self.ring.take()
         if lost := self.ring.lost():
             for listener in listeners:
                 listener.lose(lost)
@@ -257,11 +255,13 @@ class Publisher:
                 self._told = self.taps.sources()  # as the headers of those that listen have it
                 self.taps.are_open = True
             self._each(lambda tap: tap.open())
+            self.is_heard = True
 
     def _close_taps(self) -> None:
         if self.taps.are_open:
             self.taps.are_open = False
             self._each(lambda tap: tap.close())
+            self.is_heard = False
 
     def _each(self, do: Callable[[Tap], None]) -> None:
         """Open or close every tap; the game may put on another meanwhile."""

@@ -89,7 +89,7 @@ class Recorded:
     """The facts that are given."""
 
     def facts(self, start: int, stop: int) -> list[Texts]:
-        """The facts of some questions."""
+        """The facts of some questions as a table of contexts has them: names without the quotes of the command line."""
         if start >= stop:
             return []
         try:
@@ -101,7 +101,7 @@ class Recorded:
         first = self.starts[start]
         try:
             pairs = zip(self.starts[start:stop], self.stops[start:stop], strict=True)
-            return [_texts(read_line(raw[i - first : j - first])) for i, j in pairs]
+            return [_plain_texts(read_line(raw[i - first : j - first])) for i, j in pairs]
         except (ValueError, KeyError):
             found = "the file has been changed since it was opened."
             raise TableError(Fault(found, "a recording that only grows", place=Place(str(self.path)))) from None
@@ -209,6 +209,10 @@ def _texts(line: Line) -> Texts:
             _require_text(name)
             _require_text(text or "")
     return facts
+
+
+def _plain_texts(line: Line) -> Texts:
+    return {name: line["facts"][name] if isinstance(line["facts"][name], str) else text for name, text in _texts(line).items()}
 
 
 def _require_text(text: str) -> None:

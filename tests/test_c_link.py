@@ -75,13 +75,15 @@ def test_what_a_game_in_c_tells_is_what_python_would(game: Path, game_table: cdb
         assert process.stderr is not None
         assert process.stderr.read() == ""
     assert done.code == 0
-    assert len(done.lines) == 20
+    assert len(done.lines) in (18, 19, 20)  # a look at who is there has taken the others
     assert done.err == 'contextdb: the game "game" has ended.\n'
     header, *asks, end = [json.loads(text) for text in (tmp_path / "m.jsonl").read_text().splitlines()]
     conditions = {name: settings["type"] for name, settings in SCHEMA.items()}
     assert header["tables"] == {"game": {"version": None, "rows": 70, "conditions": conditions}}
     assert end == {"line": "end"}
-    for i, line in enumerate(asks):
+    numbers = [line["facts"]["n"] for line in asks]
+    assert numbers == list(range(20 - len(asks), 20))
+    for i, line in zip(numbers, asks, strict=True):
         facts = {name: read_fact(given_fact(value), game_table.asked[name]) for name, value in line["facts"].items()}
         assert facts == {
             "ok": i % 2 == 1,
@@ -96,18 +98,21 @@ def test_what_a_game_in_c_tells_is_what_python_would(game: Path, game_table: cdb
         answer = game_table.query(facts)
         assert (int(line["rows"], 16), line["valid"]) == (answer.bits, len(answer))
         assert line["pick"] == {"row": answer.indices[0], "asset": answer.assets[0]}
-    assert run("evaluate", game.parent / "game.safetensors", tmp_path / "m.jsonl", "--json").json["contexts"] == 20
+    assert run("evaluate", game.parent / "game.safetensors", tmp_path / "m.jsonl", "--json").json["contexts"] == len(asks)
 
 
 def test_games_in_c_and_python_share_the_folder_and_its_names(game: Path, meeting: Path):
-    with cdb.link("game"), running(game, 1) as two, running(game, 1) as three:
-        assert {named(two), named(three)} == {"game-2", "game-3"}
-        until(lambda: [each.name for each in games()] == ["game", "game-2", "game-3"] or two.poll() is not None)
-        assert os.stat(meeting / "game-2.sock").st_mode & 0o777 == 0o600
-        two.kill()
-        two.wait()
-        with running(game, 1) as again:
-            assert named(again) == "game-2"
+    with cdb.link("game"), running(game, 100_000) as two:
+        assert named(two) == "game-2"
+        with running(game, 100_000) as three:
+            assert named(three) == "game-3"
+            assert [each.name for each in games()] == ["game", "game-2", "game-3"]
+            assert os.stat(meeting / "game-2.sock").st_mode & 0o777 == 0o600
+            two.kill()
+            two.wait()
+            assert [each.name for each in games()] == ["game", "game-3"]
+            with running(game, 1) as again:
+                assert named(again) == "game-2"
 
 
 @pytest.mark.parametrize("name", ["../game", "", "a/b", "x" * 41, ".x"])

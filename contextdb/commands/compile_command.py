@@ -2,7 +2,7 @@
 
 Prints the path of each written file. --stubs also writes the facts of these tables as Python types, for completion in editors and
 for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files, and
---c-link a second one, by which such a game publishes what it asks, for `contextdb live`.
+--c-link a second one, by which such a game shows live what it asks.
 
   contextdb compile tables/                  one compiled file next to each table
   contextdb compile tables/ -o build/        all of them into a folder

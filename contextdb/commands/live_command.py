@@ -1,8 +1,8 @@
 """Show what a running game asks its tables and what it picks, one line a change.
 
-The game calls contextdb.link("game"). Without NAME the only game that runs is meant; where several run, they are listed. A line has
-the seconds since the game began to publish, who asks, the table, what was picked, how many rows are valid, and the facts that
-changed, as `contextdb query` takes them. Ctrl+C ends it.
+The game has opened a link under NAME. Without NAME the only game that runs is meant; where several run, they are listed. A line has
+the seconds since the link was opened, who asks, the table, what was picked, how many rows are valid, and the facts that changed,
+written as for the command `query`. Ctrl+C ends it.
 
   contextdb live
   contextdb live game --who player --table locomotion
@@ -11,7 +11,7 @@ changed, as `contextdb query` takes them. Ctrl+C ends it.
 
 With --tables the questions are also asked of the tables of a folder: it is told where their answers differ from the game's, and
 with --explain which rows were nearest, and which of their cells fail. With --record FILE every question is kept, not only the
-newest; `contextdb evaluate` and `contextdb coverage --telemetry` read FILE, while it grows too.
+newest; the commands `evaluate` and `coverage --telemetry` read FILE, while it grows too.
 """
 
 from __future__ import annotations

@@ -171,7 +171,8 @@ def test_a_file_whose_name_looks_like_a_glob_is_that_file(here: Path):
 
 def test_a_missing_file_is_named_with_the_nearest(here: Path):
     assert refused("moves", "data/aa.csv") == [
-        'data/aa.csv: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob. Did you mean "data/a.csv"?'
+        "data/aa.csv: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob. "
+        'Did you mean "data/a.csv"?'
     ]
     assert refused("moves", "none/*.csv") == [
         "none/*.csv: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob."

@@ -350,8 +350,9 @@ SOURCE = Source("jog", "v", 3, {})
 
 def filled(*entries: tuple[object, object, object]) -> Ring:
     ring = Ring(100)
+    ring.keeps_all = True
     for who, what, answer in entries:
-        ring.put(0.0, who, SOURCE, what, answer)  # type: ignore[arg-type]
+        ring.put(who, 0.0, who, SOURCE, what, answer)  # type: ignore[arg-type]
     return ring
 
 
@@ -377,30 +378,32 @@ def test_a_pick_of_an_answer_that_was_told_before_is_of_who_asked():
     answer, moments = object(), Moments(lambda: None)
     ring = filled(("a", {"n": 1}, answer))
     moments.of(ring.take())
-    ring.put(0.0, "table", SOURCE, Picked(2, "run"), answer)  # type: ignore[arg-type]
+    ring.put("a", 0.0, "table", SOURCE, Picked(2, "run"), answer)  # type: ignore[arg-type]
     [pick] = moments.of(ring.take())
     assert (pick.who, pick.facts, pick.pick) == ("a", None, Picked(2, "run"))
 
 
 def test_entries_that_had_to_go_are_counted():
     ring = Ring(4)
+    ring.keeps_all = True
     for number in range(10):
-        ring.put(0.0, "a", SOURCE, {"n": number}, None)
+        ring.put("a", 0.0, "a", SOURCE, {"n": number}, None)
     assert [entry[4] for entry in ring.take()] == [{"n": n} for n in range(6, 10)]
     assert ring.lost() == 6
     assert ring.lost() == 0
-    ring.put(0.0, "a", SOURCE, {}, None)
+    ring.put("a", 0.0, "a", SOURCE, {}, None)
     assert len(ring.take()) == 1
     assert ring.lost() == 0
 
 
 def test_what_was_told_to_nobody_is_not_lost():
     ring = Ring(4)
+    ring.keeps_all = True
     for _ in range(3):
         for number in range(10):
-            ring.put(0.0, "a", SOURCE, {"n": number}, None)
+            ring.put("a", 0.0, "a", SOURCE, {"n": number}, None)
         ring.forget()
-    ring.put(0.0, "a", SOURCE, {}, None)
+    ring.put("a", 0.0, "a", SOURCE, {}, None)
     assert len(ring.take()) == 1
     assert ring.lost() == 0
 
@@ -429,11 +432,67 @@ def test_lines_that_are_lost_are_told(link: cdb.Link, meeting: Path):
     jog = table()
     link.watch(jog)
     with listening(link, meeting, every=True) as hearing:
+        until(lambda: link._ring.keeps_all)
         with link._publisher.lock:  # the thread waits, as on a machine that is busy
-            until(lambda: link._ring.entries.maxlen == MOST_ENTRIES)
             generator = random.Random(0)
             for _ in range(3 * MOST_ENTRIES):
                 jog.query({**FACTS, "speed": generator.random()})
         jog.query(FACTS)
         lost = sum(line["count"] for line in next_lines(hearing, "lost"))
     assert lost >= MOST_ENTRIES
+
+
+# ---- the newest alone
+
+
+def slotted() -> Ring:
+    return Ring(4)
+
+
+def test_of_each_teller_the_newest_is_kept_with_the_newest_that_was_picked_from():
+    ring, answers = slotted(), [object() for _ in range(5)]
+    for time_s, answer in enumerate(answers):
+        ring.put("a", time_s, "a", SOURCE, {"n": time_s}, answer)  # type: ignore[arg-type]
+        if time_s in (1, 2):
+            ring.put_pick(("table", "a"), time_s, "table", SOURCE, Picked(time_s, f"p{time_s}"), answer)  # type: ignore[arg-type]
+    ring.put("b", 9.0, "b", SOURCE, {"n": 9}, None)
+    assert not ring.entries
+    assert told(ring, False) == [("a", {"n": 2}, "p2"), ("a", {"n": 4}, None), ("b", {"n": 9}, None)]
+    assert ring.lost() == 0
+    assert ring.take() == []
+
+
+def test_a_pick_of_an_older_answer_is_told_by_itself():
+    ring, old = slotted(), object()
+    ring.put("a", 1.0, "a", SOURCE, {"n": 1}, old)  # type: ignore[arg-type]
+    ring.put("a", 2.0, "a", SOURCE, {"n": 2}, object())  # type: ignore[arg-type]
+    ring.put_pick(("a",), 3.0, "a", SOURCE, Picked(0, "walk"), old)  # type: ignore[arg-type]
+    assert told(ring, False) == [("a", {"n": 2}, None), ("a", None, "walk")]
+
+
+def test_characters_that_ask_first_and_are_picked_for_later_keep_their_picks():
+    ring, answers = slotted(), {name: object() for name in "abcdef"}
+    for time_s, (name, answer) in enumerate(answers.items()):
+        ring.put(name, time_s, name, SOURCE, {}, answer)  # type: ignore[arg-type]
+    for name, answer in list(answers.items())[:3]:
+        ring.put_pick(("table", "f"), 9.0, "table", SOURCE, Picked(0, f"of {name}"), answer)  # type: ignore[arg-type]
+    assert [(who, asset) for who, _, asset in told(ring, False)] == [
+        ("a", "of a"), ("b", "of b"), ("c", "of c"), ("d", None), ("e", None), ("f", None)
+    ]  # fmt: skip
+
+
+def test_a_listener_that_wants_the_newest_gets_each_character_of_a_table(link: cdb.Link, meeting: Path):
+    jog, now = table(), {"who": ""}
+    link.watch(jog, lambda: now["who"])
+    live = jog.live(FACTS)
+    link.watch(live, "npc")
+    with listening(link, meeting) as hearing, link._publisher.lock:
+        for now["who"] in ("a", "b", "a"):
+            jog.query(FACTS)
+        picked = jog.pick(live.matches())
+        link._publisher.lock.release()
+        try:
+            lines = next_lines(hearing, "ask", 3)
+        finally:
+            link._publisher.lock.acquire()
+    assert sorted((line["who"], line.get("pick", {}).get("asset")) for line in lines) == [("a", None), ("b", None), ("npc", picked)]

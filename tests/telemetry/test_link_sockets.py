@@ -152,6 +152,7 @@ def test_a_listener_that_stalls_loses_lines_and_is_told_how_many(meeting: Path):
     with cdb.link("game", per_second=60) as link:
         link.watch(jog)
         with listening(link, meeting, every=True) as heard:
+            until(lambda: link._ring.keeps_all)
             [listener] = link._publisher._listeners
             n_asked = 0
             while listener.has_room:

@@ -14,7 +14,7 @@ from contextdb.telemetry.link import doors
 from contextdb.telemetry.link.folder import require_name
 from contextdb.telemetry.link.listeners import FileListener
 from contextdb.telemetry.link.publisher import Publisher
-from contextdb.telemetry.link.ring import MOST_ENTRIES, MOST_RECORDED, Ring
+from contextdb.telemetry.link.ring import Ring
 from contextdb.telemetry.link.taps import Taps, Who
 
 PER_SECOND = 30.0
@@ -85,7 +85,7 @@ class Link:
     def __init__(self, door: doors.Door, file: FileListener | None, every_s: float) -> None:
         self.name = door.name
         """What the game is called: the name that was asked for, or that with a number."""
-        self._ring = Ring(MOST_ENTRIES if file is None else MOST_RECORDED)
+        self._ring = Ring()
         self._taps = Taps(self._ring)
         self._publisher = Publisher(door, self._taps, self._ring, file, every_s)
         self._is_closed = False
@@ -128,7 +128,7 @@ class Link:
             from contextdb.telemetry.link.decisions import require_decision
 
             require_decision(decision)
-            self._ring.put(time.monotonic(), who, None, decision, None)
+            self._ring.put(("tell", who), time.monotonic(), who, None, decision, None)
 
     def close(self) -> None:
         """Publish no more. What was watched is what it was before."""

@@ -69,6 +69,7 @@ class Publisher:
         self._selector.register(self._ears, selectors.EVENT_READ)
         if file is not None:
             file.offer(self._header())
+            ring.keeps_all = True
             self._open_taps()
         self._thread = threading.Thread(target=self._run, name="contextdb.link", daemon=True)
         self._thread.start()
@@ -186,6 +187,7 @@ class Publisher:
             self._close_taps()
             self.ring.forget()
             return
+        self.ring.keeps_all = any(one.wants_every for one in listeners)
         with self.lock:
             self.taps.follow()
         self._open_taps()
@@ -212,9 +214,9 @@ class Publisher:
     def _shared_out(self, entries: list[Entry], listeners: list[Listener]) -> Iterator[tuple[Moment, list[Listener]]]:
         """Each moment with those that want it."""
         kept = newest(entries, self._pace)
-        numbers = {entry[0] for entry in kept}
+        new = set(map(id, kept))
         for moment in self._moments.of(entries if any(one.wants_every for one in listeners) else kept):
-            is_new = moment.number in numbers
+            is_new = id(moment.entry) in new
             takers = [one for one in listeners if (is_new or one.wants_every) and one.wants(moment)]
             if takers:
                 yield moment, takers

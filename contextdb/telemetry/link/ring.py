@@ -1,7 +1,6 @@
 """What a game asked and picked, kept for the moment until the link's thread makes lines of it.
 
-An entry is a tuple in a deque: to append it is all that the game's thread does. When the deque is full, the oldest entries go; they
-are counted, since every entry has a number.
+An entry is a tuple: to put it into a dict or a deque is all that the game's thread does.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from contextdb.cells.conditions import Condition
@@ -17,11 +17,7 @@ from contextdb.compiled.casting.facts import Actors
 from contextdb.compiled.matches import Matches
 from contextdb.telemetry.link.lines import ASK, DECISION, PICK, Line, dumped, sent_facts
 
-MOST_ENTRIES = 1 << 11
-"""Between two looks of the link's thread. More would have left the processor's cache when they go, and cost the game twice as
-much."""
-MOST_RECORDED = 1 << 15
-"""The same where a file takes every question."""
+MOST_ENTRIES = 1 << 13
 AT_ONCE = 128
 """Entries that are looked through without a rest."""
 UNNAMED = object()
@@ -62,33 +58,57 @@ Entry = tuple[int, float, object, Source | None, Any, Matches | None]
 
 
 class Ring:
-    """The newest entries."""
+    """What was told since the link's thread last looked.
+
+    As a rule that is the newest entry of each teller in `slots`, and the newest of its questions that was picked from in `picks`:
+    what it replaces is let go at once, in the game's thread, while it is still in the processor's cache. Where somebody wants
+    every question, `keeps_all`, it is all of them, in `entries`. All are changed by single steps that no thread can interrupt.
+    """
 
     def __init__(self, most: int = MOST_ENTRIES) -> None:
+        self.keeps_all = False
+        self.slots: dict[object, Entry] = {}
+        self.picks: dict[object, tuple[Entry, Entry]] = {}
         self.entries: deque[Entry] = deque(maxlen=most)
         self.numbers = count()
+        """Of what goes into `entries`; all else has the number 0."""
         self._first = self._behind = self._taken = self._told = 0
 
-    def put(self, time_s: float, who: object, source: Source | None, what: object, answer: Matches | None) -> None:
+    def put(self, teller: object, time_s: float, who: object, source: Source | None, what: object, answer: Matches | None) -> None:
         """Add an entry; what is called in every question does the same without a call."""
-        self.entries.append((next(self.numbers), time_s, who, source, what, answer))
+        if self.keeps_all:
+            self.entries.append((next(self.numbers), time_s, who, source, what, answer))
+        else:
+            self.slots[teller] = (0, time_s, who, source, what, answer)
+
+    def put_pick(
+        self, tellers: tuple[object, ...], time_s: float, who: object, source: Source, pick: Picked, answer: Matches
+    ) -> None:
+        """Add a pick, to the newest question of one of these where it is a pick of its answer."""
+        if not self.keeps_all:
+            for teller in tellers:
+                asked = self.slots.get(teller)
+                if asked is not None and asked[5] is answer:
+                    self.picks[teller] = asked, (0, time_s, who, source, pick, answer)
+                    return
+        self.entries.append((next(self.numbers), time_s, who, source, pick, answer))
 
     def take(self) -> list[Entry]:
         """The entries that are there now, oldest first."""
-        entries = self.entries
-        taken = []
-        for _ in range(len(entries)):
-            try:
-                taken.append(entries.popleft())
-            except IndexError:  # nobody else takes any, but it is no fault either
-                break
-        if taken:
-            self._taken += len(taken)
-            self._behind = max(self._behind, taken[-1][0] + 1)
-        return taken
+        taken = [self.slots.popitem()[1] for _ in range(len(self.slots))]
+        picks = [self.picks.popitem()[1] for _ in range(len(self.picks))]
+        taken += [asked for asked, _ in picks]
+        taken += [pick for _, pick in picks]
+        kept = [self.entries.popleft() for _ in range(len(self.entries))]  # the game only adds: there are no fewer meanwhile
+        if kept:
+            self._taken += len(kept)
+            self._behind = max(self._behind, kept[-1][0] + 1)
+        if not taken:
+            return kept
+        return sorted({id(entry): entry for entry in (*taken, *kept)}.values(), key=itemgetter(1))
 
     def lost(self) -> int:
-        """How many entries had to go since this was last asked."""
+        """How many entries had to go since this was last asked, though somebody wanted all of them."""
         lost = self._behind - self._first - self._taken
         new, self._told = max(lost - self._told, 0), max(lost, self._told)
         return new
@@ -103,8 +123,7 @@ class Ring:
 class Moment:
     """What becomes one line: a question, with the pick of its answer; a pick alone; or a decision."""
 
-    number: int
-    """That of its entry."""
+    entry: Entry
     time_s: float
     who: str | None
     source: Source | None
@@ -165,33 +184,26 @@ class Moments:
         """The moments, in their order."""
         asked: dict[int, Moment] = {}
         moments: list[Moment] = []
-        for at, (number, time_s, who, source, what, answer) in enumerate(entries):
+        for at, entry in enumerate(entries):
+            _, time_s, who, source, what, answer = entry
             if at % AT_ONCE == 0:
                 self._pace()
             if type(what) is Picked:
-                moments += self._picked(number, time_s, who, source, what, answer, asked)
+                moments += self._picked(entry, what, asked)
                 continue
             name = None if who is None else str(who)
             if source is None:
-                moments.append(Moment(number, time_s, name, None, decision=what))
+                moments.append(Moment(entry, time_s, name, None, decision=what))
                 continue
             facts, actors = what if type(what) is WithActors else (what, None)
-            moments.append(Moment(number, time_s, name, source, facts, actors, answer))
+            moments.append(Moment(entry, time_s, name, source, facts, actors, answer))
             asked[id(answer)] = moments[-1]
         self._before = asked
         return moments
 
-    def _picked(
-        self,
-        number: int,
-        time_s: float,
-        who: object,
-        source: Source | None,
-        pick: Picked,
-        answer: Matches | None,
-        asked: dict[int, Moment],
-    ) -> Iterator[Moment]:
+    def _picked(self, entry: Entry, pick: Picked, asked: Mapping[int, Moment]) -> Iterator[Moment]:
         """A moment for a pick, unless it joins one that is there."""
+        _, time_s, who, source, _, answer = entry
         own = asked.get(id(answer))
         if own is not None and own.pick is None:
             own.pick = pick
@@ -200,7 +212,7 @@ class Moments:
         if before is None and who is UNNAMED:
             return
         name = before.who if before is not None else None if who is None else str(who)
-        yield Moment(number, time_s, name, source, answer=answer, pick=pick)
+        yield Moment(entry, time_s, name, source, answer=answer, pick=pick)
 
 
 def newest(entries: Sequence[Entry], pace: Callable[[], None]) -> list[Entry]:
@@ -222,7 +234,7 @@ def newest(entries: Sequence[Entry], pace: Callable[[], None]) -> list[Entry]:
         asked.setdefault(key, entry)
         if answer in picks:
             picked.setdefault(key, entry)
-    kept = {entry[0]: entry for entry in (*asked.values(), *picked.values())}
+    kept = {id(entry): entry for entry in (*asked.values(), *picked.values())}
     own = {id(entry[5]) for entry in kept.values()}
-    kept |= {entry[0]: entry for answer, entry in picks.items() if answer in own or answer not in answers}
-    return [kept[number] for number in sorted(kept)]
+    kept |= {id(entry): entry for answer, entry in picks.items() if answer in own or answer not in answers}
+    return [entry for entry in entries if id(entry) in kept]

@@ -65,6 +65,8 @@ class TableTap:
         self._is_named, self._is_mirroring = callable(who), bool(compiled.mirroring)
         self.is_watched = is_watched
         """Whether the table itself is watched, and not only a live context of it, whose picks it tells of."""
+        self.last_live: LiveTap | None = None
+        """The live context of the table that was asked last."""
         made_ready(compiled)
         self.source = Source(compiled.name, compiled.version, compiled.n_rows, compiled.asked)
 
@@ -94,18 +96,20 @@ class TableTap:
         """What answers a query and tells of it: the way of every query, so with as few steps as can be."""
         if not self.is_watched:
             return ask
-        append, numbers, now = self._ring.entries.append, self._ring.numbers, time.monotonic
-        keep, source, name, who_asks = self._keep, self.source, self._name, self._who
+        ring, now, keep, source, name = self._ring, time.monotonic, self._keep, self.source, self._name
+        append, numbers, slots = ring.entries.append, ring.numbers, ring.slots
 
         def ask_and_tell(context: Context) -> Matches:
             answer = ask(context)
-            append((next(numbers), now(), name, source, keep(context), answer))
+            if ring.keeps_all:
+                append((next(numbers), now(), name, source, keep(context), answer))
+            else:
+                slots[source] = (0, now(), name, source, keep(context), answer)
             return answer
 
         def ask_and_tell_who(context: Context) -> Matches:
             answer = ask(context)
-            if type(context) is not InMirror:
-                append((next(numbers), now(), who_asks(), source, keep(context), answer))
+            self.asked(context, answer)
             return answer
 
         return ask_and_tell_who if self._is_named or self._is_mirroring else ask_and_tell
@@ -113,12 +117,19 @@ class TableTap:
     def asked(self, context: Context, answer: Matches, actors: Actors | None = None) -> None:
         """Tell of a question that was answered with care, or with actors."""
         if self.is_watched and type(context) is not InMirror:
-            self._ring.put(time.monotonic(), self._who(), self.source, _kept(self._keep(context), actors), answer)
+            who = self._who()
+            facts = _kept(self._keep(context), actors)
+            self._ring.put(self._teller(who), time.monotonic(), who, self.source, facts, answer)
 
     def picked(self, answer: Matches, row: int | None, asset: str | None) -> None:
         """Tell of a pick."""
         who = self._who() if self.is_watched else UNNAMED
-        self._ring.put(time.monotonic(), who, self.source, Picked(row, asset), answer)
+        tellers = (self._teller(who), self.last_live)
+        self._ring.put_pick(tellers, time.monotonic(), who, self.source, Picked(row, asset), answer)
+
+    def _teller(self, who: object) -> object:
+        """Who tells, of whom the newest entry is kept: the table, or each of those that a function names."""
+        return (self.source, str(who)) if self._is_named else self.source
 
 
 def _kept(facts: Mapping[str, object], actors: Actors | None) -> Mapping[str, object] | WithActors:
@@ -155,9 +166,9 @@ class LiveTap:
 
     def asked(self, context: Context, answer: Matches, actors: Actors | None = None) -> None:
         """Tell of a question."""
-        ring = self._ring
         facts = _kept(self._keep(context), actors)
-        ring.entries.append((next(ring.numbers), time.monotonic(), self._who(), self._table.source, facts, answer))
+        self._table.last_live = self
+        self._ring.put(self, time.monotonic(), self._who(), self._table.source, facts, answer)
 
 
 class ControllerTap:
@@ -198,7 +209,7 @@ class ControllerTap:
 
     def record(self, decision: object) -> None:
         """Take one decision."""
-        self._ring.put(time.monotonic(), self._who(), None, decision, None)
+        self._ring.put(self, time.monotonic(), self._who(), None, decision, None)
         if self._other is not None:
             self._other.record(decision)
 

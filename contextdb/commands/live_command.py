@@ -4,7 +4,7 @@ The game has opened a link under NAME. Without NAME the only game that runs is m
 the seconds since the link was opened, who asks, the table, what was picked, how many rows are valid, and the facts that changed,
 written as for the command `query`. Ctrl+C ends it.
 
-  contextdb live
+  contextdb live game
   contextdb live game --who player --table locomotion
   contextdb live game --tables tables/ --explain
   contextdb live game --record session.jsonl

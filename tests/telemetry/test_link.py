@@ -358,8 +358,8 @@ def filled(*entries: tuple[object, object, object]) -> Ring:
 
 def told(ring: Ring, every: bool) -> list[tuple[str | None, object, object]]:
     entries = ring.take()
-    kept = entries if every else newest(entries, lambda: None)
-    return [(one.who, one.facts, one.pick and one.pick.asset) for one in Moments(lambda: None).of(kept)]
+    kept = entries if every else newest(entries)
+    return [(one.who, one.facts, one.pick and one.pick.asset) for one in Moments().of(kept)]
 
 
 def test_of_each_character_the_newest_question_is_told_and_the_newest_that_was_picked_from():
@@ -375,7 +375,7 @@ def test_of_each_character_the_newest_question_is_told_and_the_newest_that_was_p
 
 
 def test_a_pick_of_an_answer_that_was_told_before_is_of_who_asked():
-    answer, moments = object(), Moments(lambda: None)
+    answer, moments = object(), Moments()
     ring = filled(("a", {"n": 1}, answer))
     moments.of(ring.take())
     ring.put("a", 0.0, "table", SOURCE, Picked(2, "run"), answer)  # type: ignore[arg-type]
@@ -402,7 +402,7 @@ def test_what_was_told_to_nobody_is_not_lost():
     for _ in range(3):
         for number in range(10):
             ring.put("a", 0.0, "a", SOURCE, {"n": number}, None)
-        ring.forget()
+        ring.forget(lambda: None)
     ring.put("a", 0.0, "a", SOURCE, {}, None)
     assert len(ring.take()) == 1
     assert ring.lost() == 0

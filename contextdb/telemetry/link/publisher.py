@@ -57,7 +57,7 @@ class Publisher:
         self._is_closing = False
         self._pid = os.getpid()
         self._pace = Pace()
-        self._moments = Moments(self._pace)
+        self._moments = Moments()
         self._n_welcomes = 0
         self.is_heard = False
         """Whether somebody listens, or a file takes the lines, and all taps are open."""
@@ -185,7 +185,7 @@ class Publisher:
             self.taps.sweep()
         if not listeners:
             self._close_taps()
-            self.ring.forget()
+            self.ring.forget(self._pace)
             return
         self.ring.keeps_all = any(one.wants_every for one in listeners)
         with self.lock:
@@ -200,11 +200,19 @@ class Publisher:
 
     def _publish(self, listeners: list[Listener]) -> None:
         """Send the moments since the last time."""
-        with self.lock:
-            entries = self.ring.take()
-        if lost := self.ring.lost():
-            for listener in listeners:
-                listener.lose(lost)
+        pieces = self.ring.pieces()
+        while True:
+            with self.lock:
+                entries = next(pieces, None)
+            if lost := self.ring.lost():
+                for listener in listeners:
+                    listener.lose(lost)
+            if entries is None:
+                return
+            self._publish_piece(entries, listeners)
+            self._pace()
+
+    def _publish_piece(self, entries: list[Entry], listeners: list[Listener]) -> None:
         for moment, takers in self._shared_out(entries, listeners):
             takers = [one for one in takers if one.has_room or one.lose(1)]  # type: ignore[func-returns-value]
             if takers:
@@ -213,7 +221,7 @@ class Publisher:
 
     def _shared_out(self, entries: list[Entry], listeners: list[Listener]) -> Iterator[tuple[Moment, list[Listener]]]:
         """Each moment with those that want it."""
-        kept = newest(entries, self._pace)
+        kept = newest(entries)
         new = set(map(id, kept))
         for moment in self._moments.of(entries if any(one.wants_every for one in listeners) else kept):
             is_new = id(moment.entry) in new
@@ -252,7 +260,7 @@ class Publisher:
 
     def _open_taps(self) -> None:
         if not self.taps.are_open:
-            self.ring.forget()
+            self.ring.forget(self._pace)
             with self.lock:
                 self._told = self.taps.sources()  # as the headers of those that listen have it
                 self.taps.are_open = True

@@ -19,7 +19,9 @@ from contextdb.telemetry.link.lines import ASK, DECISION, PICK, Line, dumped, se
 
 MOST_ENTRIES = 1 << 13
 AT_ONCE = 128
-"""Entries that are looked through without a rest."""
+"""Entries that are taken, and let go, without a rest."""
+MOST_BEFORE = 32
+"""Questions that a pick may be of that comes later."""
 UNNAMED = object()
 """Who picks in a table of which only live contexts are watched: a pick of another answer is nobody's."""
 
@@ -93,13 +95,20 @@ class Ring:
                     return
         self.entries.append((next(self.numbers), time_s, who, source, pick, answer))
 
+    def pieces(self) -> Iterator[list[Entry]]:
+        """The entries that are there now, some at a time: to let go of many at once would take long."""
+        n_pieces = max(len(self.slots), len(self.entries)) // AT_ONCE + 1
+        for _ in range(n_pieces):
+            if piece := self.take():
+                yield piece
+
     def take(self) -> list[Entry]:
-        """The entries that are there now, oldest first."""
-        taken = [self.slots.popitem()[1] for _ in range(len(self.slots))]
-        picks = [self.picks.popitem()[1] for _ in range(len(self.picks))]
+        """Some of the entries, oldest first."""
+        taken = [self.slots.popitem()[1] for _ in range(min(len(self.slots), AT_ONCE))]
+        picks = [self.picks.popitem()[1] for _ in range(min(len(self.picks), AT_ONCE))]
         taken += [asked for asked, _ in picks]
         taken += [pick for _, pick in picks]
-        kept = [self.entries.popleft() for _ in range(len(self.entries))]  # the game only adds: there are no fewer meanwhile
+        kept = [self.entries.popleft() for _ in range(min(len(self.entries), AT_ONCE))]  # the game only adds: there are no fewer
         if kept:
             self._taken += len(kept)
             self._behind = max(self._behind, kept[-1][0] + 1)
@@ -113,9 +122,10 @@ class Ring:
         new, self._told = max(lost - self._told, 0), max(lost, self._told)
         return new
 
-    def forget(self) -> None:
+    def forget(self, pace: Callable[[], None]) -> None:
         """Let go what is there; it was for nobody."""
-        self.take()
+        for _ in self.pieces():
+            pace()
         self._first, self._taken, self._told = self._behind, 0, 0
 
 
@@ -173,10 +183,9 @@ def _of_role(role: str, asked: Mapping[str, Condition]) -> dict[str, Condition]:
 
 
 class Moments:
-    """Makes moments of entries: a pick joins the question whose answer it was made of. `pace` is called now and then."""
+    """Makes moments of entries: a pick joins the question whose answer it was made of."""
 
-    def __init__(self, pace: Callable[[], None]) -> None:
-        self._pace = pace
+    def __init__(self) -> None:
         self._before: dict[int, Moment] = {}
         """The questions of the last entries by the identity of their answers, which they keep."""
 
@@ -184,10 +193,8 @@ class Moments:
         """The moments, in their order."""
         asked: dict[int, Moment] = {}
         moments: list[Moment] = []
-        for at, entry in enumerate(entries):
+        for entry in entries:
             _, time_s, who, source, what, answer = entry
-            if at % AT_ONCE == 0:
-                self._pace()
             if type(what) is Picked:
                 moments += self._picked(entry, what, asked)
                 continue
@@ -198,7 +205,7 @@ class Moments:
             facts, actors = what if type(what) is WithActors else (what, None)
             moments.append(Moment(entry, time_s, name, source, facts, actors, answer))
             asked[id(answer)] = moments[-1]
-        self._before = asked
+        self._before = dict(list(asked.items())[-MOST_BEFORE:])
         return moments
 
     def _picked(self, entry: Entry, pick: Picked, asked: Mapping[int, Moment]) -> Iterator[Moment]:
@@ -215,16 +222,14 @@ class Moments:
         yield Moment(entry, time_s, name, source, answer=answer, pick=pick)
 
 
-def newest(entries: Sequence[Entry], pace: Callable[[], None]) -> list[Entry]:
+def newest(entries: Sequence[Entry]) -> list[Entry]:
     """Of each character and table the newest question, and the newest that was picked from; of each character the newest decision.
     With them the newest pick of each answer, unless its question is an older one."""
     picks: dict[int, Entry] = {}
     answers: set[int] = set()
     asked: dict[tuple[object, Source | None], Entry] = {}
     picked: dict[tuple[object, Source | None], Entry] = {}
-    for at, entry in enumerate(reversed(entries)):
-        if at % AT_ONCE == 0:
-            pace()
+    for entry in reversed(entries):
         answer = id(entry[5])
         if type(entry[4]) is Picked:
             picks.setdefault(answer, entry)

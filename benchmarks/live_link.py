@@ -29,7 +29,7 @@ from benchmarks import generator, ours, timing
 from benchmarks.sections import print_aligned
 from contextdb.telemetry.link import doors
 
-STATES = ("no link", "off", "on", "every", "stalled", "flood")
+STATES = ("no link", "off", "on", "stalled", "every", "flood")
 QUERIES = 66
 REST_S = 0.004
 LATE_MS = 2.0

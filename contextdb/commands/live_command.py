@@ -91,7 +91,7 @@ def _game(name: str | None, wanted: Wanted) -> Hearing | Sequence[Game]:
         return hear(path, wanted)
     except OSError:
         found = f"the game {in_quotes(path.stem)} does not answer: it is stopped, has ended, or has too many listeners."
-        raise ContextDBError(Fault(found, rule="no-such-game")) from None
+        raise ContextDBError(Fault(found)) from None
 
 
 def _list(running: Sequence[Game]) -> None:

@@ -151,8 +151,8 @@ def no_game(name: str | None, running: Sequence[Game]) -> ContextDBError:
     """The error where a game that is asked for does not run."""
     names = [game.name for game in running]
     if name is None:
-        return ContextDBError(Fault("no game is running.", 'a game that calls contextdb.link("game")', rule="no-such-game"))
+        return ContextDBError(Fault("no game is running.", 'a game that calls contextdb.link("game")'))
     near = nearest(name, names)
     found = f"no game {in_quotes(name)} is running{'' if names else ', nor any other'}."
-    fault = Fault(found, some(names) if names else "", in_quotes(near) if near else "", rule="no-such-game")
+    fault = Fault(found, some(names) if names else "", in_quotes(near) if near else "")
     return ContextDBError(fault)

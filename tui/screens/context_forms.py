@@ -264,5 +264,5 @@ class OpenDialog(Dialog[Path]):
         elif is_file and text.lower().endswith(CONTEXT_SUFFIXES):
             self.dismiss(path)
         else:
-            wrong = f"Files of contexts end in {' or '.join(CONTEXT_SUFFIXES)}." if is_file else "There is no such file."
+            wrong = f"Contexts are in {', '.join(CONTEXT_SUFFIXES)} files." if is_file else "There is no such file."
             self.query_one("#field-path", Field).say(wrong)

@@ -68,6 +68,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/query.py
 	$(PY) benchmarks/casting.py
 	$(PY) benchmarks/reload.py
+	$(PY) benchmarks/live_link.py
 	$(PY) benchmarks/c_header.py
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/crowd.py

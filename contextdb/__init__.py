@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from contextdb.tables.project import Project, load
     from contextdb.tables.table import Table
     from contextdb.tables.watching import Snapshot, Watch, watch
+    from contextdb.telemetry.link import Link, link
 
 # The same names for the interpreter, by module; tests/test_face.py compares the three lists.
 _HOMES = {
@@ -70,6 +71,7 @@ _HOMES = {
     "tables.project": "Project load",
     "tables.table": "Table",
     "tables.watching": "Snapshot Watch watch",
+    "telemetry.link": "Link link",
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 _OLD = {name: f"contextdb.motion.{name}" for name in ("ClipError", "MotionError", "QueryError")}
@@ -82,6 +84,8 @@ __all__ = [  # noqa: RUF022
     "watch",
     "Watch",
     "Snapshot",
+    "link",
+    "Link",
     "Table",
     "TableSettings",
     "CompiledTable",

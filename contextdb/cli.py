@@ -33,6 +33,7 @@ COMMANDS = {
     "import": "import a table from another program: CSV, Excel, JSON, DMN, Unreal",
     "export": "write a table for another program",
     "compile": "write the compiled file for the game",
+    "live": "what a running game asks its tables, and what it picks",
     "verify": "whether files are as contextdb wrote them",
     "motion": "motion databases: build, search, select, run, replay",
     "demo": "a tour of the sample tables",

@@ -58,6 +58,11 @@ class Odd:
     """Something that no function expects."""
 
 
+def linked(use: Callable[[cdb.Link], object]) -> None:
+    with cdb.link("arguments") as link:
+        use(link)
+
+
 WRONG: list[object] = [
     None, True, 0, -1, 1, 99, 2**70, 1.5, float("nan"), "", "x", "walk", "a\0b", "\ud800", b"x", [], [5], ["x"], [[]], [None], [{}],
     {}, {5: 5}, {"x": 5}, {"x": [5]}, {"speed": Odd()}, {"Defender": 5}, {"Defender": [5]}, {"Defender": [{5: 5}]},
@@ -71,6 +76,12 @@ CALLS: dict[str, Call] = {
     "load(path)": cdb.load,
     "Project.load(path)": cdb.Project.load,
     "watch(path)": lambda x: cdb.watch(x, poll_s=None),  # type: ignore[arg-type]
+    "link(name)": lambda x: cdb.link(x).close(),
+    "link(record)": lambda x: cdb.link("arguments", record=[x]).close(),  # type: ignore[arg-type]
+    "link(per_second)": lambda x: cdb.link("arguments", per_second=x).close(),
+    "link.watch(what)": lambda x: linked(lambda link: link.watch(x)),
+    "link.watch(who)": lambda x: linked(lambda link: link.watch(COMPILED, x)),
+    "link.tell(decision)": lambda x: linked(lambda link: link.tell("a", x)),
     "watch(poll_s)": lambda x: cdb.watch(SAMPLES, poll_s=x).close(),  # type: ignore[arg-type]
     "watch(settle_s)": lambda x: cdb.watch(SAMPLES, poll_s=None, settle_s=x).close(),  # type: ignore[arg-type]
     "watch(on_change)": lambda x: cdb.watch(SAMPLES, on_change=x, poll_s=None).close(),  # type: ignore[arg-type]

@@ -171,13 +171,14 @@ def test_a_file_whose_name_looks_like_a_glob_is_that_file(here: Path):
 
 def test_a_missing_file_is_named_with_the_nearest(here: Path):
     assert refused("moves", "data/aa.csv") == [
-        'data/aa.csv: no file of contexts is there. Accepted: a .csv or .parquet file, or a glob. Did you mean "data/a.csv"?'
+        "data/aa.csv: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob. "
+        'Did you mean "data/a.csv"?'
     ]
     assert refused("moves", "none/*.csv") == [
-        "none/*.csv: no file of contexts is there. Accepted: a .csv or .parquet file, or a glob."
+        "none/*.csv: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob."
     ]
     assert refused("moves", "data") == [
-        'data: no file of contexts is there. Accepted: a .csv or .parquet file, or a glob. Did you mean "data/*.csv"?'
+        'data: no file of contexts is there. Accepted: a .csv, .parquet or .jsonl file, or a glob. Did you mean "data/*.csv"?'
     ]
 
 
@@ -421,8 +422,8 @@ def test_an_interrupted_run_leaves_the_old_answers_and_nothing_else(here: Path, 
     (here / "answers.csv").write_text("of yesterday", encoding="utf-8")
     before = sorted(here.iterdir())
 
-    def interrupted(path: Path, wanted: Collection[str]) -> Iterator[object]:
-        yield from chunks_of(path, wanted)
+    def interrupted(path: Path, wanted: Collection[str], table: str) -> Iterator[object]:
+        yield from chunks_of(path, wanted, table)
         if path.name == "b.csv":
             raise KeyboardInterrupt
 

@@ -56,7 +56,11 @@ def mirrored_fact(fact: Fact, condition: Condition) -> Fact:
     return _negated(fact, condition.domain) if isinstance(fact, float) else _mirrored_value(fact, way)
 
 
-def mirrored_facts(facts: Mapping[str, object], conditions: Conditions) -> dict[str, object]:
+class InMirror(dict[str, object]):
+    """Facts as a mirror shows them: no moment of the game's own."""
+
+
+def mirrored_facts(facts: Mapping[str, object], conditions: Conditions) -> InMirror:
     """Facts as they are given, those of `conditions` as the mirror shows them; the rest as it is.
 
     Raises
@@ -64,7 +68,7 @@ def mirrored_facts(facts: Mapping[str, object], conditions: Conditions) -> dict[
     ContextError
         A fact that is none of its condition.
     """
-    found = dict(facts)
+    found = InMirror(facts)
     for name, condition in conditions.items():
         fact = found.get(name)
         if type(fact) is float and condition.domain.type.is_numeric:  # the usual fact; an angle is wrapped when it is read

@@ -1,13 +1,15 @@
 """Write the compiled file for the game: a .safetensors file, which the game maps into memory.
 
 Prints the path of each written file. --stubs also writes the facts of these tables as Python types, for completion in editors and
-for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files.
+for type checkers. --c-header also writes one header for games in C or C++, which opens and queries the compiled files, and
+--c-link a second one, by which such a game shows live what it asks.
 
   contextdb compile tables/                  one compiled file next to each table
   contextdb compile tables/ -o build/        all of them into a folder
   contextdb compile tables/hit_mid_air.csv -o hit_mid_air.safetensors
   contextdb compile tables/ -o build/ --stubs game/facts.py
   contextdb compile tables/ -o build/ --c-header game/tables.h
+  contextdb compile tables/ -o build/ --c-header game/tables.h --c-link game/cdb_link.h
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import sys
 from pathlib import Path, PurePath
 
 from contextdb.compiled.artefact import SUFFIX
-from contextdb.compiled.c_header import c_header_of
+from contextdb.compiled.c_header import c_header_of, c_link_of
 from contextdb.compiled.stubs import stubs_of
 from contextdb.console import ExitCode, output, printable, progress
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
@@ -42,12 +44,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--c-header", metavar="FILE", help="also write one C99 header that opens and queries the compiled files: a .h file"
     )
+    parser.add_argument(
+        "--c-link", metavar="FILE", help="with --c-header: also write a header that publishes what the game asks: a .h file"
+    )
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Compile one table or a folder of them; prints the path of each file."""
     stubs = None if arguments.stubs is None else _written_as(arguments.stubs, STUBS, "a Python file")
     header = None if arguments.c_header is None else _written_as(arguments.c_header, HEADERS, "a C header")
+    link = _link_path(arguments)
     tables = _tables(arguments.path)
     targets = [_target(table, arguments.out, len(tables)) for table in tables]
     _require_different(targets)
@@ -64,6 +70,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         _write(stubs, stubs_of({table.name: table.compile() for table in tables}))
     if header is not None and header_text is not None:
         _write(header, header_text)
+        if link is not None:
+            _write(link, _link_text(tables, header, link))
     return ExitCode.OK
 
 
@@ -76,6 +84,19 @@ def _header_text(tables: list[Table], path: Path) -> str:
             file=sys.stderr,
         )
     return text
+
+
+def _link_path(arguments: argparse.Namespace) -> Path | None:
+    if arguments.c_link is None:
+        return None
+    if arguments.c_header is None:
+        raise ContextDBError(Fault("--c-link goes with the header.", "--c-header FILE with it"))
+    return _written_as(arguments.c_link, HEADERS, "a C header")
+
+
+def _link_text(tables: list[Table], header: Path, path: Path) -> str:
+    included = PurePath(os.path.relpath(header, path.parent)).as_posix()
+    return c_link_of({table.name: table.compile() for table in tables}, included, f"CDB_{path.stem}_LINK_H")
 
 
 def _write(path: Path, text: str) -> None:

@@ -23,7 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], floa
     """The arguments about telemetry."""
     told = parser.add_argument_group("recorded contexts")
     told.add_argument(
-        "--telemetry", action="append", metavar="GLOB", help="CSV or Parquet files with a column for each fact; may be repeated"
+        "--telemetry",
+        action="append",
+        metavar="GLOB",
+        help="CSV or Parquet files with a column for each fact, or recordings (.jsonl); may be repeated",
     )
     told.add_argument(
         "--fail-under-telemetry", type=percent, metavar="PCT", help="fail if the covered percentage of recorded moments is lower"

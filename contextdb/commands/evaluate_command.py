@@ -1,6 +1,6 @@
 """Evaluate every context of a CSV or Parquet file, or of all files of a glob: how often each asset is valid, how often none.
 
-A file of contexts has a column for each fact and a row for each moment.
+A file of contexts has a column for each fact and a row for each moment, or is a recording of a live link (.jsonl).
 
   contextdb evaluate tables/hit_mid_air.csv moments.csv
   contextdb evaluate hit_mid_air "telemetry/*.parquet" --unknown any --out answers.parquet
@@ -48,7 +48,9 @@ PIECE_BYTES = 1 << 22
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("table", metavar="TABLE", help="a .csv, .parquet or .safetensors file, or the name of a table")
-    parser.add_argument("contexts", metavar="CONTEXTS", help="a CSV or Parquet file with a column for each fact, or a glob")
+    parser.add_argument(
+        "contexts", metavar="CONTEXTS", help="a CSV or Parquet file with a column for each fact, a recording (.jsonl), or a glob"
+    )
     parser.add_argument("--out", metavar="FILE", help="write each context's valid rows: .csv, .parquet, or a pipe that reads CSV")
     parser.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, Never, Self, TypeVar
+from typing import Any, ClassVar, Never, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +88,8 @@ class CompiledData(Unchanging):
     picking: PickColumns = NOTHING
     """How specific the rows are, and how long they rest; nothing for a table with tables inside, whose `ways` say it."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
+    heard: ClassVar[Any] = None
+    """Who hears of questions and picks, while somebody listens: the `Ears` of `contextdb.compiled.heard`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_ask", self._build_and_ask)  # a plain attribute: the way of every query
@@ -149,6 +151,8 @@ class CompiledData(Unchanging):
     def query_with_care(self, context: Context, unknown: Unknown = "error") -> Matches:
         """What is unusual in a context read once more, slowly: this answers it or says what is wrong."""
         found = self.matches(*self._bits_carefully(context, unknown))
+        if self.heard is not None:
+            self.heard.asked(context, found)
         return self.bound(found, kept_facts(context), unknown) if self.is_bound else found
 
     def encode(self, context: Context, *old: Never, unknown: Unknown = "error") -> NDArray[np.int32]:

@@ -56,12 +56,14 @@ class LiveContext(MutableMapping[str, object]):
     """
 
     __slots__ = (
+        "__weakref__",
         "_alike",
         "_answer",
         "_answering",
         "_blocks",
         "_cast",
         "_compiled",
+        "_ears",
         "_enabled",
         "_facts",
         "_is_bound",
@@ -78,6 +80,9 @@ class LiveContext(MutableMapping[str, object]):
         "_still",
         "_unknown",
     )
+
+    _ears: Any
+    """Who hears of its questions: set only while somebody listens, see `contextdb.compiled.heard`."""
 
     def __init__(self, compiled: CompiledData, unknown: Unknown = "error") -> None:
         self._compiled = compiled

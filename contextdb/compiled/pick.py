@@ -72,7 +72,10 @@ def pick(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None,
     answer, that state and `last` alone.
     """
     row = pick_row(compiled, matches, rng, last)
-    return compiled.fallback if row is None else compiled.assets[row]
+    asset = compiled.fallback if row is None else compiled.assets[row]
+    if compiled.heard is not None:
+        compiled.heard.picked(matches, row, asset)
+    return asset
 
 
 def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> int | None:

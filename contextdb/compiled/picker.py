@@ -176,7 +176,10 @@ class Picker:
             left = self._as_many(known, matches, slot, who, time)
             self._keep(known, np.array([slot]), np.array([-1 if left.picked is None else left.picked]), time)
         row = left.picked
-        return Pick(row, compiled.fallback if row is None else compiled.assets[row], left)
+        asset = compiled.fallback if row is None else compiled.assets[row]
+        if compiled.heard is not None:
+            compiled.heard.picked(matches, row, asset)
+        return Pick(row, asset, left)
 
     def pick_many(
         self, many: ManyMatches, *, time_s: float | None = None, who: Sequence[int] | NDArray[np.integer[Any]] | None = None

@@ -76,7 +76,10 @@ class CompiledTable(CompiledData):
         if old:
             return self.query(context, **by_name("query", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
-            return query_with_actors(self, context, Ask(actors, prefer, unknown))
+            cast = query_with_actors(self, context, Ask(actors, prefer, unknown))
+            if self.heard is not None:
+                self.heard.asked(context, cast, actors)
+            return cast
         if unknown != "error":
             return super().query(context, unknown=unknown)
         try:  # as there, without a call more: the way of every question

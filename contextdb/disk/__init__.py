@@ -22,6 +22,8 @@ from contextdb.disk.folder_lock import claim, folder_turn, sweep_in_turn, tempor
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, nearest
 
 TABLE_SUFFIXES = (".csv", ".parquet")
+CONTEXT_SUFFIXES = (*TABLE_SUFFIXES, ".jsonl")
+"""What files of contexts end in: tables, and the lines of a link (see `contextdb.telemetry.link`)."""
 CASES_SUFFIX = ".cases.csv"
 """What the file of a table's saved contexts ends in: no table itself."""
 ACTORS_SUFFIX = ".actors.json"

@@ -1,7 +1,7 @@
 """The rows of a telemetry file, some at a time: never the whole file at once.
 
 A CSV is cut at ends of lines outside of quotes, and each piece read as strictly as a table is. A Parquet file is read by polars a
-batch at a time.
+batch at a time. Of the lines of a link those of one table are read: see `contextdb.telemetry.link.recorded`.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from pathlib import Path
 import polars as pl
 from polars.selectors import by_name
 
-from contextdb.disk import TABLE_SUFFIXES
+from contextdb.disk import CONTEXT_SUFFIXES
 from contextdb.errors import Fault, FileError, Place, TableError, in_quotes
 from contextdb.files.csv_source import find_rows, read_csv, read_rows
 from contextdb.files.strangers import line_of
 from contextdb.files.texts import is_parquet, scanned_parquet
+from contextdb.telemetry.link.recorded import is_recording, pieces_of
 
 ROWS = 1 << 16
 BYTES = 1 << 24
@@ -45,18 +46,30 @@ class Chunk:
         return self.lines_before + line_of(self.raw, self.starts[row]) if self.starts else None
 
 
-def chunks_of(path: Path, wanted: Collection[str]) -> Iterator[tuple[Sequence[str], Chunk]]:
-    """The names of all columns with each chunk of the wanted ones; one empty chunk where the file has no rows.
+def chunks_of(path: Path, wanted: Collection[str], table: str) -> Iterator[tuple[Sequence[str], Chunk]]:
+    """The names of all columns with each chunk of the wanted ones; one empty chunk where the file has no rows. Of a recording of
+    several tables those rows are read that are of this one.
 
     Raises
     ------
     TableError, FileError
         The file cannot be read, with its faults.
     """
-    if path.suffix.lower() not in TABLE_SUFFIXES:
+    if path.suffix.lower() not in CONTEXT_SUFFIXES:
         found = f"a file of contexts does not end in {in_quotes(path.suffix)}."
-        raise FileError(Fault(found, " or ".join(TABLE_SUFFIXES), place=Place(str(path))))
-    yield from _parquet_chunks(path, wanted) if is_parquet(path) else _csv_chunks(path, wanted)
+        raise FileError(Fault(found, " or ".join(CONTEXT_SUFFIXES), place=Place(str(path))))
+    if is_recording(path):
+        yield from _recorded_chunks(path, wanted, table)
+    else:
+        yield from _parquet_chunks(path, wanted) if is_parquet(path) else _csv_chunks(path, wanted)
+
+
+def _recorded_chunks(path: Path, wanted: Collection[str], table: str) -> Iterator[tuple[Sequence[str], Chunk]]:
+    n_rows = 0
+    for piece in pieces_of(path, table):
+        names, frame = piece.frame(wanted)
+        yield names, Chunk(len(piece.facts), frame, n_rows, True, piece.share_done, piece.raw, piece.starts, piece.lines_before)
+        n_rows += len(piece.facts)
 
 
 def _parquet_chunks(path: Path, wanted: Collection[str]) -> Iterator[tuple[Sequence[str], Chunk]]:

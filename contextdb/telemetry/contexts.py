@@ -1,4 +1,5 @@
-"""Contexts from files: one row a moment, one column a fact. CSV texts are read as on the command line; Parquet keeps its types."""
+"""Contexts from files: one row a moment, one column a fact. CSV texts are read as on the command line; Parquet keeps its types; of
+the lines of a link the questions of the table are read."""
 
 from __future__ import annotations
 
@@ -62,7 +63,7 @@ def context_files(pattern: str) -> list[Path]:
         return [Path(pattern)]
     found = sorted(Path(p) for p in glob.glob(pattern, recursive=True) if os.path.isfile(p))
     if not found:
-        accepted = "a .csv or .parquet file, or a glob"
+        accepted = "a .csv, .parquet or .jsonl file, or a glob"
         raise FileError(Fault("no file of contexts is there.", accepted, _near(Path(pattern)), Place(pattern), "no-such-path"))
     return found
 
@@ -71,7 +72,7 @@ def _near(path: Path) -> str:
     """What may have been meant by a name that is not a file's: the files of a folder, or a file of nearly that name."""
     if os.path.isdir(path):
         suffixes = {file.suffix for file in path.iterdir()}
-        return next((path_in_quotes(path / f"*{suffix}") for suffix in (".parquet", ".csv") if suffix in suffixes), "")
+        return next((path_in_quotes(path / f"*{suffix}") for suffix in (".parquet", ".csv", ".jsonl") if suffix in suffixes), "")
     near = nearest(path.name, sorted(os.listdir(path.parent))) if os.path.isdir(path.parent) else None
     return path_in_quotes(path.parent / near) if near else ""
 
@@ -85,13 +86,14 @@ def read_contexts(path: Path, compiled: CompiledTable) -> Contexts:
         The file cannot be read, or holds facts that the table cannot use; file, line and fact are named.
     """
     read = list(contexts_in(path, compiled))
-    return Contexts(path, pl.concat([one.facts for one in read]), [chunk for one in read for chunk in one.chunks])
+    facts = pl.concat([one.facts for one in read], how="diagonal_relaxed")  # of lines, each piece has the facts that are in it
+    return Contexts(path, facts, [chunk for one in read for chunk in one.chunks])
 
 
 def contexts_in(path: Path, compiled: CompiledTable) -> Iterator[Contexts]:
     """The same, a chunk of the file at a time."""
     known = known_conditions(compiled)
-    for names, chunk in chunks_of(path, known):
+    for names, chunk in chunks_of(path, known, compiled.name):
         yield Contexts(path, _facts(path, names, chunk, known), (chunk,))
 
 

@@ -51,7 +51,7 @@ def observe(
     Parameters
     ----------
     files : path or glob, or several
-        CSV or Parquet files with a column for each fact and a row for each moment.
+        CSV or Parquet files with a column for each fact and a row for each moment, or recordings of a link (.jsonl).
     count : str, optional
         A column that says how often each row's moment was seen, a whole number from 0 up.
     engine : {"local", "dask"}
@@ -118,7 +118,7 @@ def _paths(files: str | Path | Sequence[str | Path]) -> list[Path]:
     several = [files] if isinstance(files, (str, Path)) else require_many(files, "files", "a path or a glob, or several")
     patterns = [require_path(each, "one of files") for each in several]
     if not patterns:
-        raise FileError(Fault("no file of contexts is given.", "a .csv or .parquet file, or a glob", rule="no-such-path"))
+        raise FileError(Fault("no file of contexts is given.", "a .csv, .parquet or .jsonl file, or a glob", rule="no-such-path"))
     found = {os.path.realpath(path): path for pattern in patterns for path in context_files(str(pattern))}
     return sorted(found.values())
 

@@ -36,7 +36,7 @@ def observe_file(plan: Plan, path: str | Path, n_threads: int = 1, tell: TellRow
     """Hold one file against the table; a file that cannot be read gives a part that says why."""
     sums = _Sums(plan)
     try:
-        chunks = chunks_of(Path(path), {*plan.compiled.asked, *([plan.count] if plan.count else [])})
+        chunks = chunks_of(Path(path), {*plan.compiled.asked, *([plan.count] if plan.count else [])}, plan.compiled.name)
         for found in _worked_out(plan, chunks, str(path), n_threads):
             sums.add(found)
             if tell is not None:

@@ -1,4 +1,4 @@
-"""Recorded contexts, looked at a few rows at a time: telemetry of the game, however long, in CSV or Parquet.
+"""Recorded contexts, looked at a few rows at a time: telemetry of the game, however long, in CSV, Parquet or lines of a link.
 
 One row is a moment, one column a fact. The rows stay in their file (Parquet) or its bytes (CSV) until they are asked for. Texts of
 a CSV are facts as on the command line; values of a Parquet file become such texts.
@@ -20,6 +20,7 @@ from contextdb.cells.words import quoted
 from contextdb.disk import read_bytes
 from contextdb.files.csv_source import find_rows, read_rows
 from contextdb.files.texts import is_parquet, scanned_parquet
+from contextdb.telemetry.link.recorded import facts_frame, indexed, is_recording
 
 SEARCHED_AT_ONCE = 1 << 17
 """Rows that are searched in one go."""
@@ -50,14 +51,17 @@ class Recording:
             yield _rows_with(frame, words) + start
 
 
-def open_recording(path: Path, conditions: Collection[str]) -> Recording:
-    """Open recorded contexts; the columns of these conditions are facts, others are left out.
+def open_recording(path: Path, conditions: Collection[str], table: str = "") -> Recording:
+    """Open recorded contexts; the columns of these conditions are facts, others are left out. Of the lines of a link those of the
+    table are read.
 
     Raises
     ------
     TableError, FileError
         The file cannot be read; with every fault of it.
     """
+    if is_recording(path):
+        return _open_lines(path, conditions, table)
     return _open_parquet(path, conditions) if is_parquet(path) else _open_csv(path, conditions)
 
 
@@ -117,3 +121,9 @@ def _open_csv(path: Path, conditions: Collection[str]) -> Recording:
     starts, stops = records.starts[1:], records.stops[1:]
     facts = tuple(name for name in names if name in conditions)
     return Recording(path, len(starts), facts, lambda i, j: read_rows(raw, starts[i:j], stops[i:j], names, facts))
+
+
+def _open_lines(path: Path, conditions: Collection[str], table: str) -> Recording:
+    recorded = indexed(path, table)
+    facts = tuple(name for name in recorded.names if name in conditions)
+    return Recording(path, len(recorded.starts), facts, lambda i, j: facts_frame(recorded.facts(i, j), facts))

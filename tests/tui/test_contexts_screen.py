@@ -274,7 +274,8 @@ def test_the_file_may_be_chosen_in_the_list(table: Table, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("typed", "said"), [("none.csv", "There is no such file."), ("contextdb.toml", "Files of contexts end in .csv or .parquet.")]
+    ("typed", "said"),
+    [("none.csv", "There is no such file."), ("contextdb.toml", "Contexts are in .csv, .parquet, .jsonl files.")],
 )
 def test_a_file_that_cannot_be_meant_is_refused_at_once(table: Table, typed: str, said: str):
     async def script(pilot) -> str:

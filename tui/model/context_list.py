@@ -156,7 +156,7 @@ class ContextList:
 
     @classmethod
     def open(cls, path: Path, table: Table) -> ContextList:
-        """The contexts of a file: cases (`*.cases.csv`) or a recording (`.csv`, `.parquet`).
+        """The contexts of a file: cases (`*.cases.csv`) or a recording (`.csv`, `.parquet`, `.jsonl`).
 
         Raises
         ------
@@ -166,7 +166,7 @@ class ContextList:
         if path.name.lower().endswith(CASES_SUFFIX):
             return cls(table, SavedRows(path))
         names = list(wanted_by(table).given)
-        recording = open_recording(path, names)
+        recording = open_recording(path, names, table.name)
         if not recording.facts:
             raise TableError(Fault("no column is a fact of the table.", some(names), place=Place(str(path))))
         return cls(table, RecordedRows(recording))

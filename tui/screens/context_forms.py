@@ -14,7 +14,7 @@ from textual.content import Content
 from textual.widgets import Input, RadioButton, RadioSet, Static
 
 from contextdb.checks.cases import exactly
-from contextdb.disk import TABLE_SUFFIXES
+from contextdb.disk import CONTEXT_SUFFIXES
 from contextdb.errors import ContextDBError
 from tui.model.context_list import ContextList, expectation_fault, summary
 from tui.model.paths import common_start, completions, resolved
@@ -224,7 +224,7 @@ class OpenDialog(Dialog[Path]):
 
     def _show(self, text: str) -> None:
         self.is_chosen = False
-        self.names = completions(text, self.folder, TABLE_SUFFIXES)
+        self.names = completions(text, self.folder, CONTEXT_SUFFIXES)
         self.query_one("#open-names", LineList).show(len(self.names), lambda at: (self.names[at],))
         self.query_one("#field-path", Field).say("")
 
@@ -261,8 +261,8 @@ class OpenDialog(Dialog[Path]):
             is_folder = is_file = False
         if is_folder:
             self._write(text if text.endswith("/") else f"{text}/")
-        elif is_file and text.lower().endswith(TABLE_SUFFIXES):
+        elif is_file and text.lower().endswith(CONTEXT_SUFFIXES):
             self.dismiss(path)
         else:
-            wrong = f"Files of contexts end in {' or '.join(TABLE_SUFFIXES)}." if is_file else "There is no such file."
+            wrong = f"Contexts are in {', '.join(CONTEXT_SUFFIXES)} files." if is_file else "There is no such file."
             self.query_one("#field-path", Field).say(wrong)

@@ -1,0 +1,141 @@
+"""Show what a running game asks its tables and what it picks, one line a change.
+
+The game has opened a link under NAME. Without NAME the only game that runs is meant; where several run, they are listed. A line has
+the seconds since the link was opened, who asks, the table, what was picked, how many rows are valid, and the facts that changed,
+written as for the command `query`. Ctrl+C ends it.
+
+  contextdb live game
+  contextdb live game --who player --table locomotion
+  contextdb live game --tables tables/ --explain
+  contextdb live game --record session.jsonl
+
+With --tables the questions are also asked of the tables of a folder: it is told where their answers differ from the game's, and
+with --explain which rows were nearest, and which of their cells fail. With --record FILE every question is kept, not only the
+newest; the commands `evaluate` and `coverage --telemetry` read FILE, while it grows too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from contextdb.commands.live_views import Changes
+from contextdb.compiled.table import CompiledTable
+from contextdb.console import ExitCode, aligned, output, printable
+from contextdb.errors import ContextDBError, ContextError, Fault, in_quotes
+from contextdb.tables.project import Project
+from contextdb.telemetry.link.doors import doors
+from contextdb.telemetry.link.game import new_recording
+from contextdb.telemetry.link.hearing import Game, Hearing, Wanted, games, hear, no_game
+from contextdb.telemetry.link.lines import END
+from contextdb.telemetry.link.listeners import FileListener
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("name", metavar="NAME", nargs="?", help="the name of a running game")
+    parser.add_argument("--who", action="append", metavar="WHO", help="only what this character asks; may be repeated")
+    parser.add_argument("--table", action="append", metavar="TABLE", help="only what this table is asked; may be repeated")
+    parser.add_argument("--record", metavar="FILE", help="also write every line to a new file: .jsonl")
+    parser.add_argument("--tables", metavar="FOLDER", help="a folder of tables to ask too; differing answers are told")
+    parser.add_argument("--explain", action="store_true", help="with --tables: show the nearest rows, and which cells fail")
+    parser.add_argument("--most", type=_count, metavar="N", help="end after so many lines")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Listen until the game ends, or the user does not want to any more."""
+    if arguments.explain and arguments.tables is None:
+        raise ContextError(Fault("--explain asks your own tables.", "--tables FOLDER with it"))
+    own: dict[str, CompiledTable] = {}
+    if arguments.tables is not None:
+        own = {name: table.compile() for name, table in Project.load(arguments.tables).tables.items()}
+    wanted = Wanted(arguments.who or (), arguments.table or (), every=arguments.record is not None)
+    try:
+        game = _game(arguments.name, wanted)
+        if not isinstance(game, Hearing):
+            _list(game)
+            return ExitCode.OK
+        with ExitStack() as stack:
+            hearing = stack.enter_context(game)
+            file = None if arguments.record is None else _record(Path(arguments.record), hearing, stack)
+            with output():
+                _show(hearing, Changes(own, arguments.explain), file, arguments.most)
+    except KeyboardInterrupt:  # how a listener ends
+        return ExitCode.OK
+    return ExitCode.OK
+
+
+def _game(name: str | None, wanted: Wanted) -> Hearing | Sequence[Game]:
+    """The game that is meant, or several of which it may be one.
+
+    Raises
+    ------
+    ContextDBError
+        None runs that is meant; those that run are named.
+    """
+    if name is not None:
+        path = dict(doors()).get(name)
+        if path is None:
+            raise no_game(name, games())
+    else:
+        running = games()
+        if not running:
+            raise no_game(None, running)
+        if len(running) > 1:
+            return running
+        path = running[0].path
+    try:
+        return hear(path, wanted)
+    except OSError:
+        found = f"the game {in_quotes(path.stem)} does not answer: it is stopped, has ended, or has too many listeners."
+        raise ContextDBError(Fault(found)) from None
+
+
+def _list(running: Sequence[Game]) -> None:
+    rows = [(game.name, str(game.header["pid"]), ", ".join(map(str, game.header["tables"]))) for game in running]
+    with output():
+        print(*aligned([("game", "process", "tables"), *rows]), sep="\n")
+
+
+def _record(path: Path, hearing: Hearing, stack: ExitStack) -> FileListener:
+    file = new_recording(path)
+    stack.callback(file.close)
+    file.offer(hearing.raw_header)
+    return file
+
+
+def _show(hearing: Hearing, changes: Changes, file: FileListener | None, most: int | None) -> None:
+    """Print lines as they come."""
+    _tell(changes.versions(hearing.header))
+    n_lines, has_ended = 0, False
+    for batch in hearing.batches():
+        for raw, line in batch:
+            has_ended = has_ended or line["line"] == END
+            if file is not None:
+                file.offer(raw)
+            said = changes.of(line)
+            _tell(said.notes)
+            if said.lines:
+                print(*said.lines, sep="\n", flush=True)
+                n_lines += 1
+            if most is not None and n_lines >= most:
+                return
+        if file is not None:
+            file.send()
+    name = in_quotes(str(hearing.header["game"]))
+    _tell([f"the game {name} has ended." if has_ended else f"the game {name} is gone."])
+
+
+def _tell(notes: Sequence[str]) -> None:
+    for note in notes:
+        print(printable(f"contextdb: {note}"), file=sys.stderr, flush=True)
+
+
+def _count(text: str) -> int:
+    """A number of lines."""
+    if not text.isdecimal() or not int(text):
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a number of lines, such as 10.")
+    return int(text)

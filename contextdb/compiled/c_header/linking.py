@@ -1,0 +1,122 @@
+"""The file beside the header by which a game in C publishes what it asks: `reader/link.h`, and a function for each table that knows
+the names of its facts. It goes with the header that `face` makes of the same tables.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.resources import files
+
+from contextdb.cells.conditions import Condition
+from contextdb.compiled.c_header.face import Choices, TableFace, choices_of, face_of, names_left, plain_of
+from contextdb.compiled.c_header.spelling import Names, comment, literal
+from contextdb.compiled.data import CompiledData
+
+_HEAD = """/* Written by `contextdb compile --c-link`: do not edit. It goes with {header}, which was written with it. */
+
+#ifndef {guard}
+#define {guard}
+
+#if !defined(_WIN32) && !defined(_GNU_SOURCE)
+#define _GNU_SOURCE
+#endif
+
+#include {include}
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+{reader}
+"""
+_FOOT = """
+#ifdef __cplusplus
+}}
+#endif
+
+#endif /* {guard} */
+"""
+
+
+def c_link_of(tables: Mapping[str, CompiledData], header: str, guard: str = "CDB_LINK_H") -> str:
+    """The text of the file, ASCII with line feeds. `header` is how it includes the header of the same tables; those that the header
+    leaves out are left out here too."""
+    names = names_left()
+    choices: dict[Condition, Choices] = {}
+    faces: list[tuple[CompiledData, TableFace]] = []
+    for name, table in tables.items():
+        if table.when is not None:
+            continue
+        for condition in table.conditions:  # in the order of the header, so that names come out alike
+            if condition.domain.values and condition not in choices:
+                choices[condition] = choices_of(condition, names)
+        faces.append((table, face_of(name, table, names)))
+    guard = Names().of(guard, is_upper=True)
+    reader = files("contextdb.compiled.c_header").joinpath("reader", "link.h").read_text(encoding="ascii")
+    head = _HEAD.format(header=comment(header)[3:-3], guard=guard, include=literal(header), reader=reader)
+    parts = [_joined(_tables(faces)), *(_joined(_tell(table, face, choices)) for table, face in faces)]
+    return "".join([head, *parts, _FOOT.format(guard=guard)])
+
+
+def _joined(lines: Iterator[str]) -> str:
+    return "\n" + "".join(f"{line}\n" for line in lines)
+
+
+def _tables(faces: Sequence[tuple[CompiledData, TableFace]]) -> Iterator[str]:
+    """The function that says what tables there are; their versions are not known in C."""
+    yield "#ifndef _WIN32"
+    yield "static inline void cdbl_tables(cdbl_link *link)"
+    yield "{"
+    yield '    cdbl_say(link, "{");'
+    for number, (table, face) in enumerate(faces):
+        comma = "," if number else ""
+        told = f'{comma}{json.dumps(face.table)}:{{"version":null,"rows":{table.n_rows},"conditions":{{'
+        yield f"    cdbl_say(link, {literal(told)});"
+        for at, condition in enumerate(_told(table)):
+            named = f"{',' if at else ''}{json.dumps(condition.name)}:{json.dumps(condition.domain.kind)}"
+            yield f"    cdbl_say(link, {literal(named)});"
+        yield '    cdbl_say(link, "}}");'
+    yield '    cdbl_say(link, "}");'
+    yield "}"
+    yield "#endif"
+
+
+def _told(table: CompiledData) -> list[Condition]:
+    """The conditions whose facts are told: derived ones are computed by whoever reads them."""
+    return [condition for condition in table.conditions if condition.expr is None]
+
+
+def _tell(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+    base = face.base
+    yield comment(f"---- table {face.table}")
+    yield ""
+    yield "/* Tell a question: who asks, the facts, the valid rows that the query gave, and the row that was picked, or -1. */"
+    yield f"static inline void {base.replace('cdb_', 'cdbl_', 1)}_tell(cdbl_link *link, const char *who, const {base} *opened,"
+    yield f"    const {base}_facts *facts, const uint64_t *rows, int64_t picked)"
+    yield "{"
+    yield "#ifndef _WIN32"
+    yield f"    cdbl_begin(link, who, {literal(face.table)});"
+    for condition, name in zip(table.conditions, face.fields, strict=True):
+        if condition.expr is None:
+            yield f"    {_fact(condition, name, choices.get(condition))}"
+    yield from () if _told(table) else ("    (void)facts;",)
+    yield "    cdbl_end(link, &opened->table, rows, picked);"
+    yield "#else"
+    yield "    (void)link, (void)who, (void)opened, (void)facts, (void)rows, (void)picked;"
+    yield "#endif"
+    yield "}"
+
+
+def _fact(condition: Condition, name: str, declared: Choices | None) -> str:
+    kind, field, said = condition.domain.type, f"facts->{name}", literal(condition.name)
+    if kind.is_tags and declared:
+        return f"cdbl_set(link, {said}, {field}.words, {declared.type}_values, {len(declared.values) + 1});"
+    if kind.is_tags:
+        return f"cdbl_texts(link, {said}, &{field});"
+    if declared:
+        return f"cdbl_choice(link, {said}, (int64_t){field}, {declared.type}_values, {len(declared.values)});"
+    if kind.is_numeric and not kind.is_decimal:
+        return f"cdbl_date(link, {said}, {field});"
+    how = {"whole": "truth" if kind.is_truth else "whole", "number": "number", "text": "text"}[plain_of(kind).member]
+    return f"cdbl_{how}(link, {said}, {field});"

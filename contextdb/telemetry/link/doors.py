@@ -1,0 +1,169 @@
+"""Where a game listens for who wants to watch it: a local socket, which only programs of the same user can connect to.
+
+A Unix socket with mode 0600 where there are such; the system also says which user has connected. Elsewhere (Windows) a port of
+127.0.0.1, and a file that only the user may read with the port and a token: who does not begin with the token is sent nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import socket
+import stat
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes
+from contextdb.telemetry.link.folder import HAS_OWNERS, NAME, runtime_folder, turn
+
+IS_UNIX = hasattr(socket, "AF_UNIX")
+SOCKET, PORT = ".sock", ".port"
+MOST_OF_A_NAME = 99
+"""So many games of one name may run at once."""
+WAITING = 16
+"""So many connections may wait to be taken."""
+PATIENCE_S = 2.0
+"""A game that has not taken a connection in this time is stopped, or has too many listeners."""
+
+
+@dataclass(frozen=True, eq=False)
+class Door:
+    """A game that listens."""
+
+    name: str
+    path: Path
+    server: socket.socket
+    token: str
+    """What a listener must begin with; "" where the system says who connects."""
+    inode: int
+
+    def close(self) -> None:
+        """Listen no more."""
+        self.server.close()
+        with suppress(OSError), turn(self.path.parent):
+            if os.lstat(self.path).st_ino == self.inode:
+                self.path.unlink()
+
+
+def opened(name: str) -> Door:
+    """Listen under a name, or under it with a number, "game-2", where another game has it.
+
+    Raises
+    ------
+    FileError
+        The folder is not this user's alone, or the system refuses.
+    """
+    folder = runtime_folder()
+    try:
+        with turn(folder):
+            for number in range(1, MOST_OF_A_NAME + 1):
+                own = name if number == 1 else f"{name}-{number}"
+                path = folder / f"{own}{SOCKET if IS_UNIX else PORT}"
+                if _is_free(path):
+                    return _unix_door(own, path) if IS_UNIX else _port_door(own, path)
+    except OSError as error:
+        why = f"the game cannot listen: {error.strerror or error}."
+        raise FileError(Fault(why, "a folder for sockets, with a short path", place=Place(str(folder)))) from None
+    raise ContextError(Fault(f"{MOST_OF_A_NAME} games are called {in_quotes(name)}.", "another name"))
+
+
+def _unix_door(name: str, path: Path) -> Door:
+    server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        server.bind(str(path))
+        os.chmod(path, 0o600)  # nobody can connect before it listens
+        server.listen(WAITING)
+        server.setblocking(False)
+        return Door(name, path, server, "", os.lstat(path).st_ino)
+    except OSError:
+        server.close()
+        raise
+
+
+def _port_door(name: str, path: Path) -> Door:
+    server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    token = secrets.token_hex(32)
+    try:
+        server.bind(("127.0.0.1", 0))
+        server.listen(WAITING)
+        server.setblocking(False)
+        handle = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
+        with os.fdopen(handle, "w", encoding="ascii") as file:
+            json.dump({"port": server.getsockname()[1], "token": token}, file)
+        return Door(name, path, server, token, os.lstat(path).st_ino)
+    except OSError:
+        server.close()
+        raise
+
+
+def _is_free(path: Path) -> bool:
+    """Whether nobody listens there; what a game that was killed left there is deleted."""
+    if not os.path.lexists(path):
+        return True
+    try:
+        connected(path).close()
+    except (ConnectionRefusedError, FileNotFoundError):
+        with suppress(FileNotFoundError):
+            path.unlink()
+        return True
+    except OSError:
+        return False
+    return False
+
+
+def doors() -> Iterator[tuple[str, Path]]:
+    """The name of each game that listens, and where; what killed games left is deleted."""
+    folder = runtime_folder()
+    with turn(folder):
+        paths = [path for path in folder.iterdir() if path.suffix in (SOCKET, PORT) and NAME.fullmatch(path.stem)]
+        left = [path for path in sorted(paths, key=lambda path: path.stem) if not _is_free(path)]
+    for path in left:
+        yield path.stem, path
+
+
+def connected(path: Path) -> socket.socket:
+    """A connection to a game, which may wait for `PATIENCE_S`.
+
+    Raises
+    ------
+    OSError
+        Nobody listens there: ConnectionRefusedError, FileNotFoundError; or the system refuses.
+    """
+    connection = socket.socket(socket.AF_INET if path.suffix == PORT else socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        connection.settimeout(PATIENCE_S)
+        connection.connect(("127.0.0.1", _port(path)[0]) if path.suffix == PORT else str(path))
+        return connection
+    except BaseException:
+        connection.close()
+        raise
+
+
+def token_of(path: Path) -> str:
+    """What a listener must begin with."""
+    return _port(path)[1] if path.suffix == PORT else ""
+
+
+def _port(path: Path) -> tuple[int, str]:
+    """Port and token of a file; OSError for one that is not whole, or not this user's alone."""
+    found = os.lstat(path)
+    if HAS_OWNERS and (found.st_uid != os.getuid() or found.st_mode & 0o077 or not stat.S_ISREG(found.st_mode)):
+        raise PermissionError(f"{path} is not this user's alone")
+    try:
+        read = json.loads(path.read_bytes())
+        return int(read["port"]), str(read["token"])
+    except (ValueError, TypeError, KeyError):
+        raise OSError(f"{path} is no file of a game that listens") from None
+
+
+def is_same_user(connection: socket.socket) -> bool:
+    """Whether the program at the other end is the same user's; True where the system does not say."""
+    peer = getattr(socket, "SO_PEERCRED", None)
+    if peer is None or connection.family != getattr(socket, "AF_UNIX", None):
+        return True
+    _, uid, _ = struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, peer, struct.calcsize("3i")))
+    return bool(uid == os.getuid())

@@ -1,0 +1,176 @@
+"""A link: a running game publishes what it asks and picks, to those that listen on the same machine."""
+
+from __future__ import annotations
+
+import os
+import time
+import weakref
+from pathlib import Path
+from types import TracebackType
+
+from contextdb.cells.arguments import require_number, require_path
+from contextdb.errors import ContextError, Fault, FileError, Place
+from contextdb.telemetry.link import doors
+from contextdb.telemetry.link.folder import require_name
+from contextdb.telemetry.link.listeners import FileListener
+from contextdb.telemetry.link.publisher import Publisher
+from contextdb.telemetry.link.ring import Ring
+from contextdb.telemetry.link.taps import Taps, Who
+
+PER_SECOND = 30.0
+RECORDING = ".jsonl"
+"""What the file of a recording ends in."""
+
+_links: weakref.WeakSet[Link] = weakref.WeakSet()
+"""The open links: a process that is forked off lets go of them."""
+
+
+def link(name: str = "game", *, record: str | Path | None = None, per_second: float = PER_SECOND) -> Link:
+    """Let programs of the same user on this machine watch what the game asks and picks: see docs/live.md.
+
+    Parameters
+    ----------
+    name : str
+        What the game is called; where one of this name runs already, this one is called "game-2".
+    record : path, optional
+        A new file, *.jsonl, which takes every question from now on, whether or not anybody listens.
+    per_second : float
+        How often a second lines are sent: then of each character and table the newest.
+
+    Raises
+    ------
+    ContextError
+        It cannot be a name.
+    FileError
+        The file is there already or cannot be written; the folder in which games are met is not this user's alone.
+    """
+    require_name(name)
+    if not 1.0 <= require_number(per_second, "per_second") <= 60.0:
+        raise ContextError(Fault(f"per_second is {per_second:g}.", "a number from 1 to 60"))
+    file = None if record is None else new_recording(require_path(record, "record"))
+    try:
+        return Link(doors.opened(name), file, 1.0 / per_second)
+    except BaseException:
+        if file is not None:
+            file.close()
+        raise
+
+
+def new_recording(path: Path) -> FileListener:
+    """A new file for lines.
+
+    Raises
+    ------
+    FileError
+        It does not end in .jsonl, is there already, or cannot be written.
+    """
+    place = Place(str(path))
+    if path.suffix != RECORDING:
+        raise FileError(Fault("a recording does not end so.", f"a name that ends in {RECORDING}", place=place))
+    try:
+        return FileListener(path, path.open("xb"))
+    except FileExistsError:
+        raise FileError(Fault("the file is there already.", "a new file", place=place)) from None
+    except OSError as error:
+        raise FileError(Fault(f"the file cannot be written: {error.strerror}.", "an existing folder", place=place)) from None
+
+
+class Link:
+    """What a game watches by. Get one from `contextdb.link`; close it, or use it in a `with`.
+
+    While nobody listens, what is watched is as fast as ever: tables are not changed. While somebody does, the game's thread puts a
+    tuple into a ring for each question; all else is done in the link's own thread.
+    """
+
+    def __init__(self, door: doors.Door, file: FileListener | None, every_s: float) -> None:
+        self.name = door.name
+        """What the game is called: the name that was asked for, or that with a number."""
+        self._ring = Ring()
+        self._taps = Taps(self._ring)
+        self._publisher = Publisher(door, self._taps, self._ring, file, every_s)
+        self._is_closed = False
+        self._knows_decisions = False
+        _links.add(self)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether somebody listens now, or a file takes the lines."""
+        return self._publisher.is_heard
+
+    def watch(self, what: object, who: Who = None) -> None:
+        """Publish what something is asked, and what is picked or decided, from now on.
+
+        Parameters
+        ----------
+        what : CompiledTable, LiveContext, Controller, Watch or mapping of CompiledTable
+            A folder that is watched for changes, `cdb.watch(folder)`, stays watched when its tables are exchanged. Tables, live
+            contexts and controllers that the game lets go are watched no more.
+        who : str or function, optional
+            The character that asks; a function gives it, and is called in each question. Who watches again, renames.
+
+        Raises
+        ------
+        ContextError
+            It is none of these, another link watches it, or the link is closed.
+        """
+        if self._is_closed:
+            raise ContextError(Fault("the link is closed.", "an open link"))
+        with self._publisher.lock:
+            if hasattr(what, "recorder"):
+                self._load_decisions()
+            self._taps.watch(what, who)
+
+    def tell(self, who: str | None, decision: object) -> None:
+        """Publish the decision of a controller that is not watched, or the choice of a selector.
+
+        Raises
+        ------
+        ContextError
+            It is neither.
+        """
+        if not self._knows_decisions:
+            self._load_decisions()
+        from contextdb.telemetry.link.decisions import require_decision
+
+        require_decision(decision)
+        if self.is_heard:
+            self._ring.put(("tell", who), time.monotonic(), who, None, decision, None)
+
+    def close(self) -> None:
+        """Publish no more. What was watched is what it was before."""
+        if not self._is_closed:
+            self._is_closed = True
+            _links.discard(self)
+            self._publisher.close()
+            self._taps.forget()
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Link {self.name!r}: {'closed' if self._is_closed else 'heard' if self.is_heard else 'nobody listens'}>"
+
+    def _load_decisions(self) -> None:
+        """Load what makes lines of decisions, now and not in a frame."""
+        import contextdb.telemetry.link.decisions  # noqa: F401
+
+        self._knows_decisions = True
+
+    def _forked(self) -> None:
+        self._is_closed = True
+        self._publisher.drop()
+        self._taps.forget()
+
+
+def _let_go() -> None:
+    """In a process that was forked off: its copies of links are closed, the game's own stay."""
+    for each in list(_links):
+        each._forked()
+    _links.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_let_go)

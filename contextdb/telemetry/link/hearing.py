@@ -1,0 +1,158 @@
+"""The other end of a link: which games run, and the lines of one of them."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from contextdb.errors import ContextDBError, Fault, Place, in_quotes, nearest, some
+from contextdb.telemetry.link.doors import connected, doors, token_of
+from contextdb.telemetry.link.lines import FORMAT, HEADER, MOST_BYTES, Line, dumped, read_line
+
+PIECE = 1 << 16
+HEADER_S = 5.0
+"""A game that has not sent its header in this time is stopped."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a listener asks for; nobody and no table named: all."""
+
+    who: Sequence[str] = ()
+    tables: Sequence[str] = ()
+    every: bool = False
+    """Every question, not only the newest of each character and table."""
+
+    def takes(self, line: Line) -> bool:
+        """Whether a line is asked for: a game written in C sends all of them."""
+        if self.who and "who" in line and line["who"] not in self.who:
+            return False
+        return not self.tables or "table" not in line or line["table"] in self.tables
+
+
+def hear(path: Path, wanted: Wanted = Wanted()) -> Hearing:
+    """Listen to a game.
+
+    Raises
+    ------
+    OSError
+        It is not there, or does not answer.
+    ContextDBError
+        What it sends is not the lines of a link, or of another format.
+    """
+    return Hearing(path, connected(path), wanted)
+
+
+class Hearing:
+    """The lines of a game. `header` is the first of them."""
+
+    def __init__(self, path: Path, connection: socket.socket, wanted: Wanted) -> None:
+        self._connection = connection
+        self._place = Place(str(path))
+        self._wanted = wanted
+        self._rest = b""
+        self._waiting: list[tuple[bytes, Line]] = []
+        try:
+            connection.settimeout(HEADER_S)
+            connection.sendall(_request(wanted, token_of(path)))
+            self.header, self.raw_header = self._first()
+            connection.settimeout(None)
+        except BaseException:
+            connection.close()
+            raise
+
+    def batches(self) -> Iterator[list[tuple[bytes, Line]]]:
+        """Lines as they are sent, with their bytes, those that came together in one list; ends when the game does."""
+        batch, self._waiting = self._waiting, []
+        while True:
+            if batch:
+                yield batch
+            try:
+                got = self._connection.recv(PIECE)
+            except ConnectionError:
+                got = b""
+            if not got:
+                return
+            batch = self._lines(got)
+
+    def close(self) -> None:
+        """Hang up."""
+        self._connection.close()
+
+    def __enter__(self) -> Hearing:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def _first(self) -> tuple[Line, bytes]:
+        while not self._waiting:
+            got = self._connection.recv(PIECE)
+            if not got:
+                raise ConnectionResetError("it hung up")
+            self._waiting = self._lines(got)
+        raw, header = self._waiting.pop(0)
+        require_header(header, self._place)
+        return header, raw
+
+    def _lines(self, got: bytes) -> list[tuple[bytes, Line]]:
+        *whole, self._rest = (self._rest + got).split(b"\n")
+        if len(self._rest) > MOST_BYTES:
+            raise ContextDBError(Fault("a line of the game does not end.", "lines of JSON", place=self._place))
+        try:
+            lines = [(raw + b"\n", read_line(raw)) for raw in whole]
+            return [(raw, line) for raw, line in lines if self._wanted.takes(line)]
+        except ValueError as error:
+            raise ContextDBError(Fault(f"a line of the game cannot be read: {error}", place=self._place)) from None
+
+
+def require_header(line: Line, place: Place) -> None:
+    """Raise ContextDBError for a first line that is no header of this format."""
+    if line["line"] != HEADER:
+        raise ContextDBError(Fault("the first line is no header of a link.", 'a line with "line": "header"', place=place))
+    if line["format"] != FORMAT:
+        found = f"the lines are of format {line['format']}; this contextdb reads format {FORMAT}."
+        raise ContextDBError(Fault(found, f"format {FORMAT}", place=place))
+
+
+def _request(wanted: Wanted, token: str) -> bytes:
+    asked: Line = {"format": FORMAT, "every": wanted.every}
+    asked |= {"token": token} if token else {}
+    asked |= {"who": list(wanted.who)} if wanted.who else {}
+    asked |= {"tables": list(wanted.tables)} if wanted.tables else {}
+    return dumped(asked)
+
+
+@dataclass(frozen=True)
+class Game:
+    """A game that can be listened to."""
+
+    name: str
+    path: Path
+    header: Line
+
+
+def games() -> list[Game]:
+    """The games that run now, by name. One that does not answer is left out."""
+    found = []
+    for name, path in doors():
+        try:
+            with hear(path) as hearing:
+                found.append(Game(name, path, hearing.header))
+        except (OSError, ContextDBError):
+            continue
+    return found
+
+
+def no_game(name: str | None, running: Sequence[Game]) -> ContextDBError:
+    """The error where a game that is asked for does not run."""
+    names = [game.name for game in running]
+    if name is None:
+        return ContextDBError(Fault("no game is running.", 'a game that calls contextdb.link("game")'))
+    near = nearest(name, names)
+    found = f"no game {in_quotes(name)} is running{'' if names else ', nor any other'}."
+    fault = Fault(found, some(names) if names else "", in_quotes(near) if near else "")
+    return ContextDBError(fault)

@@ -28,7 +28,7 @@ from contextdb.motion.search.many_filters import ManyFilters
 
 MOST_KINDS = 65536
 """With more kinds of frames than this, every frame is scanned."""
-BLOCK_QUERIES = 256
+BLOCK_QUERIES = 512
 """So many queries at most go through the frames together."""
 THREAD_QUERIES = 32
 """Fewer queries than this are not worth a second thread."""

@@ -15,6 +15,18 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     when.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
 
+and for a table with rules or derived facts, P programs of D derived facts and then of the rules, which name F facts
+(`contextdb.compiled.programs`; Python does not read them):
+
+    programs.code          int32 [N, 4]          the instructions: an `Op` and three operands
+    programs.starts        int64 [P + 1]         where each program begins in `code`
+    programs.numbers       float64               what instructions name by number
+    programs.texts         uint8                 JSON list of texts, likewise
+    programs.facts         uint8                 JSON list of F names of conditions
+    programs.types         uint8                 JSON list of their types
+    programs.derived       int64 [D]             which of these facts each program computes, each behind those that it needs
+    programs.of_row        int32 [R]             which rule each row has, from 0; -1 for none. [0] where no row has one
+
 and for a table with tables inside, D the depth, T the number of tables (`contextdb.compiled.ways`; soft cells then have D R rows):
 
     ways.numbers           int32 [D, R]
@@ -46,6 +58,7 @@ from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData, SoftMasks
+from contextdb.compiled.programs import programs_to_tensors
 from contextdb.compiled.ways_stored import ways_from, ways_to_json, ways_to_tensors
 from contextdb.expressions import Derivation
 from contextdb.expressions.rules import WhenColumn, WhenRules
@@ -95,6 +108,7 @@ def save(compiled: CompiledData, path: Path) -> None:
     if compiled.when is not None:
         tensors["when.codes"] = compiled.when.texts.codes
         tensors["when.texts"] = texts_to_array(list(compiled.when.texts.texts))
+    tensors |= programs_to_tensors(compiled)
     if compiled.ways is not None:
         tensors |= ways_to_tensors(compiled.ways)
     about = json.dumps(

@@ -1,6 +1,6 @@
 /* Asks artefacts of any table without a face of its own: ask IN OUT.
  *
- * IN: a schema, some artefacts and some contexts, as whole numbers of 8 bytes, little-endian, and texts: their length without the 0
+ * IN: a schema, what strange conditions do, some artefacts and some contexts, as whole numbers of 8 bytes, little-endian, and texts: their length without the 0
  * at their end, then their bytes. OUT: for each artefact the status of opening it; where that is 0, for each context the status,
  * the number of words, and the words of the answer. Artefacts lie in blocks of just their size, so that a sanitizer sees what is
  * read beyond. */
@@ -40,6 +40,7 @@ static cdb_fact fact(const cdb_condition *condition)
 {
     cdb_fact found;
     memset(&found, 0, sizeof found);
+    if (condition->expr) return found; /* it is computed */
     if (condition->type == CDB_TEXT) found.text = text();
     else if (condition->type == CDB_TAGS && condition->n_values > 0) {
         size_t size = (condition->n_values + 63) / 64 * 8;
@@ -63,7 +64,7 @@ static void put(FILE *out, int64_t value)
 }
 
 /* One answer: rows met one after another must be those that are counted, and their assets must be there to read. */
-static void answer(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
+static void answer(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
     cdb_unknown unknown)
 {
     uint64_t *rows = (uint64_t *)malloc(table->n_words * 8 + 8);
@@ -88,6 +89,7 @@ int main(int argc, char **argv)
     static cdb_fact *facts;
     static char *input;
     char *artefacts;
+    cdb_strange strange;
     int64_t n_artefacts, n_contexts, n, i, j;
     long size;
     if (!in || !out || fseek(in, 0, SEEK_END) != 0 || (size = ftell(in)) < 0) return 2;
@@ -106,6 +108,7 @@ int main(int argc, char **argv)
     }
     schema.conditions = conditions;
     schema.n_conditions = (size_t)n;
+    strange = (cdb_strange)whole();
     n_artefacts = whole();
     artefacts = at;
     for (i = 0; i < n_artefacts; i++) text();
@@ -124,7 +127,7 @@ int main(int argc, char **argv)
         cdb_fault fault;
         memcpy(bytes, at, (size_t)length);
         at += length + 1;
-        put(out, (int64_t)cdb_open(&table, columns, &schema, bytes, (size_t)length, &fault));
+        put(out, (int64_t)cdb_open(&table, columns, &schema, bytes, (size_t)length, strange, &fault));
         if (fault.status == CDB_OK)
             for (j = 0; j < n_contexts; j++) answer(out, &table, columns, &schema, facts + j * n, unknown[j]);
         cdb_close(&table);

@@ -1,7 +1,7 @@
 """The part of the header that is about single tables: for each a struct of facts, and functions that open and ask it.
 
-A condition that several tables share has one enum. Derived facts are fields like any others: an expression is not worked out in C,
-so the game gives its value, and the artefact is refused when its expression is no longer the one that the header shows.
+A condition that several tables share has one enum. The schema of a table has the conditions of its columns, then those that its
+rules and derived facts need. The game gives all but the derived ones, which are computed by the programs of the artefact.
 """
 
 from __future__ import annotations
@@ -12,17 +12,22 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from textwrap import wrap
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.kinds import Kind
 from contextdb.compiled.c_header.spelling import Names, comment, literal
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.programs import named_conditions
 
-READER = 2
+READER = 3
 """Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
 
-PARTS = ("types.h", "json.h", "opening.h", "columns.h", "arrays.h", "open.h", "query.h", "files.h")
+PARTS = (
+    *("types.h", "arithmetic.h", "json.h", "opening.h", "columns.h", "facts.h", "programs.h", "arrays.h", "linking.h", "open.h"),
+    *("query.h", "files.h"),
+)
 _HEAD = """/* Written by `contextdb compile --c-header`: do not edit. */
 
 #ifdef CDB_READER
@@ -49,7 +54,7 @@ _FOOT = """
 
 #endif /* {guard} */
 """
-_ENDINGS = ("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_open", "_close", "_query")
+_ENDINGS = ("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_given", "_open", "_open_with", "_close", "_query")
 
 
 @dataclass(frozen=True)
@@ -75,14 +80,6 @@ def plain_of(kind: Kind) -> Plain:
 
 
 @dataclass(frozen=True)
-class HeldBack:
-    """A table that no C program can ask, and why."""
-
-    table: str
-    why: str
-
-
-@dataclass(frozen=True)
 class Choices:
     """A condition's declared values in C: the type, the array of their names, and an enumerator for each."""
 
@@ -104,11 +101,12 @@ class TableFace:
     table: str
     base: str
     fields: tuple[str, ...]
+    """"" for a derived condition, which no field gives."""
     enumerators: tuple[str, ...]
 
 
-def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H") -> tuple[str, list[HeldBack]]:
-    """The text of the header, ASCII with line feeds, and the tables that it leaves out; the same tables give the same text.
+def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H") -> str:
+    """The text of the header, ASCII with line feeds; the same tables give the same text.
 
     Raises
     ------
@@ -117,20 +115,21 @@ def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H")
     """
     names = names_left()
     choices: dict[Condition, Choices] = {}
-    held_back, parts = [], []
+    parts = []
     for name, table in tables.items():
-        if why := _why_not(table):
-            held_back.append(HeldBack(name, why))
-            parts.append(f"\n{comment(f'table {name} is left out: {why}')}\n")
-            continue
-        for condition in table.conditions:
+        for condition in conditions_of(table):
             if condition.domain.values and condition not in choices:
                 choices[condition] = choices_of(condition, names)
                 parts.append("\n" + "".join(f"{line}\n" for line in _choices(condition, choices[condition])))
         parts.append("\n" + "".join(f"{line}\n" for line in _table(table, face_of(name, table, names), choices)))
     guard = names.of(guard, is_upper=True)
     head = _HEAD.format(version=READER, reader=_reader(), guard=guard)
-    return "".join([head, *parts, _FOOT.format(guard=guard)]), held_back
+    return "".join([head, *parts, _FOOT.format(guard=guard)])
+
+
+def conditions_of(table: CompiledData) -> tuple[Condition, ...]:
+    """The conditions of a table's schema: those of its columns, then the others that its rules and derived facts need."""
+    return (*table.conditions, *(c for c in named_conditions(table) if c.name not in table.places))
 
 
 def names_left() -> Names:
@@ -142,11 +141,6 @@ def names_left() -> Names:
 def _reader() -> str:
     folder = files("contextdb.compiled.c_header").joinpath("reader")
     return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in PARTS)
-
-
-def _why_not(table: CompiledData) -> str:
-    """Why a table cannot be answered for in C; "" where it can."""
-    return "its rows have rules of their own (when)" if table.when is not None else ""
 
 
 def choices_of(condition: Condition, names: Names) -> Choices:
@@ -175,8 +169,8 @@ def face_of(name: str, table: CompiledData, names: Names) -> TableFace:
     return TableFace(
         name,
         base,
-        tuple(fields.of(c.name) for c in table.conditions),
-        tuple(names.of(c.name, head, is_upper=True) for c in table.conditions),
+        tuple("" if c.expr else fields.of(c.name) for c in conditions_of(table)),
+        tuple(names.of(c.name, head, is_upper=True) for c in conditions_of(table)),
     )
 
 
@@ -237,15 +231,20 @@ def _table(table: CompiledData, face: TableFace, choices: Mapping[Condition, Cho
 def _facts_struct(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     yield f"typedef struct {face.base}_facts {{"
     lines = []
-    for condition, name in zip(table.conditions, face.fields, strict=True):
+    for condition, name in _given_conditions(table, face):
         kind = _type(condition, choices.get(condition))
         lines.append((f"    {kind}{'' if kind.endswith('*') else ' '}{name};", condition))
     width = max((len(line) for line, _ in lines), default=0) + 2
     yield from (f"{line:<{min(width, 60)}}{_told(condition)}" for line, condition in lines)
     if not lines:
-        yield "    char nothing; /* the table has no conditions */"
+        yield "    char nothing; /* the table needs no facts */"
     yield f"}} {face.base}_facts;"
     yield ""
+
+
+def _given_conditions(table: CompiledData, face: TableFace) -> list[tuple[Condition, str]]:
+    """The conditions whose facts the game gives, and their fields."""
+    return [(c, name) for c, name in zip(conditions_of(table), face.fields, strict=True) if name]
 
 
 def _type(condition: Condition, choices: Choices | None) -> str:
@@ -255,14 +254,13 @@ def _type(condition: Condition, choices: Choices | None) -> str:
 
 
 def _told(condition: Condition) -> str:
-    """Type, name, bounds, unit, expression and description of a condition."""
+    """Type, name, bounds, unit and description of a condition."""
     domain = condition.domain
     low, high = domain.minimum, domain.maximum
     bounds = f"{_end(low, domain)}..{_end(high, domain)}" if math.isfinite(low) or math.isfinite(high) else ""
     unit = condition.unit or domain.type.unit
     head = " ".join(part for part in (domain.kind, condition.name, bounds, unit) if part)
-    derived = f"the game computes it: {condition.expr}" if condition.expr else ""
-    return comment("; ".join(part for part in (head, derived, condition.description) if part))
+    return comment("; ".join(part for part in (head, condition.description) if part))
 
 
 def _end(bound: float, domain: Domain) -> str:
@@ -281,18 +279,19 @@ def _conditions_enum(table: CompiledData, face: TableFace) -> Iterator[str]:
 def _schema(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     yield f"static inline const cdb_schema *{face.base}_schema(void)"
     yield "{"
-    if table.conditions:
+    if conditions_of(table):
         yield "    static const cdb_condition conditions[] = {"
-        for number, condition in enumerate(table.conditions, 1):
+        for number, condition in enumerate(conditions_of(table), 1):
             values = choices.get(condition)
             n_values = 0 if values is None else len(values.values) + (condition.domain.type.is_tags)
             expr = literal(condition.expr) if condition.expr else "NULL"
             listed = f"{values.type}_values" if values else "NULL"
-            ending = "," if number < len(table.conditions) else ""
+            ending = "," if number < len(conditions_of(table)) else ""
             kind = f"CDB_{condition.domain.kind.upper()}"
             yield f"        {{{literal(condition.name)}, {kind}, {expr}, {listed}, {n_values}}}{ending}"
         yield "    };"
-    yield f"    static const cdb_schema schema = {{{'conditions' if table.conditions else 'NULL'}, {len(table.conditions)}}};"
+    conditions = conditions_of(table)
+    yield f"    static const cdb_schema schema = {{{'conditions' if conditions else 'NULL'}, {len(conditions)}}};"
     yield "    return &schema;"
     yield "}"
     yield ""
@@ -304,7 +303,7 @@ def _missing_facts(table: CompiledData, face: TableFace, choices: Mapping[Condit
     yield "{"
     yield f"    {face.base}_facts facts;"
     yield "    memset(&facts, 0, sizeof facts);"
-    for condition, name in zip(table.conditions, face.fields, strict=True):
+    for condition, name in _given_conditions(table, face):
         kind, declared = condition.domain.type, choices.get(condition)
         if not kind.is_tags:
             yield f"    facts.{name} = {declared.missing if declared else plain_of(kind).missing};"
@@ -316,33 +315,63 @@ def _missing_facts(table: CompiledData, face: TableFace, choices: Mapping[Condit
 
 
 def _functions(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
-    base, n = face.base, max(len(table.conditions), 1)
+    base, n = face.base, max(len(conditions_of(table)), 1)
     yield f"typedef struct {base} {{"
     yield "    cdb_table table;"
     yield f"    cdb_column columns[{n}];"
     yield f"}} {base};"
     yield ""
-    yield "/* Open an artefact from memory that stays where it is until it is closed: see cdb_open. */"
-    yield f"static inline cdb_status {base}_open({base} *opened, const void *bytes, size_t size, cdb_fault *fault)"
+    yield from _facts_in_order(table, face, choices)
+    for name, arguments, told, body in _FUNCTIONS:
+        yield f"/* {told} */"
+        head = f"static inline {'void' if name == 'close' else 'cdb_status'} {base}_{name}({arguments.format(base=base)})"
+        yield from (line.rstrip() for line in wrap(head, 126, subsequent_indent="    ", break_long_words=False))
+        yield "{"
+        yield from (f"    {line}".format(base=base, n=n) for line in body)
+        yield "}"
+        yield ""
+
+
+_ASKED = "const {base} *opened, const {base}_facts *facts, cdb_unknown unknown"
+_GIVEN = ("cdb_fact given[{n}];", "{base}_given(facts, given);")
+_TABLE = "&opened->table, opened->columns, {base}_schema()"
+_FUNCTIONS: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
+    (
+        "open",
+        "{base} *opened, const void *bytes, size_t size, cdb_fault *fault",
+        "Open an artefact from memory that stays where it is until it is closed: see cdb_open.",
+        (f"return cdb_open({_TABLE}, bytes, size, CDB_STRANGE_REFUSED, fault);",),
+    ),
+    (
+        "open_with",
+        "{base} *opened, const void *bytes, size_t size, cdb_strange strange, cdb_fault *fault",
+        "The same; `strange` says what a condition does that this header does not know.",
+        (f"return cdb_open({_TABLE}, bytes, size, strange, fault);",),
+    ),
+    ("close", "{base} *opened", "Give back what opening took.", ("cdb_close(&opened->table);",)),
+    (
+        "query",
+        f"{_ASKED}, uint64_t *rows, size_t room, cdb_fault *fault",
+        "The valid rows, one bit a row, in `rows` of `room` words: see cdb_query.",
+        (*_GIVEN, f"return cdb_query({_TABLE}, given, unknown, rows, room, fault);"),
+    ),
+)
+"""The functions of a table: name, arguments, comment and lines."""
+
+
+def _facts_in_order(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+    """The function that brings the fields of the struct into the order of the schema."""
+    yield f"static inline void {face.base}_given(const {face.base}_facts *facts, cdb_fact *given)"
     yield "{"
-    yield f"    return cdb_open(&opened->table, opened->columns, {base}_schema(), bytes, size, fault);"
+    if not all(face.fields) or not face.fields:
+        yield f"    memset(given, 0, {max(len(face.fields), 1)} * sizeof *given);"
+    if not any(face.fields):
+        yield "    (void)facts;"
+    for number, (condition, name) in enumerate(zip(conditions_of(table), face.fields, strict=True)):
+        if name:
+            yield f"    {_given(number, name, condition, choices.get(condition))}"
     yield "}"
     yield ""
-    yield f"static inline void {base}_close({base} *opened)"
-    yield "{"
-    yield "    cdb_close(&opened->table);"
-    yield "}"
-    yield ""
-    yield "/* The valid rows, one bit a row, in `rows` of `room` words: see cdb_query. */"
-    yield f"static inline cdb_status {base}_query(const {base} *opened, const {base}_facts *facts, cdb_unknown unknown,"
-    yield "    uint64_t *rows, size_t room, cdb_fault *fault)"
-    yield "{"
-    yield f"    cdb_fact given[{n}];"
-    for number, (condition, name) in enumerate(zip(table.conditions, face.fields, strict=True)):
-        yield f"    {_given(number, name, condition, choices.get(condition))}"
-    yield from () if table.conditions else ("    (void)facts;", "    memset(given, 0, sizeof given);")
-    yield f"    return cdb_query(&opened->table, opened->columns, {base}_schema(), given, unknown, rows, room, fault);"
-    yield "}"
 
 
 def _given(number: int, name: str, condition: Condition, declared: Choices | None) -> str:

@@ -42,12 +42,12 @@ static inline cdbi_array cdbi_read_array(const cdb_table *table, cdbi_json *entr
     return array;
 }
 
-/* Whether an array holds 8-byte numbers of a kind in so many dimensions, the last of which is `width`, and has their bytes. */
+/* Whether an array holds numbers of a kind in so many dimensions, the last of which is `width`, and has their bytes. */
 static inline int cdbi_fits(const cdbi_array *array, const char *dtype, size_t n_dimensions, size_t width)
 {
-    size_t n = array->n_bytes / 8, i;
-    if (strcmp(array->dtype, dtype) != 0 || array->n_dimensions != n_dimensions || array->n_bytes % 8 != 0) return 0;
-    if (array->shape[n_dimensions - 1] != width || ((uintptr_t)array->at & 7) != 0) return 0;
+    size_t size = strcmp(dtype, "I32") == 0 ? 4 : 8, n = array->n_bytes / size, i;
+    if (strcmp(array->dtype, dtype) != 0 || array->n_dimensions != n_dimensions || array->n_bytes % size != 0) return 0;
+    if (array->shape[n_dimensions - 1] != width || ((uintptr_t)array->at & (size - 1)) != 0) return 0;
     for (i = 0; i < n_dimensions; i++)
         if (array->shape[i] == 0) return n == 0;
     for (i = 0; i < n_dimensions; i++) {
@@ -103,7 +103,8 @@ static inline cdb_column *cdbi_column_of(const cdbi_opening *opening, const char
     return NULL;
 }
 
-static inline void cdbi_assets(cdbi_opening *opening, const cdbi_array *array)
+/* The texts of an array that is a list of texts in JSON. */
+static inline cdbi_list cdbi_take_texts(cdbi_opening *opening, const cdbi_array *array, const char *key)
 {
     const char *start = (const char *)array->at;
     cdbi_json json;
@@ -113,9 +114,46 @@ static inline void cdbi_assets(cdbi_opening *opening, const cdbi_array *array)
     json.why = NULL;
     list = cdbi_texts(opening, &json);
     cdbi_peek(&json);
-    if (json.why || json.at != json.end || list.n != opening->table->n_rows || strcmp(array->dtype, "U8") != 0)
-        cdbi_refuse(opening, CDB_BAD_FILE, "the names of the assets cannot be read", -1, "assets");
-    opening->table->assets = list.texts;
+    if (json.why || json.at != json.end || strcmp(array->dtype, "U8") != 0)
+        cdbi_refuse(opening, CDB_BAD_FILE, "a list of texts cannot be read", -1, key);
+    return list;
+}
+
+/* Take a part of the programs; 0 where it does not fit. */
+static inline int cdbi_take_program(cdbi_opening *opening, const char *key, const cdbi_array *array)
+{
+    static const char *const parts[] = {"texts", "facts", "types", "numbers", "code", "starts", "derived", "of_row"};
+    cdbi_programs *programs = &opening->table->programs;
+    const void *at = array->at;
+    size_t n = array->shape[0], part = 0;
+    while (part < 8 && strcmp(key + strlen("programs."), parts[part]) != 0) part++;
+    programs->parts |= part < 8 ? 1U << part : 0;
+    switch (part) {
+    case 0: programs->texts = cdbi_take_texts(opening, array, key); return 1;
+    case 1: programs->facts = cdbi_take_texts(opening, array, key); return 1;
+    case 2: programs->types = cdbi_take_texts(opening, array, key); return 1;
+    case 3:
+        programs->numbers = (const double *)at;
+        programs->n_numbers = n;
+        return cdbi_fits(array, "F64", 1, n);
+    case 4:
+        programs->code = (const int32_t *)at;
+        programs->n_code = n;
+        return cdbi_fits(array, "I32", 2, 4);
+    case 5:
+        programs->starts = (const int64_t *)at;
+        programs->n_starts = n;
+        return cdbi_fits(array, "I64", 1, n);
+    case 6:
+        programs->derived = (const int64_t *)at;
+        programs->n_derived = n;
+        return cdbi_fits(array, "I64", 1, n);
+    case 7:
+        programs->of_row = (const int32_t *)at;
+        programs->n_of_row = n;
+        return cdbi_fits(array, "I32", 1, n);
+    default: return 1;
+    }
 }
 
 /* Take every array that is asked for. */
@@ -139,7 +177,12 @@ static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
         if (header.why) break;
         column = cdbi_column_of(opening, key, &part);
         if (column) fits = cdbi_take_part(column, part, &array, table->n_words);
-        else if (strcmp(key, "assets") == 0 && !table->assets) cdbi_assets(opening, &array);
+        else if (strncmp(key, "programs.", strlen("programs.")) == 0) fits = cdbi_take_program(opening, key, &array);
+        else if (strcmp(key, "assets") == 0 && !table->assets) {
+            cdbi_list assets = cdbi_take_texts(opening, &array, key);
+            table->assets = assets.texts;
+            fits = assets.n == table->n_rows;
+        }
         else if (strcmp(key, "enabled") == 0) {
             table->enabled = cdbi_words(&array);
             fits = cdbi_fits(&array, "U64", 1, table->n_words);
@@ -153,30 +196,6 @@ static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
         if (!fits) cdbi_refuse(opening, CDB_BAD_FILE, "an array has another type, shape or place than it must have", -1, key);
     }
     if (header.why) cdbi_refuse(opening, CDB_BAD_FILE, header.why, -1, "");
-}
-
-static inline int cdbi_is_nan(double number)
-{
-    uint64_t bits; /* by its bits: fast-math options take x != x away */
-    memcpy(&bits, &number, sizeof bits);
-    return (bits & 0x7FFFFFFFFFFFFFFF) > 0x7FF0000000000000;
-}
-
-static inline int cdbi_is_infinite(double number)
-{
-    uint64_t bits;
-    memcpy(&bits, &number, sizeof bits);
-    return (bits & 0x7FFFFFFFFFFFFFFF) == 0x7FF0000000000000;
-}
-
-/* A whole number for each double, in their order. Compared as doubles, tiny ones would be 0 to a machine that was told to flush. */
-#define CDBI_MINUS_ZERO 0x7FFFFFFFFFFFFFFFU
-
-static inline uint64_t cdbi_place(double number)
-{
-    uint64_t bits;
-    memcpy(&bits, &number, sizeof bits);
-    return bits >> 63 ? ~bits : bits | 0x8000000000000000U;
 }
 
 /* Whether a column has all its arrays, as long as each other, and its bounds ascend. */

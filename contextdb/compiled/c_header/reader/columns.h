@@ -173,10 +173,15 @@ static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cd
     return one.why ? one.why : other.why;
 }
 
-/* Which condition of the schema this one of the file is, its type and expression the same; n_conditions where it is none. */
-static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *about, size_t file_index)
+static inline const char *cdbi_type_name(cdb_type type)
 {
     static const char *const types[] = {"bool", "int", "number", "angle", "date", "enum", "text", "tags"};
+    return types[type];
+}
+
+/* Which condition of the schema this one of the file is, its type the same; n_conditions where it is none. */
+static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *about, size_t file_index)
+{
     const cdb_schema *schema = opening->schema;
     size_t i, at = 0;
     int is_derived;
@@ -192,6 +197,7 @@ static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *abou
         cdbi_refuse(opening, CDB_BAD_FILE, value.why, -1, "about");
         return schema->n_conditions;
     }
+    if (i == schema->n_conditions && opening->strange == CDB_STRANGE_ANY) return i;
     if (i == schema->n_conditions) {
         value = cdbi_member(about, "name");
         cdbi_text(&value, name, sizeof name);
@@ -199,15 +205,15 @@ static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *abou
         return schema->n_conditions;
     }
     value = cdbi_member(about, "type");
-    if (!cdbi_is(&value, types[schema->conditions[at].type])) {
+    if (!cdbi_is(&value, cdbi_type_name(schema->conditions[at].type))) {
         cdbi_refuse(opening, CDB_OTHER_TABLE, "its type is another than that of this header", (int)at, schema->conditions[at].name);
         return schema->n_conditions;
     }
     value = cdbi_member(about, "expr");
     is_derived = cdbi_peek(&value) == '"';
-    if (is_derived != (schema->conditions[at].expr != NULL) || (is_derived && !cdbi_is(&value, schema->conditions[at].expr))) {
-        cdbi_refuse(opening, CDB_OTHER_TABLE, "it is derived in another way than this header says", (int)at,
-            schema->conditions[at].name);
+    if (is_derived != (schema->conditions[at].expr != NULL)) {
+        cdbi_refuse(opening, CDB_OTHER_TABLE, is_derived ? "it is derived, and this header takes it from the game"
+            : "it is given, and this header computes it", (int)at, schema->conditions[at].name);
         return schema->n_conditions;
     }
     return at;
@@ -225,8 +231,14 @@ static inline const char *cdbi_columns(cdbi_opening *opening, const cdbi_json *a
         cdbi_json masks;
         at = cdbi_condition(opening, &conditions, n - 1);
         if (opening->status != CDB_OK) return NULL;
-        if (opening->columns[at].kind != 0) return "two conditions have one name";
         if (!cdbi_next(&columns, ']', &m)) break;
+        if (at == opening->schema->n_conditions) {
+            opening->table->n_strange++;
+            cdbi_skip(&conditions, 0);
+            cdbi_skip(&columns, 0);
+            continue;
+        }
+        if (opening->columns[at].kind != 0) return "two conditions have one name";
         masks = cdbi_member(&columns, "masks");
         why = masks.why ? masks.why : cdbi_column(opening, at, &masks);
         if (why || opening->status != CDB_OK) return why;
@@ -242,7 +254,7 @@ static inline const char *cdbi_columns(cdbi_opening *opening, const cdbi_json *a
 static inline void cdbi_refuse_unknown(cdbi_opening *opening, cdbi_json about)
 {
     static const char *const known[] = {"name", "rows", "policy", "fallback", "conditions", "columns", "slots", "computed_from",
-        "ways"};
+        "ways", "when"};
     size_t n = 0, i;
     char key[CDBI_KEY];
     cdbi_take(&about, '{');
@@ -250,9 +262,8 @@ static inline void cdbi_refuse_unknown(cdbi_opening *opening, cdbi_json about)
         cdbi_key(&about, key);
         for (i = 0; i < sizeof known / sizeof *known && strcmp(key, known[i]) != 0; i++) {}
         if (about.why) break;
-        if (strcmp(key, "when") == 0)
-            cdbi_refuse(opening, CDB_OTHER_TABLE, "rows of the table have rules of their own, which C cannot work out", -1, key);
-        else if (i == sizeof known / sizeof *known)
+        if (strcmp(key, "when") == 0 || strcmp(key, "computed_from") == 0) opening->has_programs = 1;
+        if (i == sizeof known / sizeof *known)
             cdbi_refuse(opening, CDB_OTHER_TABLE, "the table holds something that this header cannot answer for", -1, key);
         cdbi_skip(&about, 0);
     }

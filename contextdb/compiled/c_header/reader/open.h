@@ -47,12 +47,13 @@ static inline void cdbi_read(cdbi_opening *opening, const cdbi_json *header)
     CDB_FREE(text);
     if (opening->status == CDB_OK) cdbi_arrays(opening, *header);
     if (opening->status == CDB_OK) cdbi_check(opening);
+    if (opening->status == CDB_OK) cdbi_link(opening);
 }
 
 /* Open an artefact from memory that stays where it is, unchanged, until cdb_close. It begins on an address that 8 divides, as the
  * memory of malloc and of a mapped file does. `columns` has room for n_conditions. Where it is refused the table is closed. */
 static inline cdb_status cdb_open(cdb_table *table, cdb_column *columns, const cdb_schema *schema, const void *bytes, size_t size,
-    cdb_fault *fault)
+    cdb_strange strange, cdb_fault *fault)
 {
     const unsigned char *start = (const unsigned char *)bytes;
     cdbi_opening opening;
@@ -65,6 +66,8 @@ static inline cdb_status cdb_open(cdb_table *table, cdb_column *columns, const c
     opening.columns = columns;
     opening.schema = schema;
     opening.fault = fault;
+    opening.strange = strange;
+    opening.has_programs = 0;
     opening.status = cdbi_fault(fault, CDB_OK, "", -1, "");
     for (i = 0; size >= 8 && i < 8; i++) length |= (uint64_t)start[i] << (8 * i);
     if (size < 8 || length > size - 8) return cdbi_fault(fault, CDB_BAD_FILE, "the file is too short for its header", -1, "");

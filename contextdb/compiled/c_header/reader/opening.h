@@ -26,6 +26,8 @@ typedef struct cdbi_opening {
     const cdb_schema *schema;
     cdb_fault *fault;
     cdb_status status;
+    cdb_strange strange;
+    int has_programs;               /* the table has rules or derived facts */
 } cdbi_opening;
 
 /* Keep the first fault of an opening. */

@@ -51,6 +51,11 @@ typedef enum cdb_unknown {          /* what a missing fact does */
     CDB_UNKNOWN_NEVER               /* only cells that are Any accept it */
 } cdb_unknown;
 
+typedef enum cdb_strange {          /* what a condition of the file does that this header does not know */
+    CDB_STRANGE_REFUSED,            /* the file is refused */
+    CDB_STRANGE_ANY                 /* its cells are Any; a derived fact, and a rule, that needs it accepts everything */
+} cdb_strange;
+
 typedef enum cdb_status {
     CDB_OK,
     CDB_CANNOT_READ,                /* the file is not there, or the system refuses */
@@ -76,18 +81,24 @@ typedef struct cdb_texts {          /* a fact of a condition of tags whose names
     int64_t count;                  /* CDB_MISSING where the tags are not known */
 } cdb_texts;
 
+typedef struct cdbi_tags {          /* a derived fact of tags: the fact of another condition */
+    const struct cdb_condition *condition;
+    const union cdb_fact *fact;     /* NULL: not known */
+} cdbi_tags;
+
 typedef union cdb_fact {
     int64_t whole;                  /* bool, int, enum (the number of its value), date (days since 1970-01-01: see cdb_date) */
     double number;                  /* number, angle (degrees) */
     const char *text;               /* text, in UTF-8 */
     const uint64_t *tags;           /* declared tags: bit 0 says that they are known, bit i that tag i of the schema is there */
     cdb_texts texts;                /* other tags */
+    cdbi_tags same;                 /* derived tags; derived ints and dates are a `number`, enums a `text` */
 } cdb_fact;
 
 typedef struct cdb_condition {
     const char *name;
     cdb_type type;
-    const char *expr;               /* how the tables derive it from other facts, or NULL; in C the game gives it */
+    const char *expr;               /* how the tables derived it from other facts when the header was written, or NULL */
     const char *const *values;      /* of an enum, from 0; of tags, from 1: values[0] is then "" */
     size_t n_values;                /* 0 where none are declared */
 } cdb_condition;
@@ -131,13 +142,40 @@ typedef struct cdb_column {
     size_t n_negated;
 } cdb_column;
 
+#define CDBI_INPUT 1               /* a program reads the fact */
+#define CDBI_RULED 2               /* a rule names it */
+
+#define CDBI_PROGRAM_PARTS 0xFFU
+
+typedef struct cdbi_programs {      /* the rules of rows and the derived facts */
+    const int32_t *code;            /* instructions of four numbers */
+    size_t n_code;
+    const double *numbers;
+    size_t n_numbers;
+    cdbi_list texts, facts, types;
+    const int64_t *starts;          /* where each program begins in `code`; derived facts first */
+    size_t n_starts, n_programs;
+    const int64_t *derived;         /* which of `facts` each of the first programs computes */
+    size_t n_derived;
+    const int32_t *of_row;          /* the rule of each row, or -1 */
+    size_t n_of_row;
+    size_t *places;                 /* where each of `facts` is in the schema; n_conditions: nowhere */
+    unsigned char *is_dropped;      /* programs that need a condition that this header does not know */
+    unsigned char *uses;            /* for each condition of the schema CDBI_INPUT and CDBI_RULED */
+    unsigned parts;                 /* which of its arrays the file has, a bit each: all or none */
+    uint64_t *ruled;                /* the rows that have a rule */
+    size_t *rows, *row_starts;      /* the rows of each rule */
+} cdbi_programs;
+
 typedef struct cdb_table {
     size_t n_rows;
     size_t n_words;                 /* words of a mask: n_rows / 64, rounded up */
+    size_t n_strange;               /* columns of conditions that this header does not know, which are Any */
     const uint64_t *enabled;
     const int64_t *priorities;      /* one for each row, for picking; 0 where the table has none */
     const double *row_weights;      /* one for each row; 1 where the table has none */
     const char **assets;
+    cdbi_programs programs;
     void *blocks;                   /* the memory that was taken */
     const unsigned char *data;
     size_t data_size;

@@ -6,6 +6,7 @@ import math
 import random
 import struct
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -128,6 +129,28 @@ def fact_bytes(condition: Condition, fact: object) -> bytes:
     return bits.to_bytes((len(values) + 63) // 64 * 8, "little")
 
 
+@dataclass(frozen=True)
+class Told:
+    """What C says of one context beside the answer."""
+
+    penalties: tuple[int, list[float]]
+    """Status and costs."""
+    pick: tuple[int, int]
+    """Status and row, -1 for none."""
+    why_not: list[int]
+    """For each row the numbers of failing conditions as bits, 62 for its rule, 61 where it is disabled; -1 for a fault."""
+
+
+@dataclass
+class Answers:
+    """What C answers for one artefact."""
+
+    status: int
+    rows: list[tuple[int, int]]
+    """For each context status and rows, as one integer."""
+    told: list[Told]
+
+
 def asked(
     ask: Path,
     folder: Path,
@@ -137,25 +160,41 @@ def asked(
     strange: int = 0,
 ) -> list[tuple[int, list[tuple[int, int]]]]:
     """For each artefact the status of opening it, and for each context status and rows, as one integer."""
+    return [(a.status, a.rows) for a in all_asked(ask, folder, conditions, artefacts, moments, strange)]
+
+
+def all_asked(
+    ask: Path,
+    folder: Path,
+    conditions: Sequence[Condition],
+    artefacts: Sequence[bytes],
+    moments: Iterable[tuple[str, Facts]],
+    strange: int = 0,
+    memory: int = -1,
+) -> list[Answers]:
+    """The same, and what else is said of each context where a character picks with a `memory`."""
     listed = list(moments)
     plain = [c for c in conditions if not c.expr]
     contexts = b"".join(
         packed(UNKNOWN.index(unknown)) + b"".join(fact_bytes(c, facts.get(c.name)) for c in plain) for unknown, facts in listed
     )
-    counted = [packed(strange, len(artefacts)), *map(text, artefacts), packed(len(listed))]
-    given = [schema_bytes(conditions), *counted, contexts]
-    (folder / "in").write_bytes(b"".join(given))
+    counted = [packed(strange, memory, len(artefacts)), *map(text, artefacts), packed(len(listed))]
+    (folder / "in").write_bytes(b"".join([schema_bytes(conditions), *counted, contexts]))
     ran(ask, folder / "in", folder / "out")
     words = np.fromfile(folder / "out", "<i8")
     found, at = [], 0
     for _ in artefacts:
-        status, at = int(words[at]), at + 1
-        answers = []
-        for _ in listed if status == OK else ():
+        answers, at = Answers(int(words[at]), [], []), at + 1
+        for _ in listed if answers.status == OK else ():
             n_words = int(words[at + 1])
-            answers.append((int(words[at]), int.from_bytes(words[at + 2 : at + 2 + n_words].tobytes(), "little")))
+            answers.rows.append((int(words[at]), int.from_bytes(words[at + 2 : at + 2 + n_words].tobytes(), "little")))
             at += 2 + n_words
-        found.append((status, answers))
+            if memory >= 0:
+                n, status, rest = int(words[at]), int(words[at + 1]), words[at + 2 :]
+                costs, why = rest[:n].view("<f8").tolist(), rest[n + 2 : 2 * n + 2].tolist()
+                answers.told.append(Told((status, costs), (int(rest[n]), int(rest[n + 1])), why))
+                at += 4 + 2 * n
+        found.append(answers)
     assert at == len(words)
     return found
 

@@ -353,7 +353,7 @@ def test_what_a_later_version_writes_is_refused_and_not_passed_over(ask: Path, t
     header = json.loads(whole[8 : 8 + header_bytes(whole)])
     header["__metadata__"]["about"] = json.dumps(json.loads(header["__metadata__"]["about"]) | {key: []})
     other = json.loads(json.dumps(header))
-    other["__metadata__"]["contextdb"] = "3"
+    other["__metadata__"]["contextdb"] = "4"
     files = [with_header(whole, json.dumps(h).encode()) for h in (header, other)]
     assert [found for found, _ in asked(ask, tmp_path, compiled.conditions, files, [])] == [status, BAD_FILE]
 

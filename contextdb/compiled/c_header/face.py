@@ -25,8 +25,8 @@ READER = 3
 """Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
 
 PARTS = (
-    *("types.h", "arithmetic.h", "json.h", "opening.h", "columns.h", "facts.h", "programs.h", "arrays.h", "linking.h", "open.h"),
-    *("query.h", "files.h"),
+    *("types.h", "arithmetic.h", "json.h", "opening.h", "columns.h", "facts.h", "programs.h", "arrays.h", "linking.h", "levels.h"),
+    *("open.h", "query.h", "rows.h", "pick.h", "files.h"),
 )
 _HEAD = """/* Written by `contextdb compile --c-header`: do not edit. */
 
@@ -54,7 +54,10 @@ _FOOT = """
 
 #endif /* {guard} */
 """
-_ENDINGS = ("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_given", "_open", "_open_with", "_close", "_query")
+_ENDINGS = (
+    *("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_given", "_open", "_open_with", "_close"),
+    *("_query", "_pick", "_penalties", "_why_not"),
+)
 
 
 @dataclass(frozen=True)
@@ -354,6 +357,24 @@ _FUNCTIONS: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
         f"{_ASKED}, uint64_t *rows, size_t room, cdb_fault *fault",
         "The valid rows, one bit a row, in `rows` of `room` words: see cdb_query.",
         (*_GIVEN, f"return cdb_query({_TABLE}, given, unknown, rows, room, fault);"),
+    ),
+    (
+        "pick",
+        f"{_ASKED}, const uint64_t *rows, size_t room, double time_s, cdb_picker *picker, int64_t *row, cdb_fault *fault",
+        "One of the valid rows, by the table's policy: see cdb_pick.",
+        (*_GIVEN, f"return cdb_pick({_TABLE}, given, unknown, rows, room, time_s, picker, row, fault);"),
+    ),
+    (
+        "penalties",
+        f"{_ASKED}, double *penalties, size_t room, cdb_fault *fault",
+        "What each row's soft cells cost: see cdb_penalties.",
+        (*_GIVEN, f"return cdb_penalties({_TABLE}, given, unknown, penalties, room, fault);"),
+    ),
+    (
+        "why_not",
+        f"{_ASKED}, int64_t row, int *reasons, size_t room, size_t *n, cdb_fault *fault",
+        "Why a row is not valid: see cdb_why_not.",
+        (*_GIVEN, f"return cdb_why_not({_TABLE}, given, unknown, row, reasons, room, n, fault);"),
     ),
 )
 """The functions of a table: name, arguments, comment and lines."""

@@ -50,10 +50,9 @@ static inline void cdbi_sort(cdbi_list *list, uint32_t *classes)
 }
 
 /* The values of a bool or enum column must be those that this header was made for; those of a text column are kept. */
-static inline void cdbi_values(cdbi_opening *opening, size_t at, cdbi_json *json)
+static inline void cdbi_values(cdbi_opening *opening, cdb_column *column, size_t at, cdbi_json *json)
 {
     const cdb_condition *condition = &opening->schema->conditions[at];
-    cdb_column *column = &opening->columns[at];
     size_t n = 0, i;
     int is_same = 1;
     if (condition->type == CDB_TEXT) {
@@ -118,9 +117,8 @@ static inline void cdbi_read_slot(cdbi_opening *opening, size_t at, cdbi_json *j
             cdbi_read_part(opening, at, json, &slot->parts[n - 1]);
 }
 
-static inline void cdbi_negated(cdbi_opening *opening, size_t at, cdbi_json *json)
+static inline void cdbi_negated(cdbi_opening *opening, cdb_column *column, size_t at, cdbi_json *json)
 {
-    cdb_column *column = &opening->columns[at];
     size_t count = cdbi_count(json), n = 0;
     column->negated = (cdbi_slot *)cdbi_memory(opening, count, sizeof(cdbi_slot));
     if (!column->negated) return;
@@ -142,9 +140,8 @@ static inline int cdbi_kind(const cdbi_json *about)
 }
 
 /* How a column is kept: an object such as {"kind": "number"}. */
-static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cdbi_json *about)
+static inline const char *cdbi_column(cdbi_opening *opening, cdb_column *column, size_t at, const cdbi_json *about)
 {
-    cdb_column *column = &opening->columns[at];
     cdb_type type = opening->schema->conditions[at].type;
     int kind = cdbi_kind(about), is_number = type == CDB_INT || type == CDB_NUMBER || type == CDB_ANGLE || type == CDB_DATE;
     cdbi_json one = {NULL, NULL, NULL}, other = {NULL, NULL, NULL};
@@ -153,7 +150,7 @@ static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cd
         return "a column is kept in a way that its type is not";
     if (kind == CDBI_VALUE) {
         one = cdbi_member(about, "values");
-        cdbi_values(opening, at, &one);
+        cdbi_values(opening, column, at, &one);
         other = cdbi_member(about, "has_others");
         if (cdbi_peek(&other) != (type == CDB_TEXT ? 't' : 'f'))
             cdbi_fail(&other, "a column is kept in a way that its type is not");
@@ -168,7 +165,7 @@ static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cd
         column->texts = cdbi_texts(opening, &one);
         cdbi_set_bits(opening, &opening->schema->conditions[at], &column->texts);
         other = cdbi_member(about, "negated");
-        cdbi_negated(opening, at, &other);
+        cdbi_negated(opening, column, at, &other);
     }
     return one.why ? one.why : other.why;
 }
@@ -219,6 +216,16 @@ static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *abou
     return at;
 }
 
+/* The soft cells of a column, where it has some: `soft` is null, or an object as for a column. */
+static inline const char *cdbi_soft_column(cdbi_opening *opening, size_t at, const cdbi_json *about)
+{
+    cdb_table *table = opening->table;
+    cdbi_json soft = cdbi_member(about, "soft");
+    if (soft.why || cdbi_peek(&soft) != '{') return soft.why;
+    if (!table->soft) table->soft = (cdbi_soft *)cdbi_memory(opening, opening->schema->n_conditions, sizeof *table->soft);
+    return table->soft ? cdbi_column(opening, &table->soft[at].column, at, &soft) : NULL;
+}
+
 /* The conditions and the columns of `about`: two lists that go side by side. */
 static inline const char *cdbi_columns(cdbi_opening *opening, const cdbi_json *about)
 {
@@ -240,7 +247,9 @@ static inline const char *cdbi_columns(cdbi_opening *opening, const cdbi_json *a
         }
         if (opening->columns[at].kind != 0) return "two conditions have one name";
         masks = cdbi_member(&columns, "masks");
-        why = masks.why ? masks.why : cdbi_column(opening, at, &masks);
+        why = masks.why ? masks.why : cdbi_column(opening, &opening->columns[at], at, &masks);
+        if (why || opening->status != CDB_OK) return why;
+        why = cdbi_soft_column(opening, at, &columns);
         if (why || opening->status != CDB_OK) return why;
         opening->columns[at].file_index = n - 1;
         cdbi_skip(&conditions, 0);

@@ -63,7 +63,10 @@ static inline void cdbi_check_programs(cdbi_opening *opening, unsigned char *is_
         if (is_derived && place == schema->n_conditions) programs->is_dropped[i] = 1;
         if (programs->is_dropped[i]) {
             if (is_derived) is_strange[fact] = 1;
-            if (is_derived && place < schema->n_conditions) opening->columns[place].kind = 0;
+            if (is_derived && place < schema->n_conditions) {
+                opening->columns[place].kind = 0;
+                if (opening->table->soft) opening->table->soft[place].column.kind = 0;
+            }
             continue;
         }
         if (is_derived) type = cdbi_value_type(schema->conditions[place].type);

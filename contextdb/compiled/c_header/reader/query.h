@@ -88,19 +88,19 @@ static inline void cdbi_and(uint64_t *rows, const uint64_t *from, const uint64_t
     }
 }
 
-/* rows &= the mask of a wide column, put together from the two digits of the fact's class. */
-static inline void cdbi_and_wide(uint64_t *rows, const cdb_column *column, double number, size_t n_words)
+/* rows &= some words of the mask of a wide column, put together from the two digits of the fact's class; rows[0] is word `from`. */
+static inline void cdbi_and_wide(uint64_t *rows, const cdb_column *column, double number, size_t from, size_t to, size_t n_words)
 {
     size_t found = cdbi_class(column, number), n_fine = (size_t)1 << column->shift, n_coarse = (column->n_digits - n_fine) / 2;
     size_t after = (found >> column->shift) * n_words, same = after + n_coarse * n_words;
     size_t fine = (2 * n_coarse + (found & (n_fine - 1))) * n_words, layer, at, step = column->n_digits * n_words;
-    for (at = 0; at < n_words; at++) {
+    for (at = from; at < to; at++) {
         uint64_t some = 0;
-        for (layer = 0; layer < column->n_layers && rows[at]; layer++) {
+        for (layer = 0; layer < column->n_layers && rows[at - from]; layer++) {
             const uint64_t *low = column->low + layer * step + at, *high = column->high + layer * step + at;
             some |= (low[after] | (low[same] & low[fine])) & (high[after] | (high[same] & high[fine]));
         }
-        rows[at] &= some;
+        rows[at - from] &= some;
     }
 }
 
@@ -127,7 +127,7 @@ static inline void cdbi_and_others(uint64_t *rows, const cdb_table *table, const
         if (is_missing && unknown == CDB_UNKNOWN_ANY) continue;
         if (columns[i].kind == CDBI_SLOTS) cdbi_and_slots(rows, &columns[i], &schema->conditions[i], &facts[i], table->n_words);
         else if (is_missing) cdbi_and(rows, rows, &columns[i].any_mask, 1, table->n_words);
-        else cdbi_and_wide(rows, &columns[i], cdbi_number(&schema->conditions[i], &facts[i]), table->n_words);
+        else cdbi_and_wide(rows, &columns[i], cdbi_number(&schema->conditions[i], &facts[i]), 0, table->n_words, table->n_words);
     }
 }
 

@@ -64,8 +64,11 @@ typedef enum cdb_status {
     CDB_OTHER_TABLE,                /* an artefact, but not one that this header, or any in C, can answer for */
     CDB_MISSING_FACT,
     CDB_WRONG_FACT,
-    CDB_TOO_SHORT                   /* the array for the answer has fewer words than the table */
+    CDB_TOO_SHORT,                  /* an array of the caller has fewer words than are needed */
+    CDB_NOT_UNIQUE                  /* several rows are valid, and the policy allows one */
 } cdb_status;
+
+typedef enum cdb_policy { CDB_COLLECT, CDB_PRIORITY, CDB_FIRST, CDB_UNIQUE, CDB_SPECIFIC, CDB_CHEAPEST } cdb_policy;
 
 #define CDB_NAME_BYTES 96
 
@@ -167,6 +170,24 @@ typedef struct cdbi_programs {      /* the rules of rows and the derived facts *
     size_t *rows, *row_starts;      /* the rows of each rule */
 } cdbi_programs;
 
+typedef struct cdbi_level {         /* what picks look at in a table, the outer one or one inside it */
+    cdb_policy policy;
+    size_t n_rows;
+    const int64_t *priorities;
+    const double *row_weights;
+    const double *specificities;    /* NULL where the table has none, as those below */
+    const unsigned char *once;
+    const double *cooldown_s;
+    const int64_t *cooldown_turns;
+    uint64_t *keys;                 /* of each row that rests after it was picked a hash; 0 of another */
+    const char *name;
+} cdbi_level;
+
+typedef struct cdbi_soft {          /* the soft cells of a condition, a row for each row of each depth */
+    cdb_column column;
+    const double *penalties;
+} cdbi_soft;
+
 typedef struct cdb_table {
     size_t n_rows;
     size_t n_words;                 /* words of a mask: n_rows / 64, rounded up */
@@ -175,6 +196,17 @@ typedef struct cdb_table {
     const int64_t *priorities;      /* one for each row, for picking; 0 where the table has none */
     const double *row_weights;      /* one for each row; 1 where the table has none */
     const char **assets;
+    cdb_policy policy;
+    const char *fallback;           /* the asset where no row can be picked, or NULL */
+    size_t n_limited;               /* rows that rest after they were picked, of all tables */
+    cdbi_soft *soft;                /* one for each condition, or NULL where no cell is soft */
+    size_t n_depths;                /* 1, or how many tables are in each other */
+    cdbi_level *levels;
+    size_t n_levels;
+    const int32_t *way_numbers, *way_rows; /* for each depth and row which of the levels, and which row of it; NULL without */
+    const char **leaves;
+    int has_chance, is_cheapest;    /* whether a policy is one by chance; the cheapest */
+    uint64_t *asset_keys;           /* a hash of each asset */
     cdbi_programs programs;
     void *blocks;                   /* the memory that was taken */
     const unsigned char *data;

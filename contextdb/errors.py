@@ -11,6 +11,7 @@ correction, in that order. One error reports all faults of a file together.
     ├── FileError       the disk refuses: missing, not permitted, full, changed under us
     ├── ContextError    facts that a query cannot use, or an invalid argument
     │   ├── NoSuchFact      a fact that does not exist; also a KeyError
+    │   ├── NoSuchOutput    an output that a table does not have; also a KeyError
     │   └── NoSuchPlace     a row, or a place in an answer, that does not exist; also an IndexError
     ├── PolicyError     a table breaks its own policy
     ├── ArtefactError   a compiled file that is truncated, altered or from another version
@@ -125,6 +126,10 @@ class ContextError(ContextDBError):
 
 class NoSuchFact(ContextError, KeyError):
     """A fact that a live context does not have: the table has no such condition, or the fact is not set."""
+
+
+class NoSuchOutput(ContextError, KeyError):
+    """An output that a table does not have."""
 
 
 class NoSuchPlace(ContextError, IndexError):

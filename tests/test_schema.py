@@ -145,7 +145,8 @@ def test_a_schema_can_be_pickled_for_other_processes():
 
 
 def test_every_key_of_a_table_is_a_field_of_its_settings():
-    assert set(SECTIONS["tables"] or ()) == {f.name for f in fields(TableSettings)} - {"name"}
+    more = {"name", "typed", "fallback_outputs"}  # what `outputs` and `fallback` say besides names
+    assert set(SECTIONS["tables"] or ()) == {f.name for f in fields(TableSettings)} - more
 
 
 def test_a_table_is_found_by_its_file():
@@ -284,7 +285,11 @@ def test_keys_of_a_condition_that_do_not_go_together_are_said(section: str, mess
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("outputs = 'x'", f'outputs = "x": this is text, not a list. Accepted: {NAMES_SAID}. Did you mean outputs = ["x"]?'),
+        (
+            "outputs = 'x'",
+            f'outputs = "x": this is text, not a list. Accepted: {NAMES_SAID}, or typed outputs, such as '
+            '{ damage = { type = "number" } }. Did you mean outputs = ["x"]?',
+        ),
         (
             "policy = 'frist'",
             'policy = "frist": there is no such policy. Accepted: "collect", "first", "unique", "priority". '

@@ -510,3 +510,11 @@ def test_the_statements_that_are_looked_at_grow_with_the_new_conditions_and_not_
         assert schema_change(None, replace(table, path=tmp_path / "t.csv")) is not None
         counts.append(walked)
     assert counts[1] < 16 * counts[0]
+
+
+def test_a_key_that_goes_from_a_table_without_rows_goes_from_the_file(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[tables.t]\nfallback = "idle"\npolicy = "first"\n')
+    (tmp_path / "t.csv").write_text("Asset,speed\n")
+    table = load(tmp_path / "t.csv")
+    assert write_schema(table, edits.set_settings(table, fallback=None).apply(table))
+    assert (tmp_path / "contextdb.toml").read_text() == '[tables.t]\npolicy = "first"\n'

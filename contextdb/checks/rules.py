@@ -57,6 +57,21 @@ RULES: dict[str, Rule] = {
         "A cell reaches beyond the declared `min` and `max`.",
         "No action needed; to be exact, leave the end open (3..) or widen `min` and `max` in contextdb.toml.",
     ),
+    "unreadable-output": Rule(
+        "error",
+        "A cell of an output cannot be read as the output's type.",
+        "Write the cell in an accepted form, or correct the type or the values of the output in contextdb.toml.",
+    ),
+    "output-out-of-bounds": Rule(
+        "error",
+        "A cell of an output is outside the declared `min` and `max`.",
+        "Correct the cell, or widen `min` and `max` of the output in contextdb.toml.",
+    ),
+    "missing-output": Rule(
+        "error",
+        "A cell of an output is empty, and the output has no default.",
+        "Fill in the cell, or declare `default` for the output in contextdb.toml.",
+    ),
     "no-asset": Rule(
         "error",
         "A row names no asset.",
@@ -81,6 +96,11 @@ RULES: dict[str, Rule] = {
         "error",
         "A condition has different types in a table and in a table inside it.",
         "Declare the condition in contextdb.toml, so that its type is not guessed.",
+    ),
+    "unlike-outputs": Rule(
+        "error",
+        "An output has different types in a table and in a table inside it.",
+        "Declare the output in the same way in both tables.",
     ),
     "too-many-rows": Rule(
         "error",

@@ -17,6 +17,7 @@ from collections.abc import Iterator
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
+from contextdb.cells.outputs import OutputValue
 from contextdb.commands import missing_facts_by_option
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact
@@ -158,6 +159,7 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
     rows: list[dict[str, object]] = []
     for r in matches:
         rows.append({"row": r, "asset": compiled.assets[r], "always": r in always})
+        rows[-1] |= {"outputs": _json_outputs(compiled, r)} if len(compiled.outputs) else {}
         rows[-1] |= {"undecided": True} if undecided >> r & 1 else {}
         if outcome.prefers_some:
             rows[-1] |= (
@@ -170,6 +172,19 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
     if explains:
         document["explain"] = [_explained(r) for r in explanation.nearest(most)]
     return document
+
+
+def _json_outputs(compiled: CompiledTable, row: int) -> dict[str, object]:
+    """The outputs of a row as JSON has them: NaN as null, an infinite number as text, several numbers as a list."""
+    return {name: _json_value(value) for name, value in compiled.outputs.of_row(row).items()}
+
+
+def _json_value(value: OutputValue) -> object:
+    if isinstance(value, tuple):
+        return [_json_value(number) for number in value]
+    if not isinstance(value, float) or math.isfinite(value):
+        return value
+    return None if math.isnan(value) else str(value)
 
 
 def _json_fact(fact: Fact, name: str, compiled: CompiledTable) -> object:

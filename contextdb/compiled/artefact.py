@@ -11,11 +11,18 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     CCC.texts              uint8                 JSON list of the distinct texts
     slots.CCC.codes        as CCC.codes and CCC.texts, for the columns of slots, named in `about`
     slots.CCC.texts
+    outputs.declared       uint8                 JSON list: name, type, default, bounds, values, size, unit, description of each
+    outputs.CCC.values     output CCC, of bool, int, number: uint8 (0 or 1), int64, float64 [R + 1]; numbers: float64 [R + 1, size]
+    outputs.CCC.codes      int32 [R + 1]         of enum and text: which of the texts
+    outputs.CCC.texts      uint8                 JSON list; of an enum its values in their order, then "" for none
     when.codes             as CCC.codes and CCC.texts, for the column of rules, named in `about`
     when.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
 
-and for a table with rules or derived facts, P programs of D derived facts and then of the rules, which name F facts
+Value R of an output is what there is without a row: what `fallback` gives, else the default, else False, 0, NaN or "". Infinite
+defaults are "inf" and "-inf" in the JSON. What knows no outputs passes all of these over: they change no answer.
+
+For a table with rules or derived facts, P programs of D derived facts and then of the rules, which name F facts
 (`contextdb.compiled.programs`; Python does not read them):
 
     programs.code          int32 [N, 4]          the instructions: an `Op` and three operands
@@ -27,7 +34,7 @@ and for a table with rules or derived facts, P programs of D derived facts and t
     programs.derived       int64 [D]             which of these facts each program computes, each behind those that it needs
     programs.of_row        int32 [R]             which rule each row has, from 0; -1 for none. [0] where no row has one
 
-and for a table with tables inside, D the depth, T the number of tables (`contextdb.compiled.ways`; soft cells then have D R rows):
+For a table with tables inside, D the depth, T the number of tables (`contextdb.compiled.ways`; soft cells then have D R rows):
 
     ways.numbers           int32 [D, R]
     ways.rows              int32 [D, R]
@@ -58,6 +65,7 @@ from contextdb.cells.sets import TagMeet, TagSet
 from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData, SoftMasks
+from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors
 from contextdb.compiled.programs import programs_to_tensors
 from contextdb.compiled.ways_stored import ways_from, ways_to_json, ways_to_tensors
 from contextdb.expressions import Derivation
@@ -105,6 +113,7 @@ def save(compiled: CompiledData, path: Path) -> None:
     for at, column in enumerate(compiled.slots or ()):
         tensors[f"slots.{at:03d}.codes"] = column.codes
         tensors[f"slots.{at:03d}.texts"] = texts_to_array(list(column.texts))
+    tensors |= outputs_to_tensors(compiled.outputs)
     if compiled.when is not None:
         tensors["when.codes"] = compiled.when.texts.codes
         tensors["when.texts"] = texts_to_array(list(compiled.when.texts.texts))
@@ -171,6 +180,7 @@ def _table(about: dict[str, Any], tensors: Tensors, kind: type[Compiled]) -> Com
         when=_when(about, conditions, tensors),
         ways=ways_from(about["ways"], tensors, len(conditions)) if "ways" in about else None,
         declared=frozenset(texts_from_array(tensors["declared"]) if "declared" in tensors else ()),
+        outputs=outputs_from(tensors, n_rows),
     )
 
 

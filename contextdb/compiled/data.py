@@ -34,6 +34,7 @@ from contextdb.compiled.lookup import UNUSUAL, SingleLookup, StraightAsk, build_
 from contextdb.compiled.mask_bits import bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, SetMatches
 from contextdb.compiled.memory import Memory
+from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.stack import MaskStack
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.versions import version_of
@@ -42,9 +43,6 @@ from contextdb.errors import ContextError, Fault, Place, in_quotes
 from contextdb.expressions.derived import Derivation
 from contextdb.expressions.rules import WhenRules
 from contextdb.schema.shapes import Policy
-
-SLOT_COLUMNS = ("Mandatory_Slots", "Optional_Slots")
-"""The outputs that say which roles a row fills."""
 
 Made = TypeVar("Made")
 
@@ -76,13 +74,15 @@ class CompiledData(Unchanging):
     derivation: Derivation | None = None
     """How the conditions that are derived are computed; None where none is."""
     slots: tuple[TextColumn, ...] | None = None
-    """The outputs of `SLOT_COLUMNS` that the table has; None where that is not known."""
+    """The outputs that say which roles a row fills, as far as the table has them; None where that is not known."""
     when: WhenRules | None = None
     """The rows' own rules; None where no row has one."""
     ways: Ways | None = None
     """The way of each row through tables inside tables; None for a table without."""
     declared: frozenset[str] = frozenset()
     """Conditions the project declares. A fact with one of these names belongs to another table; it is not a typo."""
+    outputs: Outputs = NO_OUTPUTS
+    """What the rows give the game besides their assets; one without columns where the table has none."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -344,7 +344,8 @@ class CompiledData(Unchanging):
     def answering(self) -> Answering:
         """What the answers of this table share."""
         ask_mirrored = self.query_mirrored if self.mirroring else None
-        own = Answering(self.assets, self.leaves, self.name, partial(version_of, self._said), ask_mirrored)
+        version = partial(version_of, self._said)
+        own = Answering(self.assets, self.leaves, self.name, version, ask_mirrored, outputs=self.outputs)
         answering: Answering = self.__dict__.setdefault("answering", own)  # one, whichever thread comes first
         return answering
 
@@ -359,6 +360,7 @@ class CompiledData(Unchanging):
             (self.name, self.policy, self.fallback, list(self.assets), conditions, derived),
             *(self.enabled, self.priorities, self.row_weights, *self.texts, *(self.slots or ())),
             *((self.when.texts,) if self.when is not None else ()),
+            *self.outputs.said,
             *(*ways, *(part for t in inner for part in ((t.name, t.policy), t.priorities, t.row_weights))),
         )
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Flags, Rows, Words, read_only
+from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.errors import ContextError, Fault, in_quotes, plural
 
 _INT64 = np.dtype(np.int64)
@@ -29,7 +30,7 @@ class Answering:
     Two are of the same table where name and `version` are equal; the version is worked out where two have to be compared.
     """
 
-    __slots__ = ("_version", "ask_mirrored", "assets", "is_mirroring", "leaves", "name", "row_numbers")
+    __slots__ = ("_version", "ask_mirrored", "assets", "is_mirroring", "leaves", "name", "outputs", "row_numbers")
 
     def __init__(
         self,
@@ -39,6 +40,7 @@ class Answering:
         version: str | Callable[[], str] = "",
         ask_mirrored: Callable[[Mapping[str, object]], Matches] | None = None,
         is_mirroring: bool = False,
+        outputs: Outputs = NO_OUTPUTS,
     ) -> None:
         self.assets = assets
         self.ask_mirrored = ask_mirrored
@@ -47,6 +49,7 @@ class Answering:
         """Whether facts of the table change in a mirror."""
         self.leaves = assets if leaves is None else leaves
         self.name = name
+        self.outputs = outputs
         self.row_numbers: Rows = read_only(np.arange(len(assets), dtype=np.int64))
         self._version = version
 
@@ -75,7 +78,7 @@ class Answering:
 
     def __reduce__(self) -> tuple[type[Answering], tuple[object, ...]]:
         """What is pickled: not the table, which `ask_mirrored` would bring along."""
-        return Answering, (self.assets, self.leaves, self.name, self.version, None, self.is_mirroring)
+        return Answering, (self.assets, self.leaves, self.name, self.version, None, self.is_mirroring, self.outputs)
 
 
 _OWN_ANSWER = "an answer of this compiled table"
@@ -137,6 +140,17 @@ class Matches:
         """The assets of the valid rows, without the paths of tables inside tables."""
         leaves = self._table.leaves
         return [leaves[r] for r in self.indices.tolist()]
+
+    def outputs(self, name: str) -> NDArray[Any]:
+        """An output of the valid rows, in the order of `indices`, read-only: bool, int64 or float64 [count], for `numbers` float64
+        [count, size], for enum and text an array of str.
+
+        Raises
+        ------
+        NoSuchOutput
+            The table has no such output.
+        """
+        return self._table.outputs.of_matches(self.indices, name)
 
     @property
     def mask(self) -> Words:

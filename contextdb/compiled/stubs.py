@@ -1,7 +1,7 @@
-"""The facts of compiled tables as Python types, so that an editor completes names and values and a type checker knows them.
+"""Facts and outputs of compiled tables as Python types, so that an editor completes names and values and a type checker knows them.
 
-For each table a TypedDict of the facts that it asks for; for each condition with declared values a Literal of them. The text is a
-module that imports typing alone. Nothing here touches the disk.
+For each table a TypedDict of the facts that it asks for, and where it has outputs one of those of a row; for each condition and
+output with declared values a Literal of them. The text is a module that imports typing alone. Nothing here touches the disk.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from unicodedata import normalize
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
+from contextdb.cells.outputs import Output
+from contextdb.cells.words import format_number
 from contextdb.compiled.data import CompiledData
 from contextdb.errors import shown
 
@@ -24,6 +26,10 @@ from __future__ import annotations
 
 {imports}from typing import Literal, TypeAlias, TypedDict
 '''
+
+
+_OUTPUTS = {"bool": "bool", "int": "int", "number": "float", "text": "str", "numbers": "tuple[{}]"}
+"""The Python types of outputs; that of an enum is a Literal of its values."""
 
 
 def stubs_of(tables: Mapping[str, CompiledData]) -> str:
@@ -37,6 +43,8 @@ def stubs_of(tables: Mapping[str, CompiledData]) -> str:
                 literals[condition] = names.of(condition.name)
                 parts.append(_literal(literals[condition], condition))
         parts.append(_facts(names.of(f"{table.name} facts"), table, literals))
+        if len(table.outputs):
+            parts.append(_outputs(names, table))
     modules = {c.domain.type.annotation.rpartition(".")[0] for table in tables.values() for c in table.asked.values()}
     imports = "".join(f"import {module}\n" for module in sorted(modules - {""}))
     return _HEAD.format(imports=imports) + "".join(f"\n{part}" for part in parts)
@@ -64,8 +72,12 @@ def _literal(name: str, condition: Condition) -> str:
     values = condition.domain.values or ()
     if condition.domain.type.is_tags:
         values = tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
+    return _listed(name, condition.name, values)
+
+
+def _listed(name: str, of: str, values: Iterable[str]) -> str:
     listed = "".join(f"    {value!r},\n" for value in values)
-    return f"# {shown(condition.name, 200)}\n{name}: TypeAlias = Literal[\n{listed}]\n"
+    return f"# {shown(of, 200)}\n{name}: TypeAlias = Literal[\n{listed}]\n"
 
 
 def _with_those_above(tag: str) -> Iterator[str]:
@@ -75,8 +87,31 @@ def _with_those_above(tag: str) -> Iterator[str]:
 
 def _facts(name: str, table: CompiledData, literals: Mapping[Condition, str]) -> str:
     lines = [f"        {c.name!r}: {_type(c, literals.get(c))},{_comment(c)}\n" for c in table.asked.values()]
+    return _typed_dict(name, table, lines)
+
+
+def _outputs(names: _Names, table: CompiledData) -> str:
+    """The outputs of a row, as `compiled.outputs.of_row` gives them, with a Literal for the values of each enum."""
+    types, literals = dict[str, str](), ""
+    for output in table.outputs.declared:
+        if output.kind == "enum":
+            types[output.name] = names.of(f"{table.name} {output.name}")
+            values = (*output.values, *(("",) if output.needs_cell else ()))  # "" where no table of a row's way has it
+            literals += _listed(types[output.name], output.name, values) + "\n"
+        else:
+            types[output.name] = _OUTPUTS[output.kind].format(", ".join(["float"] * output.size))
+    lines = [f"        {o.name!r}: {types[o.name]},{_output_comment(o)}\n" for o in table.outputs.declared]
+    return literals + _typed_dict(names.of(f"{table.name} outputs"), table, lines)
+
+
+def _typed_dict(name: str, table: CompiledData, lines: Sequence[str]) -> str:
     fields = "{\n" + "".join(lines) + "    }" if lines else "{}"
     return f"# table {shown(table.name, 200)}\n{name} = TypedDict(\n    {name!r},\n    {fields},\n)\n"
+
+
+def _output_comment(output: Output) -> str:
+    bounds = [format_number(bound) if math.isfinite(bound) else "" for bound in (output.minimum, output.maximum)]
+    return _said("..".join(bounds) if any(bounds) else "", output.unit, output.description)
 
 
 def _type(condition: Condition, literal: str | None) -> str:
@@ -91,7 +126,11 @@ def _comment(condition: Condition) -> str:
     low, high = condition.domain.minimum, condition.domain.maximum
     bounds = f"{_end(low, condition.domain)}..{_end(high, condition.domain)}" if math.isfinite(low) or math.isfinite(high) else ""
     unit = condition.unit or condition.domain.type.unit
-    parts = [" ".join(part for part in (bounds, unit) if part), condition.description]
+    return _said(bounds, unit, condition.description)
+
+
+def _said(bounds: str, unit: str, description: str) -> str:
+    parts = [" ".join(part for part in (bounds, unit) if part), description]
     said = shown(": ".join(part for part in parts if part), 200)
     return f"  # {said}" if said else ""
 

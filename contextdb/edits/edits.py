@@ -44,7 +44,8 @@ def check_text(condition: Condition, text: str) -> Fault | None:
 
 
 def check_cell(table: Table, column: str, text: str) -> Fault | None:
-    """The same for any column of a table: an asset and an output may be any text."""
+    """The same for any column of a table: an asset and an output without a type may be any text. Whether a cell of an output may be
+    empty hangs on its row, so that is not said here."""
     settings = table.settings
     for one in table.conditions:
         if one.condition.name == column:
@@ -53,6 +54,8 @@ def check_cell(table: Table, column: str, text: str) -> Fault | None:
         return Fault(f"cannot read {in_quotes(text)}.", '"True" or "False"', rule="unreadable-cell")
     if column == settings.when and table.when is not None:
         return check_rule(text, table.known_conditions) or unwritable(text)
+    if text.strip() and (output := settings.output(column)) is not None:
+        return output.fault(text) or unwritable(text)
     if column in (settings.priority, settings.weight) and text.strip():
         alone = Columns(((column, column),)).apply(table.with_rows_taken([]))
         faults = Cells({column: {0: text}}).apply(Rows(np.array([-1])).apply(alone)).faults
@@ -184,7 +187,7 @@ def insert_columns(table: Table, at: int, columns: Sequence[NewColumn]) -> Edit:
     layout[at:at] = [(column.name, None) for column in columns]
     settings: dict[str, Any] = {c.job: c.name for c in columns if c.job not in ("condition", "output")}
     if outputs := [c.name for c in columns if c.job == "output"]:
-        settings["outputs"] = [*table.settings.outputs, *outputs]
+        settings["outputs"] = settings_to_dict(table.settings.with_outputs([*table.settings.outputs, *outputs]))["outputs"]
     declared = {c.name: c.declared for c in columns if c.declared}
     said = Sections(settings, {"conditions": declared} if declared else {})
     changes: list[Change] = [Columns(tuple(layout))]
@@ -244,6 +247,19 @@ def set_settings(table: Table, **said: Any) -> Edit:
     if changed.get("assume"):
         _require_known(table, cast("list[str]", changed["assume"]))
     return _checked(table, edit)
+
+
+def set_outputs(table: Table, names: Sequence[str]) -> Edit:
+    """Say which columns are outputs; what is declared of those that stay, and what the fallback gives to them, is kept."""
+    after = settings_to_dict(table.settings.with_outputs(names))
+    changed = differences(settings_to_dict(table.settings), after)
+    return _checked(table, Edit("Set outputs of the table", (Sections(changed),) if changed else ()))
+
+
+def set_fallback(table: Table, asset: str | None) -> Edit:
+    """Set the asset of the fallback; the outputs that it gives stay, and go with it."""
+    after = settings_to_dict(replace(table.settings, fallback=asset))
+    return set_settings(table, fallback=after.get("fallback"))
 
 
 def _require_known(table: Table, assume: Sequence[str]) -> None:

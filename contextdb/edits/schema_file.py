@@ -8,7 +8,7 @@ the table says.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -95,7 +95,7 @@ def schema_change(before: Table | None, after: Table) -> SchemaChange | None:
         The file may not be read.
     """
     path = schema_path(after)
-    wanted = _changes(_keys(before, path) if before else {}, _keys(after, path, only_own=before is None))
+    wanted = _changes({} if before is None else _keys(before, path), _keys(after, path, only_own=before is None))
     if not wanted:
         return None
     raw = read_bytes(path) if path.is_file() else b""
@@ -220,7 +220,7 @@ def _short(value: object) -> str:
 
 def _edited(text: str, wanted: Changes, table: Table, name: str) -> str:
     parts: dict[KeyPath, dict[str, object]] = {}
-    for key, (_, now) in wanted.items():
+    for key, now in _finest(wanted):
         parts.setdefault(key[:-1], {})[key[-1]] = now
     gone = [part for part, keys in parts.items() if all(now is None for now in keys.values())]
     new = {} if gone else _new_conditions(text, parts, table)  # what is gone may be what a new one was called
@@ -237,6 +237,16 @@ def _edited(text: str, wanted: Changes, table: Table, name: str) -> str:
     for part in gone:
         text = toml_edit.drop_empty_section(_with_keys(text, part, parts[part], ()), part)
     return text
+
+
+def _finest(wanted: Changes) -> Iterator[tuple[KeyPath, object]]:
+    """The keys to write: of a table's key that is a table itself, such as its outputs, those in it that change."""
+    for key, (was, now) in wanted.items():
+        if key[0] == "tables" and isinstance(was, Mapping) and isinstance(now, Mapping):
+            inner = {(*key, name): (was.get(name), now.get(name)) for name in {**was, **now}}
+            yield from _finest({path: said for path, said in inner.items() if repr(said[0]) != repr(said[1])})  # false is not 0
+        else:
+            yield key, now
 
 
 def _new_conditions(text: str, parts: Mapping[KeyPath, Mapping[str, object]], table: Table) -> dict[KeyPath, dict[str, object]]:

@@ -29,6 +29,8 @@ def _section(section: str, name: str, said: Mapping[str, object]) -> Iterator[st
         line = f"{key} = {as_toml(value)}"
         if isinstance(value, list) and len(line) > LONG_LINE:
             yield from (f"{key} = [", *(f"  {as_toml(item)}," for item in value), "]")
+        elif isinstance(value, Mapping) and len(line) > LONG_LINE:
+            yield from (f"{dotted((key, inner))} = {as_toml(item)}" for inner, item in value.items())
         else:
             yield line
     yield ""

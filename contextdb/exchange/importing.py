@@ -177,14 +177,14 @@ def _source(reading: Reading, path: Path | None) -> AnySource | None:
 
 def _settings(settings: TableSettings, kept: Sequence[Mapped], reading: Reading) -> TableSettings:
     """The settings under the jobs of the columns; what the file itself keeps of fallback, policy and assumptions is taken over."""
-    said: dict[str, Any] = {"outputs": tuple(column.name for column in kept if column.job == "output")}
-    said["asset"] = next(column.name for column in kept if column.job == "asset")
+    said: dict[str, Any] = {"asset": next(column.name for column in kept if column.job == "asset")}
     for job in PLAIN_JOBS:
         said[job] = next((column.name for column in kept if column.job == job), None)
     own = next(iter(reading.schema.tables.values()), None)
     if own is not None and settings == TableSettings(settings.name, settings.file):
         said |= {"fallback": own.fallback, "policy": own.policy, "assume": own.assume}
-    return replace(settings, **said)
+        said |= {"typed": own.typed, "fallback_outputs": own.fallback_outputs}
+    return replace(settings, **said).with_outputs(column.name for column in kept if column.job == "output")
 
 
 def declared_differently(reading: Reading, schema: Schema) -> list[str]:

@@ -14,7 +14,8 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
 from contextdb.schema.jobs import columns_checked
-from contextdb.schema.settings import KINDS_WITH, Schema, TableSettings, conditions_from_dict
+from contextdb.schema.outputs import fallback_to_toml, outputs_faults, outputs_to_toml
+from contextdb.schema.settings import KINDS_WITH, Schema, TableSettings, conditions_from_dict, settings_fields
 from contextdb.schema.shapes import NAMES, SECTIONS, as_toml, wrong_name
 
 Part = dict[str, object]
@@ -51,9 +52,14 @@ def has_place(key: str, kind: object) -> bool:
 def settings_to_dict(settings: TableSettings) -> Part:
     """What `[tables.NAME]` says of a table."""
     plain = TableSettings(settings.name)
-    said = {field.name: getattr(settings, field.name) for field in fields(settings) if field.name != "name"}
+    said = {field.name: getattr(settings, field.name) for field in fields(settings) if field.name in (SECTIONS["tables"] or ())}
     said = {key: value for key, value in said.items() if value != getattr(plain, key)}
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in said.items()}
+    said = {key: list(value) if isinstance(value, tuple) else value for key, value in said.items()}
+    if "outputs" in said:
+        said["outputs"] = outputs_to_toml(settings.outputs, settings.typed)
+    if "fallback" in said:
+        said["fallback"] = fallback_to_toml(settings.fallback, settings.fallback_outputs)
+    return said
 
 
 def schema_to_dict(schema: Schema) -> dict[str, dict[str, Part]]:
@@ -110,19 +116,20 @@ def settings_with(settings: TableSettings, said: Mapping[str, Any]) -> TableSett
     faults = []
     for key, value in said.items():
         if key not in shapes:
-            near = nearest(key, shapes)
+            near = nearest(str(key), shapes)
             faults.append(
-                Fault(f"a table has no setting {in_quotes(key)}.", some(shapes, len(shapes)), in_quotes(near) if near else "")
+                Fault(f"a table has no setting {in_quotes(str(key))}.", some(shapes, len(shapes)), in_quotes(near) if near else "")
             )
         elif value is not None and (wrong := shapes[key].wrong(value)):
             meant = shapes[key].mend(value)
             mend = "" if meant is None else f"{key} = {as_toml(meant)}"
             faults.append(Fault(f"{shown(f'{key} = {as_toml(value)}')}: {wrong}.", shapes[key].accepted, mend))
+    if not faults:
+        together = {key: value for key, value in {**settings_to_dict(settings), **said}.items() if value is not None}
+        faults = [fault for _, fault in outputs_faults(together)]
     if faults:
         raise SchemaError(*faults)
-    now: dict[str, Any] = {key: getattr(plain, key) if value is None else value for key, value in said.items()}
-    now |= {key: tuple(value) for key, value in now.items() if isinstance(value, list)}
-    return replace(settings, **now)
+    return replace(plain, **settings_fields(together))
 
 
 def job_faults(settings: TableSettings, columns: Sequence[str], schema: Schema) -> Iterator[Fault]:

@@ -20,6 +20,7 @@ from contextdb.cells.conditions import Condition, Mirror
 from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind, names_where
 from contextdb.cells.mirroring import sided_pairs, swap_faults, swapped_tag
+from contextdb.cells.outputs import Output, OutputValue
 from contextdb.cells.sets import covers
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES
@@ -28,6 +29,7 @@ from contextdb.expressions import Derivation, assumption_faults, derivation_faul
 from contextdb.files.file_names import alike, composed
 from contextdb.schema import shapes, toml_values
 from contextdb.schema.jobs import JOBS, columns_checked, columns_with_jobs
+from contextdb.schema.outputs import declared_outputs, fallback_of, outputs_faults
 from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
 from contextdb.schema.toml_lines import Path, key_lines, line_of, read_toml
 
@@ -60,6 +62,20 @@ class TableSettings:
     assume: tuple[str, ...] = ()
     when: str | None = None
     """The column of each row's own rule."""
+    typed: tuple[Output, ...] = ()
+    """What is declared of outputs; one without a say here is a text."""
+    fallback_outputs: tuple[tuple[str, OutputValue], ...] = ()
+    """Names and values of the outputs that `fallback` gives."""
+
+    @property
+    def declared_outputs(self) -> tuple[Output, ...]:
+        """The outputs, in the order of `outputs`."""
+        typed = {output.name: output for output in self.typed}
+        return tuple(typed.get(name) or Output(name) for name in self.outputs)
+
+    def output(self, name: str) -> Output | None:
+        """What is declared of an output; None for a column of another kind, or one of which nothing is."""
+        return next((output for output in self.typed if output.name == name), None)
 
     @property
     def jobs(self) -> list[tuple[str, str]]:
@@ -73,7 +89,23 @@ class TableSettings:
     def renamed(self, name_of: Callable[[str], str | None]) -> TableSettings:
         """The settings under other names of the columns; one that is gone, None, has no job."""
         now: dict[str, Any] = {job: name_of(getattr(self, job) or "") for job in JOBS}
-        return replace(self, **now, outputs=tuple(name for name in map(name_of, self.outputs) if name is not None))
+        typed = ((name_of(output.name), output) for output in self.typed)
+        given = ((name_of(name), value) for name, value in self.fallback_outputs)
+        return replace(
+            self,
+            **now,
+            outputs=tuple(name for name in map(name_of, self.outputs) if name is not None),
+            typed=tuple(replace(output, name=name) for name, output in typed if name is not None),
+            fallback_outputs=tuple((name, value) for name, value in given if name is not None),
+        )
+
+    def with_outputs(self, names: Iterable[str]) -> TableSettings:
+        """The settings with other outputs; what is said of those that stay is kept."""
+        outputs = tuple(names)
+        typed = tuple(output for output in self.typed if output.name in outputs)
+        return replace(
+            self, outputs=outputs, typed=typed, fallback_outputs=tuple(o for o in self.fallback_outputs if o[0] in outputs)
+        )
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -253,6 +285,9 @@ def _part_faults(path: Path, part: object) -> Iterator[Found]:
         yield from _key_faults(path, part)
         if name == "conditions":
             yield from _condition_faults(path, part)
+        elif name == "tables":
+            for below, fault in outputs_faults(_fitting("tables", part)):
+                yield (*path, *below), replace(fault, found=f"{_header(path)} {fault.found}")
 
 
 def _key_faults(path: Path, part: Section) -> Iterator[Found]:
@@ -496,5 +531,15 @@ def _mirror(said: str | Mapping[str, str] | None) -> Mirror | None:
 
 
 def _settings(name: str, part: Section) -> TableSettings:
-    keys: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in part.items()}
-    return TableSettings(name, **keys)
+    return replace(TableSettings(name), **settings_fields(part))
+
+
+def settings_fields(part: Section) -> dict[str, Any]:
+    """What the keys of a sound `[tables.NAME]` are in a `TableSettings`."""
+    found: dict[str, Any] = {key: tuple(value) if isinstance(value, (list, tuple)) else value for key, value in part.items()}
+    declared = declared_outputs(part.get("outputs", ()))
+    if "outputs" in part:
+        found["outputs"], found["typed"] = tuple(o.name for o in declared), tuple(o for o in declared if not o.is_plain)
+    if "fallback" in part:
+        found["fallback"], found["fallback_outputs"] = fallback_of(part["fallback"], declared)
+    return found

@@ -113,6 +113,17 @@ def _wrong_values(value: object) -> str | None:
     return _wrong_list(value) or (None if value else "the list is empty")
 
 
+def _wrong_outputs(value: object) -> str | None:
+    """What is wrong with the names of outputs; what is said of each is for `contextdb.schema.outputs` to check."""
+    if not isinstance(value, Mapping):
+        return _wrong_list(value)
+    return next((f"the name {as_toml(name)} cannot be used: {wrong}" for name in value if (wrong := wrong_name(name))), None)
+
+
+def _wrong_fallback(value: object) -> str | None:
+    return None if isinstance(value, Mapping) else wrong_name(value)
+
+
 def _wrong_file(value: object) -> str | None:
     if not isinstance(value, str) or wrong_name(value):
         return wrong_name(value)
@@ -207,6 +218,12 @@ NUMBER = Shape("a number, such as -1.5", _wrong_number, _meant_number)
 BOUND = Shape("a number, such as -1.5", _wrong_bound, _meant_number)
 """A number as its type writes it; whether that fits is for the type to say."""
 NAMES = Shape('a list of different names, such as ["A", "B"]', _wrong_list, _meant_names(","))
+OUTPUTS = Shape(
+    'a list of different names, such as ["A", "B"], or typed outputs, such as { damage = { type = "number" } }',
+    _wrong_outputs,
+    _meant_names(","),
+)
+FALLBACK = Shape('a name, such as "idle", or { asset = "idle", outputs = { damage = 3 } }', _wrong_fallback, _meant_text)
 VALUES = Shape('a list of different names, such as ["A", "B"]', _wrong_values, _meant_names(r"[,;|\s]+"))
 FILE = Shape("a .csv or .parquet file in the folder of contextdb.toml or below it", _wrong_file, _meant_file)
 
@@ -229,11 +246,11 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
     "tables": {
         "file": FILE,
         "asset": NAME,
-        "outputs": NAMES,
+        "outputs": OUTPUTS,
         "enabled": NAME,
         "priority": NAME,
         "weight": NAME,
-        "fallback": NAME,
+        "fallback": FALLBACK,
         "policy": _one_of(POLICIES, "policy", POLICY_SYNONYMS),
         "assume": EXPRESSIONS,
         "when": NAME,

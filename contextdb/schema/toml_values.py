@@ -68,7 +68,7 @@ def _inline(old: str, keys: Path, value: object) -> str:
     elif keys[-1] in inner or not isinstance(value, Mapping):
         inner[keys[-1]] = value
     else:
-        inner.append(keys[-1], tomlkit.item(value))
+        inner.append(keys[-1], tomlkit.value(as_toml(value)))
     return document.as_string().removeprefix("x = ").removesuffix("\n")
 
 

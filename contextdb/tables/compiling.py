@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextdb import bitmask
-from contextdb.compiled.data import SLOT_COLUMNS
+from contextdb.cells.outputs import SLOT_COLUMNS
 from contextdb.compiled.table import CompiledTable
 from contextdb.expressions.rules.rules import WhenRules
 from contextdb.tables.data import TableData
@@ -29,4 +29,5 @@ def compile_table(table: TableData) -> CompiledTable:
         when=when,
         ways=table.ways,
         declared=frozenset(table.schema.conditions),
+        outputs=table.outputs,
     )

@@ -8,7 +8,7 @@ worked out for that column (its cells, its masks). Texts that cannot be read sta
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +26,7 @@ from contextdb.cells.arguments import (
 )
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
+from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Ways
 from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, some
@@ -33,6 +34,8 @@ from contextdb.expressions.rules import WhenColumn
 from contextdb.files.texts import AnySource
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
 from contextdb.tables.condition_column import ConditionColumn
+from contextdb.tables.nesting.names import inner_name
+from contextdb.tables.output_columns import OutputColumn, output_columns, outputs_of
 from contextdb.tables.plain_columns import PlainColumns
 
 AnyTable = TypeVar("AnyTable", bound="TableData")
@@ -132,7 +135,9 @@ class TableData(Unchanging):
     def _in_order(self, more: Iterable[Fault]) -> list[Fault]:
         """The faults of cells, and others that have their places already, in the order of rows."""
         found = [(row, at, fault) for at, column in enumerate(self.conditions) for row, fault in column.faulty_rows()]
-        found += [(row, -1, fault.at(self.place(row, fault.place.column))) for row, fault in self._plain.faults]
+        found += [
+            (row, -1, fault.at(self.place(row, fault.place.column))) for row, fault in (*self._plain.faults, *self._output_faults)
+        ]
         if self.when is not None:
             found += [(row, -1, fault.at(self.place(row, self.when.name))) for row, fault in self.when.faulty_rows()]
         found += [(fault.place.row or 0, -1, fault) for fault in more]
@@ -203,6 +208,26 @@ class TableData(Unchanging):
     def row_weights(self) -> NDArray[np.float64]:
         """The weight of each row in a random pick: float64 [n_rows]; 1 without a weight column."""
         return self._plain.weights
+
+    @cached_property
+    def output_columns(self) -> tuple[OutputColumn, ...]:
+        """The outputs' columns, in the order of the settings."""
+        return output_columns(self.columns, self.settings)
+
+    @cached_property
+    def outputs(self) -> Outputs:
+        """What the rows give the game besides their assets, to be read by row."""
+        return outputs_of(self.output_columns, self.settings)
+
+    @property
+    def _output_faults(self) -> Iterator[tuple[int, Fault]]:
+        """The cells of outputs that cannot be read; a row that refers to a table may leave them empty."""
+        if any(column.faults for column in self.output_columns):
+            texts = self.text_column(self.asset_column)
+            refers = np.array([inner_name(text) is not None for text in texts.texts], np.bool_)
+            may_be_empty = frozenset(np.flatnonzero(refers[texts.codes]).tolist())
+            for column in self.output_columns:
+                yield from column.faulty_rows(may_be_empty)
 
     @cached_property
     def when(self) -> WhenColumn | None:

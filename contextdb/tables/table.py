@@ -13,6 +13,7 @@ from contextdb.cells.arguments import require_kind, require_many, require_mappin
 from contextdb.columns import TextColumn
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, SchemaError, TableError, in_quotes
+from contextdb.schema.sections import settings_with
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, conditions_from_dict, expression_faults
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.data import TableData
@@ -33,7 +34,7 @@ class Table(TableData):
         cls,
         columns: Mapping[str, Sequence[str]],
         schema: Mapping[str, Mapping[str, object]] | Schema | None = None,
-        settings: TableSettings | None = None,
+        settings: TableSettings | Mapping[str, object] | None = None,
         name: str | None = None,
     ) -> Table:
         """Build a table from texts.
@@ -44,15 +45,15 @@ class Table(TableData):
             The cells of each column, equally many; the first column names the assets unless `settings.asset` says otherwise.
         schema : mapping, optional
             The contents of `[conditions.NAME]` in contextdb.toml: `{"speed": {"type": "number"}}`. Others are inferred.
-        settings : contextdb.schema.TableSettings, optional
-            The contents of `[tables.NAME]` in contextdb.toml.
+        settings : mapping, optional
+            The contents of `[tables.NAME]` in contextdb.toml: `{"policy": "first", "outputs": {"damage": {"type": "int"}}}`.
         name : str, optional
             The name of the table. Default: that of the settings, or "table".
 
         Raises
         ------
         SchemaError
-            The schema is invalid.
+            The schema or the settings are invalid.
         TableError
             Columns of unequal length, or cells that cannot be read.
         """
@@ -61,8 +62,10 @@ class Table(TableData):
             schema = replace(EMPTY, conditions=conditions_from_dict(schema))
             if faults := list(expression_faults(schema)):
                 raise SchemaError(*faults)
-        if settings is not None:
-            require_kind(settings, TableSettings, "settings", "a contextdb.schema.TableSettings")
+        if isinstance(settings, Mapping):
+            settings = settings_with(TableSettings(name if isinstance(name, str) else "table"), settings)
+        elif settings is not None:
+            require_kind(settings, TableSettings, "settings", "a mapping, with the keys of [tables.NAME] in contextdb.toml")
         name = require_text(name, "name") if name is not None else settings.name if settings is not None else "table"
         for n, values in require_mapping(columns, "columns", 'a mapping: {"Asset Name": [...], "speed": [...]}').items():
             require_many(values, f"the column {in_quotes(require_text(n, 'a name of columns'))}", "a list of texts")

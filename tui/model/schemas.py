@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from contextdb.errors import SchemaError
-from contextdb.schema.sections import EDITED_SECTIONS, settings_to_dict
+from contextdb.schema.sections import EDITED_SECTIONS, settings_to_dict, settings_with
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.tables.changes import Edit, Sections
 from contextdb.tables.table import Table
@@ -63,8 +63,7 @@ def _joined(saved: Schema, table: Schema, disk: Schema, section: str) -> dict[st
 
 def _joined_settings(saved: TableSettings, table: TableSettings, disk: TableSettings) -> TableSettings:
     joined = _three_way(settings_to_dict(saved), settings_to_dict(table), settings_to_dict(disk))
-    said: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in joined.items()}
-    return TableSettings(disk.name, **said)
+    return settings_with(TableSettings(disk.name), joined)
 
 
 def _three_way(was: Mapping[str, Any], mine: Mapping[str, Any], yours: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.conditions import Condition
+from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.edits import edits
 from contextdb.edits.history import History, Step, where_now
@@ -113,14 +114,28 @@ class ShownTable:
         condition = self.condition(column)
         if condition is not None:
             return condition.faults.get(int(texts.codes[int(self.view.rows[row])]))
-        return self.text_fault(column, self.text(row, column)) or edits.check_cell(self.table, texts.name, self.text(row, column))
+        text = self.text(row, column)
+        if (output := self.missing_output(column)) is not None and self.is_missing(int(self.view.rows[row]), column):
+            return output.fault(text)
+        return self.text_fault(column, text) or edits.check_cell(self.table, texts.name, text)
 
     def text_fault(self, column: int, text: str) -> Fault | None:
-        """What is wrong with a text of a column that is not a condition: a row's own rule, a table that is to are in a row."""
+        """What is wrong with a text of a column that is not a condition: a row's own rule, an output, a table that is to be in a
+        row."""
         name, table = self.table.columns[column].name, self.table
-        if name == table.settings.when:
+        if name == table.settings.when or table.settings.output(name) is not None:
             return edits.check_cell(table, name, text)
         return self.inner_fault(text) if name == table.asset_column else None
+
+    def missing_output(self, column: int) -> Output | None:
+        """The output that a column is, if its cells may not be empty."""
+        output = self.table.settings.output(self.table.columns[column].name)
+        return output if output is not None and output.needs_cell else None
+
+    def is_missing(self, file_row: int, column: int) -> bool:
+        """Whether a cell of an output that may not be empty is; a row that refers to a table may leave it to that."""
+        texts = self.table.columns
+        return not texts[column][file_row].strip() and inner_name(texts[self.asset_at][file_row]) is None
 
     def inner_fault(self, text: str) -> Fault | None:
         """Why a table cannot be in a row whose asset cell has this text."""

@@ -86,6 +86,9 @@ class Window:
         codes = texts.codes[self._rows].tolist()
         kinds = {code: self._kind(column, condition, code) for code in set(codes)}
         found = [(texts.texts[code], kinds[code]) for code in codes]
+        if condition is None and self._sheet.missing_output(column) is not None:
+            is_missing = [self._sheet.is_missing(int(row), column) for row in self._rows]
+            found = [(text, "fault" if wrong else kind) for (text, kind), wrong in zip(found, is_missing, strict=True)]
         if self._failing is None or (condition is None and texts.name != self._sheet.table.settings.when):
             return found
         fails = self._failing[:, column].tolist()

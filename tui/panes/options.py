@@ -6,6 +6,7 @@ the reason.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar, get_args
 
 from rich.markup import escape
@@ -242,7 +243,7 @@ class OptionsPane(Pane):
         chosen = set(event.selection_list.selected)
         names = [c.name for c in self.sheet.table.columns if c.name in chosen]
         if set(self.sheet.table.settings.outputs) != chosen:
-            self._set_setting("outputs", names)
+            self._set("outputs", lambda: edits.set_outputs(self.sheet.table, names))
 
     @on(Input.Submitted)
     def _typed(self, event: Input.Submitted) -> None:
@@ -269,8 +270,18 @@ class OptionsPane(Pane):
         if value == getattr(self.sheet.table.settings, key):
             self._field(key).say()
             return
+        is_fallback = key == "fallback"
+        self._set(
+            key,
+            lambda: (
+                edits.set_fallback(self.sheet.table, value) if is_fallback else edits.set_settings(self.sheet.table, **{key: value})
+            ),
+        )
+
+    def _set(self, key: str, edit: Callable[[], Edit]) -> None:
+        """Apply an edit, or say under its field why it cannot be."""
         try:
-            self._apply(edits.set_settings(self.sheet.table, **{key: value}))
+            self._apply(edit())
         except ContextDBError as error:
             self._field(key).say(plain(error.faults[0]))
 

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Any, Generic
 
 from contextdb.cells.conditions import Condition
+from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.schema.jobs import JOB_KEYS, JOBS
 from contextdb.schema.sections import job_faults
@@ -118,11 +119,19 @@ def _settings(
     is_same = yours["outputs"] == was["outputs"]
     wanted: dict[str, Any] = {} if is_same else {"outputs": _merged_names(was["outputs"], mine["outputs"], yours["outputs"])}
     wanted |= {key: yours[key] for key in JOBS if mine[key] == was[key] != yours[key]}
-    said: TableSettings = replace(ours.settings, **{key: mine[key] for key in JOB_KEYS})
+    said: TableSettings = replace(ours.settings, **{key: mine[key] for key in (*JOB_KEYS, "fallback_outputs")})
+    said = replace(said, typed=_merged_types(was["typed"], mine["typed"], yours["typed"]))
     for tried in (wanted, *({key: value} for key, value in wanted.items())):  # all at once, else what can be
         if not any(job_faults(now := replace(said, **tried), names, schema)):
             said = now
-    return said
+    return said.with_outputs(said.outputs)
+
+
+def _merged_types(was: tuple[Output, ...], ours: tuple[Output, ...], theirs: tuple[Output, ...]) -> tuple[Output, ...]:
+    """What is declared of outputs: as ours has it where ours changed it, else as theirs."""
+    base, mine, yours = ({output.name: output for output in side} for side in (was, ours, theirs))
+    found = [yours.get(name) if mine.get(name) == base.get(name) else mine.get(name) for name in {**mine, **yours}]
+    return tuple(output for output in found if output is not None)
 
 
 def _merged_names(was: tuple[str, ...], ours: tuple[str, ...], theirs: tuple[str, ...]) -> tuple[str, ...]:

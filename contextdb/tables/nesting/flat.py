@@ -1,7 +1,7 @@
 """A table with the rows of its inner tables in place of those that refer to them: the table that is compiled and measured.
 
 Cells of one condition in the tables of a way must all hold; a row is enabled when every row of its way is. Columns of slots and
-rules add up, of other outputs the innermost text counts. Nothing here touches the disk.
+rules add up, of other outputs the innermost cell that is not empty counts. Nothing here touches the disk.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ import numpy as np
 
 from contextdb import bitmask
 from contextdb.cells.conditions import Condition
+from contextdb.cells.outputs import SLOT_COLUMNS
 from contextdb.columns import TextColumn
+from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.table import CompiledTable
 from contextdb.compiled.ways import Ways, WayTable
 from contextdb.errors import Fault, Place, TableError, in_quotes
@@ -25,6 +27,7 @@ from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.data import TableData
 from contextdb.tables.nesting.expansion import NO_ROWS, Expansion, expand
 from contextdb.tables.nesting.flat_columns import FlatColumn
+from contextdb.tables.nesting.flat_outputs import declared_of, flat_outputs
 from contextdb.tables.nesting.flat_texts import free_name, outputs_of, paths_and_leaves, rules_of
 from contextdb.tables.nesting.links import Neighbours, require_sound
 from contextdb.tables.plain_columns import PlainColumns
@@ -63,6 +66,11 @@ class FlatTable(TableData):
         plain = _plain(self.expansion)
         off = bitmask.unpack(bitmask.from_int(self.switched_off, self.n_rows), self.n_rows)
         return replace(plain, enabled=plain.enabled & ~off)
+
+    @cached_property
+    def outputs(self) -> Outputs:
+        """The outputs of all tables, to be read by flat row."""
+        return flat_outputs(self.expansion, {c.name: c for c in self.columns if c.name in SLOT_COLUMNS})
 
     def place(self, row: int, column: str | None = None) -> Place:
         """Where the innermost row of a way stands; with a column, the innermost that has it."""
@@ -108,6 +116,7 @@ def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
     columns = tuple(_column(expansion, conditions[name], found, last) for name, found in sources.items())
     taken = set(sources)
     asset, leaves = _assets(expansion, free_name(table.asset_column, taken), last)
+    declared_of(expansion)
     outputs = outputs_of(expansion, taken)
     rules = rules_of(expansion, taken)
     settings = replace(
@@ -117,7 +126,7 @@ def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:
         fallback=table.settings.fallback,
         policy=table.settings.policy,
         assume=table.settings.assume,
-        **({"when": rules.name} if rules else {}),
+        when=rules.name if rules else None,
     )
     texts = (asset, *outputs, *([rules] if rules else []), *(c.texts for c in columns))
     flat = FlatTable(

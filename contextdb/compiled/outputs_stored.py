@@ -1,0 +1,98 @@
+"""Outputs as tensors of a compiled file, and back; see `contextdb.compiled.artefact` for their names."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from contextdb.cells.outputs import OUTPUT_TYPES, Output, OutputValue
+from contextdb.columns import TextColumn
+from contextdb.compiled.outputs import NO_OUTPUTS, OutputCells, Outputs
+from contextdb.files.tensors import Tensors, texts_from_array, texts_to_array
+
+DECLARED = "outputs.declared"
+
+
+def outputs_to_tensors(outputs: Outputs) -> Tensors:
+    """The arrays of outputs, and what is declared of them; nothing for a table without."""
+    if not len(outputs):
+        return {}
+    declared = json.dumps(list(map(_output_to_json, outputs.declared)), ensure_ascii=False)
+    tensors: Tensors = {DECLARED: np.frombuffer(declared.encode("utf-8", "surrogatepass"), np.uint8)}
+    for at, cells in enumerate(outputs.cells):
+        if isinstance(cells, TextColumn):
+            tensors[f"outputs.{at:03d}.codes"] = cells.codes
+            tensors[f"outputs.{at:03d}.texts"] = texts_to_array(list(cells.texts))
+        else:
+            tensors[f"outputs.{at:03d}.values"] = cells.view(np.uint8) if cells.dtype == np.bool_ else cells
+    return tensors
+
+
+def outputs_from(tensors: Tensors, n_rows: int) -> Outputs:
+    """The outputs of a compiled file with so many rows; ValueError for arrays of other shapes or types."""
+    if DECLARED not in tensors:
+        return NO_OUTPUTS
+    declared = tuple(map(_output, json.loads(tensors[DECLARED].tobytes().decode("utf-8", "surrogatepass"))))
+    return Outputs(declared, tuple(_cells(output, f"outputs.{at:03d}", tensors, n_rows) for at, output in enumerate(declared)))
+
+
+def _output_to_json(output: Output) -> dict[str, object]:
+    return {
+        "name": output.name,
+        "type": output.kind,
+        "default": _to_json(output.default),
+        "bounds": [bound if math.isfinite(bound) else None for bound in (output.minimum, output.maximum)],
+        "values": output.values,
+        "size": output.size,
+        "unit": output.unit,
+        "description": output.description,
+    }
+
+
+def _output(about: dict[str, Any]) -> Output:
+    if about["type"] not in OUTPUT_TYPES:
+        raise ValueError(about["type"])
+    low, high = about["bounds"]
+    bare = Output(
+        about["name"],
+        about["type"],
+        None,
+        -math.inf if low is None else low,
+        math.inf if high is None else high,
+        tuple(about["values"]),
+        about["size"],
+        about["unit"],
+        about["description"],
+    )
+    return bare if about["default"] is None else replace(bare, default=_from_json(bare, about["default"]))
+
+
+def _cells(output: Output, prefix: str, tensors: Tensors, n_rows: int) -> OutputCells:
+    if output.is_text:
+        texts, codes = texts_from_array(tensors[f"{prefix}.texts"]), tensors[f"{prefix}.codes"]
+        if codes.shape != (n_rows + 1,) or codes.dtype != np.int32 or codes.min() < 0 or codes.max() >= len(texts):
+            raise ValueError(prefix)
+        return TextColumn(output.name, tuple(texts), codes)
+    values, wanted = tensors[f"{prefix}.values"], output.array([])
+    if output.kind == "bool" and values.dtype == np.uint8 and values.max() <= 1:
+        values = values.view(np.bool_)
+    if values.shape != (n_rows + 1, *wanted.shape[1:]) or values.dtype != wanted.dtype:
+        raise ValueError(prefix)
+    return values
+
+
+def _to_json(value: OutputValue | None) -> object:
+    """A value as JSON has it, infinite numbers as texts."""
+    if isinstance(value, tuple):
+        return [_to_json(number) for number in value]
+    return str(value) if isinstance(value, float) and math.isinf(value) else value
+
+
+def _from_json(output: Output, value: Any) -> OutputValue:
+    if output.kind == "numbers":
+        return output.taken([float(number) for number in value])
+    return output.taken(float(value) if output.kind == "number" else value)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from contextdb.compiled.explain import Explanation, Failure, RowExplanation
     from contextdb.compiled.live import LiveContext
     from contextdb.compiled.matches import Matches
+    from contextdb.compiled.picker import Pick, Picker
     from contextdb.compiled.table import CompiledTable
     from contextdb.console import __version__ as __version__
     from contextdb.covering import CoverageReport, Gap, coverage
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "compiled.batch": ("ManyMatches",),
+    "compiled.picker": ("Pick", "Picker"),
     "compiled.table": ("CompiledTable",),
     "console": ("__version__",),
     "covering": ("CoverageReport", "Gap", "coverage"),
@@ -90,6 +92,8 @@ __all__ = [  # noqa: RUF022
     "CompiledTable",
     "Matches",
     "ManyMatches",
+    "Picker",
+    "Pick",
     "LiveContext",
     "cell",
     "coverage",

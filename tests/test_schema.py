@@ -269,12 +269,12 @@ def test_a_type_of_another_language_is_mended(found: str, mend: str):
         (
             "tpye = 'bool'",
             'line 2: [conditions.x] has no key "tpye". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror". Did you mean "type"?',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight". Did you mean "type"?',
         ),
         (
             "type = 'enum'\noptions = ['A']",
             'line 3: [conditions.x] has no key "options". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror". Did you mean "values"?',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight". Did you mean "values"?',
         ),
     ],
 )
@@ -292,8 +292,8 @@ def test_keys_of_a_condition_that_do_not_go_together_are_said(section: str, mess
         ),
         (
             "policy = 'frist'",
-            'policy = "frist": there is no such policy. Accepted: "collect", "first", "unique", "priority". '
-            'Did you mean policy = "first"?',
+            'policy = "frist": there is no such policy. '
+            'Accepted: "collect", "first", "unique", "priority", "specific", "cheapest". Did you mean policy = "first"?',
         ),
         ("enabled = true", 'enabled = true: this is true or false, not text. Accepted: a name, such as "Asset Name".'),
         (
@@ -474,7 +474,8 @@ def test_conditions_given_in_python_are_checked_as_those_of_a_file():
         ),
         (
             {"speed": {"type": "number", 7: 1}},
-            '[conditions.speed] has no key "7". Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror".',
+            '[conditions.speed] has no key "7". '
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight".',
         ),
     ],
 )

@@ -28,6 +28,9 @@ class Condition:
     mirror: Mirror | None = None
     """How its facts change in a mirror; None where that is not declared. See `contextdb.cells.mirroring`."""
 
+    weight: float = 1.0
+    """What a cell of this condition counts under the policy "specific"."""
+
     @property
     def role(self) -> str | None:
         """The role before the first dot: Defender of Defender.DepthChart; None for a plain fact."""

@@ -190,7 +190,7 @@ RULES: dict[str, Rule] = {
     "never-chosen": Rule(
         "warning",
         "By the table's policy another valid row always comes before this one.",
-        "Move the row up, give it a higher priority, or narrow the rows that come before it.",
+        "Move the row up, give it a higher priority or more cells, or narrow the rows that come before it.",
     ),
     "policy-overlap": Rule(
         "error",

@@ -6,6 +6,10 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     priorities             int64 [R]
     row_weights            float64 [R]
     assets                 uint8                 JSON list of R texts
+    specificities          float64 [R]           where the policy is "specific": higher first, after the priority
+    once                   bool [R]              where rows are played once at most
+    cooldown_s             float64 [R]           where rows rest for seconds
+    cooldown_turns         int64 [R]             where rows rest for picks
     CCC.FIELD              as in contextdb.compiled.classes, for condition number CCC: `masks` (and `bounds`), or `low`, `high`,
     `any_mask` CCC.codes              int32 [R]             which of the distinct texts each row holds
     CCC.texts              uint8                 JSON list of the distinct texts
@@ -39,7 +43,8 @@ For a table with tables inside, D the depth, T the number of tables (`contextdb.
     ways.numbers           int32 [D, R]
     ways.rows              int32 [D, R]
     ways.leaves            uint8                 JSON list of R texts
-    ways.TTT.FIELD         priorities, row_weights and lines of table number TTT
+    ways.TTT.FIELD         priorities, row_weights and lines of table number TTT; specificities, once, cooldown_s and
+                           cooldown_turns where it has them, which then are nowhere else
     CCC.layers             int32 [D, R]          which text each depth says
     CCC.said               uint8                 JSON list of those texts
     when.layers, when.said                       the same for the rows' own rules
@@ -48,7 +53,8 @@ The metadata hold `contextdb` (the version of this layout), `about` (JSON: name,
 column; where facts are derived also the conditions that they are computed from; where rows have rules also their column and the
 conditions that they name and that are not columns) and `digest`, BLAKE2b-128 of `about` and of all
 tensors in the order of their names. Opening checks all of it. A table with rules has layout 2, so that what knows only masks does
-not answer without them, and so has one with tables inside and soft cells; any other has layout 1.
+not answer without them, and so has one with tables inside and soft cells. One that is picked from by "specific" or "cheapest", at
+any depth, has layout 3. Any other has layout 1.
 """
 
 from __future__ import annotations
@@ -66,6 +72,7 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, ValueMasks, WideMasks
 from contextdb.compiled.data import CompiledData, SoftMasks
 from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors
+from contextdb.compiled.pick_columns import PickColumns
 from contextdb.compiled.programs import programs_to_tensors
 from contextdb.compiled.ways_stored import ways_from, ways_to_json, ways_to_tensors
 from contextdb.expressions import Derivation
@@ -90,6 +97,7 @@ COMPILED = FileKind(
     "contextdb", 1, "one that contextdb compiled", "a file that this version of contextdb compiled", "to compile the table again"
 )
 WITH_RULES = replace(COMPILED, layout=2, also=(COMPILED.layout,))
+WITH_RANKS = replace(COMPILED, layout=3, also=(COMPILED.layout, WITH_RULES.layout))
 
 
 def save(compiled: CompiledData, path: Path) -> None:
@@ -118,6 +126,7 @@ def save(compiled: CompiledData, path: Path) -> None:
         tensors["when.codes"] = compiled.when.texts.codes
         tensors["when.texts"] = texts_to_array(list(compiled.when.texts.texts))
     tensors |= programs_to_tensors(compiled)
+    tensors |= compiled.picking.arrays
     if compiled.ways is not None:
         tensors |= ways_to_tensors(compiled.ways)
     about = json.dumps(
@@ -134,8 +143,15 @@ def save(compiled: CompiledData, path: Path) -> None:
         | ({"when": _when_to_json(compiled)} if compiled.when else {})
         | ({"ways": ways_to_json(compiled.ways)} if compiled.ways else {})
     )
+    write_tensors(path, _kind_of(compiled), tensors, {"about": about, "digest": digest_of(tensors, about)})
+
+
+def _kind_of(compiled: CompiledData) -> FileKind:
+    """The layout that the table needs, so that what does not know it refuses the file."""
+    if not compiled.policies.isdisjoint(("specific", "cheapest")):
+        return WITH_RANKS
     is_more = compiled.when is not None or (compiled.ways is not None and any(compiled.soft))
-    write_tensors(path, WITH_RULES if is_more else COMPILED, tensors, {"about": about, "digest": digest_of(tensors, about)})
+    return WITH_RULES if is_more else COMPILED
 
 
 def open_artefact(path: Path, kind: type[Compiled]) -> Compiled:
@@ -148,7 +164,7 @@ def open_artefact(path: Path, kind: type[Compiled]) -> Compiled:
     FileError
         The file cannot be read.
     """
-    tensors, metadata = read_tensors(path, WITH_RULES)
+    tensors, metadata = read_tensors(path, WITH_RANKS)
     with COMPILED.reading(path):
         about = metadata["about"]
         if digest_of(tensors, about) != metadata.get("digest"):
@@ -181,6 +197,7 @@ def _table(about: dict[str, Any], tensors: Tensors, kind: type[Compiled]) -> Com
         ways=ways_from(about["ways"], tensors, len(conditions)) if "ways" in about else None,
         declared=frozenset(texts_from_array(tensors["declared"]) if "declared" in tensors else ()),
         outputs=outputs_from(tensors, n_rows),
+        picking=PickColumns.of(tensors.get),
     )
 
 

@@ -214,7 +214,7 @@ class ManyMatches(Unchanging, Answers[Matches]):
         if self.compiled.mirroring:
             matches.with_mirrored(lambda: self.mirrored[context])
         if self.compiled.is_soft:
-            matches.with_penalties(lambda: self.compiled.penalties(kept.of_context(context), kept.unknown))
+            matches.with_penalties(lambda: self.compiled.layered_penalties(kept.of_context(context), kept.unknown))
         return matches
 
     @property

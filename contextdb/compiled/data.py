@@ -35,6 +35,7 @@ from contextdb.compiled.mask_bits import bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, SetMatches
 from contextdb.compiled.memory import Memory
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
+from contextdb.compiled.pick_columns import NOTHING, PickColumns, ranks_of
 from contextdb.compiled.stack import MaskStack
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.versions import version_of
@@ -83,6 +84,8 @@ class CompiledData(Unchanging):
     """Conditions the project declares. A fact with one of these names belongs to another table; it is not a typo."""
     outputs: Outputs = NO_OUTPUTS
     """What the rows give the game besides their assets; one without columns where the table has none."""
+    picking: PickColumns = NOTHING
+    """How specific the rows are, and how long they rest; nothing for a table with tables inside, whose `ways` say it."""
     _ask: Callable[[Context], Matches] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -156,6 +159,12 @@ class CompiledData(Unchanging):
             local.append(None if fact is None and unknown == "any" else masks.codes(fact))  # type: ignore[arg-type]
         return self.stack.codes(local)
 
+    @cached_property
+    def ranks(self) -> NDArray[np.float64]:
+        """What the policy goes by before chance, apart from costs, higher first: float64 [n_rows]; for a table without tables
+        inside."""
+        return ranks_of(self.policy, self.priorities, self.picking)
+
     @property
     def policies(self) -> frozenset[str]:
         """The policies of the table and of those that are in it."""
@@ -167,7 +176,12 @@ class CompiledData(Unchanging):
         A soft cell whose fact is missing costs nothing with unknown="any", its penalty with "never". A set-valued fact costs
         nothing where some value of the set matches.
         """
-        costs = np.zeros(self.n_rows)
+        costs: NDArray[np.float64] = self.layered_penalties(context, unknown).sum(axis=0)
+        return costs
+
+    def layered_penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:
+        """The same for the cells of each depth: float64 [D, n_rows]; D is 1 for a table without tables inside."""
+        costs = np.zeros((self.n_depths, self.n_rows))
         if any(self.soft):
             facts = self.read_context(context, unknown)
             for at, condition in enumerate(self.conditions):
@@ -175,16 +189,17 @@ class CompiledData(Unchanging):
                     costs += self.column_penalties(at, facts[condition.name], unknown)
         return costs
 
+    @property
+    def n_depths(self) -> int:
+        """How many tables are in each other: D, 1 for a table without tables inside."""
+        return 1 if self.ways is None else len(self.ways.rows)
+
     def column_penalties(self, at: int, fact: Fact, unknown: Unknown) -> NDArray[np.float64]:
-        """What the soft cells of one condition cost with a fact in canonical form: float64 [n_rows]."""
+        """What the soft cells of one condition cost with a fact in canonical form: float64 [D, n_rows]."""
         soft = self.soft[at]
         if soft is None or (fact is None and unknown == "any"):
-            return np.zeros(self.n_rows)
-        masks, row_penalties = soft
-        n = len(row_penalties)  # in a table with tables inside, a row for each row of each depth
-        fails = ~bitmask.unpack(bitmask.from_int(bits_of(masks, fact)[0], n), n)
-        costs = np.where(fails, row_penalties, 0.0)
-        return costs if n == self.n_rows else costs.reshape(-1, self.n_rows).sum(axis=0)
+            return np.zeros((self.n_depths, self.n_rows))
+        return costs_of(soft, fact).reshape(self.n_depths, self.n_rows)
 
     @cached_property
     def mirroring(self) -> dict[str, Condition]:
@@ -202,7 +217,7 @@ class CompiledData(Unchanging):
         """An answer that knows what else hangs on the facts of its moment: what soft cells cost, and the answer in a mirror."""
         if self.mirroring:
             matches.with_mirrored(self.keeping(unknown)(context))
-        return matches.with_penalties(partial(self.penalties, self.keep(context), unknown)) if self.is_soft else matches
+        return matches.with_penalties(partial(self.layered_penalties, self.keep(context), unknown)) if self.is_soft else matches
 
     def keeping(self, unknown: Unknown) -> Callable[[Context], dict[str, object] | Callable[[], Matches]]:
         """What makes of a context that an answer was asked with what `Matches.with_mirrored` takes."""
@@ -345,7 +360,7 @@ class CompiledData(Unchanging):
         """What the answers of this table share."""
         ask_mirrored = self.query_mirrored if self.mirroring else None
         version = partial(version_of, self._said)
-        own = Answering(self.assets, self.leaves, self.name, version, ask_mirrored, outputs=self.outputs)
+        own = Answering(self.assets, self.leaves, self.name, version, ask_mirrored, outputs=self.outputs, asked_of=self)
         answering: Answering = self.__dict__.setdefault("answering", own)  # one, whichever thread comes first
         return answering
 
@@ -362,6 +377,7 @@ class CompiledData(Unchanging):
             *((self.when.texts,) if self.when is not None else ()),
             *self.outputs.said,
             *(*ways, *(part for t in inner for part in ((t.name, t.policy), t.priorities, t.row_weights))),
+            *(said for picking in (self.picking, *(t.picking for t in inner)) for part in picking.arrays.items() for said in part),
         )
 
     @cached_property
@@ -405,6 +421,15 @@ class CompiledData(Unchanging):
         """Raise ContextError for a table with rules."""
         if self.when is not None:
             raise ContextError(Fault(f"the table {in_quotes(self.name)} has rules: {why}.", "query, query_many or live"))
+
+
+def costs_of(soft: SoftMasks, fact: Fact) -> NDArray[np.float64]:
+    """What the soft cells of one column cost with a fact in canonical form: float64 [n], n the rows of each depth, one after the
+    other."""
+    masks, penalties = soft
+    n = len(penalties)
+    fails = ~bitmask.unpack(bitmask.from_int(bits_of(masks, fact)[0], n), n)
+    return np.where(fails, penalties, 0.0)
 
 
 def _composed(ask: Callable[[Context], Matches], complete: Callable[[Context], Context]) -> Callable[[Context], Matches]:

@@ -30,7 +30,7 @@ class Answering:
     Two are of the same table where name and `version` are equal; the version is worked out where two have to be compared.
     """
 
-    __slots__ = ("_version", "ask_mirrored", "assets", "is_mirroring", "leaves", "name", "outputs", "row_numbers")
+    __slots__ = ("_version", "ask_mirrored", "asked_of", "assets", "is_mirroring", "leaves", "name", "outputs", "row_numbers")
 
     def __init__(
         self,
@@ -41,12 +41,15 @@ class Answering:
         ask_mirrored: Callable[[Mapping[str, object]], Matches] | None = None,
         is_mirroring: bool = False,
         outputs: Outputs = NO_OUTPUTS,
+        asked_of: object = None,
     ) -> None:
         self.assets = assets
         self.ask_mirrored = ask_mirrored
         """Asks with the facts as a mirror shows them; None for a table in which no fact changes there, and where it was pickled."""
         self.is_mirroring = is_mirroring or ask_mirrored is not None
         """Whether facts of the table change in a mirror."""
+        self.asked_of = asked_of
+        """The compiled table, for a picker; None where it was pickled."""
         self.leaves = assets if leaves is None else leaves
         self.name = name
         self.outputs = outputs
@@ -77,7 +80,7 @@ class Answering:
         return self
 
     def __reduce__(self) -> tuple[type[Answering], tuple[object, ...]]:
-        """What is pickled: not the table, which `ask_mirrored` would bring along."""
+        """What is pickled: not the table, which `ask_mirrored` and `asked_of` would bring along."""
         return Answering, (self.assets, self.leaves, self.name, self.version, None, self.is_mirroring, self.outputs)
 
 
@@ -115,6 +118,11 @@ class Matches:
         """The rows as one Python integer, row r as bit r."""
         self._table = table
         self._rows: Rows | None = None
+
+    @property
+    def answering(self) -> Answering:
+        """What all answers of the table share."""
+        return self._table
 
     @property
     def n_rows(self) -> int:
@@ -181,10 +189,15 @@ class Matches:
     @property
     def penalties(self) -> NDArray[np.float64]:
         """What each row's soft cells cost in a search with this context: float64 [n_rows]; see `CompiledTable.penalties`."""
-        return read_only(self._penalties() if self.has_penalties else np.zeros(self.n_rows))
+        return read_only(self.layered_penalties.sum(axis=0) if self.has_penalties else np.zeros(self.n_rows))
+
+    @property
+    def layered_penalties(self) -> NDArray[np.float64]:
+        """The same for the cells of each depth of tables inside tables: float64 [D, n_rows]."""
+        return read_only(self._penalties() if self.has_penalties else np.zeros((1, self.n_rows)))
 
     def with_penalties(self, penalties: Callable[[], NDArray[np.float64]]) -> Matches:
-        """The same answer of a table with soft cells; what they cost is worked out when it is asked for."""
+        """The same answer of a table with soft cells; what they cost at each depth is worked out when it is asked for."""
         self._penalties = penalties
         return self
 
@@ -258,7 +271,7 @@ class Matches:
         state = _slots(self) | {"_rows": None}
         if state.pop("_mirrored", None) is not None and (seen := self._mirrored_or_none()) is not None:
             state["_mirrored"] = seen
-        return state | {"_penalties": partial(_known, self.penalties)} if self.has_penalties else state
+        return state | {"_penalties": partial(_known, self.layered_penalties)} if self.has_penalties else state
 
     def _mirrored_or_none(self) -> Matches | None:
         """The answer in a mirror, which knows this one as its own; None where it cannot be had."""

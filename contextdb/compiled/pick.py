@@ -3,6 +3,9 @@
     first               the first valid row of the file
     unique              the only valid row; two at once break the table's promise and raise PolicyError
     collect, priority   of the rows with the highest priority one at random, by row weight, and not the asset picked last
+    specific            the same, between those of the highest priority that are the most specific: with the most cells that are
+                        neither Any nor soft, each counting the `weight` of its condition
+    cheapest            the same, between those of the highest priority whose soft cells cost least
 
 Rows of weight 0 are never picked, and never prevent another row from being picked. When no row is left, the answer is the table's
 fallback.
@@ -15,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +27,13 @@ from contextdb.bitmask import Rows
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
+from contextdb.compiled.pick_columns import PickColumns
 from contextdb.compiled.ways import Ways, WayTable
 from contextdb.errors import ContextError, Fault, PolicyError, in_quotes, some
-from contextdb.schema.shapes import Policy
+from contextdb.schema.shapes import CHANCE, Policy
+
+Costs = NDArray[np.float64]
+"""What the soft cells of each depth cost: [D, n]."""
 
 
 def pick(compiled: CompiledData, matches: Matches, rng: Rng | int | None = None, last: str | None = None) -> str | None:
@@ -77,17 +85,17 @@ def pick_row(compiled: CompiledData, matches: Matches, rng: Rng | int | None = N
     if not len(rows):
         return None
     if compiled.ways is not None:
-        return _through_tables(compiled, compiled.ways, rows, source, last)
+        return _through_tables(compiled, compiled.ways, matches, source, last)
     if compiled.policy == "unique" and len(rows) > 1:
-        raise _not_unique(compiled.name, matches.assets)
-    if compiled.policy in ("first", "unique"):
+        raise not_unique(compiled.name, matches.assets)
+    if compiled.policy not in CHANCE:
         return int(rows[0])
-    return _weighted(compiled, rows, source, last)
+    return _weighted(compiled, matches, source, last)
 
 
-def _through_tables(compiled: CompiledData, ways: Ways, rows: Rows, source: Rng, last: str | None) -> int | None:
+def _through_tables(compiled: CompiledData, ways: Ways, matches: Matches, source: Rng, last: str | None) -> int | None:
     """The row that is picked where tables are in tables."""
-    possible = _possible(ways, rows[ways.pickable[rows]], 0)
+    possible = _possible(ways, _pickable(ways, matches.indices), 0, _costs(compiled, matches))
     if not len(possible):
         return None
     if not any(table.is_weighted for table in ways.tables):
@@ -101,24 +109,40 @@ def _through_tables(compiled: CompiledData, ways: Ways, rows: Rows, source: Rng,
     return row
 
 
-def _possible(ways: Ways, rows: Rows, depth: int) -> Rows:
+def _pickable(ways: Ways, rows: Rows) -> Rows:
+    return rows[ways.pickable[rows]]
+
+
+def _costs(compiled: CompiledData, matches: Matches) -> Costs | None:
+    """What soft cells cost, where a policy asks for it."""
+    return matches.layered_penalties if "cheapest" in compiled.policies and matches.has_penalties else None
+
+
+def _possible(ways: Ways, rows: Rows, depth: int, costs: Costs | None) -> Rows:
     """Of rows whose ways are the same above a depth, those that the policies may pick."""
     table = ways.table_at(int(rows[0]), depth) if len(rows) else None
     if table is None:
         return rows
     parts = ways.parts(rows, depth)
-    parts = _best_parts(ways, table, parts, depth)
-    return np.concatenate([_possible(ways, part, depth + 1) for part in parts])
+    parts = _best_parts(ways, table, parts, depth, costs)
+    return np.concatenate([_possible(ways, part, depth + 1, costs) for part in parts])
 
 
-def _best_parts(ways: Ways, table: WayTable, parts: list[Rows], depth: int) -> list[Rows]:
+def _best_parts(ways: Ways, table: WayTable, parts: list[Rows], depth: int, costs: Costs | None) -> list[Rows]:
     """Of the rows of one table, each with the ways that go on from it, those that its policy may pick."""
     if table.policy == "unique" and len(parts) > 1:
-        raise _not_unique(table.name, [ways.steps(int(part[0]))[depth].asset for part in parts])
+        raise not_unique(table.name, [ways.steps(int(part[0]))[depth].asset for part in parts])
     if not table.is_weighted:
         return parts[:1]
-    priorities = [int(table.priorities[ways.rows[depth, part[0]]]) for part in parts]
-    return [part for part, priority in zip(parts, priorities, strict=True) if priority == max(priorities)]
+    parts = _least(parts, [-float(table.ranks[ways.rows[depth, part[0]]]) for part in parts])
+    if costs is None or table.policy != "cheapest":
+        return parts
+    return _least(parts, [float(costs[depth, part[0]]) for part in parts])
+
+
+def _least(parts: list[Rows], numbers: list[float]) -> list[Rows]:
+    least = min(numbers, default=0.0)
+    return [part for part, number in zip(parts, numbers, strict=True) if number == least]
 
 
 def _drawn(ways: Ways, rows: Rows, depth: int, source: Rng) -> int:
@@ -139,20 +163,26 @@ def _by_weight(weights: NDArray[np.float64], source: Rng) -> int:
     return min(int(np.searchsorted(sums, source.random() * sums[-1], "right")), len(weights) - 1)
 
 
-def _not_unique(name: str, assets: list[str]) -> PolicyError:
+def not_unique(name: str, assets: list[str]) -> PolicyError:
+    """The error of several rows of a table that are valid at once and must not."""
     found = f"{len(assets)} rows of {in_quotes(name)} are valid at once: {some(assets)}."
     return PolicyError(Fault(found, 'one: the table\'s policy is "unique"', rule="not-unique"))
 
 
-def _ranked(compiled: CompiledData, rows: Rows) -> Rows:
-    """Of some rows those between which chance decides: of the highest priority among those that have a weight."""
+def _ranked(compiled: CompiledData, matches: Matches) -> Rows:
+    """Of the valid rows those between which chance decides: those that the policy prefers, of those that have a weight."""
+    rows = matches.indices
     rows = rows[compiled.row_weights[rows] > 0.0]
-    priorities = compiled.priorities[rows]
-    return rows[priorities == priorities.max()] if len(rows) else rows
+    ranks = compiled.ranks[rows]
+    rows = rows[ranks == ranks.max()] if len(rows) else rows
+    if len(rows) < 2 or (costs := _costs(compiled, matches)) is None:
+        return rows
+    cheapest: Rows = rows[costs[0, rows] == costs[0, rows].min()]
+    return cheapest
 
 
-def _weighted(compiled: CompiledData, rows: Rows, source: Rng, last: str | None) -> int | None:
-    top = _ranked(compiled, rows).tolist()
+def _weighted(compiled: CompiledData, matches: Matches, source: Rng, last: str | None) -> int | None:
+    top = _ranked(compiled, matches).tolist()
     if not top:
         return None
     memory = compiled.memory
@@ -177,6 +207,7 @@ class Outcome:
         """Raises ContextError where the answer is of another table, or of another version of it."""
         matches.require_own(compiled.answering)
         self.compiled = compiled
+        self._matches = matches
         self.rows = matches.indices
         """The valid rows."""
         self.refusal: PolicyError | None = None
@@ -184,7 +215,7 @@ class Outcome:
         self.candidates: Rows = self.rows[:0]
         """The rows that may be picked, ascending: int64 [count]."""
         try:
-            self.candidates = _candidates(compiled, self.rows)
+            self.candidates = _candidates(compiled, matches)
         except PolicyError as error:
             self.refusal = error
 
@@ -215,7 +246,7 @@ class Outcome:
         "outranked by B (priority 5)"."""
         if any(row in self.chances for row in rows):
             chance = self.chance(rows)
-            return "picked" if chance >= 1.0 else f"picked, chance {_percent(chance)}"
+            return "picked" if chance >= 1.0 else f"picked, chance {percent(chance)}"
         return self.why_not(rows[0])
 
     def why_not(self, row: int) -> str:
@@ -223,21 +254,28 @@ class Outcome:
         if self.refusal is not None:
             return f"none is picked: {self.refusal.faults[0].found.rstrip('.')}"
         if self.compiled.ways is not None:
-            return _why_not_through(self.compiled.ways, self.rows, row)
+            return _why_not_through(self.compiled.ways, self.rows, row, self._costs)
         compiled = self.compiled
-        if compiled.policy not in ("first", "unique") and not compiled.row_weights[row] > 0.0:
+        if compiled.policy in CHANCE and not compiled.row_weights[row] > 0.0:
             return "weight 0: never picked"
-        winners = [compiled.assets[r] for r in self.candidates[:1].tolist()]
-        return _outranked(compiled.policy, winners[0], len(self.candidates), int(compiled.priorities[self.candidates[0]]))
+        first = int(self.candidates[0])
+        costs = None if self._costs is None else self._costs[0]
+        why = preferred(compiled, first, row, first, costs)
+        return _outranked(compiled.assets[first], len(self.candidates), why)
+
+    @cached_property
+    def _costs(self) -> Costs | None:
+        return _costs(self.compiled, self._matches)
 
 
-def _candidates(compiled: CompiledData, rows: Rows) -> Rows:
+def _candidates(compiled: CompiledData, matches: Matches) -> Rows:
     """Of the valid rows those that may be picked; raises PolicyError as `pick` does."""
+    rows = matches.indices
     if compiled.ways is not None:
-        return np.sort(_possible(compiled.ways, rows[compiled.ways.pickable[rows]], 0))
+        return np.sort(_possible(compiled.ways, _pickable(compiled.ways, rows), 0, _costs(compiled, matches)))
     if compiled.policy == "unique" and len(rows) > 1:
-        raise _not_unique(compiled.name, [compiled.assets[r] for r in rows.tolist()])
-    return rows[:1] if compiled.policy in ("first", "unique") else _ranked(compiled, rows)
+        raise not_unique(compiled.name, [compiled.assets[r] for r in rows.tolist()])
+    return _ranked(compiled, matches) if compiled.policy in CHANCE else rows[:1]
 
 
 def _share_out(ways: Ways, rows: Rows, depth: int, share: float, found: dict[int, float]) -> None:
@@ -257,7 +295,7 @@ def _shares(weights: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(shares / shares.sum())
 
 
-def _why_not_through(ways: Ways, valid: Rows, row: int) -> str:
+def _why_not_through(ways: Ways, valid: Rows, row: int, costs: Costs | None) -> str:
     """Why a valid row is not picked where tables are in tables: who outranks it where the ways part."""
     steps = ways.steps(row)
     if not ways.pickable[row]:
@@ -270,22 +308,54 @@ def _why_not_through(ways: Ways, valid: Rows, row: int) -> str:
         table = ways.table_at(row, depth)
         assert table is not None
         parts = ways.parts(group, depth)
-        best = _best_parts(ways, table, parts, depth)
+        best = _best_parts(ways, table, parts, depth, costs)
         group = next(part for part in parts if row in part)
         if not any(part[0] == group[0] for part in best):
-            first = int(best[0][0])
-            return _outranked(
-                table.policy, ways.steps(first)[depth].asset, len(best), int(table.priorities[ways.rows[depth, first]])
-            )
+            first, taken = int(best[0][0]), ways.rows[depth]
+            why = preferred(table, int(taken[first]), int(taken[row]), first, None if costs is None else costs[depth])
+            return _outranked(ways.steps(first)[depth].asset, len(best), why)
     raise AssertionError("the row can be picked")
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
     """A share as a whole percentage; one that is neither 0 nor 1 never rounds to them."""
     return "<1 %" if share < 0.01 else ">99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
 
 
-def _outranked(policy: Policy, winner: str, n_winners: int, priority: int) -> str:
+class Ranked(Protocol):
+    """What of a table says which of its rows is preferred: the table itself, or one of those in it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def policy(self) -> Policy: ...
+
+    @property
+    def row_weights(self) -> NDArray[np.float64]: ...
+
+    @property
+    def ranks(self) -> NDArray[np.float64]: ...
+
+    @property
+    def priorities(self) -> NDArray[np.int64]: ...
+
+    @property
+    def picking(self) -> PickColumns: ...
+
+
+def preferred(table: Ranked, winner: int, other: int, flat: int, costs: NDArray[np.float64] | None) -> str:
+    """Why a row of a table is preferred to another; `flat` is a row of the flat table behind it, for `costs` [n]."""
+    if table.policy == "first":
+        return "an earlier row"
+    priority = int(table.priorities[winner])
+    if priority == table.priorities[other] and table.policy == "specific" and table.picking.specificities is not None:
+        return f"specificity {table.picking.specificities[winner]:g}"
+    if priority == table.priorities[other] and table.policy == "cheapest":
+        return f"penalty {0.0 if costs is None else costs[flat]:g}"
+    return f"priority {priority}"
+
+
+def _outranked(winner: str, n_winners: int, why: str) -> str:
     more = f" and {n_winners - 1:,} more" if n_winners > 1 else ""
-    why = "an earlier row" if policy == "first" else f"priority {priority}"
     return f"outranked by {winner}{more} ({why})"

@@ -25,7 +25,9 @@ from contextdb.compiled.lookup import UNUSUAL
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
 from contextdb.compiled.pick import pick
+from contextdb.compiled.picker import Picker
 from contextdb.compiled.preparing import prepare
+from contextdb.errors import ContextError, Fault
 
 if TYPE_CHECKING:
     import polars as pl
@@ -148,10 +150,34 @@ class CompiledTable(CompiledData):
         return explain(self, context, unknown)
 
     def pick(
-        self, context: Context | Matches, rng: Rng | int | None = None, last: str | None = None, unknown: Unknown = "error"
+        self,
+        context: Context | Matches,
+        rng: Rng | int | None = None,
+        last: str | None = None,
+        unknown: Unknown = "error",
+        *,
+        actors: Actors | None = None,
+        prefer: Prefer = None,
     ) -> str | None:
-        """One asset by the table's policy: see `contextdb.compiled.pick.pick`."""
-        return pick(self, context if isinstance(context, Matches) else self.query(context, unknown), rng, last)
+        """One asset by the table's policy: see `contextdb.compiled.pick.pick`. Actors are those of `query`."""
+        if not isinstance(context, Matches):
+            context = self.query(context, unknown, actors, prefer)
+        elif actors is not None:
+            found = "actors are for a query, and this is the answer to one."
+            raise ContextError(Fault(found, "facts with actors, or the answer to a query with actors"))
+        return pick(self, context, rng, last)
+
+    def picker(self, seed: int = 0, memory: int = 1) -> Picker:
+        """Picks for one character or for many, which it remembers: see `contextdb.compiled.picker.Picker`.
+
+        Parameters
+        ----------
+        seed : int
+            The same seed gives the same picks, on every system.
+        memory : int
+            So many of the last assets of a character are not picked again while there is another choice.
+        """
+        return Picker(self.name, seed, memory)
 
     def save(self, path: str | Path) -> None:
         """Write the compiled file for the game, a .safetensors file, atomically."""

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from contextdb.cells.words import MARK
 from contextdb.compiled.layers import Layers
+from contextdb.compiled.pick_columns import NOTHING, PickColumns, ranks_of
 from contextdb.errors import Place
-from contextdb.schema.shapes import Policy
+from contextdb.schema.shapes import CHANCE, RANKED, Policy
 
 Numbers = NDArray[np.int32]
 Rows = NDArray[np.int64]
@@ -61,6 +62,8 @@ class WayTable:
     table: Placing | None = None
     when: str | None = None
     """Its column of rules."""
+    picking: PickColumns = NOTHING
+    """How specific its rows are, and how long they rest."""
 
     def place(self, row: int) -> Place:
         """Where a row is."""
@@ -72,7 +75,12 @@ class WayTable:
     @property
     def is_weighted(self) -> bool:
         """Whether chance decides between its rows, so that one of weight 0 is never picked."""
-        return self.policy in ("collect", "priority")
+        return self.policy in CHANCE
+
+    @cached_property
+    def ranks(self) -> NDArray[np.float64]:
+        """What its policy goes by before chance, apart from costs, higher first: [R]."""
+        return ranks_of(self.policy, self.priorities, self.picking)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,17 +138,17 @@ class Ways:
             others = self.rows[depth]
             if table.policy == "first":
                 found |= alike & (others < own) & self.pickable
-            elif table.policy == "priority":
+            elif table.policy in RANKED:
                 rows = np.flatnonzero(alike)
-                found[rows] |= (table.priorities[others[rows]] > table.priorities[own]) & self.pickable[rows]
+                found[rows] |= (table.ranks[others[rows]] > table.ranks[own]) & self.pickable[rows]
             alike = alike & (others == own)
         return found
 
-    def forbids_both(self, one: int, other: int) -> bool:
-        """Whether the table where two ways part allows one valid row only."""
+    def policy_between(self, one: int, other: int) -> Policy | None:
+        """The policy of the table where the ways of two rows part."""
         parting = int(np.flatnonzero(self.rows[:, one] != self.rows[:, other])[0])
         table = self.table_at(one, parting)
-        return table is not None and table.policy == "unique"
+        return None if table is None else table.policy
 
     def _step(self, number: int, row: int, asset: str) -> Step:
         table = self.tables[number]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb.compiled.layers import Layers
+from contextdb.compiled.pick_columns import PickColumns
 from contextdb.compiled.ways import Ways, WayTable
 from contextdb.files.tensors import Tensors, texts_from_array, texts_to_array
 
@@ -19,6 +22,7 @@ def ways_to_tensors(ways: Ways) -> Tensors:
         tensors[f"ways.{at:03d}.priorities"] = table.priorities
         tensors[f"ways.{at:03d}.row_weights"] = table.row_weights
         tensors[f"ways.{at:03d}.lines"] = np.array(lines, np.int64)
+        tensors |= {f"ways.{at:03d}.{name}": array for name, array in table.picking.arrays.items()}
     for at, layers in enumerate(ways.layers):
         if layers is None:
             continue
@@ -45,10 +49,15 @@ def ways_from(about: list[dict[str, Any]], tensors: Tensors, n_conditions: int) 
     tables = []
     for at, table in enumerate(about):
         priorities, weights, lines = (tensors[f"ways.{at:03d}.{part}"] for part in ("priorities", "row_weights", "lines"))
-        tables.append(WayTable(table["name"], table["file"], table["policy"], priorities, weights, lines, None, table.get("when")))
+        when, picking = table.get("when"), PickColumns.of(partial(_of_table, tensors, at))
+        tables.append(WayTable(table["name"], table["file"], table["policy"], priorities, weights, lines, None, when, picking))
     layers = tuple(_layers(tensors, f"{at:03d}") for at in range(n_conditions))
     leaves = texts_from_array(tensors["ways.leaves"])
     return Ways(tuple(tables), tensors["ways.numbers"], tensors["ways.rows"], leaves, layers, _layers(tensors, "when"))
+
+
+def _of_table(tensors: Tensors, at: int, name: str) -> NDArray[Any] | None:
+    return tensors.get(f"ways.{at:03d}.{name}")
 
 
 def _layers(tensors: Tensors, prefix: str) -> Layers | None:

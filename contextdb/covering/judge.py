@@ -4,12 +4,13 @@
     subsumed-row     another row is valid wherever this one is, and elsewhere too
     redundant-row    several rows together are valid wherever this one is
     dead-row         all its contexts are impossible
-    never-chosen     by the table's policy another row always comes first
+    never-chosen     by the table's policy another row always comes first: one above it, of a higher priority, or more specific
     policy-overlap   the policy is "unique" and another row can be valid at the same time
     no-context       no context at all is possible
 
 Single points count: a row that alone holds the number 5 is not redundant. A row has one of equal, subsumed, redundant and dead.
-What of these is variety, under the table's policy, is information: see `contextdb.tables.variety`.
+What of these is variety, under the table's policy, is information: see `contextdb.tables.variety`. Under "specific" a row that is
+more specific than those that make it redundant is preferred to them, and has no finding.
 """
 
 from __future__ import annotations
@@ -32,9 +33,10 @@ from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import in_quotes, plural, row_name
 from contextdb.findings import Finding, Level
+from contextdb.schema.shapes import RANKED
 from contextdb.tables.alike import identical_rows, named
 from contextdb.tables.table import EitherTable
-from contextdb.tables.variety import gathered, lets_choose, needless, softened
+from contextdb.tables.variety import NEEDLESS, gathered, lets_choose, needless, softened
 
 MOST_CAUSES = 24
 """Up to so many rows the causes of a redundant row are thinned out to those that are needed."""
@@ -79,6 +81,7 @@ class Judge:
                 self._whole("no-context", "error", "no context is possible under the assumptions; do they contradict each other?")
             ]
         found = [*self._left_out(), *self._identical, *self._rows(), *self._policy()]
+        found = [f for f in found if not self._is_preferred(f)]
         found = softened(found, self.compiled.assets) if lets_choose(self.compiled.policies) else found
         return sorted(found, key=lambda f: (f.row is not None, f.row or 0))
 
@@ -159,18 +162,38 @@ class Judge:
         ways, policies = self.compiled.ways, self.compiled.policies
         if "unique" in policies:
             yield from self._overlapping()
-        if not policies.isdisjoint(("first", "priority")):
+        if not policies.isdisjoint(("first", *RANKED)):
             for i, box in enumerate(self.space.boxes):
                 self.progress.check()
                 self._asked_of = i
                 before = self._before(i) & self._meeting(box)
                 if before and self._covered(box, before | self._impossible) and self._is_possible(box):
-                    why = "is above it" if self.compiled.policy == "first" else "has a higher priority"
-                    why = why if ways is None else "comes before it"
+                    why = "comes before it" if ways is not None else self._why_before
                     message = f"the row is never chosen: wherever it is valid, a valid row {why}."
                     yield self._at(
                         i, "never-chosen", "warning", message, self._thinned(box, before | self._impossible) & ~self._impossible
                     )
+
+    @property
+    def _why_before(self) -> str:
+        """Why the policy prefers a row."""
+        if self.compiled.policy == "first":
+            return "is above it"
+        if self.compiled.policy != "specific":
+            return "has a higher priority"
+        return "has a higher priority or is more specific" if self.compiled.priorities.any() else "is more specific"
+
+    def _is_preferred(self, finding: Finding) -> bool:
+        """Whether rows make a row redundant that is preferred to all of them for being more specific: that is the point of it."""
+        row = finding.row
+        if row is None or finding.rule not in NEEDLESS or not finding.by:
+            return False
+        ways, compiled = self.compiled.ways, self.compiled
+        if ways is not None:
+            return all(ways.policy_between(row, by) == "specific" and ways.preferred_to(by)[row] for by in finding.by)
+        if compiled.policy != "specific" or not compiled.row_weights[row] > 0.0:
+            return False
+        return bool((compiled.ranks[list(finding.by)] < compiled.ranks[row]).all())
 
     def _before(self, i: int) -> int:
         """The rows that the policy prefers to row i."""
@@ -179,12 +202,12 @@ class Judge:
             return bitmask.to_int(bitmask.pack(preferred[list(self.space.rows)]))
         if self.compiled.policy == "first":
             return (1 << i) - 1
-        return self._higher[int(self.compiled.priorities[self.space.rows[i]])]
+        return self._higher[float(self.compiled.ranks[self.space.rows[i]])]
 
     @cached_property
-    def _higher(self) -> dict[int, int]:
-        """For each priority the rows with a higher one that can be picked."""
-        own = [int(self.compiled.priorities[row]) for row in self.space.rows]
+    def _higher(self) -> dict[float, int]:
+        """For each rank, by priority and specificity, the rows of a higher one that can be picked."""
+        own = [float(self.compiled.ranks[row]) for row in self.space.rows]
         picked = [self.compiled.row_weights[row] > 0.0 for row in self.space.rows]
         higher, so_far = {}, 0
         for priority, group in groupby(sorted(range(len(own)), key=lambda i: (-own[i], i)), key=lambda i: own[i]):
@@ -211,7 +234,7 @@ class Judge:
                 self._leave_open()
                 return
             self._pairs_left -= 1
-            if ways is not None and not ways.forbids_both(rows[i], rows[j]):
+            if ways is not None and ways.policy_between(rows[i], rows[j]) != "unique":
                 continue
             if self.space.impossible or self.drawer is not None:
                 shared = self._shared(i, j)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def check_cell(table: Table, column: str, text: str) -> Fault | None:
         return check_rule(text, table.known_conditions) or unwritable(text)
     if text.strip() and (output := settings.output(column)) is not None:
         return output.fault(text) or unwritable(text)
-    if column in (settings.priority, settings.weight) and text.strip():
+    if column in [getattr(settings, job) for job in get_args(PlainJob)] and text.strip():
         alone = Columns(((column, column),)).apply(table.with_rows_taken([]))
         faults = Cells({column: {0: text}}).apply(Rows(np.array([-1])).apply(alone)).faults
         return replace(faults[0], place=Place(column=column)) if faults else unwritable(text)

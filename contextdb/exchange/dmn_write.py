@@ -23,7 +23,8 @@ NAMESPACE = "https://www.omg.org/spec/DMN/20191111/MODEL/"
 _HEAD = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
 _NEVER = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 """Characters that XML cannot hold."""
-_POLICIES = {"unique": "UNIQUE", "first": "FIRST", "collect": "COLLECT", "priority": "PRIORITY"}
+_POLICIES = {"unique": "UNIQUE", "first": "FIRST", "priority": "PRIORITY"}
+"""The hit policies of those that DMN has; the others are COLLECT, which prefers none."""
 
 
 def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
@@ -50,7 +51,7 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
     text = (
         f'{_HEAD}\n<definitions xmlns="{NAMESPACE}" id="definitions" name="{_attribute(table.name)}" namespace="contextdb">\n'
         f'  <decision id="decision" name="{_attribute(table.name)}">\n'
-        f'    <decisionTable id="table" hitPolicy="{_POLICIES[table.settings.policy]}">\n      {body}\n'
+        f'    <decisionTable id="table" hitPolicy="{_POLICIES.get(table.settings.policy, "COLLECT")}">\n      {body}\n'
         "    </decisionTable>\n  </decision>\n</definitions>\n"
     )
     return text.encode(), (*remarks, *_about(table, tags))
@@ -132,6 +133,12 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
         yield Remark(said, f"column {in_quotes(column.condition.name)}", True)
     if any(column.condition.domain.type.is_circular for column in table.conditions):
         yield Remark("angles are written from -180 to 180; give the decision angles in this range.")
+    if table.settings.policy in ("specific", "cheapest"):
+        said = f"the policy {in_quotes(table.settings.policy)} becomes COLLECT: DMN has none that prefers such rows."
+        yield Remark(said, is_loss=True)
+    for job in ("once", "cooldown_s", "cooldown_turns"):
+        if name := getattr(table.settings, job):
+            yield Remark("becomes an output: a decision does not remember what was picked.", f"column {in_quotes(name)}", True)
     if table.settings.policy == "priority":
         yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
     if table.settings.when:

@@ -187,7 +187,7 @@ def _print_across(sheet: Any, fits_page: bool) -> None:
 
 
 def _lists(table: Table) -> Lists:
-    lists: Lists = {table.settings.enabled: ("True", "False")} if table.settings.enabled else {}
+    lists: Lists = {name: ("True", "False") for name in (table.settings.enabled, table.settings.once) if name}
     for column in table.conditions:
         domain = column.condition.domain
         if domain.type.is_truth:

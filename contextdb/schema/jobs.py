@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 from contextdb.errors import Fault, in_quotes
 
-PlainJob = Literal["enabled", "priority", "weight"]
+PlainJob = Literal["enabled", "priority", "weight", "once", "cooldown_s", "cooldown_turns"]
 """A column of plain values."""
 Job = Literal["asset", PlainJob, "when"]
 JOBS: tuple[Job, ...] = get_args(Job)

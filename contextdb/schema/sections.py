@@ -37,6 +37,8 @@ def condition_to_dict(condition: Condition) -> Part:
     said |= {key: text for key, text in texts.items() if text}
     if condition.mirror is not None:
         said["mirror"] = dict(condition.mirror) if isinstance(condition.mirror, tuple) else condition.mirror
+    if condition.weight != 1.0:
+        said["weight"] = condition.weight
     return said
 
 

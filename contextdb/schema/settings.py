@@ -57,6 +57,12 @@ class TableSettings:
     enabled: str | None = None
     priority: str | None = None
     weight: str | None = None
+    once: str | None = None
+    """The column of rows that each character plays once at most."""
+    cooldown_s: str | None = None
+    """The column of the seconds for which a row rests after it was picked."""
+    cooldown_turns: str | None = None
+    """The column of the picks for which a row rests after it was picked."""
     fallback: str | None = None
     policy: Policy = "collect"
     assume: tuple[str, ...] = ()
@@ -522,7 +528,13 @@ def _condition(name: str, part: Section) -> Condition:
     low, high = (number_of(kind, part[key]) if key in part else end for key, end in (("min", -math.inf), ("max", math.inf)))
     domain = Domain(kind.name, values, low, high)
     return Condition(
-        name, domain, part.get("unit", ""), part.get("description", ""), part.get("expr"), mirror=_mirror(part.get("mirror"))
+        name,
+        domain,
+        part.get("unit", ""),
+        part.get("description", ""),
+        part.get("expr"),
+        mirror=_mirror(part.get("mirror")),
+        weight=float(part.get("weight", 1.0)),
     )
 
 

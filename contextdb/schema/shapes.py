@@ -19,11 +19,19 @@ from contextdb.cells.kinds import KINDS
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import in_quotes, nearest, some
 
-Policy = Literal["collect", "first", "unique", "priority"]
+Policy = Literal["collect", "first", "unique", "priority", "specific", "cheapest"]
 POLICIES: tuple[Policy, ...] = get_args(Policy)
 
 KIND_SYNONYMS = {synonym: name for name, kind in KINDS.items() for synonym in kind.synonyms}
-POLICY_SYNONYMS = {"all": "collect", "any": "collect", "single": "unique", "highest": "priority"}
+POLICY_SYNONYMS = {
+    **{"all": "collect", "any": "collect", "single": "unique", "highest": "priority"},
+    **dict.fromkeys(("most specific", "specificity", "score", "best"), "specific"),
+    **dict.fromkeys(("cost", "least cost", "least penalty", "lowest"), "cheapest"),
+}
+RANKED: tuple[Policy, ...] = ("priority", "specific", "cheapest")
+"""The policies that are there to prefer some rows; a row that they never choose is worth a warning."""
+CHANCE: tuple[Policy, ...] = ("collect", "priority", "specific", "cheapest")
+"""The policies under which chance decides, by weight, between the rows that are left, so that one of weight 0 is never picked."""
 MIRRORS = ("negate", "none")
 MIRROR_SYNONYMS = {
     **dict.fromkeys(("negative", "sign", "flip", "invert", "minus", "true"), "negate"),
@@ -35,6 +43,7 @@ KEY_SYNONYMS = {
     **{"desc": "description", "help": "description", "comment": "description", "path": "file", "columns": "conditions"},
     **dict.fromkeys(("mirrored", "swap", "mirroring"), "mirror"),
     **{"default": "fallback", "assumptions": "assume", "hit_policy": "policy"},
+    **{"say_once": "once", "matchonce": "once", "cooldown": "cooldown_s", "norepeat": "cooldown_turns"},
 }
 
 
@@ -90,6 +99,10 @@ def _wrong_number(value: object) -> str | None:
     if math.isnan(number):
         return "nothing is above or below it"
     return None if number == value else f"no double is equal to it; the nearest is {number!r}"
+
+
+def _wrong_weight(value: object) -> str | None:
+    return _wrong_number(value) or (None if 0.0 <= value < math.inf else "this is below 0 or infinite")  # type: ignore[operator]
 
 
 def _wrong_bound(value: object) -> str | None:
@@ -215,6 +228,7 @@ NAME = Shape('a name, such as "Asset Name"', wrong_name, _meant_text)
 EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wrong_name, _meant_text)
 EXPRESSIONS = Shape('a list of expressions, such as ["not (IsRunning and IsIdle)"]', _wrong_list, _meant_names(r"\A|\Z"))
 NUMBER = Shape("a number, such as -1.5", _wrong_number, _meant_number)
+WEIGHT = Shape("a number from 0 up, such as 2.0", _wrong_weight, _meant_number)
 BOUND = Shape("a number, such as -1.5", _wrong_bound, _meant_number)
 """A number as its type writes it; whether that fits is for the type to say."""
 NAMES = Shape('a list of different names, such as ["A", "B"]', _wrong_list, _meant_names(","))
@@ -242,6 +256,7 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
         "description": TEXT,
         "expr": EXPRESSION,
         "mirror": MIRROR,
+        "weight": WEIGHT,
     },
     "tables": {
         "file": FILE,
@@ -250,6 +265,9 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
         "enabled": NAME,
         "priority": NAME,
         "weight": NAME,
+        "once": NAME,
+        "cooldown_s": NAME,
+        "cooldown_turns": NAME,
         "fallback": FALLBACK,
         "policy": _one_of(POLICIES, "policy", POLICY_SYNONYMS),
         "assume": EXPRESSIONS,

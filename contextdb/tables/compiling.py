@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextdb import bitmask
 from contextdb.cells.outputs import SLOT_COLUMNS
+from contextdb.compiled.pick_columns import NOTHING
 from contextdb.compiled.table import CompiledTable
 from contextdb.expressions.rules.rules import WhenRules
 from contextdb.tables.data import TableData
@@ -30,4 +31,5 @@ def compile_table(table: TableData) -> CompiledTable:
         ways=table.ways,
         declared=frozenset(table.schema.conditions),
         outputs=table.outputs,
+        picking=table.picking if table.ways is None else NOTHING,
     )

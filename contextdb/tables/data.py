@@ -27,6 +27,7 @@ from contextdb.cells.arguments import (
 from contextdb.cells.conditions import Condition
 from contextdb.columns import TextColumn
 from contextdb.compiled.outputs import Outputs
+from contextdb.compiled.pick_columns import PickColumns, specificities
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.compiled.ways import Ways
 from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, some
@@ -228,6 +229,15 @@ class TableData(Unchanging):
             may_be_empty = frozenset(np.flatnonzero(refers[texts.codes]).tolist())
             for column in self.output_columns:
                 yield from column.faulty_rows(may_be_empty)
+
+    @cached_property
+    def picking(self) -> PickColumns:
+        """How specific the rows are, where the policy asks for it, and how long they rest after they were picked."""
+        if self.settings.policy != "specific":
+            return self._plain.resting
+        columns = [(c.condition, c.cells, c.texts.codes) for c in self.conditions]
+        has_rule = None if self.when is None else self.when.has_rule
+        return replace(self._plain.resting, specificities=specificities(columns, has_rule, self.n_rows))
 
     @cached_property
     def when(self) -> WhenColumn | None:

@@ -22,6 +22,9 @@ JOB_WORDS: dict[Job, str] = {
     "enabled": "a row that says False never matches",
     "priority": "higher rows are picked first",
     "weight": "how often a row is picked among equals",
+    "once": "a row that says True is picked once",
+    "cooldown_s": "seconds until a row is picked again",
+    "cooldown_turns": "picks until a row is picked again",
 }
 """What a column can be, in a few words."""
 assert tuple(JOB_WORDS) == get_args(Job)

@@ -28,6 +28,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Fact
 from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
+from contextdb.compiled.data import costs_of
 from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome
 from contextdb.compiled.table import CompiledTable
@@ -71,7 +72,7 @@ class QueryRow:
         self._inner: dict[str, QueryRow] = {}
         self._rules: tuple[WhenColumn | None, WhenRules | None] | None = None
         self._rules_left: tuple[int, int] | None = None
-        self._ranked: tuple[TableSettings, tuple[TextColumn, ...], CompiledTable] | None = None
+        self._ranked: tuple[TableSettings, tuple[object, ...], CompiledTable] | None = None
         self._assets: TextColumn | None = None
         self.is_nested = False
         """Whether some row refers to another table."""
@@ -305,24 +306,42 @@ class QueryRow:
         if self._outcome is None:
             asked = self.asked
             if asked is not None and asked.fault is None and asked.matches is not None:
-                may = asked.matches if self.is_nested else asked.compiled.matches(self.bits)
+                found = may = asked.matches
+                if not self.is_nested:
+                    may = asked.compiled.matches(self.bits).with_penalties(lambda: found.layered_penalties)
                 self._outcome = Outcome(asked.compiled, may)
             else:
                 compiled = self._ranks()
-                self._outcome = Outcome(compiled, compiled.matches(self.bits))
+                self._outcome = Outcome(compiled, compiled.matches(self.bits).with_penalties(self._costs))
         return self._outcome
 
     def _ranks(self) -> CompiledTable:
-        """The policy, priorities and weights of the rows, without their cells: those are answered for here. Columns that are the
-        same as before are not read again."""
+        """The policy, priorities and weights of the rows, and how specific they are, without their cells: those are answered for
+        here. Columns that are the same as before are not read again."""
         table, settings = self._table, replace(self._table.settings, when=None, enabled=None, assume=())
         names = (table.asset_column, settings.priority, settings.weight)
-        columns = tuple(table.text_column(name) for name in names if name is not None)
+        columns: list[object] = [table.text_column(name) for name in names if name is not None]
+        if settings.policy == "specific":
+            columns += [*table.conditions, None if table.when is None else table.when.texts]
         known = self._ranked
-        if known is None or known[0] != settings or any(a is not b for a, b in zip(known[1], columns, strict=True)):
-            compiled = compile_table(replace(table, conditions=(), settings=settings))
-            self._ranked = known = settings, columns, compiled
+        if (
+            known is None
+            or known[0] != settings
+            or len(known[1]) != len(columns)
+            or any(a is not b for a, b in zip(known[1], columns, strict=True))
+        ):
+            compiled = replace(compile_table(replace(table, conditions=(), settings=settings)), picking=table.picking)
+            self._ranked = known = settings, tuple(columns), compiled
         return known[2]
+
+    def _costs(self) -> NDArray[np.float64]:
+        """What the soft cells of each row cost with the facts of the test row: float64 [1, n_rows]."""
+        costs = np.zeros((1, self._table.n_rows))
+        for name, column in self._columns.items():
+            fact = self.facts.get(name)
+            if column.soft is not None and fact is not None and self.role_of(name) is None:
+                costs += costs_of(column.soft, fact)
+        return costs
 
     @property
     def picked(self) -> int:

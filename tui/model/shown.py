@@ -38,7 +38,7 @@ class Header:
 
     name: str
     kind: str
-    """The type of a condition; "asset", "output", "enabled", "priority", "weight" or "rule" for the others."""
+    """The type of a condition; "asset", "output", "rule", or the job of a plain column, such as "priority", for the others."""
     unit: str = ""
     leaves: int | None = None
     """How many rows the fact of the test row alone leaves."""
@@ -188,7 +188,7 @@ class ShownTable:
             return Header(name, condition.domain.kind, condition.unit, leaves, fault, n_actors, is_extra, how)
         name = self.table.columns[column].name
         settings = self.table.settings
-        jobs = {settings.enabled: "enabled", settings.priority: "priority", settings.weight: "weight", settings.when: "rule"}
+        jobs = {column: job for job, column in settings.jobs if job not in ("asset", "outputs")} | {settings.when: "rule"}
         return Header(name, "asset" if name == self.table.asset_column else jobs.get(name, "output"))
 
     def failing(self, top: int, bottom: int) -> NDArray[np.bool_]:

@@ -169,15 +169,15 @@ class Stage:
         return plain | some_cast, plain_always | self.rules.left(all_rows & some_cast, *given, lambda offer: offer.every, 1)
 
     def penalties(self, matches: CastMatches) -> NDArray[np.float64]:
-        """What the soft cells of valid rows cost with the best casting of each: float64 [n_rows]. A role that is not cast costs
-        nothing."""
+        """What the soft cells of valid rows cost at each depth with the best casting of each: float64 [D, n_rows]. A role that is
+        not cast costs nothing."""
         compiled = self.compiled
-        costs = np.zeros(compiled.n_rows)
+        costs = np.zeros((compiled.n_depths, compiled.n_rows))
         for at, fact in self.plain_facts.items():
             costs += compiled.column_penalties(at, fact, self.unknown)
         for row in matches:
             for _, offer in self.cast(row):
-                costs[row] += sum(compiled.column_penalties(at, f, self.unknown)[row] for at, f in offer.facts.items())
+                costs[:, row] += sum(compiled.column_penalties(at, f, self.unknown)[:, row] for at, f in offer.facts.items())
         return costs
 
     def best(self, row: int) -> Casting:

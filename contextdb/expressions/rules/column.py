@@ -65,6 +65,11 @@ class WhenColumn:
                 yield row, self.faults[int(self.texts.codes[row])]
 
     @property
+    def has_rule(self) -> NDArray[np.bool_]:
+        """Whether each row has a rule: bool [n_rows]."""
+        return np.array([rule is not None for rule in self.rules], np.bool_)[self.texts.codes]
+
+    @property
     def meanings(self) -> NDArray[np.int64]:
         """For each row a number that is the same for rows of the same rule; what cannot be read means itself. int64 [n_rows]."""
         known: dict[object, int] = {}

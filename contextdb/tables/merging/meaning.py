@@ -23,8 +23,10 @@ def meaning_of(table: TableData, column: int) -> Meaning:
         return _cell_reader(condition)
     if name == settings.enabled:
         return lambda text: truth_of(text) if text.strip() else True
-    if name in (settings.priority, settings.weight):
-        empty = 0.0 if name == settings.priority else 1.0
+    if name == settings.once:
+        return lambda text: truth_of(text) if text.strip() else False
+    if name in (settings.priority, settings.weight, settings.cooldown_s, settings.cooldown_turns):
+        empty = 1.0 if name == settings.weight else 0.0
         return lambda text: _number(text, empty)
     if name == settings.when:
         return lambda text: "" if has_no_rule(text) else text.strip()

@@ -98,7 +98,9 @@ class FlatTable(TableData):
 
 def _way_table(name: str, table: TableData) -> WayTable:
     file = str(table.path) if table.path else None
-    return WayTable(name, file, table.settings.policy, table.priorities, table.row_weights, None, table, table.settings.when)
+    settings = table.settings
+    weights = table.row_weights
+    return WayTable(name, file, settings.policy, table.priorities, weights, None, table, settings.when, table.picking)
 
 
 def flatten(table: TableData, tables: Mapping[str, TableData]) -> FlatTable:

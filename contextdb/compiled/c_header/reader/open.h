@@ -41,7 +41,7 @@ static inline void cdbi_read(cdbi_opening *opening, const cdbi_json *header)
         return;
     }
     if (strcmp(version, "1") != 0 && strcmp(version, "2") != 0 && strcmp(version, "3") != 0)
-        cdbi_refuse(opening, CDB_BAD_FILE, "the layout of the file is none of 1 to 3, which this header reads", -1, "");
+        cdbi_refuse(opening, CDB_BAD_FILE, "the layout of the file is not 1, 2 or 3, which this header reads", -1, "");
     whole = about;
     cdbi_skip(&whole, 0);
     room = (size_t)(whole.at - about.at) + 1;

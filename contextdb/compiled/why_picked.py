@@ -1,0 +1,95 @@
+"""Why a picker picked a row, in a few words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from contextdb.compiled.choosing import Choosing
+from contextdb.compiled.matches import Matches
+from contextdb.compiled.pick import Ranked, percent
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What was left of the valid rows, step by step. Rows ascend."""
+
+    choosing: Choosing
+    matches: Matches
+    awake: Sequence[int]
+    """Those that did not rest."""
+    may: Sequence[int]
+    """Of these those that the policies may pick."""
+    fresh: Sequence[int]
+    """Of these those that were picked least lately: chance decided between them."""
+    picked: int | None
+
+
+def why(left: Left, row: int | None) -> str:
+    """Why a row was picked: "chance 40 % of 3", "highest priority 5", "first valid row", "fallback: no row is valid"."""
+    if row is None:
+        played = left.choosing.compiled.fallback is not None
+        return f"{'fallback: ' if played else ''}{_none_left(left)}"
+    said = [*_preferences(left, row)]
+    n_left_out = len(left.may) - len(left.fresh)
+    if len(left.fresh) > 1:
+        said.append(f"chance {percent(_chance(left, row))} of {len(left.fresh)}")
+    elif n_left_out:
+        said.append("picked least lately")
+    if not said:
+        said.append("only valid row" if len(left.matches) == 1 else "only valid row that can be picked")
+    return ", ".join(said)
+
+
+def _none_left(left: Left) -> str:
+    n_valid = len(left.matches)
+    if not n_valid:
+        return "no row is valid"
+    if len(left.awake) == n_valid:
+        return "every valid row has weight 0"
+    return "every valid row rests" if not left.awake else "every valid row rests or has weight 0"
+
+
+def _preferences(left: Left, row: int) -> list[str]:
+    """What the policy of each depth, where it had a choice, went by."""
+    choosing, compiled = left.choosing, left.choosing.compiled
+    group = np.array([r for r in left.awake if choosing.pickable[r]], np.int64)
+    may = np.array(left.may, np.int64)
+    said = []
+    for depth, taken in enumerate(choosing.taken):
+        table = compiled if compiled.ways is None else compiled.ways.table_at(row, depth)
+        if table is None:
+            break
+        rows, best = np.unique(taken[group]), np.unique(taken[may])
+        if len(best) < len(rows):
+            words = _preference(table, int(taken[row]), rows, left, row, depth)
+            said.append(words if depth == 0 else f"{words} of {table.name}")
+        group, may = group[taken[group] == taken[row]], may[taken[may] == taken[row]]
+    return said
+
+
+def _preference(table: Ranked, own: int, rows: np.ndarray[tuple[int], np.dtype[np.int64]], left: Left, row: int, depth: int) -> str:
+    if table.policy == "first":
+        return "first valid row"
+    priority = int(table.priorities[own])
+    equals = rows[table.priorities[rows] == priority]
+    specificities = table.picking.specificities
+    if table.policy == "specific" and specificities is not None and (specificities[equals] < specificities[own]).any():
+        return f"most specific: {specificities[own]:g}"
+    if table.policy == "cheapest" and len(equals) > 1 and left.matches.has_penalties:
+        return f"least penalty {left.matches.layered_penalties[depth, row]:g}"
+    return f"highest priority {priority}"
+
+
+def _chance(left: Left, row: int) -> float:
+    """How likely the row was, among those that were left."""
+    chance, group = 1.0, np.array(left.fresh, np.int64)
+    for depth, taken in enumerate(left.choosing.taken):
+        first = group[np.unique(taken[group], return_index=True)[1]]
+        weights = left.choosing.weights[depth, first]
+        shares = weights / weights.max()
+        chance *= float(shares[taken[first] == taken[row]][0] / shares.sum())
+        group = group[taken[group] == taken[row]]
+    return chance

@@ -1,0 +1,573 @@
+"""The picker: picks of one character and of many, remembered, held to an oracle turn by turn."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import random
+import tempfile
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pick_oracle as oracle
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import contextdb as cdb
+from contextdb.compiled.chance import uniform, uniforms
+from contextdb.compiled.pick import Outcome, pick_row
+from contextdb.compiled.table import CompiledTable
+from contextdb.errors import ContextError, PolicyError
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
+
+
+def way_of(compiled: CompiledTable, row: int | None) -> oracle.Path | None:
+    return None if row is None or row < 0 else tuple((step.table, step.row) for step in compiled.way(row))
+
+
+def columns_of(facts: list[oracle.Facts]) -> dict[str, list[object]]:
+    return {name: [one[name] for one in facts] for name in oracle.CELLS}
+
+
+def again(picker, how: str):
+    if how == "pickled":
+        return pickle.loads(pickle.dumps(picker))
+    return {"as it is": lambda p: p, "copied": copy.copy, "deep": copy.deepcopy}[how](picker)
+
+
+# ---- held to the oracle
+
+
+@given(st.data(), oracle.tables(), st.integers(-3, 2**70), st.integers(0, 4))
+def test_characters_pick_what_the_oracle_picks_turn_by_turn(data, tables: oracle.Tables, seed: int, memory: int):
+    compiled = tables.compile()
+    picker = compiled.picker(seed, memory)
+    ids = [0, 1, 2, -7, 10**12]
+    characters = {who: oracle.Character(seed % 2**64, who, memory) for who in ids}
+    time = 0.0
+    for _ in range(8):
+        how = data.draw(st.sampled_from(["many", "many", "alone", "reload", "pickled", "copied", "deep", "forget"]))
+        time += data.draw(st.sampled_from([0.0, 0.5, 1.0, 1.5]))
+        time_s = time if tables.needs_time else data.draw(st.sampled_from([None, time]))
+        if how == "reload":
+            tables = oracle.edited(data.draw, tables)
+            compiled = tables.compile()
+        elif how == "forget":
+            who = data.draw(st.sampled_from(ids))
+            picker.forget(who)
+            characters[who].recent, characters[who].picked = [], {}
+        elif how not in ("many", "alone"):
+            kept, picker = picker, again(picker, how)
+            kept.forget()
+        else:
+            who = data.draw(st.just([0, 1, 2]) | st.lists(st.sampled_from(ids), min_size=1, unique=True))
+            facts = [data.draw(oracle.FACTS) for _ in who]
+            expected = [picked_by(characters[one], tables, own, time) for one, own in zip(who, facts, strict=True)]
+            if how == "many":
+                assert_many(compiled, picker, who, facts, expected, time_s)
+            else:
+                assert_alone(compiled, picker, who, facts, expected, time_s)
+            refused = how == "many" and any(new is None for new, _ in expected)
+            for one, (new, _) in zip(who, expected, strict=True):
+                characters[one] = characters[one] if refused or new is None else new
+
+
+def picked_by(
+    character: oracle.Character, tables: oracle.Tables, facts: oracle.Facts, time: float
+) -> tuple[oracle.Character | None, oracle.Path | None]:
+    """The character after a turn, and what it picks; None where the policy refuses."""
+    new = copy.deepcopy(character)
+    try:
+        return new, new.pick(tables, facts, time)
+    except oracle.NotUnique:
+        return None, None
+
+
+def assert_many(compiled: CompiledTable, picker, who, facts, expected, time_s) -> None:
+    many = compiled.query_many(columns_of(facts))
+    if any(new is None for new, _ in expected):
+        with pytest.raises(PolicyError, match="at once"):
+            picker.pick_many(many, who=who, time_s=time_s)
+        return
+    rows = picker.pick_many(many, who=who, time_s=time_s)
+    assert [way_of(compiled, row) for row in rows.tolist()] == [way for _, way in expected]
+
+
+def assert_alone(compiled: CompiledTable, picker, who, facts, expected, time_s) -> None:
+    for one, own, (new, way) in zip(who, facts, expected, strict=True):
+        matches = compiled.query(own)
+        if new is None:
+            with pytest.raises(PolicyError, match="at once"):
+                picker.pick(matches, who=one, time_s=time_s)
+            continue
+        pick = picker.pick(matches, who=one, time_s=time_s)
+        assert way_of(compiled, pick.row) == way
+        assert pick.asset == (compiled.fallback if way is None else compiled.assets[pick.row])
+        assert pick.why
+        assert bool(pick) == (pick.asset is not None)
+
+
+@given(oracle.tables(), oracle.FACTS)
+def test_the_outcome_and_the_stateless_pick_know_what_the_policies_may_pick(tables: oracle.Tables, facts: oracle.Facts):
+    compiled = tables.compile()
+    matches = compiled.query(facts)
+    outcome = Outcome(compiled, matches)
+    try:
+        expected = oracle.possible(tables, facts)
+    except oracle.NotUnique:
+        assert outcome.refusal is not None
+        return
+    assert [way_of(compiled, row) for row in outcome.candidates.tolist()] == expected
+    rng = random.Random(3)
+    rows = {row for _ in range(40) if (row := pick_row(compiled, matches, rng, "")) is not None}
+    assert rows <= set(outcome.candidates.tolist())
+    assert bool(rows) == bool(expected)
+    assert all(outcome.said_of([row]) for row in matches)
+    for row in matches:
+        assert outcome.said_of([row]).startswith("picked") == (row in outcome.candidates)
+    assert sum(outcome.chances.values()) == pytest.approx(1.0 if expected else 0.0)
+
+
+@given(oracle.tables(), oracle.FACTS, st.integers(0, 3))
+def test_a_compiled_file_picks_as_its_table(tables: oracle.Tables, facts: oracle.Facts, seed: int):
+    compiled = tables.compile()
+    with tempfile.TemporaryDirectory() as folder:
+        compiled.save(Path(folder) / "picks.safetensors")
+        opened = CompiledTable.open(Path(folder) / "picks.safetensors")
+        _ = opened.version
+    one, other = compiled.picker(seed, 2), opened.picker(seed, 2)
+    for turn in range(4):
+        found = [outcome(picker, table, facts, 0.7 * turn) for picker, table in ((one, compiled), (other, opened))]
+        assert found[0] == found[1]
+
+
+def outcome(picker, table: CompiledTable, facts: oracle.Facts, time_s: float) -> object:
+    try:
+        pick = picker.pick(table.query(facts), time_s=time_s)
+    except PolicyError as error:
+        return str(error)
+    return pick.row, pick.asset, pick.why
+
+
+# ---- chance
+
+
+def test_chance_is_the_same_everywhere_and_for_one_and_many():
+    known = [uniform(0, 0, 0, 0), uniform(7, 3, 2, 1), uniform(2**64 - 1, -5, 10**12, 0)]
+    assert known == [0.13870941014555427, 0.3263417356334446, 0.07240612029416893]  # a replay of last year must stay what it was
+    who, turns = np.array([0, 1, -5, 2**62]), np.array([0, 3, 7, 2**40])
+    for seed in (0, 1, 2**64 - 1):
+        for depth in range(3):
+            expected = [uniform(seed, w, t, depth) for w, t in zip(who.tolist(), turns.tolist(), strict=True)]
+            assert uniforms(seed, who, turns, depth).tolist() == expected
+
+
+def table_of(policy: str = "collect", fallback: str | None = None, **columns: list[str]) -> CompiledTable:
+    """Rows that are all valid where `x` is True; further columns by the names of their jobs, and conditions."""
+    n_rows = len(next(iter(columns.values())))
+    assets = columns.pop("asset", [chr(ord("a") + row) for row in range(n_rows)])
+    jobs = {name: name for name in columns if name in ("priority", "weight", "once", "cooldown_s", "cooldown_turns")}
+    conditions = {name: {"type": "bool"} for name in ("x", "y", "z")}
+    texts = {"asset": assets, "x": ["Any"] * n_rows, **columns}
+    settings = TableSettings("t", policy=policy, fallback=fallback, **jobs)  # type: ignore[arg-type]
+    return Table.from_columns(texts, conditions, settings, "t").compile()
+
+
+WEIGHTS = {"a": 1.0, "b": 2.0, "c": 4.0, "d": 0.5}
+NO_MEMORY = table_of(weight=[str(weight) for weight in WEIGHTS.values()])
+
+
+def chi_square(seen: Counter, expected: dict) -> float:
+    n = sum(seen.values())
+    return sum((seen[key] - n * share) ** 2 / (n * share) for key, share in expected.items())
+
+
+@pytest.mark.parametrize("how", ["one character", "many characters", "many turns"])
+def test_picks_follow_the_weights(how: str):
+    picker = NO_MEMORY.picker(5, memory=0)
+    if how == "one character":
+        matches = NO_MEMORY.query({"x": True})
+        rows = [picker.pick(matches).row for _ in range(6000)]
+    elif how == "many characters":
+        rows = picker.pick_many(NO_MEMORY.query_many({"x": [True] * 6000})).tolist()
+    else:
+        many = NO_MEMORY.query_many({"x": [True] * 60})
+        rows = [row for _ in range(100) for row in picker.pick_many(many).tolist()]
+    shares = {i: weight / sum(WEIGHTS.values()) for i, weight in enumerate(WEIGHTS.values())}
+    assert (
+        chi_square(Counter(rows), shares) < 16.3
+    )  # 3 degrees of freedom: exceeded once in a thousand seeds, and this seed is fixed
+
+
+def test_what_a_character_picks_next_does_not_hang_on_its_last_pick_or_on_its_neighbour():
+    table = table_of(x=["Any"] * 4)
+    many, picker = table.query_many({"x": [True] * 2000}), table.picker(1, memory=0)
+    turns = [picker.pick_many(many) for _ in range(4)]
+    pairs = [Counter(zip(one.tolist(), two.tolist(), strict=True)) for one, two in pairwise(turns)]
+    pairs.append(Counter(zip(turns[0][::2].tolist(), turns[0][1::2].tolist(), strict=True)))
+    shares = {(one, two): 1 / 16 for one in range(4) for two in range(4)}
+    assert all(chi_square(seen, shares) < 37.7 for seen in pairs)  # 15 degrees of freedom, once in a thousand seeds
+
+
+def test_seeds_and_characters_pick_differently_and_each_the_same_again():
+    table = table_of(x=["Any"] * 5)
+    matches = table.query({"x": True})
+
+    def picks(seed: int, who: int) -> list[int]:
+        picker = table.picker(seed)
+        return [picker.pick(matches, who=who).row for _ in range(12)]
+
+    assert picks(1, 0) == picks(1, 0)
+    assert len({tuple(picks(seed, who)) for seed in range(4) for who in range(4)}) == 16
+
+
+def test_a_character_picks_the_same_whoever_is_asked_with_it_and_in_whatever_order():
+    table = table_of(x=["Any"] * 5)
+    few, more = table.picker(3), table.picker(3)
+    for _ in range(5):
+        alone = few.pick_many(table.query_many({"x": [True] * 2}), who=[9, 4]).tolist()
+        among = more.pick_many(table.query_many({"x": [True] * 4}), who=[1, 4, 7, 9]).tolist()
+        assert alone == [among[3], among[1]]
+
+
+# ---- memory
+
+
+@pytest.mark.parametrize("memory", [1, 2, 3])
+def test_no_asset_of_the_last_picks_is_picked_while_there_is_another_choice(memory: int):
+    table = table_of(x=["Any"] * 5)
+    picker, matches = table.picker(1, memory), table.query({"x": True})
+    assets = [picker.pick(matches).asset for _ in range(100)]
+    for at in range(memory, len(assets)):
+        assert assets[at] not in assets[at - memory : at]
+    assert set(assets) == set("abcde")
+
+
+def test_where_all_were_picked_lately_the_one_of_longest_ago_is_picked():
+    table = table_of(x=["Any"] * 3)
+    picker, matches = table.picker(1, 50), table.query({"x": True})
+    assets = [picker.pick(matches).asset for _ in range(12)]
+    assert assets == assets[:3] * 4
+    assert sorted(assets[:3]) == ["a", "b", "c"]
+
+
+def test_without_memory_assets_are_repeated():
+    table = table_of(x=["Any"] * 2)
+    picker, matches = table.picker(1, memory=0), table.query({"x": True})
+    assets = [picker.pick(matches).asset for _ in range(50)]
+    assert any(one == other for one, other in pairwise(assets))
+
+
+def test_ten_thousand_characters_never_repeat_themselves():
+    table = table_of(x=["Any"] * 4)
+    picker, many = table.picker(), table.query_many({"x": [True] * 10_000})
+    turns = [picker.pick_many(many) for _ in range(4)]
+    assert all((one != other).all() for one, other in pairwise(turns))
+
+
+def test_a_reload_does_not_make_a_character_repeat_itself():
+    older, newer = table_of(asset=["a", "b"], x=["Any"] * 2), table_of(asset=["new", "b", "a"], x=["Any"] * 3)
+    for seed in range(20):
+        picker = older.picker(seed, 2)
+        before = {picker.pick(older.query({"x": True})).asset for _ in range(2)}
+        assert before == {"a", "b"}
+        assert picker.pick(newer.query({"x": True})).asset == "new"
+
+
+# ---- rows that rest
+
+
+def test_a_row_that_is_said_once_is_picked_once():
+    table = table_of("first", fallback="silence", asset=["hello", "hm"], once=["True", ""], cooldown_turns=["", "1"])
+    picker, matches = table.picker(), table.query({"x": True})
+    assert [picker.pick(matches).asset for _ in range(5)] == ["hello", "hm", "silence", "hm", "silence"]
+    picker.forget()
+    assert picker.pick(matches).asset == "hello"
+
+
+def test_a_row_rests_for_seconds():
+    table = table_of(fallback="silence", asset=["hello"], cooldown_s=["2.5"])
+    picker, matches = table.picker(), table.query({"x": True})
+    times = [0.0, 1.0, 2.4999, 2.5, 4.0, 5.0]
+    assert [picker.pick(matches, time_s=t).row for t in times] == [0, None, None, 0, None, 0]
+
+
+def test_each_character_rests_on_its_own():
+    table = table_of(fallback="silence", asset=["hello"], once=["yes"])
+    picker = table.picker()
+    assert picker.pick(table.query({"x": True}), who=1).asset == "hello"
+    assert picker.pick_many(table.query_many({"x": [True] * 3})).tolist() == [0, -1, 0]
+    picker.forget([2, 77])
+    assert picker.pick_many(table.query_many({"x": [True] * 3})).tolist() == [-1, -1, 0]
+
+
+def test_resting_rows_are_not_valid_for_the_policy():
+    table = table_of("unique", once=["True", "False"], y=["Any", "Any"])
+    with pytest.raises(PolicyError, match='2 rows of "t" are valid at once'):
+        table.picker().pick(table.query({"x": True, "y": True}))
+    table = table_of("priority", priority=["5", "1"], once=["True", ""])
+    picker = table.picker()
+    assert [picker.pick(table.query({"x": True})).asset for _ in range(3)] == ["a", "b", "b"]
+
+
+def test_two_rows_of_one_asset_rest_apart_and_stay_apart_after_a_reload():
+    older = table_of("first", asset=["a", "a"], once=["True", "True"], x=["Any", "Any"])
+    newer = table_of("first", asset=["new", "a", "a"], once=["True"] * 3, x=["Any"] * 3)
+    picker = older.picker()
+    assert picker.pick(older.query({"x": True})).row == 0
+    assert [picker.pick(newer.query({"x": True})).row for _ in range(3)] == [0, 2, None]
+
+
+def test_a_table_inside_rests_as_a_row_and_its_rows_rest_wherever_they_are_picked():
+    conditions = {"x": {"type": "bool"}}
+    inner = Table.from_columns(
+        {"asset": ["one", "two"], "x": ["Any"] * 2, "Once": ["True", ""]},
+        conditions,
+        TableSettings("inner", once="Once", policy="first"),
+    )
+    outer = Table.from_columns(
+        {"asset": ["@inner", "@inner"], "x": ["Any", "Any"], "Rest": ["1", ""]},
+        conditions,
+        TableSettings("outer", cooldown_turns="Rest", policy="first"),
+        "outer",
+    )
+    compiled = outer.compile({"inner": inner})
+    picker = compiled.picker()
+    rows = [picker.pick(compiled.query({"x": True})).row for _ in range(4)]
+    assert [way_of(compiled, row) for row in rows] == [
+        (("outer", 0), ("inner", 0)),
+        (("outer", 1), ("inner", 1)),
+        (("outer", 0), ("inner", 1)),
+        (("outer", 1), ("inner", 1)),
+    ]
+
+
+# ---- policies
+
+
+def test_the_most_specific_row_is_picked():
+    table = table_of("specific", x=["Any", "True", "True"], y=["Any", "Any", "True"], z=["Any", "True ~2", "Any"])
+    facts = {"x": True, "y": True, "z": True}
+    assert table.picker().pick(table.query(facts)).asset == "c"
+    assert table.pick(facts) == "c"
+    assert table.pick(facts | {"y": False}) == "b"
+    assert table.pick(facts | {"x": False}) == "a"
+
+
+def test_conditions_count_by_their_weight_and_equal_sums_are_equal():
+    conditions = {"x": {"type": "bool", "weight": 0.1}, "y": {"type": "bool", "weight": 0.2}, "z": {"type": "bool", "weight": 0.3}}
+    columns = {"asset": ["xy", "z", "x"], "x": ["True", "", "True"], "y": ["True", "", ""], "z": ["", "True", ""]}
+    table = Table.from_columns(columns, conditions, TableSettings("t", policy="specific")).compile()
+    facts = {"x": True, "y": True, "z": True}
+    assert Outcome(table, table.query(facts)).candidates.tolist() == [0, 1]
+    assert table.picking.specificities is not None
+    assert table.picking.specificities.tolist() == [0.3, 0.3, 0.1]
+
+
+def test_the_cheapest_row_is_picked_and_weight_decides_between_equals():
+    table = table_of("cheapest", y=["True ~2", "False ~1", "Any ~9", "Any"], weight=["1", "1", "1", "0"])
+    assert [table.pick({"x": True, "y": y}, rng=n) for y in (True, False) for n in range(1)]
+    may = {y: Outcome(table, table.query({"x": True, "y": y})).candidates.tolist() for y in (True, False)}
+    assert may == {True: [0, 2], False: [1, 2]}
+
+
+def test_outcomes_say_what_the_policies_went_by():
+    facts = {"x": True, "y": True}
+
+    def said(table: CompiledTable) -> list[str]:
+        outcome = Outcome(table, table.query(facts))
+        return [outcome.said_of([row]) for row in table.query(facts)]
+
+    assert said(table_of("specific", x=["True", "Any"], y=["True", "True"])) == ["picked", "outranked by a (specificity 2)"]
+    assert said(table_of("cheapest", y=["False ~2", "Any"])) == ["outranked by b (penalty 0)", "picked"]
+    assert said(table_of("cheapest", y=["False ~2", "Any"], priority=["1", "0"])) == ["picked", "outranked by a (priority 1)"]
+
+
+# ---- why
+
+
+def test_a_pick_says_why():
+    facts = {"x": True, "y": True}
+
+    def told(table: CompiledTable, n: int = 1, memory: int = 1, **more: object) -> str:
+        picker = table.picker(1, memory)
+        return [picker.pick(table.query(facts | more)).why for _ in range(n)][-1]
+
+    three = table_of(y=["Any"] * 3, weight=["1", "1", "3"])
+    assert told(three, memory=0) in ("chance 20 % of 3", "chance 60 % of 3")
+    assert told(three, 2) in ("chance 50 % of 2", "chance 75 % of 2", "chance 25 % of 2")
+    assert told(table_of(y=["Any"] * 2), 2) == "picked least lately"
+    assert told(table_of("priority", y=["Any"] * 2, priority=["1", "5"])) == "highest priority 5"
+    assert told(table_of("collect", y=["Any"] * 3, priority=["1", "5", "5"])) == "highest priority 5, chance 50 % of 2"
+    assert told(table_of("first", y=["Any"] * 2)) == "first valid row"
+    assert told(table_of("unique", y=["True", "False"])) == "only valid row"
+    assert told(table_of("specific", y=["Any", "True"])) == "most specific: 1"
+    assert told(table_of("cheapest", y=["False ~2", "False ~0.5"])) == "least penalty 0.5"
+    assert told(table_of(y=["False"], fallback="idle")) == "fallback: no row is valid"
+    assert told(table_of(y=["False"])) == "no row is valid"
+    assert told(table_of(y=["Any"], weight=["0"], fallback="idle")) == "fallback: every valid row has weight 0"
+    assert told(table_of(y=["Any"], once=["True"], fallback="idle"), 2) == "fallback: every valid row rests"
+    assert told(table_of(y=["Any", "Any"], once=["True", ""], weight=["1", "0"]), 2) == "every valid row rests or has weight 0"
+    assert told(table_of(y=["Any", "Any"], weight=["1", "0"])) == "only valid row that can be picked"
+
+
+def test_a_pick_in_a_table_inside_says_where_its_policy_chose():
+    conditions = {"x": {"type": "bool"}}
+    inner = Table.from_columns({"asset": ["one", "two"], "x": ["Any"] * 2}, conditions, TableSettings("inner", policy="first"))
+    columns = {"asset": ["walk", "@inner"], "x": ["Any", "Any"], "P": ["0", "3"]}
+    outer = Table.from_columns(columns, conditions, TableSettings("outer", priority="P"), "outer").compile({"inner": inner})
+    pick = outer.picker().pick(outer.query({"x": True}))
+    assert (pick.asset, pick.why) == ("outer/inner/one", "highest priority 3, first valid row of inner")
+
+
+# ---- what is given
+
+
+def test_a_strange_table_is_refused_in_a_sentence():
+    picker, other = (
+        table_of(x=["Any"]).picker(),
+        oracle.Rows("other", "collect", (oracle.Row("a", dict.fromkeys(oracle.CELLS, "Any")),)),
+    )
+    compiled = other.table().compile()
+    facts = {"flag": True, "gait": "Walk", "speed": 1.0}
+    said = 'the answer is of the table "other", and this picker is of "t". Accepted: an answer of its table, in any version.'
+    for ask in (lambda: picker.pick(compiled.query(facts)), lambda: picker.pick_many(compiled.query_many(columns_of([facts])))):
+        with pytest.raises(ContextError) as caught:
+            ask()
+        assert str(caught.value) == said
+
+
+def test_an_answer_out_of_a_pickle_has_no_table_to_pick_by():
+    table = table_of(x=["Any"])
+    with pytest.raises(ContextError, match="the answer comes out of a pickle, without its table"):
+        table.picker().pick(pickle.loads(pickle.dumps(table.query({"x": True}))))
+
+
+def test_the_time_is_asked_for_where_rows_rest_for_seconds():
+    table = table_of(x=["Any"], cooldown_s=["1"])
+    picker = table.picker()
+    with pytest.raises(
+        ContextError, match='rows of the table "t" rest for seconds after they were picked, and time_s is not given'
+    ):
+        picker.pick(table.query({"x": True}))
+    with pytest.raises(ContextError, match="time_s is not given"):
+        picker.pick_many(table.query_many({"x": [True]}))
+    for time in (float("nan"), float("inf"), "now", 1j):
+        with pytest.raises(ContextError, match=r"time_s is .* Accepted: a number of seconds"):
+            picker.pick(table.query({"x": True}), time_s=time)
+    none = table_of(x=["Any"], cooldown_s=[""])
+    assert none.picker().pick(none.query({"x": True}))
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda t: t.picker("x"), "seed is str"),
+        (lambda t: t.picker(1.5), "seed is float"),
+        (lambda t: t.picker(memory=-1), "memory is -1"),
+        (lambda t: t.picker(memory=10**6), "a number of picks, from 0 to 1000"),
+        (lambda t: t.picker().pick({"x": True}), "matches is of type dict"),
+        (lambda t: t.picker().pick(t.query({"x": True}), who="me"), "who is str"),
+        (lambda t: t.picker().pick(t.query({"x": True}), who=2**70), "a whole number of 64 bits"),
+        (lambda t: t.picker().pick_many(t.query({"x": True})), "many is of type Matches"),
+        (lambda t: t.picker().pick_many(t.query_many({"x": [True] * 2}), who=[1]), "who names 1 character, for 2 contexts"),
+        (lambda t: t.picker().pick_many(t.query_many({"x": [True] * 2}), who=[5, 5]), "who names the character 5 more than once"),
+        (lambda t: t.picker().pick_many(t.query_many({"x": [True] * 2}), who=[0.5, 1]), "who has shape"),
+        (lambda t: t.picker().pick_many(t.query_many({"x": [True]}), who=["a"]), "who has shape"),
+        (lambda t: t.picker().pick_many(t.query_many({"x": [True]}), who=np.array([2**63], np.uint64)), "64 bits"),
+        (lambda t: t.picker().forget("all"), "who has shape"),
+        (lambda t: t.pick(t.query({"x": True}), actors={}), "actors are for a query"),
+    ],
+)
+def test_wrong_arguments_are_named(ask, said: str):
+    with pytest.raises(ContextError, match=said):
+        ask(table_of(x=["Any"]))
+
+
+def test_a_refused_pick_counts_for_nobody():
+    table = table_of("unique", y=["True", "Any"])
+    picker, other = table.picker(3), table.picker(3)
+    with pytest.raises(PolicyError, match="valid at once"):
+        picker.pick_many(table.query_many({"x": [True] * 2, "y": [False, True]}))
+    assert picker.pick_many(table.query_many({"x": [True], "y": [False]})).tolist() == [1]
+    assert other.pick_many(table.query_many({"x": [True], "y": [False]})).tolist() == [1]
+    assert picker._picked.turns.tolist()[:1] == other._picked.turns.tolist()[:1]
+
+
+def test_no_contexts_and_no_rows_give_nothing():
+    table = table_of(x=["Any"])
+    assert table.picker().pick_many(table.query_many({"x": []})).tolist() == []
+    empty = table_of(fallback="idle", x=[])
+    assert empty.picker().pick(empty.query({"x": True})).asset == "idle"
+    assert empty.picker().pick_many(empty.query_many({"x": [True] * 2})).tolist() == [-1, -1]
+
+
+# ---- actors, outputs, what a pick is
+
+
+ROLES = Table.from_columns(
+    {"Asset": ["tackle", "dive"], "Defender.near": ["True", "Any ~2"], "Mandatory_Slots": ["Defender", "Defender"]},
+    {"Defender.near": {"type": "bool"}},
+    TableSettings("roles", outputs=("Mandatory_Slots",), policy="cheapest"),
+).compile()
+
+
+def test_actors_are_cast_for_the_pick():
+    actors = {"Defender": [{"id": 1, "near": False}, {"id": 2, "near": True}]}
+    pick = ROLES.picker().pick(ROLES.query({}, actors=actors))
+    assert pick.asset in ("tackle", "dive")
+    assert pick.casting["Defender"]["id"] in (1, 2)
+    far = {"Defender": [{"id": 1, "near": False}]}
+    assert ROLES.pick({}, actors=far, rng=1) == "dive"
+    assert ROLES.picker().pick(ROLES.query({}, actors=far)).casting == {"Defender": far["Defender"][0]}
+    many = ROLES.query_many({}, actors=[actors, far])
+    alone = ROLES.picker(2)
+    assert ROLES.picker(2).pick_many(many).tolist() == [alone.pick(many[i], who=i).row for i in range(2)]
+
+
+def test_a_pick_is_a_value_that_can_be_kept():
+    table = table_of(asset=["walk"], x=["Any"])
+    pick = table.picker().pick(table.query({"x": True}))
+    kept = pickle.loads(pickle.dumps(pick))
+    assert (kept, kept.why, kept.casting, kept.outputs, bool(kept)) == (pick, "only valid row", {}, {}, True)
+    assert repr(pick) == repr(kept) == "<Pick: row 0, walk; only valid row>"
+    assert {pick: 1}[kept] == 1
+    with pytest.raises(AttributeError):
+        pick.row = 3
+    nothing = table.picker().pick(table_of(x=["False"]).query({"x": True}))
+    assert (bool(nothing), nothing.row, nothing.asset, repr(nothing)) == (False, None, None, "<Pick: None; no row is valid>")
+
+
+def test_a_picker_is_told_in_a_line():
+    picker = table_of(x=["Any"]).picker(4, 2)
+    assert repr(picker) == '<Picker of "t": seed 4, memory 2, 0 characters>'
+    assert (picker.table, picker.seed, picker.memory) == ("t", 4, 2)
+
+
+def test_a_picker_is_small_in_a_pickle():
+    table = table_of(x=["Any"] * 200)
+    picker = table.picker()
+    picker.pick_many(table.query_many({"x": [True] * 100}))
+    assert len(pickle.dumps(picker)) < 20_000
+
+
+def test_live_contexts_are_picked_from():
+    table = table_of("cheapest", y=["True ~2", "False ~1"])
+    live, picker = table.live({"x": True, "y": True}), table.picker()
+    assert picker.pick(live.matches()).asset == "a"
+    live["y"] = False
+    assert picker.pick(live.matches()).asset == "b"
+
+
+def test_the_stateless_pick_leaves_rests_aside():
+    table = table_of(asset=["hello"], once=["True"])
+    assert [table.pick({"x": True}) for _ in range(3)] == ["hello"] * 3
+
+
+def test_pickers_are_public_types():
+    assert cdb.Picker.__name__ == "Picker"
+    assert cdb.Pick.__name__ == "Pick"

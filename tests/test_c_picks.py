@@ -6,13 +6,13 @@ import random
 from pathlib import Path
 
 import pytest
-from asking_c import CELLS, OK, SCHEMA, Answers, Facts, all_asked, artefact, ask_program
+from asking_c import CELLS, OK, SCHEMA, Answers, Facts, all_asked, artefact, ask_program, random_moment
 from strategies import IS_FULL
 from test_c_rules import moments_of, ruled_table
 
 from contextdb.compiled.c_header.face import conditions_of
 from contextdb.compiled.table import CompiledTable
-from contextdb.errors import ContextError
+from contextdb.errors import ContextError, PolicyError
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 
@@ -75,3 +75,67 @@ def test_costs_of_soft_cells_and_failing_cells_are_those_of_python(ask: Path, tm
         moments = moments_of(rng, 12)
         [answers] = all_asked(ask, tmp_path, conditions_of(compiled), [artefact(compiled, tmp_path)], moments, memory=1)
         assert_told(compiled, answers, moments)
+
+
+def picked_table(rng: random.Random, n_rows: int, name: str, assets: str, has_inner: bool = False) -> Table:
+    """A table from which much can be picked, by any policy, with rows that rest."""
+    names = ["ok", "state", "speed"]
+    schema = {n: {**SCHEMA[n], "weight": rng.choice([1.0, 0.1, 2.5])} for n in names}
+    soft = rng.choice([[""], ["", " ~1", " ~0.5"]])
+    cells = {
+        n: ["Any" if rng.random() < 0.6 else rng.choice(PICK_CELLS[n]) + rng.choice(soft) for _ in range(n_rows)] for n in names
+    }
+    jobs = {
+        "priority": ["0", "1", "-2"],
+        "weight": ["1", "0", "2.5", "0.1"],
+        "once": ["yes", "no"],
+        "cooldown_s": ["0", "1.2", "7"],
+    }
+    jobs["cooldown_turns"] = ["0", "1", "3"]
+    told = {job: [rng.choice(["", *values]) for _ in range(n_rows)] for job, values in jobs.items()}
+    used = {job: job for job in jobs if rng.random() < (0.7 if job in ("priority", "weight") else 0.3)}
+    policy = rng.choice(["collect", "priority", "specific", "cheapest", "collect", "first", "unique"])
+    settings = TableSettings(name, policy=policy, fallback=rng.choice([None, "rest"]), **used)
+    said = [rng.choice([*assets, "@inner"] if has_inner else assets) for _ in range(n_rows)]
+    return Table.from_columns({"Asset": said, **cells, **{job: told[job] for job in used}}, schema, settings)
+
+
+PICK_CELLS = {"ok": ["True", "False"], "state": ["A", "B C"], "speed": ["<5", "1..", "0..10"]}
+
+
+def picks_in_python(compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> list[tuple[bool, int]]:
+    """Whether a query and the pick from it are refused, and the row that is picked."""
+    picker, found = compiled.picker(seed=7, memory=memory), []
+    for turn, (unknown, facts) in enumerate(moments):
+        try:
+            row = picker.pick(compiled.query(facts, unknown), time_s=0.5 * turn, who=3).row  # type: ignore[arg-type]
+            found.append((False, -1 if row is None else row))
+        except (ContextError, PolicyError):
+            found.append((True, -1))
+    return found
+
+
+def assert_picks(ask: Path, folder: Path, compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> int:
+    """How many picks gave a row."""
+    [answers] = all_asked(ask, folder, conditions_of(compiled), [artefact(compiled, folder)], moments, memory=memory)
+    assert [(fault > 0, row) for fault, row in (told.pick for told in answers.told)] == picks_in_python(compiled, moments, memory)
+    return sum(told.pick[1] >= 0 for told in answers.told)
+
+
+def test_picks_are_those_of_a_picker_in_python(ask: Path, tmp_path: Path):
+    rng = random.Random(31)
+    n_picked = 0
+    for turn in range(400 if IS_FULL else 40):
+        outer = picked_table(rng, rng.choice([1, 6, 30]), "outer", "abcd", has_inner=turn % 3 == 0)
+        inner = picked_table(rng, 8, "inner", "aef")
+        compiled = outer.compile({"inner": inner})
+        moments = [random_moment(rng, ["ok", "state", "speed"], 0.01) for _ in range(40)]
+        n_picked += assert_picks(ask, tmp_path, compiled, moments, rng.choice([0, 1, 1, 3, 8]))
+    assert n_picked > 400
+
+
+def test_picks_from_a_table_with_rules_are_those_of_python(ask: Path, tmp_path: Path):
+    rng = random.Random(32)
+    for _ in range(60 if IS_FULL else 6):
+        compiled = ruled_table(rng, 30, {"policy": rng.choice(["specific", "cheapest", "collect"])})
+        assert_picks(ask, tmp_path, compiled, moments_of(rng, 40), 1)

@@ -7,7 +7,7 @@ typedef struct cdbi_array {
     size_t n_bytes;
     size_t shape[3];
     size_t n_dimensions;
-    char dtype[4];
+    char dtype[8];
 } cdbi_array;
 
 /* Read an entry such as {"dtype": "U64", "shape": [3, 16], "data_offsets": [0, 384]}; its bytes lie within the file. */

@@ -16,8 +16,7 @@ from c_compilers import PROGRAMS, C, built, compiler_for, ran, sanitizers
 from contextdb.cells.conditions import Condition
 from contextdb.cells.kinds import KINDS
 from contextdb.compiled.c_header import c_header_of
-from contextdb.compiled.c_header.face import choices_of
-from contextdb.compiled.c_header.spelling import Names
+from contextdb.compiled.c_header.naming import values_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
@@ -97,7 +96,7 @@ def values_in_c(condition: Condition) -> tuple[str, ...]:
     """The names of an enum's values by number, and of declared tags, from number 1 on."""
     if not condition.domain.values:
         return ()
-    declared = choices_of(condition, Names()).values
+    declared = values_of(condition)
     return ("", *declared) if condition.domain.kind == "tags" else declared
 
 

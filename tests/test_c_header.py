@@ -6,6 +6,7 @@ import datetime
 import json
 import math
 import random
+import re
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -42,7 +43,9 @@ from strategies import IS_FULL, contexts, examples, tables
 from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
 from contextdb.compiled.c_header import c_header_of
-from contextdb.compiled.c_header.face import choices_of, face_of, names_left
+from contextdb.compiled.c_header.face import reader_names
+from contextdb.compiled.c_header.naming import Names
+from contextdb.compiled.c_header.spelling import Wanted, distinct
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError
 from contextdb.tables.project import Project
@@ -224,14 +227,12 @@ def set_fact(compiled: CompiledTable, condition: Condition, field: str, fact: ob
 
 def named(compiled: CompiledTable) -> tuple[dict[str, str], str, tuple[str, ...]]:
     """What conditions with values and their values are called in the header of this one table, its own name, and its fields."""
-    names = names_left()
+    names = Names.of({compiled.name: compiled}, "guard", reader_names())
     found: dict[str, str] = {}
-    for condition in compiled.conditions:
-        if condition.domain.values:
-            choices = choices_of(condition, names)
-            found[condition.name] = choices.type
-            found |= {f"{condition.name}={v}": e for v, e in zip(choices.values, choices.enumerators, strict=True)}
-    face = face_of(compiled.name, compiled, names)
+    for condition, choices in names.choices.items():
+        found[condition.name] = choices.type
+        found |= {f"{condition.name}={v}": e for v, e in zip(choices.values, choices.enumerators, strict=True)}
+    face = names.tables[compiled.name]
     return found, face.base, face.fields
 
 
@@ -272,6 +273,46 @@ def test_the_struct_of_a_table_is_asked_as_python_asks_it(tmp_path: Path, option
         missing = [name for name in names if name not in facts]
         at, name = (names.index(missing[0]), missing[0]) if status else (-1, "")
         assert line == f"{status} {rows:032x} {at} {name}"
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("IsInMidAirAnim", "IS_IN_MID_AIR_ANIM"),
+        ("MidAir_Catch_Direction", "MID_AIR_CATCH_DIRECTION"),
+        ("HTTPServer2Go", "HTTP_SERVER2_GO"),
+        ("CB", "CB"),
+        ("dir_to", "DIR_TO"),
+    ],
+)
+def test_enumerators_keep_the_joints_of_words(text: str, name: str):
+    assert distinct([Wanted(text, "CDB_", is_upper=True)]) == [f"CDB_{name}"]
+
+
+def test_names_that_would_be_alike_are_told_apart_by_their_texts_and_not_by_their_order():
+    texts = ["a.b", "a_b", "a b", "aB", "other", "open", "Open"]
+    wanted = [Wanted(text, "cdb_", ("", "_close"), is_upper=False) for text in texts]
+    names = dict(zip(texts, distinct(wanted, {"cdb_open"}), strict=True))
+    assert dict(zip(texts[::-1], distinct(wanted[::-1], {"cdb_open"}), strict=True)) == names
+    assert (names["aB"], names["other"], names["Open"]) == ("cdb_aB", "cdb_other", "cdb_Open")
+    assert len(set(names.values())) == len(texts)
+    assert all(re.fullmatch(r"cdb_a_b_[0-9a-f]{4}", names[text]) for text in texts[:3])
+
+
+def test_the_order_of_columns_values_and_tables_changes_no_name():
+    values = ["Going_Up", "GoingUp", "Top", "going up"]
+    schema: dict[str, dict[str, object]] = {
+        "state": {"type": "enum", "values": values},
+        "a b": {"type": "bool"},
+        "a_b": {"type": "bool"},
+    }
+    one, other = (header_for({n: ["Any", "Any"] for n in order}, schema) for order in (list(schema), list(schema)[::-1]))
+    turned = {"one": other, "two": one}
+    assert enumerators(c_header_of({"two": one, "one": other})) == enumerators(c_header_of(turned))
+
+
+def enumerators(header: str) -> set[str]:
+    return set(re.findall(r"CDB_(?:STATE|ONE|TWO)_\w+", header))
 
 
 @pytest.mark.parametrize("options", [C, CXX, ["-xc", "-std=c11"], ["-xc++", "-std=c++20"]], ids=["C99", "C++11", "C11", "C++20"])

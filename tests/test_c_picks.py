@@ -10,7 +10,7 @@ from asking_c import CELLS, OK, SCHEMA, Answers, Facts, all_asked, artefact, ask
 from strategies import IS_FULL
 from test_c_rules import moments_of, ruled_table
 
-from contextdb.compiled.c_header.face import conditions_of
+from contextdb.compiled.c_header.naming import conditions_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError, PolicyError
 from contextdb.schema.settings import TableSettings

@@ -16,7 +16,7 @@ from strategies import IS_FULL
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL
-from contextdb.compiled.c_header.face import conditions_of
+from contextdb.compiled.c_header.naming import conditions_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.expressions import read_expression
 from contextdb.schema.settings import TableSettings, conditions_from_dict

@@ -14,8 +14,8 @@ int main(void)
     }
 
     cdb_contested_catch_facts facts = cdb_contested_catch_missing();
-    facts.MidAir_Catch_Direction = CDB_MIDAIR_CATCH_DIRECTION_GOING_DOWN;
-    facts.Defender_DepthChart = CDB_DEFENDER_DEPTHCHART_FS;
+    facts.MidAir_Catch_Direction = CDB_MID_AIR_CATCH_DIRECTION_GOING_DOWN;
+    facts.Defender_DepthChart = CDB_DEFENDER_DEPTH_CHART_FS;
     facts.Defender_MidAir_Contesting = 1;
     facts.Defender_CatchingAnim = 0;
     facts.Defender_Catching = 0;

@@ -17,9 +17,9 @@ from textwrap import wrap
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.kinds import Kind
-from contextdb.compiled.c_header.spelling import Names, comment, literal
+from contextdb.compiled.c_header.naming import Choices, Names, TableFace, conditions_of
+from contextdb.compiled.c_header.spelling import comment, literal
 from contextdb.compiled.data import CompiledData
-from contextdb.compiled.programs import named_conditions
 
 READER = 3
 """Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
@@ -54,10 +54,6 @@ _FOOT = """
 
 #endif /* {guard} */
 """
-_ENDINGS = (
-    *("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_given", "_open", "_open_with", "_close"),
-    *("_query", "_pick", "_penalties", "_why_not"),
-)
 
 
 @dataclass(frozen=True)
@@ -82,32 +78,6 @@ def plain_of(kind: Kind) -> Plain:
     return _TRUTH if kind.is_truth else _TEXT
 
 
-@dataclass(frozen=True)
-class Choices:
-    """A condition's declared values in C: the type, the array of their names, and an enumerator for each."""
-
-    type: str
-    values: tuple[str, ...]
-    enumerators: tuple[str, ...]
-    missing: str
-
-    @property
-    def n_words(self) -> int:
-        """Words of a set of tags; bit 0 says that the set is known."""
-        return (len(self.values) + 1 + 63) // 64
-
-
-@dataclass(frozen=True)
-class TableFace:
-    """A table in C: what its names begin with, and the field of each condition."""
-
-    table: str
-    base: str
-    fields: tuple[str, ...]
-    """"" for a derived condition, which no field gives."""
-    enumerators: tuple[str, ...]
-
-
 def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H") -> str:
     """The text of the header, ASCII with line feeds; the same tables give the same text.
 
@@ -116,65 +86,28 @@ def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H")
     ContextDBError
         A name cannot be a text of C.
     """
-    names = names_left()
-    choices: dict[Condition, Choices] = {}
+    names = Names.of(tables, guard, reader_names())
+    written: set[Condition] = set()
     parts = []
     for name, table in tables.items():
         for condition in conditions_of(table):
-            if condition.domain.values and condition not in choices:
-                choices[condition] = choices_of(condition, names)
-                parts.append("\n" + "".join(f"{line}\n" for line in _choices(condition, choices[condition])))
-        parts.append("\n" + "".join(f"{line}\n" for line in _table(table, face_of(name, table, names), choices)))
-    guard = names.of(guard, is_upper=True)
-    head = _HEAD.format(version=READER, reader=_reader(), guard=guard)
-    return "".join([head, *parts, _FOOT.format(guard=guard)])
+            if condition in names.choices and condition not in written:
+                written.add(condition)
+                parts.append("\n" + "".join(f"{line}\n" for line in _choices(condition, names.choices[condition])))
+        parts.append("\n" + "".join(f"{line}\n" for line in _table(table, names.tables[name], names.choices)))
+    head = _HEAD.format(version=READER, reader=_reader(), guard=names.guard)
+    return "".join([head, *parts, _FOOT.format(guard=names.guard)])
 
 
-def conditions_of(table: CompiledData) -> tuple[Condition, ...]:
-    """The conditions of a table's schema: those of its columns, then the others that its rules and derived facts need."""
-    return (*table.conditions, *(c for c in named_conditions(table) if c.name not in table.places))
-
-
-def names_left() -> Names:
-    """Names for a project: those that the reader has are taken."""
-    return Names(set(re.findall(r"\b(?:cdb|CDB)\w*", _reader())))
+def reader_names() -> frozenset[str]:
+    """The names that the reader has, which no project can have."""
+    return frozenset(re.findall(r"\b(?:cdb|CDB)\w*", _reader()))
 
 
 @cache
 def _reader() -> str:
     folder = files("contextdb.compiled.c_header").joinpath("reader")
     return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in PARTS)
-
-
-def choices_of(condition: Condition, names: Names) -> Choices:
-    """Names for the declared values of a condition; of tags also those above them, which a fact may hold too."""
-    values = condition.domain.values or ()
-    is_tags = condition.domain.type.is_tags
-    if is_tags:
-        values = tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
-    endings = ("", "_set", "_values", "_none", "_add") if is_tags else ("", "_values")
-    base = names.of(condition.name, "cdb_", endings)
-    head = f"CDB_{base.removeprefix('cdb_')}_".upper()
-    missing = "" if is_tags else names.of("missing", head, is_upper=True)
-    return Choices(base, values, tuple(names.of(value, head, is_upper=True) for value in values), missing)
-
-
-def _with_those_above(tag: str) -> Iterator[str]:
-    parts = tag.split(".")
-    return (".".join(parts[: n + 1]) for n in range(len(parts)))
-
-
-def face_of(name: str, table: CompiledData, names: Names) -> TableFace:
-    """Names for a table and its conditions."""
-    base = names.of(name, "cdb_", _ENDINGS)
-    head = f"CDB_{base.removeprefix('cdb_')}_".upper()
-    fields = Names()
-    return TableFace(
-        name,
-        base,
-        tuple("" if c.expr else fields.of(c.name) for c in conditions_of(table)),
-        tuple(names.of(c.name, head, is_upper=True) for c in conditions_of(table)),
-    )
 
 
 # ---- what is written
@@ -274,7 +207,7 @@ def _conditions_enum(table: CompiledData, face: TableFace) -> Iterator[str]:
     """The conditions by number, as a fault names them."""
     yield f"typedef enum {face.base}_condition {{"
     yield from (f"    {name} = {number}," for number, name in enumerate(face.enumerators))
-    yield f"    {face.base}_conditions = {len(face.enumerators)}"
+    yield f"    {face.n_conditions} = {len(face.enumerators)}"
     yield f"}} {face.base}_condition;"
     yield ""
 

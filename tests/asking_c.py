@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import random
 import struct
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,12 +16,17 @@ from c_compilers import PROGRAMS, C, built, compiler_for, ran, sanitizers
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.kinds import KINDS
+from contextdb.cells.outputs import Output
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.c_header.naming import values_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
 
+TIMES = {"full": 8, "thorough": 60}.get(os.environ.get("EXAMPLES", ""), 1)
+"""So many times the tables and files of every day are drawn."""
+SEED = int(os.environ["EXAMPLES_SEED"]) if TIMES > 1 else 0
+OUTPUT_TYPES = ("bool", "int", "number", "enum", "text", "numbers")
 UNKNOWN = ("error", "any", "never")
 OK, BAD_FILE, OTHER_TABLE, MISSING_FACT, WRONG_FACT = 0, 3, 4, 5, 6
 
@@ -109,6 +115,33 @@ def schema_bytes(conditions: Sequence[Condition]) -> bytes:
     return b"".join(parts)
 
 
+def output_bytes(outputs: Sequence[Output]) -> bytes:
+    kinds = [(text(o.name), packed(OUTPUT_TYPES.index(o.kind), o.size if o.kind == "numbers" else 1)) for o in outputs]
+    return packed(len(outputs)) + b"".join(part for pair in kinds for part in pair)
+
+
+def output_words(values: Mapping[str, object]) -> list[int]:
+    """Outputs as the program writes them."""
+    found: list[int] = []
+    for value in values.values():
+        if isinstance(value, str):
+            found.append(fnv1a(value.encode("utf-8")))
+        elif isinstance(value, int):
+            found.append(int(value))
+        else:
+            numbers = value if isinstance(value, tuple) else (value,)
+            found += np.array(numbers, "<f8").view("<i8").tolist()
+    return found
+
+
+def fnv1a(octets: bytes) -> int:
+    """The hash by which the header knows texts, as a signed number."""
+    found = 0xCBF29CE484222325
+    for octet in (*octets, 0xFF):
+        found = (found ^ octet) * 0x100000001B3 % 2**64
+    return found - 2**64 * (found >> 63)
+
+
 def fact_bytes(condition: Condition, fact: object) -> bytes:
     """A fact in canonical form as the program reads it."""
     kind, values = condition.domain.kind, values_in_c(condition)
@@ -136,6 +169,8 @@ class Told:
     """Status and costs."""
     pick: tuple[int, int]
     """Status and row, -1 for none."""
+    outputs: list[int]
+    """The outputs of that row: whole numbers, doubles by their bits, texts by their hash."""
     why_not: list[int]
     """For each row the numbers of failing conditions as bits, 62 for its rule, 61 where it is disabled; -1 for a fault."""
 
@@ -170,6 +205,7 @@ def all_asked(
     moments: Iterable[tuple[str, Facts]],
     strange: int = 0,
     memory: int = -1,
+    outputs: Sequence[Output] = (),
 ) -> list[Answers]:
     """The same, and what else is said of each context where a character picks with a `memory`."""
     listed = list(moments)
@@ -178,10 +214,11 @@ def all_asked(
         packed(UNKNOWN.index(unknown)) + b"".join(fact_bytes(c, facts.get(c.name)) for c in plain) for unknown, facts in listed
     )
     counted = [packed(strange, memory, len(artefacts)), *map(text, artefacts), packed(len(listed))]
-    (folder / "in").write_bytes(b"".join([schema_bytes(conditions), *counted, contexts]))
+    (folder / "in").write_bytes(b"".join([schema_bytes(conditions), output_bytes(outputs), *counted, contexts]))
     ran(ask, folder / "in", folder / "out")
     words = np.fromfile(folder / "out", "<i8")
     found, at = [], 0
+    n_values = sum(output.size if output.kind == "numbers" else 1 for output in outputs)
     for _ in artefacts:
         answers, at = Answers(int(words[at]), [], []), at + 1
         for _ in listed if answers.status == OK else ():
@@ -190,9 +227,9 @@ def all_asked(
             at += 2 + n_words
             if memory >= 0:
                 n, status, rest = int(words[at]), int(words[at + 1]), words[at + 2 :]
-                costs, why = rest[:n].view("<f8").tolist(), rest[n + 2 : 2 * n + 2].tolist()
-                answers.told.append(Told((status, costs), (int(rest[n]), int(rest[n + 1])), why))
-                at += 4 + 2 * n
+                costs, pick, why = rest[:n].view("<f8").tolist(), (int(rest[n]), int(rest[n + 1])), n + 2 + n_values
+                answers.told.append(Told((status, costs), pick, rest[n + 2 : why].tolist(), rest[why : why + n].tolist()))
+                at += 4 + 2 * n + n_values
         found.append(answers)
     assert at == len(words)
     return found

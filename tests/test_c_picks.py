@@ -6,9 +6,8 @@ import random
 from pathlib import Path
 
 import pytest
-from asking_c import CELLS, OK, SCHEMA, Answers, Facts, all_asked, artefact, ask_program, random_moment
-from strategies import IS_FULL
-from test_c_rules import moments_of, ruled_table
+from asking_c import CELLS, OK, SCHEMA, SEED, TIMES, Answers, Facts, all_asked, artefact, ask_program, output_words, random_moment
+from test_c_rules import moments_of, output_cells, ruled_table
 
 from contextdb.compiled.c_header.naming import conditions_of
 from contextdb.compiled.table import CompiledTable
@@ -69,8 +68,8 @@ def assert_told(compiled: CompiledTable, answers: Answers, moments: list[tuple[s
 
 
 def test_costs_of_soft_cells_and_failing_cells_are_those_of_python(ask: Path, tmp_path: Path):
-    rng = random.Random(21)
-    for turn in range(100 if IS_FULL else 12):
+    rng = random.Random(SEED + 21)
+    for turn in range(12 * TIMES):
         compiled = ruled_table(rng, 20) if turn % 4 == 0 else soft_table(rng, rng.choice([1, 20, 70]))
         moments = moments_of(rng, 12)
         [answers] = all_asked(ask, tmp_path, conditions_of(compiled), [artefact(compiled, tmp_path)], moments, memory=1)
@@ -95,37 +94,43 @@ def picked_table(rng: random.Random, n_rows: int, name: str, assets: str, has_in
     told = {job: [rng.choice(["", *values]) for _ in range(n_rows)] for job, values in jobs.items()}
     used = {job: job for job in jobs if rng.random() < (0.7 if job in ("priority", "weight") else 0.3)}
     policy = rng.choice(["collect", "priority", "specific", "cheapest", "collect", "first", "unique"])
-    settings = TableSettings(name, policy=policy, fallback=rng.choice([None, "rest"]), **used)
+    own, outputs = output_cells(rng, n_rows)
+    given = rng.choice([(), (("damage", 7), ("offset", (1.5, 2.0)))])
+    settings = TableSettings(
+        name, policy=policy, fallback="rest", fallback_outputs=given, outputs=tuple(own), typed=outputs, **used
+    )
     said = [rng.choice([*assets, "@inner"] if has_inner else assets) for _ in range(n_rows)]
-    return Table.from_columns({"Asset": said, **cells, **{job: told[job] for job in used}}, schema, settings)
+    return Table.from_columns({"Asset": said, **cells, **{job: told[job] for job in used}, **own}, schema, settings)
 
 
 PICK_CELLS = {"ok": ["True", "False"], "state": ["A", "B C"], "speed": ["<5", "1..", "0..10"]}
 
 
-def picks_in_python(compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> list[tuple[bool, int]]:
-    """Whether a query and the pick from it are refused, and the row that is picked."""
+def picks_in_python(compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> list[tuple[bool, int, list[int]]]:
+    """Whether a query and the pick from it are refused, the row that is picked, and its outputs."""
     picker, found = compiled.picker(seed=7, memory=memory), []
     for turn, (unknown, facts) in enumerate(moments):
         try:
-            row = picker.pick(compiled.query(facts, unknown), time_s=0.5 * turn, who=3).row  # type: ignore[arg-type]
-            found.append((False, -1 if row is None else row))
+            pick = picker.pick(compiled.query(facts, unknown), time_s=0.5 * turn, who=3)  # type: ignore[arg-type]
+            found.append((False, -1 if pick.row is None else pick.row, output_words(pick.outputs)))
         except (ContextError, PolicyError):
-            found.append((True, -1))
+            found.append((True, -1, output_words(compiled.outputs.fallback)))
     return found
 
 
 def assert_picks(ask: Path, folder: Path, compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> int:
     """How many picks gave a row."""
-    [answers] = all_asked(ask, folder, conditions_of(compiled), [artefact(compiled, folder)], moments, memory=memory)
-    assert [(fault > 0, row) for fault, row in (told.pick for told in answers.told)] == picks_in_python(compiled, moments, memory)
-    return sum(told.pick[1] >= 0 for told in answers.told)
+    about = conditions_of(compiled), [artefact(compiled, folder)], moments, 0, memory, compiled.outputs.declared
+    [answers] = all_asked(ask, folder, *about)
+    found = [(told.pick[0] > 0, told.pick[1], told.outputs) for told in answers.told]
+    assert found == picks_in_python(compiled, moments, memory)
+    return sum(row >= 0 for _, row, _ in found)
 
 
 def test_picks_are_those_of_a_picker_in_python(ask: Path, tmp_path: Path):
-    rng = random.Random(31)
+    rng = random.Random(SEED + 31)
     n_picked = 0
-    for turn in range(400 if IS_FULL else 40):
+    for turn in range(40 * TIMES):
         outer = picked_table(rng, rng.choice([1, 6, 30]), "outer", "abcd", has_inner=turn % 3 == 0)
         inner = picked_table(rng, 8, "inner", "aef")
         compiled = outer.compile({"inner": inner})
@@ -135,7 +140,7 @@ def test_picks_are_those_of_a_picker_in_python(ask: Path, tmp_path: Path):
 
 
 def test_picks_from_a_table_with_rules_are_those_of_python(ask: Path, tmp_path: Path):
-    rng = random.Random(32)
-    for _ in range(60 if IS_FULL else 6):
+    rng = random.Random(SEED + 32)
+    for _ in range(6 * TIMES):
         compiled = ruled_table(rng, 30, {"policy": rng.choice(["specific", "cheapest", "collect"])})
         assert_picks(ask, tmp_path, compiled, moments_of(rng, 40), 1)

@@ -79,6 +79,22 @@ static void answer(FILE *out, const cdb_table *table, const cdb_column *columns,
     free(rows);
 }
 
+/* The outputs of a row, or of none: whole numbers, doubles, and texts as their hash. */
+static void read_outputs(FILE *out, const cdb_table *table, const cdb_schema *schema, int64_t row)
+{
+    size_t i, j;
+    for (i = 0; i < schema->n_outputs; i++)
+        switch (schema->outputs[i].type) {
+        case CDB_OUT_BOOL: put(out, cdb_output_bool(table, i, row)); break;
+        case CDB_OUT_INT: put(out, cdb_output_int(table, i, row)); break;
+        case CDB_OUT_NUMBER:
+        case CDB_OUT_NUMBERS:
+            for (j = 0; j < schema->outputs[i].size; j++) fwrite(cdb_output_numbers(table, i, row) + j, 8, 1, out);
+            break;
+        default: put(out, (int64_t)cdbi_hash(CDBI_HASH, cdb_output_text(table, i, row)));
+        }
+}
+
 /* More of a context: what soft cells cost, what a character picks, and for each row why it is not valid, a bit for each condition,
  * bit 62 for its rule, bit 61 where it is disabled. */
 static void more(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
@@ -96,6 +112,7 @@ static void more(FILE *out, const cdb_table *table, const cdb_column *columns, c
         status = cdb_pick(table, columns, schema, facts, unknown, rows, table->n_words, time_s, picker, &picked, &fault);
     put(out, (int64_t)status);
     put(out, picked);
+    read_outputs(out, table, schema, picked);
     for (row = 0; (uint64_t)row < table->n_rows; row++) {
         int reasons[63];
         size_t n, i;
@@ -114,6 +131,7 @@ int main(int argc, char **argv)
     FILE *in = argc == 3 ? fopen(argv[1], "rb") : NULL, *out = argc == 3 ? fopen(argv[2], "wb") : NULL;
     static cdb_condition *conditions; /* static: what they hold to the end is no leak */
     static cdb_column *columns;
+    static cdb_output_wanted *outputs;
     static cdb_schema schema;
     static cdb_unknown *unknown;
     static cdb_fact *facts;
@@ -138,6 +156,15 @@ int main(int argc, char **argv)
     }
     schema.conditions = conditions;
     schema.n_conditions = (size_t)n;
+    outputs = (cdb_output_wanted *)calloc((size_t)(n = whole()) + 1, sizeof *outputs);
+    for (i = 0; i < n; i++) {
+        outputs[i].name = text();
+        outputs[i].type = (cdb_output_type)whole();
+        outputs[i].size = (size_t)whole();
+    }
+    schema.outputs = outputs;
+    schema.n_outputs = (size_t)n;
+    n = (int64_t)schema.n_conditions;
     strange = (cdb_strange)whole();
     memory = whole();
     n_artefacts = whole();

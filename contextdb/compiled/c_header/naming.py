@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from contextdb.cells.conditions import Condition
+from contextdb.cells.outputs import Output
 from contextdb.compiled.c_header.spelling import Wanted, distinct, upper
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.programs import named_conditions
 
 TABLE_ENDINGS = (
     *("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_given", "_open", "_open_with", "_close"),
-    *("_query", "_pick", "_penalties", "_why_not"),
+    *("_query", "_pick", "_penalties", "_why_not", "_watch", "_watch_file", "_watch_poll", "_watch_release", "_watch_close"),
 )
 
 
@@ -32,6 +33,15 @@ class Choices:
 
 
 @dataclass(frozen=True)
+class OutputNames:
+    """An output in C: what reads it, and its values where it is an enum."""
+
+    name: str
+    none: str
+    enumerators: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class TableFace:
     """A table in C: what its names begin with, and the field of each condition."""
 
@@ -42,6 +52,7 @@ class TableFace:
     enumerators: tuple[str, ...]
     n_conditions: str
     """The enumerator behind the last."""
+    outputs: tuple[OutputNames, ...]
 
 
 @dataclass(frozen=True)
@@ -64,13 +75,29 @@ class Names:
             taken,
         )
         table_types, choice_types = types[: len(tables)], types[len(tables) :]
+        readers = distinct(
+            [
+                Wanted(output.name, f"{base}_out_", ("", "_value", "_values"), of=base)
+                for base, table in zip(table_types, tables.values(), strict=True)
+                for output in table.outputs.declared
+            ],
+            taken,
+        )
         said = [(type_, text) for type_, c in zip(choice_types, declared, strict=True) for text in _said(c)]
         asked = [(base, text) for base, table in zip(table_types, tables.values(), strict=True) for text in _asked(table)]
-        wanted = [Wanted(text.removeprefix(_OWN), _head(of), is_upper=True, of=f"{of} {text}") for of, text in said + asked]
+        outputs = [output for table in tables.values() for output in table.outputs.declared]
+        given = [(name, text) for name, output in zip(readers, outputs, strict=True) for text in _given(output)]
+        owned = [*said, *asked, *given]
+        wanted = [Wanted(text.removeprefix(_OWN), _head(of), is_upper=True, of=f"{of} {text}") for of, text in owned]
         found = iter(distinct([*wanted, Wanted(guard.removeprefix("CDB_"), "CDB_", is_upper=True)], taken))
         choices = {c: _choices_of(c, type_, found) for c, type_ in zip(declared, choice_types, strict=True)}
-        faces = {name: _face_of(name, base, table, found) for (name, table), base in zip(tables.items(), table_types, strict=True)}
-        return cls(choices, faces, next(found))
+        faces = [_face_of(name, base, table, found) for (name, table), base in zip(tables.items(), table_types, strict=True)]
+        of_outputs = iter([_output_names(name, output, found) for name, output in zip(readers, outputs, strict=True)])
+        faces = [
+            replace(face, outputs=tuple(next(of_outputs) for _ in table.outputs.declared))
+            for face, table in zip(faces, tables.values(), strict=True)
+        ]
+        return cls(choices, {face.table: face for face in faces}, next(found))
 
 
 _OWN = "\0"
@@ -101,7 +128,16 @@ def _face_of(name: str, base: str, table: CompiledData, found: Iterator[str]) ->
     given = [c.name for c in conditions if c.expr is None]
     fields = dict(zip(given, distinct([Wanted(text) for text in given]), strict=True))
     enumerators = tuple(next(found) for _ in conditions)
-    return TableFace(name, base, tuple(fields.get(c.name, "") for c in conditions), enumerators, next(found))
+    return TableFace(name, base, tuple(fields.get(c.name, "") for c in conditions), enumerators, next(found), ())
+
+
+def _given(output: Output) -> list[str]:
+    return [f"{_OWN}none", *output.values] if output.kind == "enum" else []
+
+
+def _output_names(name: str, output: Output, found: Iterator[str]) -> OutputNames:
+    none, *enumerators = [next(found) for _ in _given(output)] or [""]
+    return OutputNames(name, none, tuple(enumerators))
 
 
 def _endings(condition: Condition) -> tuple[str, ...]:

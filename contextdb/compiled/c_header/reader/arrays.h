@@ -45,7 +45,8 @@ static inline cdbi_array cdbi_read_array(const cdb_table *table, cdbi_json *entr
 /* Whether an array holds numbers of a kind in so many dimensions, the last of which is `width`, and has their bytes. */
 static inline int cdbi_fits(const cdbi_array *array, const char *dtype, size_t n_dimensions, size_t width)
 {
-    size_t size = strcmp(dtype, "I32") == 0 ? 4 : strcmp(dtype, "BOOL") == 0 ? 1 : 8, n = array->n_bytes / size, i;
+    size_t size = strcmp(dtype, "I32") == 0 ? 4 : strcmp(dtype, "BOOL") == 0 || strcmp(dtype, "U8") == 0 ? 1 : 8;
+    size_t n = array->n_bytes / size, i;
     if (strcmp(array->dtype, dtype) != 0 || array->n_dimensions != n_dimensions || array->n_bytes % size != 0) return 0;
     if (array->shape[n_dimensions - 1] != width || ((uintptr_t)array->at & (size - 1)) != 0) return 0;
     for (i = 0; i < n_dimensions; i++)

@@ -19,6 +19,10 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#ifdef CDB_WATCH
+#include <sys/types.h>
+#include <sys/stat.h>
+#endif
 #ifdef CDB_FILES /* define it before this header is included, to have cdb_read_file */
 #include <stdio.h>
 #endif
@@ -106,9 +110,21 @@ typedef struct cdb_condition {
     size_t n_values;                /* 0 where none are declared */
 } cdb_condition;
 
+typedef enum cdb_output_type { CDB_OUT_BOOL, CDB_OUT_INT, CDB_OUT_NUMBER, CDB_OUT_ENUM, CDB_OUT_TEXT, CDB_OUT_NUMBERS } cdb_output_type;
+
+typedef struct cdb_output_wanted {  /* an output that the header reads */
+    const char *name;
+    cdb_output_type type;
+    size_t size;                    /* numbers in one value; 1 where it is one */
+    const char *const *values;      /* of an enum */
+    size_t n_values;
+} cdb_output_wanted;
+
 typedef struct cdb_schema {
     const cdb_condition *conditions;
     size_t n_conditions;
+    const cdb_output_wanted *outputs;
+    size_t n_outputs;
 } cdb_schema;
 
 /* What follows is filled by cdb_open; read it, and do not write. */
@@ -183,6 +199,15 @@ typedef struct cdbi_level {         /* what picks look at in a table, the outer 
     const char *name;
 } cdbi_level;
 
+typedef struct cdb_output {         /* n_rows + 1 values: the last is what there is without a row */
+    const unsigned char *bools;
+    const int64_t *ints;
+    const double *numbers;          /* of numbers: value r begins at r * size */
+    const int32_t *codes;           /* of enum and text: which of `texts` */
+    cdbi_list texts;
+    size_t size;
+} cdb_output;
+
 typedef struct cdbi_soft {          /* the soft cells of a condition, a row for each row of each depth */
     cdb_column column;
     const double *penalties;
@@ -198,6 +223,7 @@ typedef struct cdb_table {
     const char **assets;
     cdb_policy policy;
     const char *fallback;           /* the asset where no row can be picked, or NULL */
+    cdb_output *outputs;            /* those of the schema, in its order */
     size_t n_limited;               /* rows that rest after they were picked, of all tables */
     cdbi_soft *soft;                /* one for each condition, or NULL where no cell is soft */
     size_t n_depths;                /* 1, or how many tables are in each other */

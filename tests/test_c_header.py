@@ -42,12 +42,14 @@ from strategies import IS_FULL, contexts, examples, tables
 
 from contextdb.cells.angles import wrap_angle
 from contextdb.cells.conditions import Condition
+from contextdb.cells.outputs import Output
 from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.c_header.face import reader_names
 from contextdb.compiled.c_header.naming import Names
 from contextdb.compiled.c_header.spelling import Wanted, distinct
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError
+from contextdb.schema.settings import TableSettings
 from contextdb.tables.project import Project
 from contextdb.tables.table import Table
 
@@ -323,11 +325,17 @@ def test_no_name_breaks_the_header(tmp_path: Path, options: list[str]):
     tables = {
         name: Table.from_columns({"Asset": ["a"], **{c: ["Any"] for c in schema}}, schema, name=name).compile() for name in HOSTILE
     }
+    outputs = (*(Output(name, "int", 0) for name in HOSTILE), Output("mood", "enum", HOSTILE[0], values=tuple(HOSTILE)))
+    settings = TableSettings("outputs", outputs=tuple(o.name for o in outputs), typed=outputs)
+    tables["outputs"] = Table.from_columns({"Asset": ["a"], **{o.name: [""] for o in outputs}}, {}, settings).compile()
     tables["empty"] = Table.from_columns({"Asset": []}, {}, name="empty").compile()
     header = c_header_of(tables)
     assert header.isascii()
     (tmp_path / "tables.h").write_text(header, encoding="ascii")
-    (tmp_path / "main.c").write_text('#include "tables.h"\n#include "tables.h"\nint main(void) { return 0; }\n', encoding="ascii")
+    with_files = "#define CDB_FILES\n#define CDB_WATCH\n"
+    (tmp_path / "main.c").write_text(
+        with_files + '#include "tables.h"\n#include "tables.h"\nint main(void) { return 0; }\n', encoding="ascii"
+    )
     ran(built(tmp_path / "main.c", tmp_path / "main.exe", [*options, "-Wall", "-Wextra", "-Wpedantic", "-Werror"]))
 
 
@@ -428,7 +436,9 @@ def test_the_program_of_the_documents_prints_what_python_answers(tmp_path: Path,
         "Defender.Catching": False,
         "Defender.FacingBall": True,
     }
-    assert ran(program, cwd=tmp_path).splitlines() == ["Defender.FacingBall: the fact is missing", *table.query(context).assets]
+    valid = table.query(context)
+    picked = f"picked: {table.picker(1).pick(valid).asset}"
+    assert ran(program, cwd=tmp_path).splitlines() == ["Defender.FacingBall: the fact is missing", *valid.assets, picked]
     (tmp_path / "contested_catch.safetensors").write_bytes(b"")
     assert (
         subprocess.run([program], cwd=tmp_path, capture_output=True, text=True).stdout == ": the file is too short for its header\n"

@@ -29,6 +29,11 @@ int main(void)
     for (int64_t row = cdb_next_row(rows, 16, -1); row >= 0; row = cdb_next_row(rows, 16, row))
         printf("%s\n", cdb_asset(&table.table, row));
 
+    cdb_picker picker = cdb_new_picker(1, 0, 1); /* the memory of one character: seed, its number, picks that are not repeated */
+    int64_t row;
+    cdb_contested_catch_pick(&table, &facts, CDB_UNKNOWN_ERROR, rows, 16, 0.0, &picker, &row, &fault);
+    printf("picked: %s\n", cdb_asset_of(&table.table, row));
+
     cdb_contested_catch_close(&table);
     CDB_FREE(bytes);
     return 0;

@@ -18,7 +18,9 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.kinds import Kind
 from contextdb.compiled.c_header.naming import Choices, Names, TableFace, conditions_of
+from contextdb.compiled.c_header.outputs import output_enums, output_functions, outputs_wanted
 from contextdb.compiled.c_header.spelling import comment, literal
+from contextdb.compiled.c_header.watching import WATCH
 from contextdb.compiled.data import CompiledData
 
 READER = 3
@@ -159,7 +161,7 @@ def _table(table: CompiledData, face: TableFace, choices: Mapping[Condition, Cho
     yield ""
     yield from _facts_struct(table, face, choices)
     yield from _conditions_enum(table, face)
-    yield from _output_enums(table, face)
+    yield from output_enums(table, face)
     yield from _schema(table, face, choices)
     yield from _missing_facts(table, face, choices)
     yield from _functions(table, face, choices)
@@ -228,12 +230,7 @@ def _schema(table: CompiledData, face: TableFace, choices: Mapping[Condition, Ch
             yield f"        {{{literal(condition.name)}, {kind}, {expr}, {listed}, {n_values}}}{ending}"
         yield "    };"
     if face.outputs:
-        yield "    static const cdb_output_wanted outputs[] = {"
-        for number, (output, names) in enumerate(zip(table.outputs.declared, face.outputs, strict=True), 1):
-            listed, n_values = (f"{names.name}_values", len(output.values)) if names.enumerators else ("NULL", 0)
-            kind, ending = f"CDB_OUT_{output.kind.upper()}", "," if number < len(face.outputs) else ""
-            yield f"        {{{literal(output.name)}, {kind}, {max(output.size, 1)}, {listed}, {n_values}}}{ending}"
-        yield "    };"
+        yield from outputs_wanted(table, face)
     conditions = conditions_of(table)
     first = f"{'conditions' if conditions else 'NULL'}, {len(conditions)}"
     second = f"{'outputs' if face.outputs else 'NULL'}, {len(face.outputs)}"
@@ -276,117 +273,8 @@ def _functions(table: CompiledData, face: TableFace, choices: Mapping[Condition,
         yield from (f"    {line}".format(base=base, n=n) for line in body)
         yield "}"
         yield ""
-    yield from _output_functions(table, face)
-    yield from _watch(face)
-
-
-def _output_enums(table: CompiledData, face: TableFace) -> Iterator[str]:
-    """An enum, and the texts of its values, for each output of that type."""
-    for output, names in zip(table.outputs.declared, face.outputs, strict=True):
-        if not names.enumerators:
-            continue
-        yield f"typedef enum {names.name}_value {{"
-        lines = [f"    {names.none} = CDB_MISSING", *(f"    {name} = {n}" for n, name in enumerate(names.enumerators))]
-        yield ",\n".join(lines)
-        yield f"}} {names.name}_value;"
-        yield ""
-        yield f"static const char *const {names.name}_values[] = {{"
-        yield ",\n".join(f"    {literal(value)}" for value in output.values)
-        yield "};"
-        yield ""
-
-
-_READ = {
-    "bool": ("int ", "bool"),
-    "int": ("int64_t ", "int"),
-    "number": ("double ", "number"),
-    "enum": ("{name}_value ", "enum"),
-    "text": ("const char *", "text"),
-    "numbers": ("const double *", "numbers"),
-}
-"""For each type of output the type in C, and the function that reads it."""
-
-
-def _output_functions(table: CompiledData, face: TableFace) -> Iterator[str]:
-    """A function for each output that reads its value in a row."""
-    for number, (output, names) in enumerate(zip(table.outputs.declared, face.outputs, strict=True)):
-        kind, ending = _READ[output.kind]
-        size = f"{output.size} numbers" if output.kind == "numbers" else output.kind
-        told = "; ".join(part for part in (f"{size} {output.name} {output.unit or ''}".strip(), output.description) if part)
-        yield comment(f"{told}; of a row, or of none: -1")
-        yield f"static inline {kind.format(name=names.name)}{names.name}(const {face.base} *opened, int64_t row)"
-        yield "{"
-        cast = f"({names.name}_value)" if output.kind == "enum" else ""
-        yield f"    return {cast}cdb_output_{ending}(&opened->table, {number}, row);"
-        yield "}"
-        yield ""
-
-
-def _watch(face: TableFace) -> Iterator[str]:
-    """The watch of a table's file."""
-    yield from _WATCH.replace("BASE", face.base).splitlines()
-
-
-_WATCH = """\
-#ifdef CDB_WATCH
-/* A compiled file that may be replaced while the game runs. Ask `now`, which is NULL until a file could be opened. */
-typedef struct BASE_watch {
-    cdb_watch file;
-    BASE tables[2];
-    void *bytes[2];
-    BASE *now, *old; /* old: the table that was replaced, still to be asked, until it is released */
-    cdb_strange strange;
-} BASE_watch;
-
-/* A watch of a file; nothing is read yet. The path stays where it is. */
-static inline void BASE_watch_file(BASE_watch *watch, const char *path, cdb_strange strange)
-{
-    memset(watch, 0, sizeof *watch);
-    watch->file.path = path;
-    watch->strange = strange;
-}
-
-/* Look whether there is another file, and if so open it and exchange `now`; nothing is looked for while `old` is not released.
- * Where the new file is refused `now` stays as it is, and the fault is told once. */
-static inline cdb_status BASE_watch_poll(BASE_watch *watch, cdb_fault *fault)
-{
-    size_t size, free_one = watch->now == &watch->tables[0];
-    cdb_fault own;
-    void *bytes;
-    if (!fault) fault = &own;
-    if (watch->old) return cdbi_fault(fault, CDB_OK, "", -1, "");
-    bytes = cdb_read_changed(&watch->file, &size, fault);
-    if (!bytes) return fault->status;
-    if (BASE_open_with(&watch->tables[free_one], bytes, size, watch->strange, fault) != CDB_OK) {
-        CDB_FREE(bytes);
-        return fault->status;
-    }
-    watch->bytes[free_one] = bytes;
-    watch->old = watch->now;
-    watch->now = &watch->tables[free_one];
-    return CDB_OK;
-}
-
-/* Give back the table that was replaced; nobody asks it any more. */
-static inline void BASE_watch_release(BASE_watch *watch)
-{
-    size_t one = watch->old == &watch->tables[1];
-    if (!watch->old) return;
-    BASE_close(watch->old);
-    CDB_FREE(watch->bytes[one]);
-    watch->bytes[one] = NULL;
-    watch->old = NULL;
-}
-
-static inline void BASE_watch_close(BASE_watch *watch)
-{
-    BASE_watch_release(watch);
-    watch->old = watch->now;
-    watch->now = NULL;
-    BASE_watch_release(watch);
-}
-#endif
-"""
+    yield from output_functions(table, face)
+    yield from WATCH.replace("BASE", face.base).splitlines()
 
 
 _ASKED = "const {base} *opened, const {base}_facts *facts, cdb_unknown unknown"

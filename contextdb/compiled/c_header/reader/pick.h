@@ -102,7 +102,8 @@ static inline int cdbi_rests(const cdbi_pick *pick, const cdbi_level *level, siz
     if (!rest || rest->key == 0) return 0;
     if (level->once && level->once[at]) return 1;
     if (level->cooldown_turns && pick->picker->turn - rest->turn <= level->cooldown_turns[at]) return 1;
-    return level->cooldown_s && pick->time_s < cdbi_sum(rest->time_s, level->cooldown_s[at]);
+    if (!level->cooldown_s || !cdbi_is_less(0.0, level->cooldown_s[at])) return 0;
+    return pick->time_s < cdbi_sum(rest->time_s, level->cooldown_s[at]);
 }
 
 /* Whether a row has a weight wherever chance decides, and does not rest. */
@@ -148,7 +149,9 @@ static inline int cdbi_order(const cdbi_pick *pick, size_t depth, size_t row, si
     double a, b;
     if (level->policy == CDB_FIRST) return one == two ? 0 : one < two ? 1 : -1;
     if (level->policy == CDB_UNIQUE || one == two) return 0;
-    if (level->priorities[one] != level->priorities[two]) return level->priorities[one] > level->priorities[two] ? 1 : -1;
+    a = (double)level->priorities[one];
+    b = (double)level->priorities[two];
+    if (cdbi_place(a) != cdbi_place(b)) return cdbi_place(a) > cdbi_place(b) ? 1 : -1;
     if (level->policy == CDB_SPECIFIC && level->specificities) {
         a = level->specificities[one];
         b = level->specificities[two];

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import contextdb as cdb
+from contextdb.cells.outputs import OUTPUT_TYPES
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 
@@ -46,6 +47,9 @@ SAMPLES = Path(__file__).parent.parent / "tables"
 PROJECT = cdb.Project.load(SAMPLES)
 
 
+GIVING = Table.from_columns({"A": ["a"], "n": ["1"]}, {}, {"outputs": {"n": {"type": "int"}}}).compile()
+
+
 class Odd:
     """Something that no function expects."""
 
@@ -72,6 +76,16 @@ CALLS: dict[str, Call] = {
     "from_columns(columns)": lambda x: Table.from_columns(x),  # type: ignore[arg-type]
     "from_columns(schema)": lambda x: Table.from_columns({"A": ["a"], "speed": ["1"]}, x),  # type: ignore[arg-type]
     "from_columns(settings)": lambda x: Table.from_columns({"A": ["a"]}, {}, x),  # type: ignore[arg-type]
+    "from_columns(settings), outputs": lambda x: Table.from_columns({"A": ["a"]}, {}, {"outputs": x}),
+    "from_columns(settings), an output": lambda x: Table.from_columns({"A": ["a"]}, {}, {"outputs": {"n": x}}),
+    **{
+        f"from_columns(settings), {key} of {kind}": lambda x, key=key, kind=kind: output_with(key, kind, x)
+        for kind in OUTPUT_TYPES
+        for key in ("type", "default", "min", "max", "values", "size", "unit")
+    },
+    "from_columns(settings), fallback": lambda x: Table.from_columns({"A": ["a"]}, {}, {"fallback": x}),
+    "from_columns(settings), outputs of the fallback": lambda x: fallback_with(x),
+    "from_columns(settings), an output of the fallback": lambda x: fallback_with({"n": x}),
     "from_columns(name)": lambda x: Table.from_columns({"A": ["a"]}, name=x),  # type: ignore[arg-type]
     "text(row)": lambda x: TABLE.text(x, "speed"),  # type: ignore[arg-type]
     "text(column)": lambda x: TABLE.text(0, x),  # type: ignore[arg-type]
@@ -124,6 +138,11 @@ CALLS: dict[str, Call] = {
     "matches.casting(row)": lambda x: CAST.casting(x),  # type: ignore[arg-type]
     "matches.castings(row)": lambda x: CAST.castings(x),  # type: ignore[arg-type]
     "matches.casting(row) without actors": lambda x: COMPILED.query(FACTS).casting(x),  # type: ignore[arg-type]
+    "matches.outputs(name)": lambda x: GIVING.query({}).outputs(x),  # type: ignore[arg-type]
+    "outputs.column(name)": lambda x: GIVING.outputs.column(x),  # type: ignore[arg-type]
+    "outputs.of(rows)": lambda x: GIVING.outputs.of(x, "n"),  # type: ignore[arg-type]
+    "outputs.of(name)": lambda x: GIVING.outputs.of([0], x),  # type: ignore[arg-type]
+    "outputs.of_row(row)": lambda x: GIVING.outputs.of_row(x),  # type: ignore[arg-type]
     "in matches(row)": lambda x: x in CAST,
     "many[context]": lambda x: ANSWERS[x],  # type: ignore[call-overload]
     "many[context] with actors": lambda x: CAST_ANSWERS[x],  # type: ignore[call-overload]
@@ -143,6 +162,16 @@ CALLS: dict[str, Call] = {
     **{f"a live fact of {name}": lambda x, name=name: COMPILED.live({**FACTS, name: x}).matches() for name in FACTS},  # type: ignore[misc]
     **{f"many facts of {name}": lambda x, name=name: list(COMPILED.query_many({**MANY, name: [x]})) for name in FACTS},  # type: ignore[misc]
 }
+
+
+def output_with(key: str, kind: str, value: object) -> Table:
+    said: dict[str, object] = {"type": kind} | {"enum": {"values": ["A"]}, "numbers": {"size": 1}}.get(kind, {})
+    return Table.from_columns({"A": ["a"], "n": [""]}, {}, {"outputs": {"n": {**said, key: value}}})
+
+
+def fallback_with(outputs: object) -> Table:
+    settings = {"outputs": {"n": {"type": "int"}}, "fallback": {"asset": "a", "outputs": outputs}}
+    return Table.from_columns({"A": ["a"], "n": ["1"]}, {}, settings)
 
 
 def live_with(actors: object, prefer: object = None) -> cdb.LiveContext:

@@ -18,6 +18,7 @@ from running import run
 from strategies import examples
 
 import contextdb as cdb
+from contextdb.commands.check_command import check_path
 from contextdb.compiled.stubs import stubs_of
 from contextdb.compiled.table import CompiledTable
 from contextdb.files.tensors import read_tensors, write_tensors
@@ -373,6 +374,12 @@ def test_rows_that_are_no_numbers_are_refused():
         table_of("damage", "3").compile().outputs.of([True], "damage")
 
 
+def test_outputs_are_shown_in_one_line():
+    said = "<Outputs: damage (int), scale (number), loud (bool), element (enum), at (numbers)>"
+    assert repr(table_of("damage", "3").compile().outputs) == said
+    assert repr(Table.from_columns({"Asset": ["a"]}).compile().outputs) == "<Outputs: none>"
+
+
 def test_rows_of_any_shape_give_outputs_of_that_shape():
     outputs = table_of("damage", "3").compile().outputs
     assert outputs.of([[0, -1]], "damage").tolist() == [[3, 0]]
@@ -429,6 +436,14 @@ def test_a_table_inside_with_another_type_is_refused():
     assert error.value.faults[0].rule == "unlike-outputs"
 
 
+def test_check_reports_tables_inside_each_other_whose_outputs_differ(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[tables.low]\noutputs = { n = { type = "int" } }\n[tables.outer]\noutputs = ["n"]\n')
+    (tmp_path / "low.csv").write_text("Asset,n\nA,1\n")
+    (tmp_path / "outer.csv").write_text("Asset,n\n@low,1\n")
+    found = [f for f in check_path(str(tmp_path)).findings if f.level == "error"]
+    assert [(f.rule, f.column) for f in found] == [("unlike-outputs", "n")]
+
+
 # ---- contextdb.toml
 
 TOML = """
@@ -477,6 +492,7 @@ def test_settings_come_back_from_what_the_file_says_of_them(drawn):
         ('outputs = { a = { type = "numbers", size = 0 } }', "size = 0: there are no cells of so many numbers"),
         ('outputs = { a = { type = "bool", max = 1 } }', 'max = 1 has no place here: its type is "bool"'),
         ('outputs = { a = { type = "int", min = 2, max = 1 } }', "min = 2 is above max = 1.*Did you mean min = 1 and max = 2"),
+        ('outputs = { a = { type = "number", min = inf } }', "min = inf leaves no number"),
         ('outputs = { a = { type = "int", min = 0.5 } }', "an int has whole bounds.*Did you mean min = 1"),
         ('outputs = { a = { type = "int", default = 1.5 } }', "default = 1.5: this is not a whole number"),
         ('outputs = { a = { type = "int", default = true } }', "default = true: this is not a number"),
@@ -563,3 +579,17 @@ def test_a_workbook_carries_the_types_of_outputs_along(tmp_path: Path):
     assert set(after.settings.typed) == set(before.settings.typed)
     assert after.settings.fallback_outputs == before.settings.fallback_outputs
     assert after.compile().outputs.of_row(0) == before.compile().outputs.of_row(0)
+
+
+def test_a_hot_reload_takes_over_outputs_that_changed(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text('[tables.t]\noutputs = { n = { type = "int" } }\n')
+    (tmp_path / "t.csv").write_text("Asset,n\nA,1\n")
+    with cdb.watch(tmp_path, poll_s=None, settle_s=0.0) as watch:
+        before = watch["t"]
+        (tmp_path / "t.csv").write_text("Asset,n\nA,12\n")
+        watch.poll()
+        assert (before.outputs.of_row(0), watch["t"].outputs.of_row(0)) == ({"n": 1}, {"n": 12})
+        (tmp_path / "t.csv").write_text("Asset,n\nA,x\n")
+        watch.poll()
+        assert watch["t"].outputs.of_row(0) == {"n": 12}
+        assert [fault.rule for fault in watch.faults] == ["unreadable-output"]

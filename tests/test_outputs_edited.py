@@ -190,6 +190,12 @@ def test_an_output_that_one_side_renames_and_the_other_declares_anew_is_both(tab
     assert (output.maximum, merged.fallback_outputs) == (9.0, (("hurt", 3),))
 
 
+def test_the_same_value_written_otherwise_is_no_conflict(table: Table):
+    ours, theirs = table.with_cell(0, "damage", "2"), table.with_cell(0, "damage", " 2.0 ")
+    assert merge(table, ours, theirs).conflicts == ()
+    assert merge(table, ours, table.with_cell(0, "damage", "3")).conflicts != ()
+
+
 def test_merging_a_table_with_itself_changes_nothing(table: Table):
     assert merge(table, table, table).table.settings == table.settings
 

@@ -87,6 +87,11 @@ class Output:
         """What a cell may say, for messages."""
         return some(self.values) if self.kind == "enum" else _ACCEPTED[self.kind].format(size=self.size) + self._bounds
 
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The texts of all values, where they are a list."""
+        return ("True", "False") if self.kind == "bool" else self.values
+
     def array(self, values: list[OutputValue]) -> np.ndarray[Any, np.dtype[Any]]:
         """Some values as numpy has them: bool, int64, float64, float64 [n, size] or, for texts, objects."""
         if self.kind == "numbers":

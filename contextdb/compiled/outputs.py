@@ -19,14 +19,14 @@ from contextdb.cells.arguments import require_row, require_text
 from contextdb.cells.outputs import Output, OutputValue
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
-from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, in_quotes, nearest, shown, some
 
 Column = NDArray[Any]
 OutputCells = Column | TextColumn
 """R + 1 values: bool, int64, float64 or float64 [R + 1, size]; texts of an enum or a text."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Outputs(Unchanging):
     """The outputs of a compiled table: a table without outputs has none, which is not an error.
 
@@ -53,6 +53,9 @@ class Outputs(Unchanging):
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
+
+    def __repr__(self) -> str:
+        return f"<Outputs: {', '.join(f'{shown(o.name)} ({o.kind})' for o in self.declared) or 'none'}>"
 
     def column(self, name: str) -> Column:
         """The output of every row, read-only: bool, int64 or float64 [n_rows], for `numbers` float64 [n_rows, size], for enum and
@@ -145,22 +148,25 @@ class Outputs(Unchanging):
 NO_OUTPUTS = Outputs()
 
 
-def outputs_of_values(
-    declared: Sequence[Output], cells: Sequence[tuple[Sequence[OutputValue], NDArray[Any]]], fallback: Mapping[str, OutputValue]
-) -> Outputs:
-    """Outputs from the values of each column and one code a row, which says which of the values the row has."""
-    found = [
-        _cells(output, [*values, fallback.get(output.name, output.nothing)], np.append(codes, len(values)))
-        for output, (values, codes) in zip(declared, cells, strict=True)
-    ]
-    return Outputs(tuple(declared), tuple(found))
+def outputs_of_cells(declared: Sequence[Output], cells: Sequence[OutputCells], fallback: Mapping[str, OutputValue]) -> Outputs:
+    """Outputs from the values of each column's rows and from what the fallback gives."""
+    pairs = zip(declared, cells, strict=True)
+    return Outputs(tuple(declared), tuple(_with_last(o, found, fallback.get(o.name, o.nothing)) for o, found in pairs))
 
 
-def _cells(output: Output, values: list[OutputValue], codes: NDArray[Any]) -> OutputCells:
-    """The values by code; texts once each, those of an enum in their declared order, behind them "" for none."""
+def cells_of(output: Output, values: list[OutputValue], codes: NDArray[Any]) -> OutputCells:
+    """The values of R rows from some values and the place of each row's among them; of texts each once, those of an enum in their
+    declared order, behind them "" for none."""
     if not output.is_text:
         taken: Column = output.array(values)[codes]
         return taken
     known = {value: code for code, value in enumerate((*output.values, "") if output.kind == "enum" else ())}
     places = [known.setdefault(str(value), len(known)) for value in values]
     return TextColumn(output.name, tuple(known), np.array(places, np.int32)[codes])
+
+
+def _with_last(output: Output, cells: OutputCells, last: OutputValue) -> OutputCells:
+    if not isinstance(cells, TextColumn):
+        return np.concatenate([cells, output.array([last])])
+    texts = cells.texts if last in cells.texts else (*cells.texts, str(last))
+    return TextColumn(output.name, texts, np.append(cells.codes, np.int32(texts.index(str(last)))))

@@ -134,7 +134,9 @@ def _key_faults(path: tuple[str, ...], part: Said) -> Iterator[Found]:
             yield (
                 (*path, key),
                 Fault(
-                    f"{about} has no key {in_quotes(key)}.", some(OUTPUT_KEYS, len(OUTPUT_KEYS)), in_quotes(near) if near else ""
+                    f"{about} has no key {in_quotes(str(key))}.",
+                    some(OUTPUT_KEYS, len(OUTPUT_KEYS)),
+                    in_quotes(near) if near else "",
                 ),
             )
         elif wrong := OUTPUT_KEYS[key].wrong(value):
@@ -180,7 +182,9 @@ def _bound_faults(path: tuple[str, ...], kind: str, bounds: Said) -> Iterator[Fo
             Fault(f"{about} {_said('min', low)} is above {_said('max', high)}.", "a min that is not above max", mend),
         )
     for key, bound in bounds.items():
-        if kind == "int" and math.isfinite(bound) and bound != math.floor(bound):
+        if bound == (math.inf if key == "min" else -math.inf):
+            yield (*path, key), Fault(f"{about} {_said(key, bound)} leaves no number.", "a finite number", "to leave it out")
+        elif kind == "int" and math.isfinite(bound) and bound != math.floor(bound):
             mend = _said(key, math.ceil(bound) if key == "min" else math.floor(bound))
             yield (*path, key), Fault(f"{about} {_said(key, bound)}: an int has whole bounds.", "a whole number", mend)
 
@@ -189,11 +193,11 @@ def _fallback_faults(fallback: Said, declared: Iterable[Output] | None) -> Itera
     """What is wrong with a fallback that is a table; what it gives to outputs is looked at where those are known."""
     for key in fallback:
         if key not in FALLBACK_KEYS:
-            near = nearest(key, FALLBACK_KEYS)
+            near = nearest(str(key), FALLBACK_KEYS)
             mend = in_quotes(near) if near else ""
             if declared is not None and key in (output.name for output in declared):
                 mend = _said("outputs", {key: fallback[key]})
-            yield ("fallback", key), Fault(f"fallback has no key {in_quotes(key)}.", some(FALLBACK_KEYS), mend)
+            yield ("fallback", key), Fault(f"fallback has no key {in_quotes(str(key))}.", some(FALLBACK_KEYS), mend)
     if "asset" not in fallback:
         yield ("fallback",), Fault("fallback names no asset.", _said("asset", "idle"))
     elif wrong := wrong_name(fallback["asset"]):
@@ -210,9 +214,12 @@ def _given_faults(given: Said, declared: Mapping[str, Output]) -> Iterator[Found
     for name, value in given.items():
         path = ("fallback", "outputs", name)
         if name not in declared:
-            near = nearest(name, declared)
+            near = nearest(str(name), declared)
             accepted = some(declared) or "no name: the table has no outputs"
-            yield path, Fault(f"fallback gives {in_quotes(name)}, which is no output.", accepted, in_quotes(near) if near else "")
+            yield (
+                path,
+                Fault(f"fallback gives {in_quotes(str(name))}, which is no output.", accepted, in_quotes(near) if near else ""),
+            )
             continue
         try:
             declared[name].taken(value)
@@ -245,13 +252,13 @@ def _guess(part: Said) -> str:
 
 
 def _said(key: str, value: object) -> str:
-    return shown(f"{dotted((key,))} = {_written(value)}", 120)
+    return shown(f"{dotted((str(key),))} = {_written(value)}", 120)
 
 
 def _written(value: object) -> str:
     if not isinstance(value, Mapping) or not value:
         return shapes.as_toml(value)
-    return f"{{ {', '.join(f'{dotted((key,))} = {_written(item)}' for key, item in value.items())} }}"
+    return f"{{ {', '.join(f'{dotted((str(key),))} = {_written(item)}' for key, item in value.items())} }}"
 
 
 def _output(name: str, part: Said) -> Output:

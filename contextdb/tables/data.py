@@ -279,7 +279,9 @@ def with_columns(table: AnyTable, columns: Sequence[TextColumn], origin: NDArray
     """The table with other texts in the same columns, and where its rows then came from."""
     now = {c.name: c for c in columns}
     conditions = tuple(c if now[c.condition.name] is c.texts else c.with_texts(now[c.condition.name]) for c in table.conditions)
-    return replace(table, columns=tuple(columns), conditions=conditions, origin=origin)
+    after = replace(table, columns=tuple(columns), conditions=conditions, origin=origin)
+    after.__dict__["output_columns"] = tuple(column.with_texts(now[column.output.name]) for column in table.output_columns)
+    return after
 
 
 def _no_such(what: str, name: str, known: list[str]) -> Fault:

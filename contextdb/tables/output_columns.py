@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 
 from contextdb.cells.outputs import Output, OutputValue
 from contextdb.columns import TextColumn
-from contextdb.compiled.outputs import NO_OUTPUTS, Outputs, outputs_of_values
+from contextdb.compiled.outputs import NO_OUTPUTS, OutputCells, Outputs, cells_of, outputs_of_cells
 from contextdb.errors import CellError, Fault, Place
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.condition_column import MOST_MENDS
+
+Read = tuple[list[OutputValue], dict[int, Fault]]
+"""The value of each text, and why some cannot be read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,19 +42,35 @@ class OutputColumn:
         return self._read[1]
 
     @cached_property
-    def _read(self) -> tuple[list[OutputValue], dict[int, Fault]]:
-        output, texts = self.output, self.texts.texts
+    def _read(self) -> Read:
+        return self._read_on(self.texts.texts, (), {})
+
+    def _read_on(self, texts: Iterable[str], known: Sequence[OutputValue], wrong: Mapping[int, Fault]) -> Read:
+        """What texts give, behind others that are known."""
+        output, values, faults = self.output, list(known), dict(wrong)
         if output.kind == "text":
-            return [text if text.strip() else output.nothing for text in texts], {}
-        values: list[OutputValue] = []
-        faults: dict[int, Fault] = {}
-        for i, text in enumerate(texts):
+            return values + [text if text.strip() else output.nothing for text in texts], faults
+        for text in texts:
             try:
                 values.append(output.read(text, len(faults) < MOST_MENDS))
             except CellError as error:
+                faults[len(values)] = error.faults[0].at(Place(column=output.name))
                 values.append(output.nothing)
-                faults[i] = error.faults[0].at(Place(column=output.name))
         return values, faults
+
+    @cached_property
+    def cells(self) -> OutputCells:
+        """The value of each row."""
+        return cells_of(self.output, self.values, self.texts.codes)
+
+    def with_texts(self, texts: TextColumn) -> OutputColumn:
+        """The column with other texts; those that were read before are not read again."""
+        if texts is self.texts:
+            return self
+        found, known = OutputColumn(self.output, texts), len(self.texts.texts)
+        if "_read" in self.__dict__ and texts.texts[:known] == self.texts.texts:
+            found.__dict__["_read"] = self._read_on(texts.texts[known:], *self._read)
+        return found
 
     def faulty_rows(self, may_be_empty: Set[int]) -> Iterator[tuple[int, Fault]]:
         """Each row whose cell cannot be read, and why; some rows may be empty."""
@@ -72,10 +91,10 @@ def output_columns(columns: Sequence[TextColumn], settings: TableSettings) -> tu
 
 def outputs_of(columns: Iterable[OutputColumn], settings: TableSettings) -> Outputs:
     """The outputs of a table, to be read by row."""
-    found = [(column.output, (column.values, column.texts.codes)) for column in columns]
+    found = list(columns)
     if not found:
         return NO_OUTPUTS
-    return outputs_of_values([output for output, _ in found], [cells for _, cells in found], dict(settings.fallback_outputs))
+    return outputs_of_cells([c.output for c in found], [c.cells for c in found], dict(settings.fallback_outputs))
 
 
 def layered(

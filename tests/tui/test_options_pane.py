@@ -72,6 +72,24 @@ def test_every_setting_is_shown_with_its_value_and_what_it_means():
     assert not app.sheet.is_modified
 
 
+def test_unticking_an_output_keeps_the_types_of_the_others():
+    typed = {"slot": {"type": "enum", "values": ["a", "b"]}, "n": {"type": "int", "default": 1}}
+    settings = {"outputs": typed, "fallback": {"asset": "walk", "outputs": {"slot": "a", "n": 2}}}
+    columns = {"Asset": ["walk"], "slot": ["a"], "n": [""]}
+    app = PaneApp(Table.from_columns(columns, {}, settings), column=0)
+
+    async def script(pilot):
+        app.query_one("#option-outputs", TickList).focus()
+        await pilot.press("down", "space")
+        await pilot.pause()
+        await submit(pilot, "#option-fallback", "run")
+
+    drive(app, script, (80, 40))
+    now = app.sheet.table.settings
+    assert (now.outputs, now.fallback, now.fallback_outputs) == (("n",), "run", (("n", 2),))
+    assert now.output("n") is not None
+
+
 def test_a_picked_setting_is_an_edit_that_undo_takes_back():
     app = PaneApp(small())
 

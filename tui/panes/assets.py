@@ -153,9 +153,11 @@ class AssetsPane(Pane):
         editor.focus()
 
     def _known(self, texts: TextColumn) -> list[str]:
-        """What a cell may be completed to: an asset first to the clips that no row names yet."""
+        """What a cell may be completed to: an asset first to the clips that no row names yet, an output to what it may say."""
         known = _by_frequency(texts)
         table = self.sheet.table
+        if (output := table.settings.output(texts.name)) is not None:
+            return list(dict.fromkeys([*output.choices, *known]))
         if texts.name != table.asset_column:
             return known
         known += [f"{MARK}{name}" for name in table.around or () if name != table.name and f"{MARK}{name}" not in known]

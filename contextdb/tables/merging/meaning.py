@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from contextdb.cells.grammar import parse_cell
+from contextdb.cells.outputs import Output
 from contextdb.cells.words import truth_of
 from contextdb.errors import CellError
 from contextdb.expressions.rules import has_no_rule
@@ -16,7 +17,8 @@ Meaning = Callable[[str], object]
 
 
 def meaning_of(table: TableData, column: int) -> Meaning:
-    """How texts of a column are read: as cells, truths or numbers; an asset, an output and what cannot be read mean themselves."""
+    """How texts of a column are read: as cells, truths or numbers; an asset, an output without a type and what cannot be read mean
+    themselves."""
     name, settings = table.columns[column].name, table.settings
     condition = next((c for c in table.conditions if c.condition.name == name), None)
     if condition is not None:
@@ -28,6 +30,8 @@ def meaning_of(table: TableData, column: int) -> Meaning:
     if name in (settings.priority, settings.weight, settings.cooldown_s, settings.cooldown_turns):
         empty = 1.0 if name == settings.weight else 0.0
         return lambda text: _number(text, empty)
+    if (output := settings.output(name)) is not None:
+        return _output_reader(output)
     if name == settings.when:
         return lambda text: "" if has_no_rule(text) else text.strip()
     return lambda text: None
@@ -48,6 +52,16 @@ def _cell_reader(column: ConditionColumn) -> Meaning:
     def read(text: str) -> object:
         try:
             return domain.kind, known[text] if text in known else parse_cell(text, domain)
+        except CellError:
+            return None
+
+    return read
+
+
+def _output_reader(output: Output) -> Meaning:
+    def read(text: str) -> object:
+        try:
+            return output.kind, output.read(text, wants_mend=False)
         except CellError:
             return None
 

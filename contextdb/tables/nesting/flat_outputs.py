@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
-from numpy.typing import NDArray
-
-from contextdb.cells.outputs import Output, OutputValue
+from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
-from contextdb.compiled.outputs import NO_OUTPUTS, Outputs, outputs_of_values
+from contextdb.compiled.outputs import NO_OUTPUTS, Outputs, cells_of, outputs_of_cells
 from contextdb.errors import Fault, Place, TableError, in_quotes
 from contextdb.tables.nesting.expansion import Expansion
 from contextdb.tables.output_columns import layered
@@ -40,14 +37,14 @@ def flat_outputs(expansion: Expansion, slots: Mapping[str, TextColumn]) -> Outpu
     declared = declared_of(expansion)
     if not declared:
         return NO_OUTPUTS
-    cells: list[tuple[list[OutputValue], NDArray[Any]]] = []
+    cells = []
     for output in declared:
         if output.name in slots:
-            cells.append((list(slots[output.name].texts), slots[output.name].codes))
+            cells.append(cells_of(output, list(slots[output.name].texts), slots[output.name].codes))
             continue
         named = [(n, c) for n, t in enumerate(expansion.tables) for c in t.output_columns if c.output.name == output.name]
-        cells.append(layered(named, expansion.numbers, expansion.rows, output.nothing))
-    return outputs_of_values(declared, cells, dict(expansion.tables[0].settings.fallback_outputs))
+        cells.append(cells_of(output, *layered(named, expansion.numbers, expansion.rows, output.nothing)))
+    return outputs_of_cells(declared, cells, dict(expansion.tables[0].settings.fallback_outputs))
 
 
 def _unlike(expansion: Expansion, first: int, number: int, known: Output, output: Output) -> Fault:

@@ -129,7 +129,7 @@ class Character:
         if table.key(row) not in self.picked:
             return False
         turn, time = self.picked[table.key(row)]
-        return one.once or self.turn <= turn + one.cooldown_turns or time_s < time + one.cooldown_s
+        return one.once or self.turn <= turn + one.cooldown_turns or (one.cooldown_s > 0 and time_s < time + one.cooldown_s)
 
     def pick(self, tables: Tables, facts: Facts, time_s: float) -> Path | None:
         """What the character picks, and remembers."""

@@ -132,6 +132,17 @@ CALLS: dict[str, Call] = {
     "pick(rng)": lambda x: COMPILED.pick(FACTS, x),  # type: ignore[arg-type]
     "pick(last)": lambda x: COMPILED.pick(FACTS, last=x),  # type: ignore[arg-type]
     "pick(unknown)": lambda x: COMPILED.pick({}, unknown=x),  # type: ignore[arg-type]
+    "pick(actors)": lambda x: COMPILED.pick(PLAIN, actors=x),  # type: ignore[arg-type]
+    "pick(prefer)": lambda x: COMPILED.pick(PLAIN, actors={}, prefer=x),  # type: ignore[arg-type]
+    "picker(seed)": lambda x: COMPILED.picker(x),  # type: ignore[arg-type]
+    "picker(memory)": lambda x: COMPILED.picker(memory=x),  # type: ignore[arg-type]
+    "picker.pick(matches)": lambda x: COMPILED.picker().pick(x),  # type: ignore[arg-type]
+    "picker.pick(time_s)": lambda x: COMPILED.picker().pick(COMPILED.query(FACTS), time_s=x),  # type: ignore[arg-type]
+    "picker.pick(who)": lambda x: COMPILED.picker().pick(COMPILED.query(FACTS), who=x),  # type: ignore[arg-type]
+    "picker.pick_many(many)": lambda x: COMPILED.picker().pick_many(x),  # type: ignore[arg-type]
+    "picker.pick_many(time_s)": lambda x: COMPILED.picker().pick_many(ANSWERS, time_s=x),  # type: ignore[arg-type]
+    "picker.pick_many(who)": lambda x: COMPILED.picker().pick_many(ANSWERS, who=x),  # type: ignore[arg-type]
+    "picker.forget(who)": lambda x: COMPILED.picker().forget(x),  # type: ignore[arg-type]
     "penalties(context)": lambda x: COMPILED.penalties(x),  # type: ignore[arg-type]
     "penalties(unknown)": lambda x: COMPILED.penalties({}, x),  # type: ignore[arg-type]
     "cell(text)": lambda x: COMPILED.query({**FACTS, "speed": cdb.cell(x)}),  # type: ignore[arg-type]
@@ -198,7 +209,7 @@ def test_a_wrong_argument_ends_in_an_error_that_says_what_was_wrong(name: str):
 
 def test_every_public_method_is_asked_with_wrong_arguments():
     api = (SAMPLES.parent / "docs" / "api.md").read_text(encoding="utf-8")
-    methods = re.findall(r"`(?:Project|Table|CompiledTable|Matches|LiveContext|Explanation)\.(\w+)\(\w", api)
+    methods = re.findall(r"`(?:Project|Table|CompiledTable|Matches|LiveContext|Explanation|Picker)\.(\w+)\(\w", api)
     assert len(methods) > 20
     assert [n for n in methods if not any(f"{n}(" in call for call in CALLS)] == ["prepare"]  # which takes switches alone
 

@@ -296,6 +296,12 @@ def test_a_row_rests_for_seconds():
     assert [picker.pick(matches, time_s=t).row for t in times] == [0, None, None, 0, None, 0]
 
 
+def test_a_row_that_rests_for_turns_alone_does_not_look_at_the_time():
+    table = table_of(fallback="silence", asset=["hello"], cooldown_turns=["1"])
+    picker, matches = table.picker(), table.query({"x": True})
+    assert [picker.pick(matches, time_s=t).row for t in (5.0, 6.0, None, 1.0, 0.0)] == [0, None, 0, None, 0]
+
+
 def test_each_character_rests_on_its_own():
     table = table_of(fallback="silence", asset=["hello"], once=["yes"])
     picker = table.picker()

@@ -22,6 +22,8 @@ modules, signatures = set(sys.modules), compiled()
 facts = {c.name: c.domain.values[0] if c.domain.values else 1.0 for c in table.conditions}
 facts |= {c.name: True for c in table.conditions if c.domain.kind == "bool"}
 table.pick(table.query(facts), 1)
+picker = table.picker()
+picker.pick(table.query(facts)).why
 table.live(facts).matches()
 plain = {name: fact for name, fact in facts.items() if "." not in name}
 actors = {"Defender": [{n.partition(".")[2]: f for n, f in facts.items() if "." in n}]} if len(plain) < len(facts) else {}
@@ -31,7 +33,7 @@ live.actors(actors)
 live.matches()
 for n in (1, 3, 20000):
     many = table.query_many({name: [fact] * n for name, fact in facts.items()})
-    many.counts, many.hits, many.mask, many[0], len(many.lists())
+    many.counts, many.hits, many.mask, many[0], len(many.lists()), picker.pick_many(many)
 table.query_codes(table.encode(facts))
 print(sorted(m for m in set(sys.modules) - modules if m.startswith(("contextdb", "numba"))), compiled() == signatures)
 """

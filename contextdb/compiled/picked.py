@@ -125,7 +125,8 @@ class Picked:
             (here,) = np.nonzero(of >= 0)
             limit, slot, column = of[here], slots[here], columns[of[here]]
             turn, time = self.last_turn[slot, column], self.last_s[slot, column]
-            is_early = (self.turns[slot] - turn <= limits.cooldown_turns[limit]) | (time_s < time + limits.cooldown_s[limit])
+            seconds = limits.cooldown_s[limit]
+            is_early = (self.turns[slot] - turn <= limits.cooldown_turns[limit]) | ((seconds > 0.0) & (time_s < time + seconds))
             found[here] |= (turn != NEVER) & (limits.once[limit] | is_early)
         return found
 
@@ -134,6 +135,15 @@ class Picked:
         if self.memory:
             self.recent[slots, 1:] = self.recent[slots, :-1]
             self.recent[slots, 0] = assets
+
+    def remember_one(self, slot: int, asset: int | None) -> None:
+        """Keep which asset one character picked, if it did, in a turn of its own."""
+        self.turns[slot] += 1
+        if asset is not None and self.memory:
+            recent = self.recent[slot]
+            if self.memory > 1:
+                recent[1:] = recent[:-1].copy()
+            recent[0] = asset
 
     def rest(self, limits: Limits, columns: Rows, slots: Rows, rows: Rows, time_s: float) -> None:
         """Let rows rest that some characters picked in this turn, each once."""

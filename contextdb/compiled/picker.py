@@ -174,12 +174,14 @@ class Picker:
         known = self._version(self._compiled_of(matches))
         time = _time(known, time_s)
         slot = self._picked.slot(_character(who))
-        left = self._one(known, matches, slot, who, time) if known.choosing.compiled.ways is None else None
-        if left is None:
-            left = self._through_tables(known, matches, slot, who, time)
-        row = left.picked
-        self._keep(known, np.array([slot]), np.array([-1 if row is None else row]), time)
         compiled = known.choosing.compiled
+        if compiled.ways is None and known.choosing.limits is None:
+            left = self._one(known, matches, slot, who)
+            self._picked.remember_one(slot, None if left.picked is None else known.asset_list[left.picked])
+        else:
+            left = self._as_many(known, matches, slot, who, time)
+            self._keep(known, np.array([slot]), np.array([-1 if left.picked is None else left.picked]), time)
+        row = left.picked
         return Pick(row, compiled.fallback if row is None else compiled.assets[row], left)
 
     def pick_many(
@@ -284,11 +286,9 @@ class Picker:
 
     # ---- one pick, and many
 
-    def _one(self, known: _Known, matches: Matches, slot: int, who: int, time_s: float) -> Left | None:
-        """A pick in a table without tables inside, row by row; None where rows may rest."""
+    def _one(self, known: _Known, matches: Matches, slot: int, who: int) -> Left:
+        """A pick in a table without tables inside and without rows that rest, row by row."""
         choosing = known.choosing
-        if choosing.limits is not None:
-            return None
         compiled, valid = choosing.compiled, matches.indices.tolist()
         if compiled.policy not in CHANCE:
             if compiled.policy == "unique" and len(valid) > 1:
@@ -314,7 +314,7 @@ class Picker:
             picked = fresh[_hit([weights[r] for r in fresh], uniform(self._seed, who, int(self._picked.turns[slot]), 0))]
         return Left(choosing, matches, valid, may, fresh, picked)
 
-    def _through_tables(self, known: _Known, matches: Matches, slot: int, who: int, time_s: float) -> Left:
+    def _as_many(self, known: _Known, matches: Matches, slot: int, who: int, time_s: float) -> Left:
         """A pick as one of many."""
         valid = matches.indices
         contexts, slots = np.zeros(len(valid), np.int64), np.array([slot])

@@ -9,6 +9,7 @@ from contextdb.compiled.batch import load_kernels, query_codes, query_many
 from contextdb.compiled.casting.facts import Ask
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.stage import query_with_actors
+from contextdb.compiled.choosing import Choosing
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.live import live_context
 
@@ -20,6 +21,7 @@ def prepare(compiled: CompiledData, casting: bool = False, batches: bool = False
     _ = compiled.memory
     if compiled.ways is not None:
         _ = compiled.ways.pickable
+    _ = compiled.once(Choosing.of).plain
     if casting and compiled.slots is not None:
         _prepare_casting(compiled)
     if batches:

@@ -39,7 +39,8 @@ def why(left: Left, row: int | None) -> str:
     elif n_left_out:
         said.append("picked least lately")
     if not said:
-        said.append("only valid row" if len(left.matches) == 1 else "only valid row that can be picked")
+        rest = " that does not rest" if len(left.awake) == 1 else " that can be picked"
+        said.append(f"only valid row{rest if len(left.matches) > 1 else ''}")
     return ", ".join(said)
 
 

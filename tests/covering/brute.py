@@ -136,7 +136,7 @@ def random_table(rng: random.Random, policy: str = "collect", most_rows: int = 8
     if rng.random() < 0.3:
         columns["Enabled"] = [rng.choice(["True", "False", ""]) for _ in range(n_rows)]
         settings = replace(settings, enabled="Enabled")
-    if policy == "priority":
+    if policy == "priority" or (policy in ("specific", "cheapest") and rng.random() < 0.5):
         columns["Priority"] = [rng.choice(["", "1", "2", "3"]) for _ in range(n_rows)]
         settings = replace(settings, priority="Priority")
     conditions = {name: Condition(name, DOMAINS[name]) for name in names}

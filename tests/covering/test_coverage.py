@@ -103,6 +103,12 @@ def test_overlap_and_hits_are_those_of_every_context(seed):
         assert hit == pytest.approx(brute.share([row in rows for rows in brute.valid]), abs=1e-9)
 
 
+def specificities(table: cdb.Table, policy: str) -> list[int]:
+    """How many cells of each row exclude something, under the policy that asks for it."""
+    said = [[c.texts[row] not in ("Any", "") and "~" not in c.texts[row] for c in table.conditions] for row in range(table.n_rows)]
+    return [sum(row) if policy == "specific" else 0 for row in said]
+
+
 def expected_findings(brute: Brute, policy: str) -> set[tuple[str, int | None]]:
     """The findings that going through every context gives, by rule and row."""
     if brute.impossible and not brute.contexts:
@@ -125,10 +131,16 @@ def expected_findings(brute: Brute, policy: str) -> set[tuple[str, int | None]]:
             found.add(("subsumed-row", row))
         elif of[row] <= frozenset().union(*(of[r] for r in alive if r not in equal)):
             found.add(("redundant-row", row))
-    priorities = table.priorities.tolist()
+    priorities, specific = table.priorities.tolist(), specificities(table, policy)
     for row in alive:
-        before = [r for r in alive if (r < row if policy == "first" else priorities[r] > priorities[row])]
-        if policy in ("first", "priority") and of[row] and of[row] <= frozenset().union(*(of[r] for r in before)):
+        before = [r for r in alive if r < row]
+        if policy != "first":
+            before = [r for r in alive if (priorities[r], specific[r]) > (priorities[row], specific[row])]
+        if (
+            policy in ("first", "priority", "specific", "cheapest")
+            and of[row]
+            and of[row] <= frozenset().union(*(of[r] for r in before))
+        ):
             found.add(("never-chosen", row))
         if policy == "unique" and any(of[row] & of[r] for r in alive if r < row):
             found.add(("policy-overlap", row))
@@ -136,7 +148,7 @@ def expected_findings(brute: Brute, policy: str) -> set[tuple[str, int | None]]:
 
 
 @examples(6)
-@given(SEEDS, st.sampled_from(["collect", "first", "priority", "unique"]))
+@given(SEEDS, st.sampled_from(["collect", "first", "priority", "unique", "cheapest"]))
 def test_every_finding_is_right_and_none_is_missing(seed, policy):
     brute, report = made(seed, policy)
     assert report.findings_complete
@@ -149,7 +161,28 @@ def test_every_finding_is_right_and_none_is_missing(seed, policy):
 
 
 @examples(6)
-@given(SEEDS, st.sampled_from(["collect", "first", "priority", "unique"]), st.integers(1, 4))
+@given(SEEDS)
+def test_under_specific_a_row_is_not_redundant_for_rows_that_it_outranks(seed):
+    brute, report = made(seed, "specific")
+    expected, table = expected_findings(brute, "specific"), brute.table
+    ranks = list(zip(table.priorities.tolist(), specificities(table, "specific"), strict=True))
+    of = [frozenset(i for i, rows in enumerate(brute.valid) if row in rows) for row in range(table.n_rows)]
+    told = {(f.rule, f.row): f for f in (*report.findings, *report.needless) if f.rule != "variety"}
+    assert told.keys() <= expected
+    for rule, row in expected - told.keys():
+        assert rule in NEEDLESS
+        assert of[row] <= frozenset().union(*(of[r] for r in range(table.n_rows) if ranks[r] < ranks[row]))
+    for finding in told.values():
+        if finding.rule in NEEDLESS:
+            assert not all(ranks[r] < ranks[finding.row] for r in finding.by)
+            assert finding.level == "info"
+        elif finding.rule == "never-chosen":
+            assert all(ranks[r] > ranks[finding.row] for r in finding.by)
+            assert "more specific" in finding.message
+
+
+@examples(6)
+@given(SEEDS, st.sampled_from(["collect", "first", "priority", "unique", "specific", "cheapest"]), st.integers(1, 4))
 def test_variety_is_said_once_of_rows_that_share_their_contexts_and_only_where_several_may_play(seed, policy, n_assets):
     table = random_table(random.Random(seed), policy)
     for row in range(table.n_rows):

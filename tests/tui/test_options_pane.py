@@ -62,7 +62,7 @@ def test_every_setting_is_shown_with_its_value_and_what_it_means():
     async def script(pilot):
         return screen_text(app)
 
-    text = drive(app, script, (160, 52))
+    text = drive(app, script, (160, 42))
     for word in ("Policy", "collect", "Asset Name", "[x] Mandatory_Slots", "Enabled column", "Weight column", "Assumptions"):
         assert word in text
     assert "A row that says False here never matches." in text

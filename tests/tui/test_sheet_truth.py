@@ -45,6 +45,7 @@ type = "bool"
 [conditions.gait]
 type = "enum"
 values = ["Walk", "Run"]
+weight = 2.5
 [conditions."Defender.near"]
 type = "bool"
 [conditions."Defender.gap"]
@@ -52,9 +53,9 @@ type = "number"
 expr = "target * 2"
 """
 CELLS = {
-    "speed": ["Any", "0..4", "3..8", "2"],
-    "closing": ["Any", ">1", "..0", "not 0..3"],
-    "fast": ["Any", "True", "False"],
+    "speed": ["Any", "0..4", "3..8", "2", "0..4 ~2", "3..8 ~1"],
+    "closing": ["Any", ">1", "..0", "not 0..3", ">1 ~1.5"],
+    "fast": ["Any", "True", "False", "True ~2"],
     "gait": ["Any", "Walk", "not Walk"],
     "Defender.near": ["Any", "True", "False"],
     "Defender.gap": ["Any", ">3"],
@@ -67,7 +68,11 @@ FACTS = {
     "gait": ["", "Walk", "Run", "Walk Run"],
     "Defender.near": ["", "True", "False"],
 }
-JOBS = {"enabled": ["True", "True", "False"], "priority": ["0", "1", "5"], "weight": ["1", "3", "0"]}
+JOBS = {
+    **{"enabled": ["True", "True", "False"], "priority": ["0", "1", "5"], "weight": ["1", "3", "0"]},
+    **{"once": ["True", ""], "cooldown_s": ["2.5", "0"], "cooldown_turns": ["1", ""]},
+}
+POLICIES = ["collect", "first", "unique", "priority", "specific", "specific", "cheapest", "cheapest"]
 
 
 @dataclass(frozen=True)
@@ -99,7 +104,7 @@ def folders(draw: st.DrawFn) -> Folder:
         n_rows = draw(st.integers(1, 4))
         inside = ["@inner"] if name == "outer" and has_inner else []
         columns = {"Asset": [draw(st.sampled_from([f"{name}_{row}", f"{name}_{row}", *inside])) for row in range(n_rows)]}
-        settings = [f'policy = "{draw(st.sampled_from(["collect", "first", "unique", "priority"]))}"', 'asset = "Asset"']
+        settings = [f'policy = "{draw(st.sampled_from(POLICIES))}"', 'asset = "Asset"']
         for condition in draw(st.lists(st.sampled_from(sorted(CELLS)), max_size=3, unique=True)):
             columns[condition] = [draw(st.sampled_from(CELLS[condition])) for _ in range(n_rows)]
         for job, texts in JOBS.items():

@@ -34,13 +34,13 @@ OPTIONS = (
     Option("enabled", "Enabled column", "A row that says False here never matches."),
     Option("priority", "Priority column", "A whole number in each row. Of the valid rows those with the highest are picked from."),
     Option("weight", "Weight column", "How often a row is picked among equals: 2 is twice as often as 1."),
-    Option("once", "Once column", "A row that says True here is picked once by each character, then no more."),
-    Option("cooldown_s", "Cooldown column, seconds", "For so many seconds after it was picked a row is not picked again."),
-    Option("cooldown_turns", "Cooldown column, picks", "For so many picks after it was picked a row is not picked again."),
     Option("fallback", "Fallback", "The asset that plays when no row is valid. Empty: none does."),
     Option(
         "assume", "Assumptions", "What is always so, such as: not (IsRunning and IsIdle). Coverage leaves out all other contexts."
     ),
+    Option("once", "Once column", "A row that says True here is picked once by each character, then no more."),
+    Option("cooldown_s", "Cooldown seconds", "A column: for so many seconds after it was picked a row is not picked again."),
+    Option("cooldown_turns", "Cooldown picks", "A column: for so many picks after it was picked a row is not picked again."),
 )
 
 

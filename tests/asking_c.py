@@ -23,8 +23,10 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
 
-TIMES = {"full": 8, "thorough": 60}.get(os.environ.get("EXAMPLES", ""), 1)
+TIMES = {"full": 8, "thorough": 12}.get(os.environ.get("EXAMPLES", ""), 1)
 """So many times the tables and files of every day are drawn."""
+N_MOMENTS = {"thorough": 250}.get(os.environ.get("EXAMPLES", ""), 50)
+"""So many contexts each table is asked for: thoroughly 120,000 with rules, 120,000 with picks and outputs, 18,000 with both."""
 SEED = int(os.environ["EXAMPLES_SEED"]) if TIMES > 1 else 0
 OUTPUT_TYPES = ("bool", "int", "number", "enum", "text", "numbers")
 UNKNOWN = ("error", "any", "never")

@@ -6,7 +6,21 @@ import random
 from pathlib import Path
 
 import pytest
-from asking_c import CELLS, OK, SCHEMA, SEED, TIMES, Answers, Facts, all_asked, artefact, ask_program, output_words, random_moment
+from asking_c import (
+    CELLS,
+    N_MOMENTS,
+    OK,
+    SCHEMA,
+    SEED,
+    TIMES,
+    Answers,
+    Facts,
+    all_asked,
+    artefact,
+    ask_program,
+    output_words,
+    random_moment,
+)
 from test_c_rules import moments_of, output_cells, ruled_table
 
 from contextdb.compiled.c_header.naming import conditions_of
@@ -134,7 +148,7 @@ def test_picks_are_those_of_a_picker_in_python(ask: Path, tmp_path: Path):
         outer = picked_table(rng, rng.choice([1, 6, 30]), "outer", "abcd", has_inner=turn % 3 == 0)
         inner = picked_table(rng, 8, "inner", "aef")
         compiled = outer.compile({"inner": inner})
-        moments = [random_moment(rng, ["ok", "state", "speed"], 0.01) for _ in range(40)]
+        moments = [random_moment(rng, ["ok", "state", "speed"], 0.01) for _ in range(N_MOMENTS)]
         n_picked += assert_picks(ask, tmp_path, compiled, moments, rng.choice([0, 1, 1, 3, 8]))
     assert n_picked > 400
 
@@ -143,4 +157,4 @@ def test_picks_from_a_table_with_rules_are_those_of_python(ask: Path, tmp_path: 
     rng = random.Random(SEED + 32)
     for _ in range(6 * TIMES):
         compiled = ruled_table(rng, 30, {"policy": rng.choice(["specific", "cheapest", "collect"])})
-        assert_picks(ask, tmp_path, compiled, moments_of(rng, 40), 1)
+        assert_picks(ask, tmp_path, compiled, moments_of(rng, N_MOMENTS), 1)

@@ -12,6 +12,7 @@ import pytest
 from asking_c import (
     BAD_FILE,
     CELLS,
+    N_MOMENTS,
     OK,
     OTHER_TABLE,
     SCHEMA,
@@ -100,7 +101,7 @@ def test_rules_and_derived_facts_are_computed_as_python_computes_them(ask: Path,
     n_valid = n_faults = 0
     for _ in range(40 * TIMES):
         compiled = ruled_table(rng, rng.choice([1, 5, 70]))
-        moments = moments_of(rng, 50)
+        moments = moments_of(rng, N_MOMENTS)
         [(status, answers)] = asked(ask, tmp_path, conditions_of(compiled), [artefact(compiled, tmp_path)], moments)
         assert status == OK
         for moment, answer in zip(moments, answers, strict=True):

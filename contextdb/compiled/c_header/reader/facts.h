@@ -20,13 +20,13 @@ static inline uint64_t cdbi_count_bits(uint64_t word)
     return (word * 0x0101010101010101) >> 56;
 }
 
-static inline int cdbi_is_missing(const cdb_condition *condition, const cdb_fact *fact)
+CDBI_HOT int cdbi_is_missing(const cdb_condition *condition, const cdb_fact *fact)
 {
     switch (condition->type) {
-    case CDB_BOOL: return fact->whole == CDB_MISSING;
-    case CDB_ENUM: return condition->expr ? fact->text == NULL : fact->whole == CDB_MISSING;
-    case CDB_INT:
-    case CDB_DATE: return condition->expr ? cdbi_is_nan(fact->number) : fact->whole == CDB_MISSING_INT;
+    case CDB_BOOL:
+    case CDB_ENUM: return fact->whole == CDB_MISSING;
+    case CDB_INT: return condition->expr ? cdbi_is_nan(fact->number) : fact->whole == CDB_MISSING_INT;
+    case CDB_DATE: return fact->whole == CDB_MISSING_INT;
     case CDB_NUMBER:
     case CDB_ANGLE: return cdbi_is_nan(fact->number);
     case CDB_TEXT: return fact->text == NULL;
@@ -36,9 +36,9 @@ static inline int cdbi_is_missing(const cdb_condition *condition, const cdb_fact
     return condition->n_values > 0 ? fact->tags == NULL || (fact->tags[0] & 1) == 0 : fact->texts.count < 0;
 }
 
-static inline double cdbi_number(const cdb_condition *condition, const cdb_fact *fact)
+CDBI_HOT double cdbi_number(const cdb_condition *condition, const cdb_fact *fact)
 {
-    if (!condition->expr && (condition->type == CDB_INT || condition->type == CDB_DATE)) return (double)fact->whole;
+    if (condition->type == CDB_DATE || (condition->type == CDB_INT && !condition->expr)) return (double)fact->whole;
     return condition->type == CDB_ANGLE ? cdbi_wrapped(fact->number) : fact->number;
 }
 
@@ -78,15 +78,16 @@ static inline int cdbi_are_declared(const cdb_condition *condition, const cdbi_t
 }
 
 /* Whether a fact is none that the condition can have. */
-static inline int cdbi_is_wrong(const cdb_condition *condition, const cdb_fact *fact)
+CDBI_HOT int cdbi_is_wrong(const cdb_condition *condition, const cdb_fact *fact)
 {
-    if (condition->expr && condition->type == CDB_ENUM) return cdbi_value_number(condition, fact->text) == condition->n_values;
-    if (condition->expr && condition->type == CDB_TAGS) return !cdbi_are_declared(condition, &fact->same);
-    if (condition->expr) return 0;
-    if (condition->type == CDB_BOOL) return fact->whole < 0 || fact->whole > 1;
-    if (condition->type == CDB_ENUM) return fact->whole < 0 || (uint64_t)fact->whole >= condition->n_values;
-    if (condition->type == CDB_DATE) return fact->whole < CDB_FIRST_DATE || fact->whole > CDB_LAST_DATE;
-    return condition->type == CDB_ANGLE && cdbi_is_infinite(fact->number);
+    switch (condition->type) {
+    case CDB_BOOL: return fact->whole < 0 || fact->whole > 1;
+    case CDB_ENUM: return fact->whole < 0 || (uint64_t)fact->whole >= condition->n_values;
+    case CDB_DATE: return fact->whole < CDB_FIRST_DATE || fact->whole > CDB_LAST_DATE;
+    case CDB_ANGLE: return cdbi_is_infinite(fact->number);
+    case CDB_TAGS: return condition->expr && !cdbi_are_declared(condition, &fact->same);
+    default: return 0;
+    }
 }
 
 static inline int cdbi_has(const cdb_condition *condition, const cdbi_list *list, size_t at, const cdb_fact *fact)

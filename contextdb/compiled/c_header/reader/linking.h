@@ -117,6 +117,7 @@ static inline void cdbi_link(cdbi_opening *opening)
         return;
     }
     programs->n_programs = programs->n_starts - 1;
+    opening->table->has_programs = 1;
     programs->places = (size_t *)cdbi_memory(opening, programs->facts.n + 1, sizeof(size_t));
     programs->is_dropped = (unsigned char *)cdbi_memory(opening, programs->n_programs + 1, 1);
     programs->uses = (unsigned char *)cdbi_memory(opening, schema->n_conditions + 1, 1);

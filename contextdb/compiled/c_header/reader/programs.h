@@ -140,7 +140,7 @@ static inline cdbi_value cdbi_fact_value(const cdb_condition *condition, const c
     switch (condition->type) {
     case CDB_BOOL: value.truth = (int)fact->whole; break;
     case CDB_ENUM:
-        if (condition->expr) value.text = fact->text;
+        if (condition->expr) value.text = fact->derived.text;
         else value.text = fact->whole < 0 ? NULL : condition->values[fact->whole];
         break;
     case CDB_TEXT: value.text = fact->text; break;
@@ -325,6 +325,9 @@ static inline void cdbi_keep(const cdb_condition *condition, cdbi_value value, c
     switch (condition->type) {
     case CDB_BOOL: fact->whole = value.truth; break;
     case CDB_ENUM:
+        fact->derived.text = value.text;
+        fact->derived.whole = value.text ? (int64_t)cdbi_value_number(condition, value.text) : CDB_MISSING;
+        break;
     case CDB_TEXT: fact->text = value.text; break;
     case CDB_TAGS: fact->same = value.tags; break;
     case CDB_ANGLE:
@@ -332,9 +335,9 @@ static inline void cdbi_keep(const cdb_condition *condition, cdbi_value value, c
         if (!cdbi_is_nan(fact->number)) fact->number = cdbi_plain(cdbi_wrapped(fact->number));
         break;
     case CDB_DATE:
-        fact->number = value.number;
-        if (cdbi_is_less(value.number, CDB_FIRST_DATE) || cdbi_is_less(CDB_LAST_DATE, value.number))
-            fact->number = cdb_missing_number();
+        fact->whole = CDB_MISSING_INT;
+        if (!cdbi_is_less(value.number, CDB_FIRST_DATE) && !cdbi_is_less(CDB_LAST_DATE, value.number))
+            fact->whole = (int64_t)value.number;
         break;
     default: fact->number = value.number;
     }
@@ -425,6 +428,7 @@ static inline cdb_status cdbi_and_rules(uint64_t *rows, const cdb_table *table, 
 {
     const cdbi_programs *programs = &table->programs;
     size_t n_rules = programs->n_programs - programs->n_derived, n_left = 0, i, word;
+    if (programs->n_of_row == 0) return CDB_OK;
     for (word = 0; word < table->n_words; word++) n_left += (size_t)cdbi_count_bits(rows[word] & programs->ruled[word]);
     if (n_left == 0) return CDB_OK;
     if (n_left <= n_rules) {

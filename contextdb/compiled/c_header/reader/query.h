@@ -56,19 +56,18 @@ static inline size_t cdbi_answer(const cdb_column *column, const cdb_condition *
 }
 
 /* The mask of a fact, or of a missing one that only Any accepts; NULL for a column that keeps none for each class. */
-static inline const uint64_t *cdbi_mask(const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact,
+CDBI_HOT const uint64_t *cdbi_mask(const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact,
     int is_missing, size_t n_words)
 {
     if (column->kind != CDBI_VALUE && column->kind != CDBI_FLAT) return NULL;
     if (is_missing) return column->masks + (column->n_masks - 1) * n_words;
     if (column->kind == CDBI_FLAT) return column->masks + cdbi_class(column, cdbi_number(condition, fact)) * n_words;
     if (condition->type == CDB_TEXT) return column->masks + cdbi_text_class(column, fact->text) * n_words;
-    if (condition->expr && condition->type == CDB_ENUM) return column->masks + cdbi_value_number(condition, fact->text) * n_words;
     return column->masks + (size_t)fact->whole * n_words;
 }
 
 /* rows = from & all masks, some words at a time: as a rule few masks leave no row of a block, and the others need not be read. */
-static inline void cdbi_and(uint64_t *rows, const uint64_t *from, const uint64_t *const *masks, size_t n_masks, size_t n_words)
+CDBI_HOT void cdbi_and(uint64_t *rows, const uint64_t *from, const uint64_t *const *masks, size_t n_masks, size_t n_words)
 {
     size_t at = 0, i, j;
     for (; at + CDBI_BLOCK <= n_words; at += CDBI_BLOCK) {
@@ -89,7 +88,7 @@ static inline void cdbi_and(uint64_t *rows, const uint64_t *from, const uint64_t
 }
 
 /* rows &= some words of the mask of a wide column, put together from the two digits of the fact's class; rows[0] is word `from`. */
-static inline void cdbi_and_wide(uint64_t *rows, const cdb_column *column, double number, size_t from, size_t to, size_t n_words)
+CDBI_HOT void cdbi_and_wide(uint64_t *rows, const cdb_column *column, double number, size_t from, size_t to, size_t n_words)
 {
     size_t found = cdbi_class(column, number), n_fine = (size_t)1 << column->shift, n_coarse = (column->n_digits - n_fine) / 2;
     size_t after = (found >> column->shift) * n_words, same = after + n_coarse * n_words;
@@ -140,20 +139,20 @@ static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *col
     const uint64_t *masks[CDBI_MASKS], *mask, *from = table->enabled;
     size_t n = 0, i, n_words = table->n_words;
     int has_others = 0, is_missing;
-    cdb_status status = CDB_OK;
+    cdb_status status;
     masks[0] = NULL;
     memset(rows, 0, room * sizeof *rows);
     if (room < n_words)
         return cdbi_fault(fault, CDB_TOO_SHORT, "the array for the rows is shorter than a mask of the table", -1, "");
-    if (table->programs.n_programs > 0) status = cdbi_derive(table, schema, facts, unknown, fault);
-    for (i = 0; i < schema->n_conditions && status == CDB_OK; i++) {
+    if (table->has_programs) {
+        status = cdbi_derive(table, schema, facts, unknown, fault);
+        if (status != CDB_OK) return status;
+    }
+    for (i = 0; i < schema->n_conditions; i++) {
         if (columns[i].kind == 0) continue;
         is_missing = cdbi_is_missing(&schema->conditions[i], &facts[i]);
-        if (is_missing && unknown == CDB_UNKNOWN_ERROR) status = cdbi_missing_fault(fault, table, schema, facts, i);
         if (is_missing && unknown == CDB_UNKNOWN_ANY) continue;
-        if (!is_missing && cdbi_is_wrong(&schema->conditions[i], &facts[i]))
-            status = cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i);
-        if (status != CDB_OK) break;
+        if (is_missing ? unknown == CDB_UNKNOWN_ERROR : cdbi_is_wrong(&schema->conditions[i], &facts[i])) break;
         mask = cdbi_mask(&columns[i], &schema->conditions[i], &facts[i], is_missing, n_words);
         if (!mask) has_others = 1;
         else masks[n++] = mask;
@@ -163,12 +162,13 @@ static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *col
             n = 0;
         }
     }
-    if (status == CDB_OK) {
+    if (i == schema->n_conditions) {
         cdbi_and(rows, from, masks, n, n_words);
         if (has_others) cdbi_and_others(rows, table, columns, schema, facts, unknown);
-        if (table->programs.n_of_row > 0) status = cdbi_and_rules(rows, table, schema, facts, unknown, fault);
-    }
-    if (status == CDB_OK) return cdbi_fault(fault, CDB_OK, "", -1, "");
+        status = table->has_programs ? cdbi_and_rules(rows, table, schema, facts, unknown, fault) : CDB_OK;
+        if (status == CDB_OK) return cdbi_fault(fault, CDB_OK, "", -1, "");
+    } else if (cdbi_is_missing(&schema->conditions[i], &facts[i])) status = cdbi_missing_fault(fault, table, schema, facts, i);
+    else status = cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i);
     memset(rows, 0, n_words * sizeof *rows);
     return status;
 }

@@ -24,7 +24,7 @@ static inline cdb_status cdbi_ready(const cdb_table *table, const cdb_column *co
 {
     size_t i;
     cdb_status status = CDB_OK;
-    if (table->programs.n_programs > 0) status = cdbi_derive(table, schema, facts, unknown, fault);
+    if (table->has_programs) status = cdbi_derive(table, schema, facts, unknown, fault);
     for (i = 0; i < schema->n_conditions && status == CDB_OK; i++) {
         if (columns[i].kind == 0) continue;
         if (!cdbi_is_missing(&schema->conditions[i], &facts[i])) {

@@ -37,6 +37,12 @@
 extern "C" {
 #endif
 
+#if defined(__GNUC__)               /* what a query does for each fact is worth its place wherever it is called */
+#define CDBI_HOT static inline __attribute__((always_inline))
+#else
+#define CDBI_HOT static inline
+#endif
+
 typedef char cdbi_doubles_have_8_bytes[sizeof(double) == 8 ? 1 : -1];
 
 #define CDB_FALSE 0
@@ -99,7 +105,11 @@ typedef union cdb_fact {
     const char *text;               /* text, in UTF-8 */
     const uint64_t *tags;           /* declared tags: bit 0 says that they are known, bit i that tag i of the schema is there */
     cdb_texts texts;                /* other tags */
-    cdbi_tags same;                 /* derived tags; derived ints and dates are a `number`, enums a `text` */
+    cdbi_tags same;                 /* derived tags; a derived int is a `number` */
+    struct {
+        int64_t whole;
+        const char *text;           /* of any text, also one that is not declared: other facts may be computed from it */
+    } derived;                      /* a derived enum */
 } cdb_fact;
 
 typedef struct cdb_condition {
@@ -216,8 +226,9 @@ typedef struct cdbi_soft {          /* the soft cells of a condition, a row for 
 typedef struct cdb_table {
     size_t n_rows;
     size_t n_words;                 /* words of a mask: n_rows / 64, rounded up */
-    size_t n_strange;               /* columns of conditions that this header does not know, which are Any */
+    int has_programs;               /* rules or derived facts are to be computed */
     const uint64_t *enabled;
+    size_t n_strange;               /* columns of conditions that this header does not know, which are Any */
     const int64_t *priorities;      /* one for each row, for picking; 0 where the table has none */
     const double *row_weights;      /* one for each row; 1 where the table has none */
     const char **assets;

@@ -75,12 +75,22 @@ class Op(IntEnum):
     OR = 31
     NOT = 32
     IF = 33
-    """Of a truth and two values the first where it holds, the second where it does not. a is their type, as in `TYPES`."""
+    """Of a truth and two values the first where it holds, the second where it does not. a says what they are, one of `Values`."""
 
 
 SIGNS = ("==", "!=", "<", "<=", ">", ">=")
-TYPES = ("number", "truth", "text", "tags")
-_COMPARE = {"number": Op.COMPARE_NUMBERS, "truth": Op.COMPARE_TRUTHS, "text": Op.COMPARE_TEXTS}
+
+
+class Values(IntEnum):
+    """What values of the stack are."""
+
+    NUMBERS = 0
+    TRUTHS = 1
+    TEXTS = 2
+    TAGS = 3
+
+
+_COMPARE = {Values.NUMBERS: Op.COMPARE_NUMBERS, Values.TRUTHS: Op.COMPARE_TRUTHS, Values.TEXTS: Op.COMPARE_TEXTS}
 
 _OPS: dict[Function, Op] = {
     OPERATORS["+"]: Op.ADD,
@@ -182,12 +192,12 @@ class Programs:
     def _hold(self, part: Part, cell: Cell) -> None:
         accepts = cell.accepts
         match _type_of(part):
-            case "number":
+            case Values.NUMBERS:
                 spans = accepts.spans if isinstance(accepts, NumberSet) else EVERYTHING
                 self.emit(Op.IN_SPANS, self._numbered([end for span in spans for end in span]), len(spans))
-            case "truth":
+            case Values.TRUTHS:
                 self.emit(Op.IN_TRUTHS, cell.holds(False) + 2 * cell.holds(True))
-            case "tags":
+            case Values.TAGS:
                 tags = accepts if isinstance(accepts, TagSet) else TagSet(frozenset())
                 first = self._listed([*sorted(tags.needs), *sorted(tags.bans)])
                 self.emit(Op.HAS_TAGS, first, len(tags.needs), 2 * len(tags.bans) + tags.is_complement)
@@ -211,7 +221,7 @@ class Programs:
     def _(self, plan: Select) -> None:
         for part in (plan.condition, plan.then, plan.otherwise):
             self.put(part)
-        self.emit(Op.IF, TYPES.index(_type_of(plan)))
+        self.emit(Op.IF, _type_of(plan))
 
     def _numbered(self, numbers: list[float]) -> int:
         self.numbers += numbers
@@ -227,16 +237,18 @@ def _flags(link: Link) -> int:
     return 1 if link.is_wrapped else 2 if link.left_is_high else 4 if link.right_is_high else 0
 
 
-def _type_of(part: Part) -> str:
-    """The type of a part's values, one of `TYPES`."""
+def _type_of(part: Part) -> Values:
+    """What the values of a part are."""
     if isinstance(part, Select):
         return _type_of(part.then)
     if isinstance(part, Const):
-        return "truth" if isinstance(part.value, bool) else "text" if isinstance(part.value, str) else "number"
+        is_text = isinstance(part.value, str)
+        return Values.TRUTHS if isinstance(part.value, bool) else Values.TEXTS if is_text else Values.NUMBERS
     if isinstance(part, Given):
         kind = part.kind
-        return "number" if kind.is_numeric else "truth" if kind.is_truth else "tags" if kind.is_tags else "text"
-    return "number" if isinstance(part, Apply) else "truth"
+        plain = Values.NUMBERS if kind.is_numeric else Values.TRUTHS if kind.is_truth else Values.TEXTS
+        return Values.TAGS if kind.is_tags else plain
+    return Values.NUMBERS if isinstance(part, Apply) else Values.TRUTHS
 
 
 def programs_to_tensors(compiled: CompiledData) -> Tensors:

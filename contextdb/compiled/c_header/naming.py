@@ -132,7 +132,7 @@ def _face_of(name: str, base: str, table: CompiledData, found: Iterator[str]) ->
 
 
 def _given(output: Output) -> list[str]:
-    return [f"{_OWN}none", *output.values] if output.kind == "enum" else []
+    return [f"{_OWN}none", *output.values] if output.values else []
 
 
 def _output_names(name: str, output: Output, found: Iterator[str]) -> OutputNames:

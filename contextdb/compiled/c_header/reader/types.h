@@ -2,6 +2,7 @@
  *
  *   cdb_open    takes the bytes of an artefact, checks all that will ever be read of them, and keeps pointers into them
  *   cdb_query   the rows that are valid for some facts, one bit a row; takes no memory
+ *   cdb_pick    one of these rows, by the policy of the table; its memory is yours
  *   cdb_close   gives back what cdb_open took
  *
  * The faces of single tables, further down, call these with types of their own. Bit r % 64 of word r / 64 is row r. A table that is

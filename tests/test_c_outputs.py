@@ -48,10 +48,10 @@ def test_outputs_are_read_by_row_and_a_replaced_file_is_swapped_in(tmp_path: Pat
     (tmp_path / "tables.h").write_text(c_header_of({"moves": compiled}), encoding="ascii")
     program = built(PROGRAMS / "watch.c", tmp_path / "watch.exe", options, *sanitizers(compiler_for(options)))
     files = [tmp_path / "one" / "moves.safetensors", tmp_path / "two" / "moves.safetensors", tmp_path / "none"]
-    *told, swapped, refused = ran(program, *files).splitlines()
+    *told, jump, swapped, refused = ran(program, *files).splitlines()
     values = [compiled.outputs.fallback, *(compiled.outputs.of_row(row) for row in range(3))]
     assert [line.split(" ") for line in told] == [told_of(value) for value in values]
-    assert (swapped, refused) == ("2 rows after 3", "the file is too short for its header")
+    assert (jump, swapped, refused) == ("jump is row 2", "2 rows after 3", "the file is too short for its header")
 
 
 def told_of(outputs: dict[str, object]) -> list[str]:

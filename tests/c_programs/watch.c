@@ -33,6 +33,8 @@ int main(int argc, char **argv)
     cdb_moves_watch_file(&watch, argv[1], CDB_STRANGE_REFUSED);
     if (cdb_moves_watch_poll(&watch, &fault) != CDB_OK || !watch.now || watch.old) return 3;
     for (row = -1; (uint64_t)(row + 1) <= watch.now->table.n_rows; row++) told(watch.now, row);
+    printf("jump is row %d\n", (int)cdb_next_row_of(&watch.now->table, "jump", -1));
+    if (cdb_next_row_of(&watch.now->table, "jump", 2) != -1 || cdb_next_row_of(&watch.now->table, "none", -1) != -1) return 9;
     if (cdb_moves_watch_poll(&watch, &fault) != CDB_OK || watch.old) return 4; /* nothing new */
     if (!replaced(argv[1], argv[2]) || cdb_moves_watch_poll(&watch, &fault) != CDB_OK || !watch.old) return 5;
     printf("%d rows after %d\n", (int)watch.now->table.n_rows, (int)watch.old->table.n_rows);

@@ -41,7 +41,7 @@ SOURCE = Path(__file__).with_suffix(".c")
 
 def built(folder: Path, compiled: CompiledTable, compiler: str) -> Path:
     """The program that times the table."""
-    (folder / "game.h").write_text(c_header_of({"game": compiled})[0], encoding="ascii")
+    (folder / "game.h").write_text(c_header_of({"game": compiled}), encoding="ascii")
     compiled.save(folder / "game.safetensors")
     program = folder / "c_header.exe"
     subprocess.run([compiler, "-std=c11", "-O2", f"-I{folder}", str(SOURCE), "-o", str(program)], check=True)

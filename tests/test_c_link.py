@@ -47,7 +47,7 @@ def game(tmp_path_factory: pytest.TempPathFactory, game_table: cdb.CompiledTable
     """The program, with its artefact beside it."""
     folder = tmp_path_factory.mktemp("linked")
     game_table.save(folder / "game.safetensors")
-    (folder / "tables.h").write_text(c_header_of({"game": game_table})[0], encoding="ascii")
+    (folder / "tables.h").write_text(c_header_of({"game": game_table}), encoding="ascii")
     (folder / "cdb_link.h").write_text(c_link_of({"game": game_table}, "tables.h"), encoding="ascii")
     return built(PROGRAMS / "linked.c", folder / "linked.exe", C, *sanitizers(compiler_for(C)), "-O1")
 
@@ -146,15 +146,18 @@ def test_lines_are_filtered_where_they_are_heard(game: Path, meeting: Path):
             assert [line["line"] for batch in hearing.batches() for _, line in batch] == ["end"]
 
 
-def test_the_file_compiles_as_cpp_and_without_tables_that_c_cannot_answer(tmp_path: Path):
+def test_the_file_compiles_as_cpp_and_tells_the_facts_of_rules_and_not_derived_ones(tmp_path: Path):
     schema = {"class": {"type": "number"}, "gap": {"type": "number", "expr": "class * 2"}, "a.b": {"type": "tags"}}
-    plain = cdb.Table.from_columns({"Asset": ["a"], "gap": ["1.."], "a.b": ["+x"]}, schema, name="open").compile()
+    cells = {"Asset": ["a"], "gap": ["1.."], "a.b": ["+x"], "When": ["class > 1"]}
+    plain = cdb.Table.from_columns(cells, schema, {"when": "When"}, name="open").compile()
     empty = cdb.Table.from_columns({"Asset": ["a"]}, {}, name='say "link"').compile()
     tables = {"open": plain, 'say "link"': empty}
-    (tmp_path / "tables.h").write_text(c_header_of(tables)[0], encoding="ascii")
+    (tmp_path / "tables.h").write_text(c_header_of(tables), encoding="ascii")
     text = c_link_of(tables, "tables.h")
     (tmp_path / "cdb_link.h").write_text(text, encoding="ascii")
     assert text == c_link_of(tables, "tables.h")
+    assert '"class"' in text.replace("\\042", '"')
+    assert "gap" not in text
     source = tmp_path / "main.c"
     source.write_text(
         '#include "cdb_link.h"\nint main(void) { static cdbl_link link; return cdbl_open(&link, "/") + cdbl_listeners(&link); }\n'

@@ -24,7 +24,7 @@ from contextdb.compiled.c_header import c_header_of, c_link_of
 from contextdb.compiled.stubs import stubs_of
 from contextdb.console import ExitCode, output, printable, progress
 from contextdb.disk import make_folder, path_in_quotes, write_atomic
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural
+from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
 from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import Table
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     tables = _tables(arguments.path)
     targets = [_target(table, arguments.out, len(tables)) for table in tables]
     _require_different(targets)
-    header_text = None if header is None else _header_text(tables, header)
+    header_text = None if header is None else c_header_of({t.name: t.compile() for t in tables}, f"CDB_{header.stem}_H")
     for table, target in progress(list(zip(tables, targets, strict=True)), "compiling"):
         compiled = table.compile()
         make_folder(target.parent)
@@ -73,17 +73,6 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         if link is not None:
             _write(link, _link_text(tables, header, link))
     return ExitCode.OK
-
-
-def _header_text(tables: list[Table], path: Path) -> str:
-    """The header, before anything is written; tables that it leaves out are reported."""
-    text, held_back = c_header_of({table.name: table.compile() for table in tables}, f"CDB_{path.stem}_H")
-    for table in held_back:
-        print(
-            printable(f"contextdb: {path}: the table {in_quotes(table.table)} is left out: {table.why}, which C cannot work out."),
-            file=sys.stderr,
-        )
-    return text
 
 
 def _link_path(arguments: argparse.Namespace) -> Path | None:

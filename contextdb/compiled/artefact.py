@@ -26,6 +26,18 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
 Value R of an output is what there is without a row: what `fallback` gives, else the default, else False, 0, NaN or "". Infinite
 defaults are "inf" and "-inf" in the JSON. What knows no outputs passes all of these over: they change no answer.
 
+For a table with rules or derived facts, P programs of D derived facts and then of the rules, which name F facts
+(`contextdb.compiled.programs`; Python does not read them):
+
+    programs.code          int32 [N, 4]          the instructions: an `Op` and three operands
+    programs.starts        int64 [P + 1]         where each program begins in `code`
+    programs.numbers       float64               what instructions name by number
+    programs.texts         uint8                 JSON list of texts, likewise
+    programs.facts         uint8                 JSON list of F names of conditions
+    programs.types         uint8                 JSON list of their types
+    programs.derived       int64 [D]             which of these facts each program computes, each behind those that it needs
+    programs.of_row        int32 [R]             which rule each row has, from 0; -1 for none. [0] where no row has one
+
 For a table with tables inside, D the depth, T the number of tables (`contextdb.compiled.ways`; soft cells then have D R rows):
 
     ways.numbers           int32 [D, R]
@@ -61,6 +73,7 @@ from contextdb.compiled.classes import ColumnMasks, NumberMasks, TagMasks, Value
 from contextdb.compiled.data import CompiledData, SoftMasks
 from contextdb.compiled.outputs_stored import outputs_from, outputs_to_tensors
 from contextdb.compiled.pick_columns import PickColumns
+from contextdb.compiled.programs import programs_to_tensors
 from contextdb.compiled.ways_stored import ways_from, ways_to_json, ways_to_tensors
 from contextdb.expressions import Derivation
 from contextdb.expressions.rules import WhenColumn, WhenRules
@@ -112,6 +125,7 @@ def save(compiled: CompiledData, path: Path) -> None:
     if compiled.when is not None:
         tensors["when.codes"] = compiled.when.texts.codes
         tensors["when.texts"] = texts_to_array(list(compiled.when.texts.texts))
+    tensors |= programs_to_tensors(compiled)
     tensors |= compiled.picking.arrays
     if compiled.ways is not None:
         tensors |= ways_to_tensors(compiled.ways)

@@ -33,6 +33,8 @@ class Function:
     gives: Gives
     keeps_unit: bool
     """Whether arguments and result share one unit."""
+    exponent: int | None = None
+    """Of a power."""
 
 
 def _operator(sign: str, one: Callable[..., Any], many: Callable[..., Any], gives: Gives, keeps_unit: bool) -> Function:
@@ -68,4 +70,4 @@ FUNCTIONS = {
 def power_of(exponent: int) -> Function:
     """The function x ** exponent, for a whole exponent from 0 to MOST_POWER."""
     power = arithmetic.powered(exponent)
-    return Function("x ** n", power, power, 1, 1, "whole if whole", False)
+    return Function("x ** n", power, power, 1, 1, "whole if whole", False, exponent)

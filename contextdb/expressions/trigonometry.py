@@ -27,7 +27,7 @@ def direction(y: float, x: float) -> float:
     wide, high = abs(x), abs(y)
     most, least = (high, wide) if high > wide else (wide, high)
     if not most > 0.0:
-        return most  # 0, or NaN where x is
+        return most + least  # 0, or NaN where one of them is
     angle = _slope(least / most)
     angle = 90.0 - angle if high > wide else angle
     angle = 180.0 - angle if x < 0.0 else angle
@@ -45,7 +45,7 @@ def directions(y: Doubles, x: Doubles) -> Doubles:
     angle = np.where(is_steep, 90.0 - angle, angle)
     angle = np.where(x < 0.0, 180.0 - angle, angle)
     angle = np.where(y < 0.0, -angle, angle)
-    return np.where(most > 0.0, angle, most)
+    return np.where(most > 0.0, angle, most + least)
 
 
 def _slope(ratio: float) -> float:

@@ -1,6 +1,6 @@
 /* Asks artefacts of any table without a face of its own: ask IN OUT.
  *
- * IN: a schema, some artefacts and some contexts, as whole numbers of 8 bytes, little-endian, and texts: their length without the 0
+ * IN: a schema, what strange conditions do, the memory of the character that picks, -1 for none, some artefacts and some contexts, as whole numbers of 8 bytes, little-endian, and texts: their length without the 0
  * at their end, then their bytes. OUT: for each artefact the status of opening it; where that is 0, for each context the status,
  * the number of words, and the words of the answer. Artefacts lie in blocks of just their size, so that a sanitizer sees what is
  * read beyond. */
@@ -40,6 +40,7 @@ static cdb_fact fact(const cdb_condition *condition)
 {
     cdb_fact found;
     memset(&found, 0, sizeof found);
+    if (condition->expr) return found; /* it is computed */
     if (condition->type == CDB_TEXT) found.text = text();
     else if (condition->type == CDB_TAGS && condition->n_values > 0) {
         size_t size = (condition->n_values + 63) / 64 * 8;
@@ -63,7 +64,7 @@ static void put(FILE *out, int64_t value)
 }
 
 /* One answer: rows met one after another must be those that are counted, and their assets must be there to read. */
-static void answer(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
+static void answer(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
     cdb_unknown unknown)
 {
     uint64_t *rows = (uint64_t *)malloc(table->n_words * 8 + 8);
@@ -78,17 +79,66 @@ static void answer(FILE *out, const cdb_table *table, const cdb_column *columns,
     free(rows);
 }
 
+/* The outputs of a row, or of none: whole numbers, doubles, and texts as their hash. */
+static void read_outputs(FILE *out, const cdb_table *table, const cdb_schema *schema, int64_t row)
+{
+    size_t i, j;
+    for (i = 0; i < schema->n_outputs; i++)
+        switch (schema->outputs[i].type) {
+        case CDB_OUT_BOOL: put(out, cdb_output_bool(table, i, row)); break;
+        case CDB_OUT_INT: put(out, cdb_output_int(table, i, row)); break;
+        case CDB_OUT_NUMBER:
+        case CDB_OUT_NUMBERS:
+            for (j = 0; j < schema->outputs[i].size; j++) fwrite(cdb_output_numbers(table, i, row) + j, 8, 1, out);
+            break;
+        default: put(out, (int64_t)cdbi_hash(CDBI_HASH, cdb_output_text(table, i, row)));
+        }
+}
+
+/* More of a context: what soft cells cost, what a character picks, and for each row why it is not valid, a bit for each condition,
+ * bit 62 for its rule, bit 61 where it is disabled. */
+static void more(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
+    cdb_unknown unknown, double time_s, cdb_picker *picker)
+{
+    uint64_t *rows = (uint64_t *)malloc(table->n_words * 8 + 8);
+    double *penalties = (double *)malloc(table->n_rows * 8 + 8);
+    cdb_status status = cdb_query(table, columns, schema, facts, unknown, rows, table->n_words, NULL);
+    cdb_fault fault;
+    int64_t row, picked = -1;
+    put(out, (int64_t)table->n_rows);
+    put(out, (int64_t)cdb_penalties(table, columns, schema, facts, unknown, penalties, table->n_rows, &fault));
+    fwrite(penalties, 8, table->n_rows, out);
+    if (status == CDB_OK)
+        status = cdb_pick(table, columns, schema, facts, unknown, rows, table->n_words, time_s, picker, &picked, &fault);
+    put(out, (int64_t)status);
+    put(out, picked);
+    read_outputs(out, table, schema, picked);
+    for (row = 0; (uint64_t)row < table->n_rows; row++) {
+        int reasons[63];
+        size_t n, i;
+        uint64_t bits = 0;
+        status = cdb_why_not(table, columns, schema, facts, unknown, row, reasons, 63, &n, &fault);
+        for (i = 0; i < n && i < 63; i++)
+            bits |= (uint64_t)1 << (reasons[i] == CDB_RULE ? 62 : reasons[i] == CDB_DISABLED ? 61 : reasons[i] % 60);
+        put(out, status == CDB_OK ? (int64_t)bits : -1);
+    }
+    free(rows);
+    free(penalties);
+}
+
 int main(int argc, char **argv)
 {
     FILE *in = argc == 3 ? fopen(argv[1], "rb") : NULL, *out = argc == 3 ? fopen(argv[2], "wb") : NULL;
     static cdb_condition *conditions; /* static: what they hold to the end is no leak */
     static cdb_column *columns;
+    static cdb_output_wanted *outputs;
     static cdb_schema schema;
     static cdb_unknown *unknown;
     static cdb_fact *facts;
     static char *input;
     char *artefacts;
-    int64_t n_artefacts, n_contexts, n, i, j;
+    cdb_strange strange;
+    int64_t memory, n_artefacts, n_contexts, n, i, j;
     long size;
     if (!in || !out || fseek(in, 0, SEEK_END) != 0 || (size = ftell(in)) < 0) return 2;
     rewind(in);
@@ -106,6 +156,17 @@ int main(int argc, char **argv)
     }
     schema.conditions = conditions;
     schema.n_conditions = (size_t)n;
+    outputs = (cdb_output_wanted *)calloc((size_t)(n = whole()) + 1, sizeof *outputs);
+    for (i = 0; i < n; i++) {
+        outputs[i].name = text();
+        outputs[i].type = (cdb_output_type)whole();
+        outputs[i].size = (size_t)whole();
+    }
+    schema.outputs = outputs;
+    schema.n_outputs = (size_t)n;
+    n = (int64_t)schema.n_conditions;
+    strange = (cdb_strange)whole();
+    memory = whole();
     n_artefacts = whole();
     artefacts = at;
     for (i = 0; i < n_artefacts; i++) text();
@@ -122,11 +183,19 @@ int main(int argc, char **argv)
         void *bytes = malloc((size_t)length + !length);
         cdb_table table;
         cdb_fault fault;
+        cdb_picker picker = cdb_new_picker(7, 3, memory < 0 ? 0 : (size_t)memory);
+        cdb_rest rests[64];
+        memset(rests, 0, sizeof rests);
+        picker.rests = rests;
+        picker.n_rests = sizeof rests / sizeof *rests;
         memcpy(bytes, at, (size_t)length);
         at += length + 1;
-        put(out, (int64_t)cdb_open(&table, columns, &schema, bytes, (size_t)length, &fault));
+        put(out, (int64_t)cdb_open(&table, columns, &schema, bytes, (size_t)length, strange, &fault));
         if (fault.status == CDB_OK)
-            for (j = 0; j < n_contexts; j++) answer(out, &table, columns, &schema, facts + j * n, unknown[j]);
+            for (j = 0; j < n_contexts; j++) {
+                answer(out, &table, columns, &schema, facts + j * n, unknown[j]);
+                if (memory >= 0) more(out, &table, columns, &schema, facts + j * n, unknown[j], 0.5 * (double)j, &picker);
+            }
         cdb_close(&table);
         free(bytes);
     }

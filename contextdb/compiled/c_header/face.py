@@ -1,7 +1,7 @@
 """The part of the header that is about single tables: for each a struct of facts, and functions that open and ask it.
 
-A condition that several tables share has one enum. Derived facts are fields like any others: an expression is not worked out in C,
-so the game gives its value, and the artefact is refused when its expression is no longer the one that the header shows.
+A condition that several tables share has one enum. The schema of a table has the conditions of its columns, then those that its
+rules and derived facts need. The game gives all but the derived ones, which are computed by the programs of the artefact.
 """
 
 from __future__ import annotations
@@ -12,17 +12,24 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from textwrap import wrap
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.kinds import Kind
-from contextdb.compiled.c_header.spelling import Names, comment, literal
+from contextdb.compiled.c_header.naming import Choices, Names, TableFace, conditions_of
+from contextdb.compiled.c_header.outputs import output_enums, output_functions, outputs_wanted
+from contextdb.compiled.c_header.spelling import comment, literal
+from contextdb.compiled.c_header.watching import WATCH
 from contextdb.compiled.data import CompiledData
 
-READER = 2
+READER = 3
 """Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
 
-PARTS = ("types.h", "json.h", "opening.h", "columns.h", "arrays.h", "open.h", "query.h", "files.h")
+PARTS = (
+    *("types.h", "arithmetic.h", "json.h", "opening.h", "columns.h", "facts.h", "programs.h", "arrays.h", "linking.h", "levels.h"),
+    *("outputs.h", "open.h", "query.h", "rows.h", "pick.h", "files.h"),
+)
 _HEAD = """/* Written by `contextdb compile --c-header`: do not edit. */
 
 #ifdef CDB_READER
@@ -49,7 +56,6 @@ _FOOT = """
 
 #endif /* {guard} */
 """
-_ENDINGS = ("", "_facts", "_condition", "_conditions", "_schema", "_missing", "_open", "_close", "_query")
 
 
 @dataclass(frozen=True)
@@ -74,110 +80,36 @@ def plain_of(kind: Kind) -> Plain:
     return _TRUTH if kind.is_truth else _TEXT
 
 
-@dataclass(frozen=True)
-class HeldBack:
-    """A table that no C program can ask, and why."""
-
-    table: str
-    why: str
-
-
-@dataclass(frozen=True)
-class Choices:
-    """A condition's declared values in C: the type, the array of their names, and an enumerator for each."""
-
-    type: str
-    values: tuple[str, ...]
-    enumerators: tuple[str, ...]
-    missing: str
-
-    @property
-    def n_words(self) -> int:
-        """Words of a set of tags; bit 0 says that the set is known."""
-        return (len(self.values) + 1 + 63) // 64
-
-
-@dataclass(frozen=True)
-class TableFace:
-    """A table in C: what its names begin with, and the field of each condition."""
-
-    table: str
-    base: str
-    fields: tuple[str, ...]
-    enumerators: tuple[str, ...]
-
-
-def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H") -> tuple[str, list[HeldBack]]:
-    """The text of the header, ASCII with line feeds, and the tables that it leaves out; the same tables give the same text.
+def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H") -> str:
+    """The text of the header, ASCII with line feeds; the same tables give the same text.
 
     Raises
     ------
     ContextDBError
         A name cannot be a text of C.
     """
-    names = names_left()
-    choices: dict[Condition, Choices] = {}
-    held_back, parts = [], []
+    names = Names.of(tables, guard, reader_names())
+    written: set[Condition] = set()
+    parts = []
     for name, table in tables.items():
-        if why := _why_not(table):
-            held_back.append(HeldBack(name, why))
-            parts.append(f"\n{comment(f'table {name} is left out: {why}')}\n")
-            continue
-        for condition in table.conditions:
-            if condition.domain.values and condition not in choices:
-                choices[condition] = choices_of(condition, names)
-                parts.append("\n" + "".join(f"{line}\n" for line in _choices(condition, choices[condition])))
-        parts.append("\n" + "".join(f"{line}\n" for line in _table(table, face_of(name, table, names), choices)))
-    guard = names.of(guard, is_upper=True)
-    head = _HEAD.format(version=READER, reader=_reader(), guard=guard)
-    return "".join([head, *parts, _FOOT.format(guard=guard)]), held_back
+        for condition in conditions_of(table):
+            if condition in names.choices and condition not in written:
+                written.add(condition)
+                parts.append("\n" + "".join(f"{line}\n" for line in _choices(condition, names.choices[condition])))
+        parts.append("\n" + "".join(f"{line}\n" for line in _table(table, names.tables[name], names.choices)))
+    head = _HEAD.format(version=READER, reader=_reader(), guard=names.guard)
+    return "".join([head, *parts, _FOOT.format(guard=names.guard)])
 
 
-def names_left() -> Names:
-    """Names for a project: those that the reader has are taken."""
-    return Names(set(re.findall(r"\b(?:cdb|CDB)\w*", _reader())))
+def reader_names() -> frozenset[str]:
+    """The names that the reader has, which no project can have."""
+    return frozenset(re.findall(r"\b(?:cdb|CDB)\w*", _reader()))
 
 
 @cache
 def _reader() -> str:
     folder = files("contextdb.compiled.c_header").joinpath("reader")
     return "".join(folder.joinpath(part).read_text(encoding="ascii") for part in PARTS)
-
-
-def _why_not(table: CompiledData) -> str:
-    """Why a table cannot be answered for in C; "" where it can."""
-    return "its rows have rules of their own (when)" if table.when is not None else ""
-
-
-def choices_of(condition: Condition, names: Names) -> Choices:
-    """Names for the declared values of a condition; of tags also those above them, which a fact may hold too."""
-    values = condition.domain.values or ()
-    is_tags = condition.domain.type.is_tags
-    if is_tags:
-        values = tuple(dict.fromkeys(tag for value in values for tag in _with_those_above(value)))
-    endings = ("", "_set", "_values", "_none", "_add") if is_tags else ("", "_values")
-    base = names.of(condition.name, "cdb_", endings)
-    head = f"CDB_{base.removeprefix('cdb_')}_".upper()
-    missing = "" if is_tags else names.of("missing", head, is_upper=True)
-    return Choices(base, values, tuple(names.of(value, head, is_upper=True) for value in values), missing)
-
-
-def _with_those_above(tag: str) -> Iterator[str]:
-    parts = tag.split(".")
-    return (".".join(parts[: n + 1]) for n in range(len(parts)))
-
-
-def face_of(name: str, table: CompiledData, names: Names) -> TableFace:
-    """Names for a table and its conditions."""
-    base = names.of(name, "cdb_", _ENDINGS)
-    head = f"CDB_{base.removeprefix('cdb_')}_".upper()
-    fields = Names()
-    return TableFace(
-        name,
-        base,
-        tuple(fields.of(c.name) for c in table.conditions),
-        tuple(names.of(c.name, head, is_upper=True) for c in table.conditions),
-    )
 
 
 # ---- what is written
@@ -229,6 +161,7 @@ def _table(table: CompiledData, face: TableFace, choices: Mapping[Condition, Cho
     yield ""
     yield from _facts_struct(table, face, choices)
     yield from _conditions_enum(table, face)
+    yield from output_enums(table, face)
     yield from _schema(table, face, choices)
     yield from _missing_facts(table, face, choices)
     yield from _functions(table, face, choices)
@@ -237,15 +170,20 @@ def _table(table: CompiledData, face: TableFace, choices: Mapping[Condition, Cho
 def _facts_struct(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     yield f"typedef struct {face.base}_facts {{"
     lines = []
-    for condition, name in zip(table.conditions, face.fields, strict=True):
+    for condition, name in given_conditions(table, face):
         kind = _type(condition, choices.get(condition))
         lines.append((f"    {kind}{'' if kind.endswith('*') else ' '}{name};", condition))
     width = max((len(line) for line, _ in lines), default=0) + 2
     yield from (f"{line:<{min(width, 60)}}{_told(condition)}" for line, condition in lines)
     if not lines:
-        yield "    char nothing; /* the table has no conditions */"
+        yield "    char nothing; /* the table needs no facts */"
     yield f"}} {face.base}_facts;"
     yield ""
+
+
+def given_conditions(table: CompiledData, face: TableFace) -> list[tuple[Condition, str]]:
+    """The conditions whose facts the game gives, and their fields."""
+    return [(c, name) for c, name in zip(conditions_of(table), face.fields, strict=True) if name]
 
 
 def _type(condition: Condition, choices: Choices | None) -> str:
@@ -255,14 +193,13 @@ def _type(condition: Condition, choices: Choices | None) -> str:
 
 
 def _told(condition: Condition) -> str:
-    """Type, name, bounds, unit, expression and description of a condition."""
+    """Type, name, bounds, unit and description of a condition."""
     domain = condition.domain
     low, high = domain.minimum, domain.maximum
     bounds = f"{_end(low, domain)}..{_end(high, domain)}" if math.isfinite(low) or math.isfinite(high) else ""
     unit = condition.unit or domain.type.unit
     head = " ".join(part for part in (domain.kind, condition.name, bounds, unit) if part)
-    derived = f"the game computes it: {condition.expr}" if condition.expr else ""
-    return comment("; ".join(part for part in (head, derived, condition.description) if part))
+    return comment("; ".join(part for part in (head, condition.description) if part))
 
 
 def _end(bound: float, domain: Domain) -> str:
@@ -273,7 +210,7 @@ def _conditions_enum(table: CompiledData, face: TableFace) -> Iterator[str]:
     """The conditions by number, as a fault names them."""
     yield f"typedef enum {face.base}_condition {{"
     yield from (f"    {name} = {number}," for number, name in enumerate(face.enumerators))
-    yield f"    {face.base}_conditions = {len(face.enumerators)}"
+    yield f"    {face.n_conditions} = {len(face.enumerators)}"
     yield f"}} {face.base}_condition;"
     yield ""
 
@@ -281,18 +218,23 @@ def _conditions_enum(table: CompiledData, face: TableFace) -> Iterator[str]:
 def _schema(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
     yield f"static inline const cdb_schema *{face.base}_schema(void)"
     yield "{"
-    if table.conditions:
+    if conditions_of(table):
         yield "    static const cdb_condition conditions[] = {"
-        for number, condition in enumerate(table.conditions, 1):
+        for number, condition in enumerate(conditions_of(table), 1):
             values = choices.get(condition)
             n_values = 0 if values is None else len(values.values) + (condition.domain.type.is_tags)
             expr = literal(condition.expr) if condition.expr else "NULL"
             listed = f"{values.type}_values" if values else "NULL"
-            ending = "," if number < len(table.conditions) else ""
+            ending = "," if number < len(conditions_of(table)) else ""
             kind = f"CDB_{condition.domain.kind.upper()}"
             yield f"        {{{literal(condition.name)}, {kind}, {expr}, {listed}, {n_values}}}{ending}"
         yield "    };"
-    yield f"    static const cdb_schema schema = {{{'conditions' if table.conditions else 'NULL'}, {len(table.conditions)}}};"
+    if face.outputs:
+        yield from outputs_wanted(table, face)
+    conditions = conditions_of(table)
+    first = f"{'conditions' if conditions else 'NULL'}, {len(conditions)}"
+    second = f"{'outputs' if face.outputs else 'NULL'}, {len(face.outputs)}"
+    yield f"    static const cdb_schema schema = {{{first}, {second}}};"
     yield "    return &schema;"
     yield "}"
     yield ""
@@ -304,7 +246,7 @@ def _missing_facts(table: CompiledData, face: TableFace, choices: Mapping[Condit
     yield "{"
     yield f"    {face.base}_facts facts;"
     yield "    memset(&facts, 0, sizeof facts);"
-    for condition, name in zip(table.conditions, face.fields, strict=True):
+    for condition, name in given_conditions(table, face):
         kind, declared = condition.domain.type, choices.get(condition)
         if not kind.is_tags:
             yield f"    facts.{name} = {declared.missing if declared else plain_of(kind).missing};"
@@ -316,33 +258,83 @@ def _missing_facts(table: CompiledData, face: TableFace, choices: Mapping[Condit
 
 
 def _functions(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
-    base, n = face.base, max(len(table.conditions), 1)
+    base, n = face.base, max(len(conditions_of(table)), 1)
     yield f"typedef struct {base} {{"
     yield "    cdb_table table;"
     yield f"    cdb_column columns[{n}];"
     yield f"}} {base};"
     yield ""
-    yield "/* Open an artefact from memory that stays where it is until it is closed: see cdb_open. */"
-    yield f"static inline cdb_status {base}_open({base} *opened, const void *bytes, size_t size, cdb_fault *fault)"
+    yield from _facts_in_order(table, face, choices)
+    for name, arguments, told, body in _FUNCTIONS:
+        yield f"/* {told} */"
+        head = f"static inline {'void' if name == 'close' else 'cdb_status'} {base}_{name}({arguments.format(base=base)})"
+        yield from (line.rstrip() for line in wrap(head, 126, subsequent_indent="    ", break_long_words=False))
+        yield "{"
+        yield from (f"    {line}".format(base=base, n=n) for line in body)
+        yield "}"
+        yield ""
+    yield from output_functions(table, face)
+    yield from WATCH.replace("BASE", face.base).splitlines()
+
+
+_ASKED = "const {base} *opened, const {base}_facts *facts, cdb_unknown unknown"
+_GIVEN = ("cdb_fact given[{n}];", "{base}_given(facts, given);")
+_TABLE = "&opened->table, opened->columns, {base}_schema()"
+_FUNCTIONS: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
+    (
+        "open",
+        "{base} *opened, const void *bytes, size_t size, cdb_fault *fault",
+        "Open an artefact from memory that stays where it is until it is closed: see cdb_open.",
+        (f"return cdb_open({_TABLE}, bytes, size, CDB_STRANGE_REFUSED, fault);",),
+    ),
+    (
+        "open_with",
+        "{base} *opened, const void *bytes, size_t size, cdb_strange strange, cdb_fault *fault",
+        "The same; `strange` says what a condition does that this header does not know.",
+        (f"return cdb_open({_TABLE}, bytes, size, strange, fault);",),
+    ),
+    ("close", "{base} *opened", "Give back what opening took.", ("cdb_close(&opened->table);",)),
+    (
+        "query",
+        f"{_ASKED}, uint64_t *rows, size_t room, cdb_fault *fault",
+        "The valid rows, one bit a row, in `rows` of `room` words: see cdb_query.",
+        (*_GIVEN, f"return cdb_query({_TABLE}, given, unknown, rows, room, fault);"),
+    ),
+    (
+        "pick",
+        f"{_ASKED}, const uint64_t *rows, size_t room, double time_s, cdb_picker *picker, int64_t *row, cdb_fault *fault",
+        "One of the valid rows, by the table's policy: see cdb_pick.",
+        (*_GIVEN, f"return cdb_pick({_TABLE}, given, unknown, rows, room, time_s, picker, row, fault);"),
+    ),
+    (
+        "penalties",
+        f"{_ASKED}, double *penalties, size_t room, cdb_fault *fault",
+        "What each row's soft cells cost: see cdb_penalties.",
+        (*_GIVEN, f"return cdb_penalties({_TABLE}, given, unknown, penalties, room, fault);"),
+    ),
+    (
+        "why_not",
+        f"{_ASKED}, int64_t row, int *reasons, size_t room, size_t *n, cdb_fault *fault",
+        "Why a row is not valid: see cdb_why_not.",
+        (*_GIVEN, f"return cdb_why_not({_TABLE}, given, unknown, row, reasons, room, n, fault);"),
+    ),
+)
+"""The functions of a table: name, arguments, comment and lines."""
+
+
+def _facts_in_order(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
+    """The function that brings the fields of the struct into the order of the schema."""
+    yield f"static inline void {face.base}_given(const {face.base}_facts *facts, cdb_fact *given)"
     yield "{"
-    yield f"    return cdb_open(&opened->table, opened->columns, {base}_schema(), bytes, size, fault);"
+    if not all(face.fields) or not face.fields:
+        yield f"    memset(given, 0, {max(len(face.fields), 1)} * sizeof *given);"
+    if not any(face.fields):
+        yield "    (void)facts;"
+    for number, (condition, name) in enumerate(zip(conditions_of(table), face.fields, strict=True)):
+        if name:
+            yield f"    {_given(number, name, condition, choices.get(condition))}"
     yield "}"
     yield ""
-    yield f"static inline void {base}_close({base} *opened)"
-    yield "{"
-    yield "    cdb_close(&opened->table);"
-    yield "}"
-    yield ""
-    yield "/* The valid rows, one bit a row, in `rows` of `room` words: see cdb_query. */"
-    yield f"static inline cdb_status {base}_query(const {base} *opened, const {base}_facts *facts, cdb_unknown unknown,"
-    yield "    uint64_t *rows, size_t room, cdb_fault *fault)"
-    yield "{"
-    yield f"    cdb_fact given[{n}];"
-    for number, (condition, name) in enumerate(zip(table.conditions, face.fields, strict=True)):
-        yield f"    {_given(number, name, condition, choices.get(condition))}"
-    yield from () if table.conditions else ("    (void)facts;", "    memset(given, 0, sizeof given);")
-    yield f"    return cdb_query(&opened->table, opened->columns, {base}_schema(), given, unknown, rows, room, fault);"
-    yield "}"
 
 
 def _given(number: int, name: str, condition: Condition, declared: Choices | None) -> str:

@@ -7,10 +7,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
+from pathlib import PurePosixPath
 
 from contextdb.cells.conditions import Condition
-from contextdb.compiled.c_header.face import Choices, TableFace, choices_of, face_of, names_left, plain_of
-from contextdb.compiled.c_header.spelling import Names, comment, literal
+from contextdb.compiled.c_header.face import given_conditions, plain_of, reader_names
+from contextdb.compiled.c_header.naming import Choices, Names, TableFace
+from contextdb.compiled.c_header.spelling import Wanted, comment, distinct, literal
 from contextdb.compiled.data import CompiledData
 
 _HEAD = """/* Written by `contextdb compile --c-link`: do not edit. It goes with {header}, which was written with it. */
@@ -40,22 +42,13 @@ _FOOT = """
 
 
 def c_link_of(tables: Mapping[str, CompiledData], header: str, guard: str = "CDB_LINK_H") -> str:
-    """The text of the file, ASCII with line feeds. `header` is how it includes the header of the same tables; those that the header
-    leaves out are left out here too."""
-    names = names_left()
-    choices: dict[Condition, Choices] = {}
-    faces: list[tuple[CompiledData, TableFace]] = []
-    for name, table in tables.items():
-        if table.when is not None:
-            continue
-        for condition in table.conditions:  # in the order of the header, so that names come out alike
-            if condition.domain.values and condition not in choices:
-                choices[condition] = choices_of(condition, names)
-        faces.append((table, face_of(name, table, names)))
-    guard = Names().of(guard, is_upper=True)
+    """The text of the file, ASCII with line feeds. `header` is how it includes the header of the same tables."""
+    names = Names.of(tables, f"CDB_{PurePosixPath(header).stem}_H", reader_names())  # as in the header
+    faces = [(table, names.tables[name]) for name, table in tables.items()]
+    [guard] = distinct([Wanted(guard.removeprefix("CDB_"), "CDB_", is_upper=True)])
     reader = files("contextdb.compiled.c_header").joinpath("reader", "link.h").read_text(encoding="ascii")
     head = _HEAD.format(header=comment(header)[3:-3], guard=guard, include=literal(header), reader=reader)
-    parts = [_joined(_tables(faces)), *(_joined(_tell(table, face, choices)) for table, face in faces)]
+    parts = [_joined(_tables(faces)), *(_joined(_tell(table, face, names.choices)) for table, face in faces)]
     return "".join([head, *parts, _FOOT.format(guard=guard)])
 
 
@@ -73,18 +66,13 @@ def _tables(faces: Sequence[tuple[CompiledData, TableFace]]) -> Iterator[str]:
         comma = "," if number else ""
         told = f'{comma}{json.dumps(face.table)}:{{"version":null,"rows":{table.n_rows},"conditions":{{'
         yield f"    cdbl_say(link, {literal(told)});"
-        for at, condition in enumerate(_told(table)):
+        for at, (condition, _) in enumerate(given_conditions(table, face)):
             named = f"{',' if at else ''}{json.dumps(condition.name)}:{json.dumps(condition.domain.kind)}"
             yield f"    cdbl_say(link, {literal(named)});"
         yield '    cdbl_say(link, "}}");'
     yield '    cdbl_say(link, "}");'
     yield "}"
     yield "#endif"
-
-
-def _told(table: CompiledData) -> list[Condition]:
-    """The conditions whose facts are told: derived ones are computed by whoever reads them."""
-    return [condition for condition in table.conditions if condition.expr is None]
 
 
 def _tell(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choices]) -> Iterator[str]:
@@ -97,10 +85,9 @@ def _tell(table: CompiledData, face: TableFace, choices: Mapping[Condition, Choi
     yield "{"
     yield "#ifndef _WIN32"
     yield f"    cdbl_begin(link, who, {literal(face.table)});"
-    for condition, name in zip(table.conditions, face.fields, strict=True):
-        if condition.expr is None:
-            yield f"    {_fact(condition, name, choices.get(condition))}"
-    yield from () if _told(table) else ("    (void)facts;",)
+    given = given_conditions(table, face)
+    yield from (f"    {_fact(condition, name, choices.get(condition))}" for condition, name in given)
+    yield from () if given else ("    (void)facts;",)
     yield "    cdbl_end(link, &opened->table, rows, picked);"
     yield "#else"
     yield "    (void)link, (void)who, (void)opened, (void)facts, (void)rows, (void)picked;"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from unicodedata import normalize
 
 from contextdb.errors import ContextDBError, Fault, shown
@@ -28,23 +31,47 @@ RESERVED = frozenset(_WORDS.split())
 """Keywords of C and C++, and names that headers often make macros of."""
 
 
-@dataclass
-class Names:
-    """Names that are given once each."""
+@dataclass(frozen=True)
+class Wanted:
+    """A name that is wanted for a text: "Defender.Tags" gives Defender_Tags, or in capitals DEFENDER_TAGS."""
 
-    taken: set[str] = field(default_factory=set)
+    text: str
+    prefix: str = ""
+    endings: tuple[str, ...] = ("",)
+    """What is put behind the name, so that each of these must be free."""
+    is_upper: bool = False
+    of: str = ""
+    """What the text belongs to, where the same text is wanted for several things."""
 
-    def of(self, text: str, prefix: str = "", endings: tuple[str, ...] = ("",), is_upper: bool = False) -> str:
-        """A name like the text, with a prefix, of which no ending is taken: "Defender.Tags" gives Defender_Tags."""
-        stem = prefix + _letters(text)
-        stem = stem.upper() if is_upper else stem
-        if not prefix and (stem in RESERVED or not stem[0].isalpha()):
+    def name(self, n_digits: int) -> str:
+        """The name, with so many digits of a hash of the text."""
+        letters = _letters(self.text)
+        stem = self.prefix + (upper(letters) if self.is_upper else letters)
+        if not self.prefix and (stem in RESERVED or not stem[0].isalpha()):
             stem = f"{stem}_" if stem in RESERVED else f"n{stem}"
-        number, name = 1, stem
-        while any(name + ending in self.taken for ending in endings):
-            number, name = number + 1, f"{stem.rstrip('_')}_{number + 1}"
-        self.taken.update(name + ending for ending in endings)
-        return name
+        digits = hashlib.blake2b(f"{self.of}\0{self.text}".encode("utf-8", "surrogatepass")).hexdigest()[:n_digits]
+        return f"{stem.rstrip('_')}_{digits.upper() if self.is_upper else digits}" if digits else stem
+
+
+def distinct(wanted: Sequence[Wanted], taken: Collection[str] = frozenset()) -> list[str]:
+    """Names for texts, no two alike. A name that two texts would have, or that is taken, gets digits of a hash of its own text:
+    which ones does not hang on their order."""
+    n_digits = [0] * len(wanted)
+    while True:
+        names = [one.name(n) for one, n in zip(wanted, n_digits, strict=True)]
+        whole = [[name + ending for ending in one.endings] for one, name in zip(wanted, names, strict=True)]
+        claims = Counter(name for own in whole for name in own)
+        clashes = [i for i, own in enumerate(whole) if any(claims[name] > 1 or name in taken for name in own)]
+        if not clashes:
+            return names
+        for i in clashes:
+            assert n_digits[i] < 128, wanted[i]
+            n_digits[i] += 4
+
+
+def upper(letters: str) -> str:
+    """A name in capitals that keeps its word joints: IsInMidAirAnim gives IS_IN_MID_AIR_ANIM."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", letters).upper()
 
 
 def _letters(text: str) -> str:

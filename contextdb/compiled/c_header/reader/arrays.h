@@ -7,7 +7,7 @@ typedef struct cdbi_array {
     size_t n_bytes;
     size_t shape[3];
     size_t n_dimensions;
-    char dtype[4];
+    char dtype[8];
 } cdbi_array;
 
 /* Read an entry such as {"dtype": "U64", "shape": [3, 16], "data_offsets": [0, 384]}; its bytes lie within the file. */
@@ -42,12 +42,13 @@ static inline cdbi_array cdbi_read_array(const cdb_table *table, cdbi_json *entr
     return array;
 }
 
-/* Whether an array holds 8-byte numbers of a kind in so many dimensions, the last of which is `width`, and has their bytes. */
+/* Whether an array holds numbers of a kind in so many dimensions, the last of which is `width`, and has their bytes. */
 static inline int cdbi_fits(const cdbi_array *array, const char *dtype, size_t n_dimensions, size_t width)
 {
-    size_t n = array->n_bytes / 8, i;
-    if (strcmp(array->dtype, dtype) != 0 || array->n_dimensions != n_dimensions || array->n_bytes % 8 != 0) return 0;
-    if (array->shape[n_dimensions - 1] != width || ((uintptr_t)array->at & 7) != 0) return 0;
+    size_t size = strcmp(dtype, "I32") == 0 ? 4 : strcmp(dtype, "BOOL") == 0 || strcmp(dtype, "U8") == 0 ? 1 : 8;
+    size_t n = array->n_bytes / size, i;
+    if (strcmp(array->dtype, dtype) != 0 || array->n_dimensions != n_dimensions || array->n_bytes % size != 0) return 0;
+    if (array->shape[n_dimensions - 1] != width || ((uintptr_t)array->at & (size - 1)) != 0) return 0;
     for (i = 0; i < n_dimensions; i++)
         if (array->shape[i] == 0) return n == 0;
     for (i = 0; i < n_dimensions; i++) {
@@ -88,22 +89,35 @@ static inline int cdbi_take_part(cdb_column *column, const char *part, const cdb
     return cdbi_fits(array, "U64", 3, n_words);
 }
 
-/* The column whose part a key names, and the part behind "CCC."; NULL where the key is about no column. */
-static inline cdb_column *cdbi_column_of(const cdbi_opening *opening, const char *key, const char **part)
+/* The column whose part a key names, and the part behind "CCC."; n_conditions where the key is about no column. */
+static inline size_t cdbi_column_of(const cdbi_opening *opening, const char *key, const char **part)
 {
     size_t number = 0, i;
     const char *at = key;
     for (; *at >= '0' && *at <= '9' && at < key + 9; at++) number = number * 10 + (size_t)(*at - '0');
-    if (at < key + 3 || *at != '.') return NULL;
+    if (at < key + 3 || *at != '.') return opening->schema->n_conditions;
     *part = at + 1;
     for (i = 0; i < opening->schema->n_conditions; i++) {
-        cdb_column *column = &opening->columns[(number + i) % opening->schema->n_conditions];
-        if (column->kind != 0 && column->file_index == number) return column;
+        size_t place = (number + i) % opening->schema->n_conditions;
+        if (opening->columns[place].kind != 0 && opening->columns[place].file_index == number) return place;
     }
-    return NULL;
+    return i;
 }
 
-static inline void cdbi_assets(cdbi_opening *opening, const cdbi_array *array)
+/* Take an array for a condition's column or its soft cells; 0 where it does not fit. */
+static inline int cdbi_take_condition(cdbi_opening *opening, size_t at, const char *part, const cdbi_array *array)
+{
+    cdb_table *table = opening->table;
+    size_t n_soft = table->n_depths * table->n_rows;
+    if (strncmp(part, "soft.", 5) != 0) return cdbi_take_part(&opening->columns[at], part, array, table->n_words);
+    if (!table->soft || table->soft[at].column.kind == 0) return 1;
+    if (strcmp(part + 5, "penalties") != 0) return cdbi_take_part(&table->soft[at].column, part + 5, array, (n_soft + 63) / 64);
+    table->soft[at].penalties = (const double *)(const void *)array->at;
+    return cdbi_fits(array, "F64", 1, n_soft);
+}
+
+/* The texts of an array that is a list of texts in JSON. */
+static inline cdbi_list cdbi_take_texts(cdbi_opening *opening, const cdbi_array *array, const char *key)
 {
     const char *start = (const char *)array->at;
     cdbi_json json;
@@ -113,9 +127,97 @@ static inline void cdbi_assets(cdbi_opening *opening, const cdbi_array *array)
     json.why = NULL;
     list = cdbi_texts(opening, &json);
     cdbi_peek(&json);
-    if (json.why || json.at != json.end || list.n != opening->table->n_rows || strcmp(array->dtype, "U8") != 0)
-        cdbi_refuse(opening, CDB_BAD_FILE, "the names of the assets cannot be read", -1, "assets");
-    opening->table->assets = list.texts;
+    if (json.why || json.at != json.end || strcmp(array->dtype, "U8") != 0)
+        cdbi_refuse(opening, CDB_BAD_FILE, "a list of texts cannot be read", -1, key);
+    return list;
+}
+
+/* Take a part of the programs; 0 where it does not fit. */
+static inline int cdbi_take_program(cdbi_opening *opening, const char *key, const cdbi_array *array)
+{
+    static const char *const parts[] = {"texts", "facts", "types", "numbers", "code", "starts", "derived", "of_row"};
+    cdbi_programs *programs = &opening->table->programs;
+    const void *at = array->at;
+    size_t n = array->shape[0], part = 0;
+    while (part < 8 && strcmp(key + strlen("programs."), parts[part]) != 0) part++;
+    programs->parts |= part < 8 ? 1U << part : 0;
+    switch (part) {
+    case 0: programs->texts = cdbi_take_texts(opening, array, key); return 1;
+    case 1: programs->facts = cdbi_take_texts(opening, array, key); return 1;
+    case 2: programs->types = cdbi_take_texts(opening, array, key); return 1;
+    case 3:
+        programs->numbers = (const double *)at;
+        programs->n_numbers = n;
+        return cdbi_fits(array, "F64", 1, n);
+    case 4:
+        programs->code = (const int32_t *)at;
+        programs->n_code = n;
+        return cdbi_fits(array, "I32", 2, 4);
+    case 5:
+        programs->starts = (const int64_t *)at;
+        programs->n_starts = n;
+        return cdbi_fits(array, "I64", 1, n);
+    case 6:
+        programs->derived = (const int64_t *)at;
+        programs->n_derived = n;
+        return cdbi_fits(array, "I64", 1, n);
+    case 7:
+        programs->of_row = (const int32_t *)at;
+        programs->n_of_row = n;
+        return cdbi_fits(array, "I32", 1, n);
+    default: return 1;
+    }
+}
+
+/* Take an array that picks look at, of one of the levels; 0 where it does not fit. */
+static inline int cdbi_take_level(cdbi_level *level, const char *part, const cdbi_array *array)
+{
+    const void *at = array->at;
+    size_t n = array->shape[0];
+    int is_level = 1, fits = 1;
+    if (strcmp(part, "priorities") == 0) {
+        level->priorities = (const int64_t *)at;
+        fits = cdbi_fits(array, "I64", 1, n);
+    } else if (strcmp(part, "row_weights") == 0) {
+        level->row_weights = (const double *)at;
+        fits = cdbi_fits(array, "F64", 1, n);
+    } else if (strcmp(part, "specificities") == 0) {
+        level->specificities = (const double *)at;
+        fits = cdbi_fits(array, "F64", 1, n);
+    } else if (strcmp(part, "once") == 0) {
+        level->once = (const unsigned char *)at;
+        fits = cdbi_fits(array, "BOOL", 1, n);
+    } else if (strcmp(part, "cooldown_s") == 0) {
+        level->cooldown_s = (const double *)at;
+        fits = cdbi_fits(array, "F64", 1, n);
+    } else if (strcmp(part, "cooldown_turns") == 0) {
+        level->cooldown_turns = (const int64_t *)at;
+        fits = cdbi_fits(array, "I64", 1, n);
+    } else is_level = 0;
+    if (!is_level) return 1;
+    if (level->n_rows == CDBI_NOT_SAID) level->n_rows = n;
+    return fits && level->n_rows == n;
+}
+
+/* Take an array of the ways through tables inside tables; 0 where it does not fit. */
+static inline int cdbi_take_way(cdbi_opening *opening, const char *key, const cdbi_array *array)
+{
+    cdb_table *table = opening->table;
+    const char *part = key + strlen("ways.");
+    size_t number = 0;
+    if (strcmp(part, "leaves") == 0) {
+        cdbi_list leaves = cdbi_take_texts(opening, array, key);
+        table->leaves = leaves.texts;
+        return leaves.n == table->n_rows;
+    }
+    if (strcmp(part, "numbers") == 0 || strcmp(part, "rows") == 0) {
+        if (part[0] == 'n') table->way_numbers = (const int32_t *)(const void *)array->at;
+        else table->way_rows = (const int32_t *)(const void *)array->at;
+        return cdbi_fits(array, "I32", 2, table->n_rows) && array->shape[0] == table->n_depths;
+    }
+    for (; *part >= '0' && *part <= '9' && number < 100000; part++) number = number * 10 + (size_t)(*part - '0');
+    if (*part != '.' || !opening->has_ways || number >= table->n_levels) return 1;
+    return cdbi_take_level(&table->levels[number], part + 1, array);
 }
 
 /* Take every array that is asked for. */
@@ -127,8 +229,8 @@ static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
     const char *part = NULL;
     cdbi_take(&header, '{');
     while (opening->status == CDB_OK && cdbi_next(&header, '}', &n)) {
-        cdb_column *column;
         cdbi_array array;
+        size_t at;
         int fits = 1;
         cdbi_key(&header, key);
         if (strcmp(key, "__metadata__") == 0) {
@@ -137,46 +239,26 @@ static inline void cdbi_arrays(cdbi_opening *opening, cdbi_json header)
         }
         array = cdbi_read_array(table, &header);
         if (header.why) break;
-        column = cdbi_column_of(opening, key, &part);
-        if (column) fits = cdbi_take_part(column, part, &array, table->n_words);
-        else if (strcmp(key, "assets") == 0 && !table->assets) cdbi_assets(opening, &array);
-        else if (strcmp(key, "enabled") == 0) {
+        at = cdbi_column_of(opening, key, &part);
+        if (at < opening->schema->n_conditions) fits = cdbi_take_condition(opening, at, part, &array);
+        else if (strncmp(key, "programs.", strlen("programs.")) == 0) fits = cdbi_take_program(opening, key, &array);
+        else if (strncmp(key, "ways.", strlen("ways.")) == 0) fits = cdbi_take_way(opening, key, &array);
+        else if (strcmp(key, "assets") == 0 && !table->assets) {
+            cdbi_list assets = cdbi_take_texts(opening, &array, key);
+            table->assets = assets.texts;
+            fits = assets.n == table->n_rows;
+        } else if (strcmp(key, "enabled") == 0) {
             table->enabled = cdbi_words(&array);
             fits = cdbi_fits(&array, "U64", 1, table->n_words);
-        } else if (strcmp(key, "priorities") == 0) {
-            table->priorities = (const int64_t *)(const void *)array.at;
-            fits = cdbi_fits(&array, "I64", 1, table->n_rows);
-        } else if (strcmp(key, "row_weights") == 0) {
-            table->row_weights = (const double *)(const void *)array.at;
-            fits = cdbi_fits(&array, "F64", 1, table->n_rows);
+        } else if (strcmp(key, "priorities") == 0 || strcmp(key, "row_weights") == 0) {
+            if (key[0] == 'p') table->priorities = (const int64_t *)(const void *)array.at;
+            else table->row_weights = (const double *)(const void *)array.at;
+            fits = cdbi_fits(&array, key[0] == 'p' ? "I64" : "F64", 1, table->n_rows);
         }
+        if (fits && !opening->has_ways) fits = cdbi_take_level(&table->levels[0], key, &array);
         if (!fits) cdbi_refuse(opening, CDB_BAD_FILE, "an array has another type, shape or place than it must have", -1, key);
     }
     if (header.why) cdbi_refuse(opening, CDB_BAD_FILE, header.why, -1, "");
-}
-
-static inline int cdbi_is_nan(double number)
-{
-    uint64_t bits; /* by its bits: fast-math options take x != x away */
-    memcpy(&bits, &number, sizeof bits);
-    return (bits & 0x7FFFFFFFFFFFFFFF) > 0x7FF0000000000000;
-}
-
-static inline int cdbi_is_infinite(double number)
-{
-    uint64_t bits;
-    memcpy(&bits, &number, sizeof bits);
-    return (bits & 0x7FFFFFFFFFFFFFFF) == 0x7FF0000000000000;
-}
-
-/* A whole number for each double, in their order. Compared as doubles, tiny ones would be 0 to a machine that was told to flush. */
-#define CDBI_MINUS_ZERO 0x7FFFFFFFFFFFFFFFU
-
-static inline uint64_t cdbi_place(double number)
-{
-    uint64_t bits;
-    memcpy(&bits, &number, sizeof bits);
-    return bits >> 63 ? ~bits : bits | 0x8000000000000000U;
 }
 
 /* Whether a column has all its arrays, as long as each other, and its bounds ascend. */
@@ -209,7 +291,9 @@ static inline void cdbi_check(cdbi_opening *opening)
     if (table->n_rows % 64 != 0 && table->enabled[table->n_words - 1] >> (table->n_rows % 64) != 0)
         cdbi_refuse(opening, CDB_BAD_FILE, "rows are enabled that are not there", -1, "enabled");
     for (i = 0; i < opening->schema->n_conditions && opening->status == CDB_OK; i++)
-        if (opening->columns[i].kind != 0 && !cdbi_is_whole(&opening->columns[i], opening->schema->conditions[i].type))
+        if ((opening->columns[i].kind != 0 && !cdbi_is_whole(&opening->columns[i], opening->schema->conditions[i].type))
+            || (table->soft && table->soft[i].column.kind != 0
+                && (!table->soft[i].penalties || !cdbi_is_whole(&table->soft[i].column, opening->schema->conditions[i].type))))
             cdbi_refuse(opening, CDB_BAD_FILE, "its arrays are not there, do not go together, or do not ascend", (int)i,
                 cdbi_name(opening, i));
 }

@@ -50,10 +50,9 @@ static inline void cdbi_sort(cdbi_list *list, uint32_t *classes)
 }
 
 /* The values of a bool or enum column must be those that this header was made for; those of a text column are kept. */
-static inline void cdbi_values(cdbi_opening *opening, size_t at, cdbi_json *json)
+static inline void cdbi_values(cdbi_opening *opening, cdb_column *column, size_t at, cdbi_json *json)
 {
     const cdb_condition *condition = &opening->schema->conditions[at];
-    cdb_column *column = &opening->columns[at];
     size_t n = 0, i;
     int is_same = 1;
     if (condition->type == CDB_TEXT) {
@@ -118,9 +117,8 @@ static inline void cdbi_read_slot(cdbi_opening *opening, size_t at, cdbi_json *j
             cdbi_read_part(opening, at, json, &slot->parts[n - 1]);
 }
 
-static inline void cdbi_negated(cdbi_opening *opening, size_t at, cdbi_json *json)
+static inline void cdbi_negated(cdbi_opening *opening, cdb_column *column, size_t at, cdbi_json *json)
 {
-    cdb_column *column = &opening->columns[at];
     size_t count = cdbi_count(json), n = 0;
     column->negated = (cdbi_slot *)cdbi_memory(opening, count, sizeof(cdbi_slot));
     if (!column->negated) return;
@@ -142,9 +140,8 @@ static inline int cdbi_kind(const cdbi_json *about)
 }
 
 /* How a column is kept: an object such as {"kind": "number"}. */
-static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cdbi_json *about)
+static inline const char *cdbi_column(cdbi_opening *opening, cdb_column *column, size_t at, const cdbi_json *about)
 {
-    cdb_column *column = &opening->columns[at];
     cdb_type type = opening->schema->conditions[at].type;
     int kind = cdbi_kind(about), is_number = type == CDB_INT || type == CDB_NUMBER || type == CDB_ANGLE || type == CDB_DATE;
     cdbi_json one = {NULL, NULL, NULL}, other = {NULL, NULL, NULL};
@@ -153,7 +150,7 @@ static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cd
         return "a column is kept in a way that its type is not";
     if (kind == CDBI_VALUE) {
         one = cdbi_member(about, "values");
-        cdbi_values(opening, at, &one);
+        cdbi_values(opening, column, at, &one);
         other = cdbi_member(about, "has_others");
         if (cdbi_peek(&other) != (type == CDB_TEXT ? 't' : 'f'))
             cdbi_fail(&other, "a column is kept in a way that its type is not");
@@ -168,15 +165,20 @@ static inline const char *cdbi_column(cdbi_opening *opening, size_t at, const cd
         column->texts = cdbi_texts(opening, &one);
         cdbi_set_bits(opening, &opening->schema->conditions[at], &column->texts);
         other = cdbi_member(about, "negated");
-        cdbi_negated(opening, at, &other);
+        cdbi_negated(opening, column, at, &other);
     }
     return one.why ? one.why : other.why;
 }
 
-/* Which condition of the schema this one of the file is, its type and expression the same; n_conditions where it is none. */
-static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *about, size_t file_index)
+static inline const char *cdbi_type_name(cdb_type type)
 {
     static const char *const types[] = {"bool", "int", "number", "angle", "date", "enum", "text", "tags"};
+    return types[type];
+}
+
+/* Which condition of the schema this one of the file is, its type the same; n_conditions where it is none. */
+static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *about, size_t file_index)
+{
     const cdb_schema *schema = opening->schema;
     size_t i, at = 0;
     int is_derived;
@@ -192,6 +194,7 @@ static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *abou
         cdbi_refuse(opening, CDB_BAD_FILE, value.why, -1, "about");
         return schema->n_conditions;
     }
+    if (i == schema->n_conditions && opening->strange == CDB_STRANGE_ANY) return i;
     if (i == schema->n_conditions) {
         value = cdbi_member(about, "name");
         cdbi_text(&value, name, sizeof name);
@@ -199,18 +202,28 @@ static inline size_t cdbi_condition(cdbi_opening *opening, const cdbi_json *abou
         return schema->n_conditions;
     }
     value = cdbi_member(about, "type");
-    if (!cdbi_is(&value, types[schema->conditions[at].type])) {
+    if (!cdbi_is(&value, cdbi_type_name(schema->conditions[at].type))) {
         cdbi_refuse(opening, CDB_OTHER_TABLE, "its type is another than that of this header", (int)at, schema->conditions[at].name);
         return schema->n_conditions;
     }
     value = cdbi_member(about, "expr");
     is_derived = cdbi_peek(&value) == '"';
-    if (is_derived != (schema->conditions[at].expr != NULL) || (is_derived && !cdbi_is(&value, schema->conditions[at].expr))) {
-        cdbi_refuse(opening, CDB_OTHER_TABLE, "it is derived in another way than this header says", (int)at,
-            schema->conditions[at].name);
+    if (is_derived != (schema->conditions[at].expr != NULL)) {
+        cdbi_refuse(opening, CDB_OTHER_TABLE, is_derived ? "it is derived, and this header takes it from the game"
+            : "it is given, and this header computes it", (int)at, schema->conditions[at].name);
         return schema->n_conditions;
     }
     return at;
+}
+
+/* The soft cells of a column, where it has some: `soft` is null, or an object as for a column. */
+static inline const char *cdbi_soft_column(cdbi_opening *opening, size_t at, const cdbi_json *about)
+{
+    cdb_table *table = opening->table;
+    cdbi_json soft = cdbi_member(about, "soft");
+    if (soft.why || cdbi_peek(&soft) != '{') return soft.why;
+    if (!table->soft) table->soft = (cdbi_soft *)cdbi_memory(opening, opening->schema->n_conditions, sizeof *table->soft);
+    return table->soft ? cdbi_column(opening, &table->soft[at].column, at, &soft) : NULL;
 }
 
 /* The conditions and the columns of `about`: two lists that go side by side. */
@@ -225,10 +238,18 @@ static inline const char *cdbi_columns(cdbi_opening *opening, const cdbi_json *a
         cdbi_json masks;
         at = cdbi_condition(opening, &conditions, n - 1);
         if (opening->status != CDB_OK) return NULL;
-        if (opening->columns[at].kind != 0) return "two conditions have one name";
         if (!cdbi_next(&columns, ']', &m)) break;
+        if (at == opening->schema->n_conditions) {
+            opening->table->n_strange++;
+            cdbi_skip(&conditions, 0);
+            cdbi_skip(&columns, 0);
+            continue;
+        }
+        if (opening->columns[at].kind != 0) return "two conditions have one name";
         masks = cdbi_member(&columns, "masks");
-        why = masks.why ? masks.why : cdbi_column(opening, at, &masks);
+        why = masks.why ? masks.why : cdbi_column(opening, &opening->columns[at], at, &masks);
+        if (why || opening->status != CDB_OK) return why;
+        why = cdbi_soft_column(opening, at, &columns);
         if (why || opening->status != CDB_OK) return why;
         opening->columns[at].file_index = n - 1;
         cdbi_skip(&conditions, 0);
@@ -242,7 +263,7 @@ static inline const char *cdbi_columns(cdbi_opening *opening, const cdbi_json *a
 static inline void cdbi_refuse_unknown(cdbi_opening *opening, cdbi_json about)
 {
     static const char *const known[] = {"name", "rows", "policy", "fallback", "conditions", "columns", "slots", "computed_from",
-        "ways"};
+        "ways", "when"};
     size_t n = 0, i;
     char key[CDBI_KEY];
     cdbi_take(&about, '{');
@@ -250,9 +271,8 @@ static inline void cdbi_refuse_unknown(cdbi_opening *opening, cdbi_json about)
         cdbi_key(&about, key);
         for (i = 0; i < sizeof known / sizeof *known && strcmp(key, known[i]) != 0; i++) {}
         if (about.why) break;
-        if (strcmp(key, "when") == 0)
-            cdbi_refuse(opening, CDB_OTHER_TABLE, "rows of the table have rules of their own, which C cannot work out", -1, key);
-        else if (i == sizeof known / sizeof *known)
+        if (strcmp(key, "when") == 0 || strcmp(key, "computed_from") == 0) opening->has_programs = 1;
+        if (i == sizeof known / sizeof *known)
             cdbi_refuse(opening, CDB_OTHER_TABLE, "the table holds something that this header cannot answer for", -1, key);
         cdbi_skip(&about, 0);
     }

@@ -30,6 +30,48 @@ static inline void *cdb_read_file(const char *path, size_t *size, cdb_fault *fau
 }
 #endif
 
+#ifdef CDB_WATCH /* define it beside CDB_FILES before this header is included, to have watches */
+
+typedef struct cdb_watch {          /* a file that may be replaced while the game runs */
+    const char *path;
+    int64_t stamp[4];
+    int was_there;
+} cdb_watch;
+
+static inline int cdbi_stamp(const char *path, int64_t stamp[4])
+{
+#ifdef _MSC_VER
+    struct _stat64 found;
+    if (_stat64(path, &found) != 0) return 0;
+#else
+    struct stat found;
+    if (stat(path, &found) != 0) return 0;
+#endif
+    stamp[0] = (int64_t)found.st_size;
+    stamp[1] = (int64_t)found.st_mtime;
+    stamp[2] = (int64_t)found.st_ino;
+#if defined(st_mtime) && !defined(__APPLE__) && !defined(_MSC_VER)
+    stamp[3] = (int64_t)found.st_mtim.tv_nsec;
+#else
+    stamp[3] = 0;
+#endif
+    return 1;
+}
+
+/* The bytes of the file where it is another one than the last time it was looked at; else NULL. Give them to CDB_FREE. */
+static inline void *cdb_read_changed(cdb_watch *watch, size_t *size, cdb_fault *fault)
+{
+    int64_t stamp[4] = {0, 0, 0, 0};
+    int is_there = cdbi_stamp(watch->path, stamp);
+    *size = 0;
+    cdbi_fault(fault, CDB_OK, "", -1, "");
+    if (is_there == watch->was_there && memcmp(stamp, watch->stamp, sizeof stamp) == 0) return NULL;
+    watch->was_there = is_there;
+    memcpy(watch->stamp, stamp, sizeof stamp);
+    return is_there ? cdb_read_file(watch->path, size, fault) : NULL;
+}
+#endif
+
 #ifdef __cplusplus
 }
 #endif

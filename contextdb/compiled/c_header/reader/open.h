@@ -1,6 +1,6 @@
 
 /* What the text `about` says: the number of rows, the conditions, and how each column is kept. */
-static inline void cdbi_about(cdbi_opening *opening, const cdbi_json *about)
+static inline void cdbi_about(cdbi_opening *opening, const cdbi_json *about, size_t depths)
 {
     const char *why;
     cdbi_json rows = cdbi_member(about, "rows");
@@ -13,7 +13,18 @@ static inline void cdbi_about(cdbi_opening *opening, const cdbi_json *about)
     opening->table->n_words = (size_t)((n_rows + 63) / 64);
     cdbi_refuse_unknown(opening, *about);
     why = opening->status == CDB_OK ? cdbi_columns(opening, about) : NULL;
+    if (!why && opening->status == CDB_OK) why = cdbi_read_levels(opening, about, depths);
     if (why) cdbi_refuse(opening, CDB_BAD_FILE, why, -1, "about");
+}
+
+/* How many tables are in each other, out of the shape of ways.numbers; 0 where there is none. */
+static inline size_t cdbi_depths(const cdbi_json *header)
+{
+    cdbi_json ways = cdbi_member(header, "ways.numbers"), shape = cdbi_member(&ways, "shape");
+    uint64_t depths;
+    if (ways.why || shape.why || !cdbi_take(&shape, '[')) return 0;
+    depths = cdbi_whole(&shape);
+    return depths > CDBI_DEPTHS ? CDBI_DEPTHS + 1 : (size_t)depths;
 }
 
 /* Read the header's texts, then its arrays. `about` is JSON inside a text of JSON: it is unfolded into memory of its own first. */
@@ -43,16 +54,19 @@ static inline void cdbi_read(cdbi_opening *opening, const cdbi_json *header)
     }
     whole.at = text;
     whole.end = text + cdbi_text(&about, text, room);
-    cdbi_about(opening, &whole);
+    cdbi_about(opening, &whole, cdbi_depths(header));
     CDB_FREE(text);
     if (opening->status == CDB_OK) cdbi_arrays(opening, *header);
     if (opening->status == CDB_OK) cdbi_check(opening);
+    if (opening->status == CDB_OK) cdbi_link(opening);
+    if (opening->status == CDB_OK) cdbi_levels(opening);
+    if (opening->status == CDB_OK) cdbi_outputs(opening, header);
 }
 
 /* Open an artefact from memory that stays where it is, unchanged, until cdb_close. It begins on an address that 8 divides, as the
  * memory of malloc and of a mapped file does. `columns` has room for n_conditions. Where it is refused the table is closed. */
 static inline cdb_status cdb_open(cdb_table *table, cdb_column *columns, const cdb_schema *schema, const void *bytes, size_t size,
-    cdb_fault *fault)
+    cdb_strange strange, cdb_fault *fault)
 {
     const unsigned char *start = (const unsigned char *)bytes;
     cdbi_opening opening;
@@ -65,6 +79,8 @@ static inline cdb_status cdb_open(cdb_table *table, cdb_column *columns, const c
     opening.columns = columns;
     opening.schema = schema;
     opening.fault = fault;
+    opening.strange = strange;
+    opening.has_programs = opening.has_ways = 0;
     opening.status = cdbi_fault(fault, CDB_OK, "", -1, "");
     for (i = 0; size >= 8 && i < 8; i++) length |= (uint64_t)start[i] << (8 * i);
     if (size < 8 || length > size - 8) return cdbi_fault(fault, CDB_BAD_FILE, "the file is too short for its header", -1, "");

@@ -5,6 +5,8 @@
 #define CDBI_FLAT 2
 #define CDBI_WIDE 3
 #define CDBI_SLOTS 4
+#define CDBI_NOT_SAID ((size_t)-1)
+#define CDBI_DEPTHS 64
 
 static inline cdb_status cdbi_fault(cdb_fault *fault, cdb_status status, const char *reason, int condition, const char *name)
 {
@@ -26,6 +28,9 @@ typedef struct cdbi_opening {
     const cdb_schema *schema;
     cdb_fault *fault;
     cdb_status status;
+    cdb_strange strange;
+    int has_ways;                   /* the table has tables inside */
+    int has_programs;               /* the table has rules or derived facts */
 } cdbi_opening;
 
 /* Keep the first fault of an opening. */

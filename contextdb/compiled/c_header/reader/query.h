@@ -4,17 +4,6 @@
 #define CDBI_MASKS 64
 #define CDBI_BLOCK 4
 
-/* The same angle from -180 up to, not including, 180. Exact: each step takes a number from one less than twice as large. */
-static inline double cdbi_wrapped(double degrees)
-{
-    double rest = degrees < 0 ? -degrees : degrees, turn = 360;
-    while (turn <= rest / 2) turn *= 2;
-    for (; turn >= 360; turn /= 2)
-        if (rest >= turn) rest -= turn;
-    if (degrees < 0) return rest > 180 ? 360 - rest : -rest;
-    return rest >= 180 ? rest - 360 : rest;
-}
-
 /* How many bounds are not above a number. */
 static inline size_t cdbi_class(const cdb_column *column, double number)
 {
@@ -43,20 +32,6 @@ static inline size_t cdbi_text_class(const cdb_column *column, const char *text)
     return column->texts.n;
 }
 
-static inline int cdbi_has(const cdb_condition *condition, const cdbi_list *list, size_t at, const cdb_fact *fact)
-{
-    size_t width = cdbi_tag_words(condition), i;
-    int64_t j;
-    if (width > 0) {
-        for (i = 0; i < width; i++)
-            if (list->bits[at * width + i] & fact->tags[i]) return 1;
-        return 0;
-    }
-    for (j = 0; j < fact->texts.count; j++)
-        if (cdbi_covers(list->texts[at], fact->texts.texts[j])) return 1;
-    return 0;
-}
-
 /* Whether the fact has all that a part needs and nothing that it bans. */
 static inline int cdbi_is_in(const cdb_condition *condition, const cdbi_part *part, const cdb_fact *fact)
 {
@@ -80,37 +55,8 @@ static inline size_t cdbi_answer(const cdb_column *column, const cdb_condition *
     return 1;
 }
 
-static inline int cdbi_is_missing(const cdb_condition *condition, const cdb_fact *fact)
-{
-    switch (condition->type) {
-    case CDB_BOOL:
-    case CDB_ENUM: return fact->whole == CDB_MISSING;
-    case CDB_INT:
-    case CDB_DATE: return fact->whole == CDB_MISSING_INT;
-    case CDB_NUMBER:
-    case CDB_ANGLE: return cdbi_is_nan(fact->number);
-    case CDB_TEXT: return fact->text == NULL;
-    case CDB_TAGS: break;
-    }
-    return condition->n_values > 0 ? fact->tags == NULL || (fact->tags[0] & 1) == 0 : fact->texts.count < 0;
-}
-
-static inline int cdbi_is_wrong(const cdb_condition *condition, const cdb_fact *fact)
-{
-    if (condition->type == CDB_BOOL) return fact->whole < 0 || fact->whole > 1;
-    if (condition->type == CDB_ENUM) return fact->whole < 0 || (uint64_t)fact->whole >= condition->n_values;
-    if (condition->type == CDB_DATE) return fact->whole < CDB_FIRST_DATE || fact->whole > CDB_LAST_DATE;
-    return condition->type == CDB_ANGLE && cdbi_is_infinite(fact->number);
-}
-
-static inline double cdbi_number(const cdb_condition *condition, const cdb_fact *fact)
-{
-    if (condition->type == CDB_INT || condition->type == CDB_DATE) return (double)fact->whole;
-    return condition->type == CDB_ANGLE ? cdbi_wrapped(fact->number) : fact->number;
-}
-
 /* The mask of a fact, or of a missing one that only Any accepts; NULL for a column that keeps none for each class. */
-static inline const uint64_t *cdbi_mask(const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact,
+CDBI_HOT const uint64_t *cdbi_mask(const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact,
     int is_missing, size_t n_words)
 {
     if (column->kind != CDBI_VALUE && column->kind != CDBI_FLAT) return NULL;
@@ -121,7 +67,7 @@ static inline const uint64_t *cdbi_mask(const cdb_column *column, const cdb_cond
 }
 
 /* rows = from & all masks, some words at a time: as a rule few masks leave no row of a block, and the others need not be read. */
-static inline void cdbi_and(uint64_t *rows, const uint64_t *from, const uint64_t *const *masks, size_t n_masks, size_t n_words)
+CDBI_HOT void cdbi_and(uint64_t *rows, const uint64_t *from, const uint64_t *const *masks, size_t n_masks, size_t n_words)
 {
     size_t at = 0, i, j;
     for (; at + CDBI_BLOCK <= n_words; at += CDBI_BLOCK) {
@@ -141,19 +87,19 @@ static inline void cdbi_and(uint64_t *rows, const uint64_t *from, const uint64_t
     }
 }
 
-/* rows &= the mask of a wide column, put together from the two digits of the fact's class. */
-static inline void cdbi_and_wide(uint64_t *rows, const cdb_column *column, double number, size_t n_words)
+/* rows &= some words of the mask of a wide column, put together from the two digits of the fact's class; rows[0] is word `from`. */
+CDBI_HOT void cdbi_and_wide(uint64_t *rows, const cdb_column *column, double number, size_t from, size_t to, size_t n_words)
 {
     size_t found = cdbi_class(column, number), n_fine = (size_t)1 << column->shift, n_coarse = (column->n_digits - n_fine) / 2;
     size_t after = (found >> column->shift) * n_words, same = after + n_coarse * n_words;
     size_t fine = (2 * n_coarse + (found & (n_fine - 1))) * n_words, layer, at, step = column->n_digits * n_words;
-    for (at = 0; at < n_words; at++) {
+    for (at = from; at < to; at++) {
         uint64_t some = 0;
-        for (layer = 0; layer < column->n_layers && rows[at]; layer++) {
+        for (layer = 0; layer < column->n_layers && rows[at - from]; layer++) {
             const uint64_t *low = column->low + layer * step + at, *high = column->high + layer * step + at;
             some |= (low[after] | (low[same] & low[fine])) & (high[after] | (high[same] & high[fine]));
         }
-        rows[at] &= some;
+        rows[at - from] &= some;
     }
 }
 
@@ -180,36 +126,33 @@ static inline void cdbi_and_others(uint64_t *rows, const cdb_table *table, const
         if (is_missing && unknown == CDB_UNKNOWN_ANY) continue;
         if (columns[i].kind == CDBI_SLOTS) cdbi_and_slots(rows, &columns[i], &schema->conditions[i], &facts[i], table->n_words);
         else if (is_missing) cdbi_and(rows, rows, &columns[i].any_mask, 1, table->n_words);
-        else cdbi_and_wide(rows, &columns[i], cdbi_number(&schema->conditions[i], &facts[i]), table->n_words);
+        else cdbi_and_wide(rows, &columns[i], cdbi_number(&schema->conditions[i], &facts[i]), 0, table->n_words, table->n_words);
     }
 }
 
-static inline cdb_status cdbi_fact_fault(cdb_fault *fault, cdb_status status, const cdb_schema *schema, size_t at, uint64_t *rows,
-    size_t n_words)
-{
-    const char *reason = status == CDB_MISSING_FACT ? "the fact is missing" : "the fact is not one that the condition can have";
-    memset(rows, 0, n_words * sizeof *rows);
-    return cdbi_fault(fault, status, reason, (int)at, schema->conditions[at].name);
-}
-
-/* The rows whose every cell accepts its fact, one bit a row, in `rows`, which has room for `room` words; words behind those of the
- * table become 0. Facts stand in the order of the schema. On a fault no row is valid. */
-static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
-    const cdb_fact *facts, cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
+/* The rows whose every cell accepts its fact and whose rule holds, one bit a row, in `rows`, which has room for `room` words; words
+ * behind those of the table become 0. Facts are in the order of the schema; those of derived conditions are computed here and
+ * written into `facts`. On a fault no row is valid. */
+static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
+    cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
 {
     const uint64_t *masks[CDBI_MASKS], *mask, *from = table->enabled;
     size_t n = 0, i, n_words = table->n_words;
     int has_others = 0, is_missing;
+    cdb_status status;
+    masks[0] = NULL;
     memset(rows, 0, room * sizeof *rows);
     if (room < n_words)
         return cdbi_fault(fault, CDB_TOO_SHORT, "the array for the rows is shorter than a mask of the table", -1, "");
+    if (table->has_programs) {
+        status = cdbi_derive(table, schema, facts, unknown, fault);
+        if (status != CDB_OK) return status;
+    }
     for (i = 0; i < schema->n_conditions; i++) {
         if (columns[i].kind == 0) continue;
         is_missing = cdbi_is_missing(&schema->conditions[i], &facts[i]);
-        if (is_missing && unknown == CDB_UNKNOWN_ERROR) return cdbi_fact_fault(fault, CDB_MISSING_FACT, schema, i, rows, n_words);
         if (is_missing && unknown == CDB_UNKNOWN_ANY) continue;
-        if (!is_missing && cdbi_is_wrong(&schema->conditions[i], &facts[i]))
-            return cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i, rows, n_words);
+        if (is_missing ? unknown == CDB_UNKNOWN_ERROR : cdbi_is_wrong(&schema->conditions[i], &facts[i])) break;
         mask = cdbi_mask(&columns[i], &schema->conditions[i], &facts[i], is_missing, n_words);
         if (!mask) has_others = 1;
         else masks[n++] = mask;
@@ -219,9 +162,15 @@ static inline cdb_status cdb_query(const cdb_table *table, const cdb_column *col
             n = 0;
         }
     }
-    cdbi_and(rows, from, masks, n, n_words);
-    if (has_others) cdbi_and_others(rows, table, columns, schema, facts, unknown);
-    return cdbi_fault(fault, CDB_OK, "", -1, "");
+    if (i == schema->n_conditions) {
+        cdbi_and(rows, from, masks, n, n_words);
+        if (has_others) cdbi_and_others(rows, table, columns, schema, facts, unknown);
+        status = table->has_programs ? cdbi_and_rules(rows, table, schema, facts, unknown, fault) : CDB_OK;
+        if (status == CDB_OK) return cdbi_fault(fault, CDB_OK, "", -1, "");
+    } else if (cdbi_is_missing(&schema->conditions[i], &facts[i])) status = cdbi_missing_fault(fault, table, schema, facts, i);
+    else status = cdbi_fact_fault(fault, CDB_WRONG_FACT, schema, i);
+    memset(rows, 0, n_words * sizeof *rows);
+    return status;
 }
 
 /* ---- Answers */
@@ -230,13 +179,7 @@ static inline int64_t cdb_count(const uint64_t *rows, size_t n_words)
 {
     uint64_t count = 0;
     size_t i;
-    for (i = 0; i < n_words; i++) {
-        uint64_t word = rows[i];
-        word -= (word >> 1) & 0x5555555555555555;
-        word = (word & 0x3333333333333333) + ((word >> 2) & 0x3333333333333333);
-        word = (word + (word >> 4)) & 0x0F0F0F0F0F0F0F0F;
-        count += (word * 0x0101010101010101) >> 56;
-    }
+    for (i = 0; i < n_words; i++) count += cdbi_count_bits(rows[i]);
     return (int64_t)count;
 }
 
@@ -245,17 +188,11 @@ static inline int64_t cdb_next_row(const uint64_t *rows, size_t n_words, int64_t
 {
     size_t at = (size_t)((row + 1) / 64);
     uint64_t word = at < n_words ? rows[at] & (~(uint64_t)0 << ((row + 1) % 64)) : 0;
-    int64_t bit = 0, step;
     while (word == 0) {
         if (++at >= n_words) return -1;
         word = rows[at];
     }
-    for (step = 32; step > 0; step /= 2)
-        if ((word & (((uint64_t)1 << step) - 1)) == 0) {
-            word >>= step;
-            bit += step;
-        }
-    return (int64_t)at * 64 + bit;
+    return (int64_t)(at * 64 + cdbi_first_bit(word));
 }
 
 /* The name of a row's asset, in UTF-8; NULL for a row that is not there. */
@@ -265,14 +202,6 @@ static inline const char *cdb_asset(const cdb_table *table, int64_t row)
 }
 
 /* ---- Facts that are missing, and lists of facts */
-
-static inline double cdb_missing_number(void)
-{
-    uint64_t bits = 0x7FF8000000000000;
-    double number;
-    memcpy(&number, &bits, sizeof number);
-    return number;
-}
 
 /* A date of the calendar as whole days since 1970-01-01: cdb_date(2026, 1, 31). */
 static inline int64_t cdb_date(int year, int month, int day)

@@ -1,0 +1,160 @@
+"""The C header says what soft cells cost, why a row is not valid, which rows an asset has, and picks as Python does."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from asking_c import (
+    CELLS,
+    N_MOMENTS,
+    OK,
+    SCHEMA,
+    SEED,
+    TIMES,
+    Answers,
+    Facts,
+    all_asked,
+    artefact,
+    ask_program,
+    output_words,
+    random_moment,
+)
+from test_c_rules import moments_of, output_cells, ruled_table
+
+from contextdb.compiled.c_header.naming import conditions_of
+from contextdb.compiled.table import CompiledTable
+from contextdb.errors import ContextError, PolicyError
+from contextdb.schema.settings import TableSettings
+from contextdb.tables.table import Table
+
+RULE, DISABLED = 1 << 62, 1 << 61
+
+
+@pytest.fixture(scope="session")
+def ask(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program that asks any artefact."""
+    return ask_program(tmp_path_factory.mktemp("ask"))
+
+
+def soft_table(rng: random.Random, n_rows: int) -> CompiledTable:
+    """A table in which many cells are soft, and some rows disabled."""
+    names = rng.sample(list(SCHEMA), 4)
+    softness = ["", " ~2", " ~0.7", " ~1e9"]
+    cells = {n: [rng.choice(CELLS[n]).split(" ~")[0] + rng.choice(softness) for _ in range(n_rows)] for n in names}
+    cells = {n: ["Any" if c.startswith("Any") else c for c in column] for n, column in cells.items()}
+    enabled = [rng.choice(["yes", "yes", "no"]) for _ in range(n_rows)]
+    columns = {"Asset": [rng.choice("abcd") for _ in range(n_rows)], **cells, "On": enabled}
+    return Table.from_columns(columns, SCHEMA, TableSettings("soft", enabled="On")).compile()
+
+
+def costs_in_python(compiled: CompiledTable, unknown: str, facts: Facts) -> tuple[int, list[float]]:
+    try:
+        return OK, compiled.penalties(facts, unknown).tolist()  # type: ignore[arg-type]
+    except ContextError:
+        return -1, [0.0] * compiled.n_rows
+
+
+def failing_in_python(compiled: CompiledTable, unknown: str, facts: Facts) -> list[int]:
+    """What fails in each row, as the program says it."""
+    try:
+        explanation = compiled.explain(facts, unknown=unknown)  # type: ignore[arg-type]
+    except ContextError:
+        return [-1] * compiled.n_rows
+    number = {c.name: i for i, c in enumerate(compiled.conditions)}
+    found = []
+    for row in range(compiled.n_rows):
+        told = explanation.row(row)
+        bits = sum({1 << number[f.condition] if f.condition in number else RULE for f in told.failures})
+        found.append(bits | (0 if told.is_enabled else DISABLED))
+    return found
+
+
+def assert_told(compiled: CompiledTable, answers: Answers, moments: list[tuple[str, Facts]]) -> None:
+    assert answers.status == OK
+    for moment, (fault, _), told in zip(moments, answers.rows, answers.told, strict=True):
+        status, costs = costs_in_python(compiled, *moment)
+        assert told.penalties == (told.penalties[0] if status else OK, costs)
+        assert (told.penalties[0] == OK) is (status == OK)
+        if fault == OK:  # else Python refuses, where C says of an open rule that it does not hold
+            assert told.why_not == failing_in_python(compiled, *moment)
+
+
+def test_costs_of_soft_cells_and_failing_cells_are_those_of_python(ask: Path, tmp_path: Path):
+    rng = random.Random(SEED + 21)
+    for turn in range(12 * TIMES):
+        compiled = ruled_table(rng, 20) if turn % 4 == 0 else soft_table(rng, rng.choice([1, 20, 70]))
+        moments = moments_of(rng, 12)
+        [answers] = all_asked(ask, tmp_path, conditions_of(compiled), [artefact(compiled, tmp_path)], moments, memory=1)
+        assert_told(compiled, answers, moments)
+
+
+def picked_table(rng: random.Random, n_rows: int, name: str, assets: str, has_inner: bool = False) -> Table:
+    """A table from which much can be picked, by any policy, with rows that rest."""
+    names = ["ok", "state", "speed"]
+    schema = {n: {**SCHEMA[n], "weight": rng.choice([1.0, 0.1, 2.5])} for n in names}
+    soft = rng.choice([[""], ["", " ~1", " ~0.5"]])
+    cells = {
+        n: ["Any" if rng.random() < 0.6 else rng.choice(PICK_CELLS[n]) + rng.choice(soft) for _ in range(n_rows)] for n in names
+    }
+    jobs = {
+        "priority": ["0", "1", "-2"],
+        "weight": ["1", "0", "2.5", "0.1"],
+        "once": ["yes", "no"],
+        "cooldown_s": ["0", "1.2", "7"],
+    }
+    jobs["cooldown_turns"] = ["0", "1", "3"]
+    told = {job: [rng.choice(["", *values]) for _ in range(n_rows)] for job, values in jobs.items()}
+    used = {job: job for job in jobs if rng.random() < (0.7 if job in ("priority", "weight") else 0.3)}
+    policy = rng.choice(["collect", "priority", "specific", "cheapest", "collect", "first", "unique"])
+    own, outputs = output_cells(rng, n_rows)
+    given = rng.choice([(), (("damage", 7), ("offset", (1.5, 2.0)))])
+    settings = TableSettings(
+        name, policy=policy, fallback="rest", fallback_outputs=given, outputs=tuple(own), typed=outputs, **used
+    )
+    said = [rng.choice([*assets, "@inner"] if has_inner else assets) for _ in range(n_rows)]
+    return Table.from_columns({"Asset": said, **cells, **{job: told[job] for job in used}, **own}, schema, settings)
+
+
+PICK_CELLS = {"ok": ["True", "False"], "state": ["A", "B C"], "speed": ["<5", "1..", "0..10"]}
+
+
+def picks_in_python(compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> list[tuple[bool, int, list[int]]]:
+    """Whether a query and the pick from it are refused, the row that is picked, and its outputs."""
+    picker, found = compiled.picker(seed=7, memory=memory), []
+    for turn, (unknown, facts) in enumerate(moments):
+        try:
+            pick = picker.pick(compiled.query(facts, unknown=unknown), time_s=0.5 * turn, who=3)  # type: ignore[arg-type]
+            found.append((False, -1 if pick.row is None else pick.row, output_words(pick.outputs)))
+        except (ContextError, PolicyError):
+            found.append((True, -1, output_words(compiled.outputs.fallback)))
+    return found
+
+
+def assert_picks(ask: Path, folder: Path, compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> int:
+    """How many picks gave a row."""
+    about = conditions_of(compiled), [artefact(compiled, folder)], moments, 0, memory, compiled.outputs.declared
+    [answers] = all_asked(ask, folder, *about)
+    found = [(told.pick[0] > 0, told.pick[1], told.outputs) for told in answers.told]
+    assert found == picks_in_python(compiled, moments, memory)
+    return sum(row >= 0 for _, row, _ in found)
+
+
+def test_picks_are_those_of_a_picker_in_python(ask: Path, tmp_path: Path):
+    rng = random.Random(SEED + 31)
+    n_picked = 0
+    for turn in range(40 * TIMES):
+        outer = picked_table(rng, rng.choice([1, 6, 30]), "outer", "abcd", has_inner=turn % 3 == 0)
+        inner = picked_table(rng, 8, "inner", "aef")
+        compiled = outer.compile({"inner": inner})
+        moments = [random_moment(rng, ["ok", "state", "speed"], 0.01) for _ in range(N_MOMENTS)]
+        n_picked += assert_picks(ask, tmp_path, compiled, moments, rng.choice([0, 1, 1, 3, 8]))
+    assert n_picked > 400
+
+
+def test_picks_from_a_table_with_rules_are_those_of_python(ask: Path, tmp_path: Path):
+    rng = random.Random(SEED + 32)
+    for _ in range(6 * TIMES):
+        compiled = ruled_table(rng, 30, {"policy": rng.choice(["specific", "cheapest", "collect"])})
+        assert_picks(ask, tmp_path, compiled, moments_of(rng, N_MOMENTS), 1)

@@ -13,7 +13,7 @@ import pytest
 
 import contextdb as cdb
 from contextdb import telemetry
-from contextdb.cells.outputs import OUTPUT_TYPES
+from contextdb.cells.output_types import OUTPUT_TYPES
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
-from contextdb.cells.outputs import OutputValue
+from contextdb.cells.output_types import OutputValue
 from contextdb.commands import missing_facts_by_option
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from contextdb.bitmask import Rows, read_only
 from contextdb.cells.arguments import require_row, require_text
-from contextdb.cells.outputs import Output, OutputValue
+from contextdb.cells.output_types import OutputValue
+from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, in_quotes, nearest, shown, some
@@ -158,10 +159,10 @@ def outputs_of_cells(declared: Sequence[Output], cells: Sequence[OutputCells], f
 def cells_of(output: Output, values: list[OutputValue], codes: NDArray[Any]) -> OutputCells:
     """The values of R rows from some values and the place of each row's among them; of texts each once, those of an enum in their
     declared order, behind them "" for none."""
-    if not output.is_text:
+    if not output.type.is_text:
         taken: Column = output.array(values)[codes]
         return taken
-    known = {value: code for code, value in enumerate((*output.values, "") if output.kind == "enum" else ())}
+    known = {value: code for code, value in enumerate((*output.values, "") if output.type.has_values else ())}
     places = [known.setdefault(str(value), len(known)) for value in values]
     return TextColumn(output.name, tuple(known), np.array(places, np.int32)[codes])
 

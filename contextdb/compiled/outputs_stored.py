@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from contextdb.cells.outputs import OUTPUT_TYPES, Output, OutputValue
+from contextdb.cells.output_types import OUTPUT_TYPES, OutputValue
+from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.compiled.outputs import NO_OUTPUTS, OutputCells, Outputs
 from contextdb.files.tensors import Tensors, texts_from_array, texts_to_array
@@ -72,13 +73,13 @@ def _output(about: dict[str, Any]) -> Output:
 
 
 def _cells(output: Output, prefix: str, tensors: Tensors, n_rows: int) -> OutputCells:
-    if output.is_text:
+    if output.type.is_text:
         texts, codes = texts_from_array(tensors[f"{prefix}.texts"]), tensors[f"{prefix}.codes"]
         if codes.shape != (n_rows + 1,) or codes.dtype != np.int32 or codes.min() < 0 or codes.max() >= len(texts):
             raise ValueError(prefix)
         return TextColumn(output.name, tuple(texts), codes)
     values, wanted = tensors[f"{prefix}.values"], output.array([])
-    if output.kind == "bool" and values.dtype == np.uint8 and values.max() <= 1:
+    if wanted.dtype == np.bool_ and values.dtype == np.uint8 and values.max() <= 1:
         values = values.view(np.bool_)
     if values.shape != (n_rows + 1, *wanted.shape[1:]) or values.dtype != wanted.dtype:
         raise ValueError(prefix)
@@ -93,6 +94,10 @@ def _to_json(value: OutputValue | None) -> object:
 
 
 def _from_json(output: Output, value: Any) -> OutputValue:
-    if output.kind == "numbers":
-        return output.taken([float(number) for number in value])
-    return output.taken(float(value) if output.kind == "number" else value)
+    if not output.type.is_numeric:
+        return output.taken(value)
+    return output.taken([_number(part) for part in value] if isinstance(value, list) else _number(value))
+
+
+def _number(value: Any) -> Any:
+    return float(value) if isinstance(value, str) else value

@@ -30,10 +30,8 @@ OF_ACTORS = {"id": "NotRequired[object]", "name": "NotRequired[str]"}
 NameOf = Callable[[str], str]
 
 
-def accepted(annotation: str, is_tags: bool) -> str:
-    """The type of a fact: its values, numpy's too, and for other types than bool and tags a set of them, `cdb.cell(...)`."""
-    if is_tags or annotation == "bool":
-        return WIDER.get(annotation, annotation)
+def accepted(annotation: str) -> str:
+    """The type of a fact that is no set of tags: its values, numpy's too, and but for a bool a set of them."""
     return WIDER.get(annotation) or f"{annotation} | cdb.FactSet"
 
 

@@ -37,10 +37,6 @@ _TAKEN = (
 )
 
 
-_OUTPUTS = {"bool": "bool", "int": "int", "number": "float", "text": "str", "numbers": "tuple[{}]"}
-"""The Python types of outputs; that of an enum is a Literal of its values."""
-
-
 def stubs_of(tables: Mapping[str, CompiledData]) -> str:
     """The text of a Python module with the types of all tables; the same tables give the same text."""
     names = _Names()
@@ -104,12 +100,12 @@ def _outputs(names: _Names, table: CompiledData) -> str:
     """The outputs of a row, as `compiled.outputs.of_row` gives them, with a Literal for the values of each enum."""
     types, literals = dict[str, str](), ""
     for output in table.outputs.declared:
-        if output.kind == "enum":
+        if output.type.has_values:
             types[output.name] = names.of(f"{table.name} {output.name}")
             values = (*output.values, *(("",) if output.needs_cell else ()))  # "" where no table of a row's way has it
             literals += _listed(types[output.name], output.name, values) + "\n"
         else:
-            types[output.name] = _OUTPUTS[output.kind].format(", ".join(["float"] * output.size))
+            types[output.name] = output.type.annotation.format(", ".join(["float"] * output.size))
     lines = [f"        {o.name!r}: {types[o.name]},{_output_comment(o)}\n" for o in table.outputs.declared]
     return literals + _typed_dict(names.of(f"{table.name} outputs"), table, lines)
 
@@ -128,7 +124,7 @@ def _type(condition: Condition, literal: str | None) -> str:
     if condition.domain.type.is_tags:
         tag = literal or "str"
         return f"set[{tag}] | frozenset[{tag}] | list[{tag}] | tuple[{tag}, ...]"
-    return accepted(literal or condition.domain.type.annotation, is_tags=False)
+    return accepted(literal or condition.domain.type.annotation)
 
 
 def _comment(condition: Condition) -> str:

@@ -16,7 +16,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from contextdb.cells.outputs import MOST_NUMBERS, NUMERIC, OUTPUT_TYPES, SLOT_COLUMNS, Output, OutputValue
+from contextdb.cells.output_types import MOST_NUMBERS, OUTPUT_TYPES, OutputType, OutputValue, names_where
+from contextdb.cells.outputs import SLOT_COLUMNS, Output
 from contextdb.errors import Fault, in_quotes, nearest, shown, some
 from contextdb.schema import shapes
 from contextdb.schema.shapes import KEY_SYNONYMS, KIND_SYNONYMS, NUMBER, TEXT, VALUES, Shape, what, wrong_name
@@ -31,7 +32,13 @@ TYPE_SYNONYMS = {
     **dict.fromkeys(("angle", "seconds"), "number"),
     **dict.fromkeys(("tags", "date"), "text"),
 }
-_KEYS_OF = {"min": NUMERIC, "max": NUMERIC, "values": ("enum",), "size": ("numbers",)}
+_NUMERIC = names_where(lambda kind: kind.is_numeric)
+_KEYS_OF = {
+    "min": _NUMERIC,
+    "max": _NUMERIC,
+    "values": names_where(lambda kind: kind.has_values),
+    "size": names_where(lambda kind: kind.has_size),
+}
 """The types that a key has a place in; the others have one in all."""
 
 
@@ -150,16 +157,16 @@ def _key_faults(path: tuple[str, ...], part: Said) -> Iterator[Found]:
 
 def _joint_faults(path: tuple[str, ...], part: Said) -> Iterator[Found]:
     """What is wrong with keys that are sound by themselves."""
-    about, kind = f"output {in_quotes(path[-1])}", part["type"]
+    about, kind = f"output {in_quotes(path[-1])}", OUTPUT_TYPES[part["type"]]
     found: list[Found] = []
     for key, kinds in _KEYS_OF.items():
-        if key in part and kind not in kinds:
-            wrong = f"{about} {_said(key, part[key])} has no place here: its type is {in_quotes(kind)}."
+        if key in part and kind.name not in kinds:
+            wrong = f"{about} {_said(key, part[key])} has no place here: its type is {in_quotes(kind.name)}."
             found.append(((*path, key), Fault(wrong, f"{key} in an output of type {' or '.join(kinds)}", "to leave it out")))
-    for key, needed, said in (("values", "enum", ["A", "B"]), ("size", "numbers", 3)):
-        if kind == needed and key not in part:
-            found.append((path, Fault(f"{about} is of type {in_quotes(kind)} and has no {key}.", _said(key, said))))
-    if path[-1] in SLOT_COLUMNS and (kind != "text" or "default" in part):
+    for key, is_needed, said in (("values", kind.has_values, ["A", "B"]), ("size", kind.has_size, 3)):
+        if is_needed and key not in part:
+            found.append((path, Fault(f"{about} is of type {in_quotes(kind.name)} and has no {key}.", _said(key, said))))
+    if path[-1] in SLOT_COLUMNS and (not kind.is_free or "default" in part):
         wrong = f"{about} says which roles a row fills, so it is a text without a default."
         found.append((path, Fault(wrong, _said("type", "text"))))
     found += _bound_faults(path, kind, {key: part[key] for key in ("min", "max") if key in part})
@@ -172,7 +179,7 @@ def _joint_faults(path: tuple[str, ...], part: Said) -> Iterator[Found]:
             yield (*path, "default"), Fault(f"{about} {_said('default', part['default'])}: {error}.", bare.accepted)
 
 
-def _bound_faults(path: tuple[str, ...], kind: str, bounds: Said) -> Iterator[Found]:
+def _bound_faults(path: tuple[str, ...], kind: OutputType, bounds: Said) -> Iterator[Found]:
     about = f"output {in_quotes(path[-1])}"
     low, high = bounds.get("min", -math.inf), bounds.get("max", math.inf)
     if low > high:
@@ -184,7 +191,7 @@ def _bound_faults(path: tuple[str, ...], kind: str, bounds: Said) -> Iterator[Fo
     for key, bound in bounds.items():
         if bound == (math.inf if key == "min" else -math.inf):
             yield (*path, key), Fault(f"{about} {_said(key, bound)} leaves no number.", "a finite number", "to leave it out")
-        elif kind == "int" and math.isfinite(bound) and bound != math.floor(bound):
+        elif kind.is_whole and math.isfinite(bound) and bound != math.floor(bound):
             mend = _said(key, math.ceil(bound) if key == "min" else math.floor(bound))
             yield (*path, key), Fault(f"{about} {_said(key, bound)}: an int has whole bounds.", "a whole number", mend)
 
@@ -274,7 +281,7 @@ def _output(name: str, part: Said) -> Output:
         part.get("description", ""),
     )
     default = bare.taken(part["default"]) if "default" in part else None
-    if default is None or (bare.kind == "text" and default == ""):
+    if default is None or (bare.type.is_free and default == ""):
         return bare
     return replace(bare, default=default)
 
@@ -283,9 +290,9 @@ def _output_to_toml(output: Output) -> dict[str, object]:
     said: dict[str, object] = {"type": output.kind}
     said |= {} if output.default is None else {"default": _plain(output.default)}
     bounds = {"min": output.minimum, "max": output.maximum}
-    said |= {key: int(end) if output.kind == "int" else end for key, end in bounds.items() if math.isfinite(end)}
+    said |= {key: int(end) if output.type.is_whole else end for key, end in bounds.items() if math.isfinite(end)}
     said |= {"values": list(output.values)} if output.values else {}
-    said |= {"size": output.size} if output.kind == "numbers" else {}
+    said |= {"size": output.size} if output.type.has_size else {}
     texts = {"unit": output.unit, "description": output.description}
     return said | {key: text for key, text in texts.items() if text}
 

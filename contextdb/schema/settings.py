@@ -21,7 +21,8 @@ from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind, names_where
 from contextdb.cells.mirroring import sided_pairs, swap_faults, swapped_tag
 from contextdb.cells.notebook import one_line
-from contextdb.cells.outputs import Output, OutputValue
+from contextdb.cells.output_types import OutputValue
+from contextdb.cells.outputs import Output
 from contextdb.cells.sets import covers
 from contextdb.columns import TextColumn
 from contextdb.disk import TABLE_SUFFIXES

@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.outputs import Output, OutputValue
+from contextdb.cells.output_types import OutputValue
+from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.compiled.outputs import NO_OUTPUTS, OutputCells, Outputs, cells_of, outputs_of_cells
 from contextdb.errors import CellError, Fault, Place
@@ -48,7 +49,7 @@ class OutputColumn:
     def _read_on(self, texts: Iterable[str], known: Sequence[OutputValue], wrong: Mapping[int, Fault]) -> Read:
         """What texts give, behind others that are known."""
         output, values, faults = self.output, list(known), dict(wrong)
-        if output.kind == "text":
+        if output.type.is_free:
             return values + [text if text.strip() else output.nothing for text in texts], faults
         for text in texts:
             try:

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from contextdb.cells.outputs import OUTPUT_TYPES
 from contextdb.compiled.c_header.naming import TableFace
 from contextdb.compiled.c_header.spelling import comment, literal
 from contextdb.compiled.data import CompiledData
-
-_TYPES = ("int ", "int64_t ", "double ", "{name}_value ", "const char *", "const double *")
-"""The type of an output in C, in the order of `OUTPUT_TYPES`; the function that reads it has the name of the type."""
 
 
 def output_enums(table: CompiledData, face: TableFace) -> Iterator[str]:
@@ -42,13 +38,13 @@ def outputs_wanted(table: CompiledData, face: TableFace) -> Iterator[str]:
 def output_functions(table: CompiledData, face: TableFace) -> Iterator[str]:
     """A function for each output that reads its value in a row."""
     for number, (output, names) in enumerate(zip(table.outputs.declared, face.outputs, strict=True)):
-        kind, ending = _TYPES[OUTPUT_TYPES.index(output.kind)], output.kind
-        size = f"{output.size} numbers" if output.kind == "numbers" else output.kind
+        kind = output.type.c_type.format(name=names.name)
+        size = f"{output.size} numbers" if output.type.has_size else output.kind
         told = "; ".join(part for part in (f"{size} {output.name} {output.unit or ''}".strip(), output.description) if part)
         yield comment(f"{told}; of a row, or of none: -1")
-        yield f"static inline {kind.format(name=names.name)}{names.name}(const {face.base} *opened, int64_t row)"
+        yield f"static inline {kind}{names.name}(const {face.base} *opened, int64_t row)"
         yield "{"
         cast = f"({names.name}_value)" if names.enumerators else ""
-        yield f"    return {cast}cdb_output_{ending}(&opened->table, {number}, row);"
+        yield f"    return {cast}cdb_output_{output.kind}(&opened->table, {number}, row);"
         yield "}"
         yield ""

@@ -15,9 +15,9 @@ from contextdb.edits import edits
 from contextdb.edits.diffing.toml_merging import merge_toml
 from contextdb.edits.schema_file import write_schema
 from contextdb.errors import SchemaError
+from contextdb.files.toml_text import as_toml, dotted
 from contextdb.schema.sections import settings_to_dict, settings_with
 from contextdb.schema.settings import TableSettings, read_schema
-from contextdb.schema.toml_values import as_toml, dotted
 from contextdb.tables.changes import Edit
 from contextdb.tables.merging.merging import merge
 from contextdb.tables.project import load

@@ -207,7 +207,7 @@ def test_a_wrong_value_in_a_number_condition_is_said(line: str, message: str):
                                f'Accepted: {NAMES_SAID}. Did you mean values = ["A"]?'),
         ("values = ['A ']", 'values = ["A "]: entry 1 cannot be used: a space is before or after it. '
                             f'Accepted: {NAMES_SAID}. Did you mean values = ["A"]?'),
-        ("values = [['A']]", f"values = [[…]]: entry 1 cannot be used: this is a list, not text. Accepted: {NAMES_SAID}."),
+        ("values = [['A']]", f'values = [["A"]]: entry 1 cannot be used: this is a list, not text. Accepted: {NAMES_SAID}.'),
     ],
 )  # fmt: skip
 def test_a_wrong_list_of_values_is_said(line: str, message: str):
@@ -346,7 +346,7 @@ SECTIONS_SAID = (
         ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name". Did you mean "name"?'),
         ("conditions = 5", "line 1: conditions = 5: this is a number, not a section. Accepted: [conditions.NAME]."),
         ("project = 'x'", 'line 1: project = "x": this is text, not a section. Accepted: [project].'),
-        ("[[tables]]", "line 1: tables = [{}]: this is a list, not a section. Accepted: [tables.NAME]."),
+        ("[[tables]]", "line 1: tables = [ {} ]: this is a list, not a section. Accepted: [tables.NAME]."),
         (
             "[conditions]\nspeed = 'number'",
             'line 2: [conditions] speed = "number": this is text, not a table. Accepted: [conditions.NAME]. '
@@ -356,8 +356,8 @@ SECTIONS_SAID = (
         ("[databases]\njog = []", "line 2: [databases] jog = []: this is a list, not a table. Accepted: [databases.NAME]."),
         (
             "[conditions.Defender.Tags]\ntype = 'tags'",
-            "line 1: [conditions.Defender] Tags = {…}: this is a table, not a key. Accepted: a name with a dot in quotes. "
-            'Did you mean [conditions."Defender.Tags"]?',
+            'line 1: [conditions.Defender] Tags = { type = "tags" }: this is a table, not a key. '
+            'Accepted: a name with a dot in quotes. Did you mean [conditions."Defender.Tags"]?',
         ),
         (
             "[conditions.' x']\ntype = 'bool'",

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contextdb.schema.toml_values import as_toml, dotted, merged
+from contextdb.files.toml_text import as_toml, dotted
+from contextdb.schema.toml_values import merged
 
 NAMES = st.sampled_from(["a", "b", "Defender.Tags", "", 'a "b"', "é", "x y"])
 PLAIN = st.one_of(

@@ -15,8 +15,8 @@ from contextdb.cells.mirroring import sided_pairs, way_of
 from contextdb.cells.sets import Cell, TagSet, ValueSet
 from contextdb.cells.words import format_number
 from contextdb.errors import some
+from contextdb.files.toml_text import as_toml
 from contextdb.findings import Finding
-from contextdb.schema.toml_values import as_toml
 from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.links import reached
 from contextdb.tables.table import Table

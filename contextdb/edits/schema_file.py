@@ -16,11 +16,11 @@ from contextdb.disk import read_bytes, write_atomic
 from contextdb.disk.together import NewFile
 from contextdb.errors import Fault, FileError, Place, SchemaError, shown, some
 from contextdb.files.file_names import alike
+from contextdb.files.toml_text import Path as KeyPath
+from contextdb.files.toml_text import as_toml, dotted
 from contextdb.schema import toml_edit
 from contextdb.schema.sections import schema_to_dict, settings_to_dict
 from contextdb.schema.settings import EMPTY, Schema, TableSettings, read_schema
-from contextdb.schema.toml_values import Path as KeyPath
-from contextdb.schema.toml_values import as_toml, dotted
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
 from contextdb.tables.table import Table
 

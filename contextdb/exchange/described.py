@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from contextdb.files.toml_text import as_toml, dotted
 from contextdb.schema.sections import condition_to_dict, settings_to_dict
-from contextdb.schema.toml_values import as_toml, dotted
 from contextdb.tables.table import Table
 
 TYPES_SHEET = "contextdb"

@@ -16,7 +16,7 @@ from contextdb.exchange.reading import Reading, Remark, listed
 from contextdb.exchange.values import text_of_value
 from contextdb.files.csv_faults import MOST_CHARACTERS
 from contextdb.files.csv_source import name_faults
-from contextdb.schema.shapes import what
+from contextdb.files.toml_text import what
 
 _ACCEPTED = 'a list of objects, [{"Asset Name": "jog", "speed": "2..4"}], or one object a line'
 MOST_FAULTS = 20

@@ -11,6 +11,7 @@ import numbers
 from collections.abc import Mapping, Sequence
 
 from contextdb.errors import Fault, Place, in_quotes, nearest, shown, some
+from contextdb.files.toml_text import as_toml, what
 
 Mapped = Mapping[str, object]
 
@@ -51,7 +52,7 @@ class Section:
         value = self.part.get(key)
         number = as_number(value)
         if number is None:
-            self.wrong(key, f"this is {what_is(value)}, not a number", accepted, _meant_number(key, value))
+            self.wrong(key, f"this is {_no_number(value)}", accepted, _meant_number(key, value))
         elif not least <= number <= most:
             self.wrong(key, "this is out of range", accepted)
         else:
@@ -65,7 +66,7 @@ class Section:
         found = [as_number(item) for item in listed]
         wrong = next((item for item, number in zip(listed, found, strict=True) if number is None), None)
         if not listed or None in found:
-            why = "the list is empty" if not listed else f"{as_toml(wrong)} is {what_is(wrong)}, not a number"
+            why = "the list is empty" if not listed else f"{shown(as_toml(wrong))} is {_no_number(wrong)}"
             self.wrong(key, why, accepted)
             return None
         known = tuple(number for number in found if number is not None)
@@ -79,7 +80,7 @@ class Section:
         value = self.part.get(key)
         if isinstance(value, str) and value.strip():
             return value
-        self.wrong(key, "this is empty" if isinstance(value, str) else f"this is {what_is(value)}, not text", accepted)
+        self.wrong(key, "this is empty" if isinstance(value, str) else f"this is {what(value)}, not text", accepted)
         return None
 
     def one_of(self, key: str, words: Sequence[str], noun: str, synonyms: Mapping[str, str] | None = None) -> str | None:
@@ -104,23 +105,10 @@ def as_number(value: object) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def what_is(value: object) -> str:
-    """What a value is, in the words of TOML."""
-    if isinstance(value, bool):
-        return "true or false"
-    if isinstance(value, numbers.Real):
-        return "a number that is not finite" if as_number(value) is None else "a number"
-    names = {str: "text", list: "a list", tuple: "a list", dict: "a table", type(None): "nothing"}
-    return names.get(type(value), "a table" if isinstance(value, Mapping) else f"a {type(value).__name__}")
-
-
-def as_toml(value: object) -> str:
-    """A value as TOML writes it, near enough for a message."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {as_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(as_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False, default=str)
+def _no_number(value: object) -> str:
+    """What a value is that `as_number` does not take."""
+    is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    return "not a finite number" if is_number else f"{what(value)}, not a number"
 
 
 def _meant_number(key: str, value: object) -> str:

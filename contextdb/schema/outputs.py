@@ -19,9 +19,8 @@ from typing import Any
 from contextdb.cells.output_types import MOST_NUMBERS, OUTPUT_TYPES, OutputType, OutputValue, names_where
 from contextdb.cells.outputs import SLOT_COLUMNS, Output
 from contextdb.errors import Fault, in_quotes, nearest, shown, some
-from contextdb.schema import shapes
-from contextdb.schema.shapes import KEY_SYNONYMS, KIND_SYNONYMS, NUMBER, TEXT, VALUES, Shape, what, wrong_name
-from contextdb.schema.toml_values import dotted
+from contextdb.files.toml_text import as_toml, dotted, what
+from contextdb.schema.shapes import KEY_SYNONYMS, KIND_SYNONYMS, NUMBER, TEXT, VALUES, Shape, wrong_name
 
 Found = tuple[tuple[str, ...], Fault]
 Said = Mapping[str, Any]
@@ -259,13 +258,7 @@ def _guess(part: Said) -> str:
 
 
 def _said(key: str, value: object) -> str:
-    return shown(f"{dotted((str(key),))} = {_written(value)}", 120)
-
-
-def _written(value: object) -> str:
-    if not isinstance(value, Mapping) or not value:
-        return shapes.as_toml(value)
-    return f"{{ {', '.join(f'{dotted((str(key),))} = {_written(item)}' for key, item in value.items())} }}"
+    return shown(f"{dotted((str(key),))} = {as_toml(value)}", 120)
 
 
 def _output(name: str, part: Said) -> Output:

@@ -13,10 +13,11 @@ from typing import Any
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
+from contextdb.files.toml_text import as_toml
 from contextdb.schema.jobs import columns_checked
 from contextdb.schema.outputs import fallback_to_toml, outputs_faults, outputs_to_toml
 from contextdb.schema.settings import KINDS_WITH, Schema, TableSettings, conditions_from_dict, settings_fields
-from contextdb.schema.shapes import NAMES, SECTIONS, as_toml, wrong_name
+from contextdb.schema.shapes import NAMES, SECTIONS, wrong_name
 
 Part = dict[str, object]
 """The keys of one named section, such as `[conditions.speed]`, and their values as TOML has them."""

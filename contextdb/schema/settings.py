@@ -29,10 +29,11 @@ from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, plural, shown, some
 from contextdb.expressions import Derivation, assumption_faults, derivation_faults, derive
 from contextdb.files.file_names import alike, composed
-from contextdb.schema import shapes, toml_values
+from contextdb.files.toml_text import as_toml, dotted, what
+from contextdb.schema import shapes
 from contextdb.schema.jobs import JOBS, columns_checked, columns_with_jobs
 from contextdb.schema.outputs import declared_outputs, fallback_of, outputs_faults
-from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, as_toml, what, wrong_name
+from contextdb.schema.shapes import KEY_SYNONYMS, SECTIONS, Policy, Shape, wrong_name
 from contextdb.schema.toml_lines import Path, key_lines, line_of, read_toml
 
 Found = tuple[Path, Fault]
@@ -491,15 +492,12 @@ def _blueprint_faults(path: Path, blueprint: Section, conditions: Set[str]) -> I
 
 def _header(path: Path) -> str:
     """A section as the file writes it: [conditions.speed], [conditions."Defender.Tags"]."""
-    *outer, name = map(str, path)
-    is_bare = name and all(c.isascii() and (c.isalnum() or c in "_-") for c in name)
-    return shown(f"[{'.'.join((*outer, name if is_bare else as_toml(name)))}]")
+    return shown(f"[{dotted(tuple(map(str, path)))}]")
 
 
 def _said(key: str, value: object) -> str:
-    """A key with its value, that of a mirror with the names in it."""
-    is_pairs = key == "mirror" and isinstance(value, Mapping)
-    return shown(f"{key} = {toml_values.as_toml(value) if is_pairs else as_toml(value)}")
+    """A key with its value."""
+    return shown(f"{key} = {as_toml(value)}")
 
 
 def _shapes(section: str) -> Mapping[str, Shape]:

@@ -18,6 +18,7 @@ from typing import Literal, get_args
 from contextdb.cells.kinds import KINDS
 from contextdb.disk import TABLE_SUFFIXES
 from contextdb.errors import in_quotes, nearest, some
+from contextdb.files.toml_text import as_toml, what
 
 Policy = Literal["collect", "first", "unique", "priority", "specific", "cheapest"]
 POLICIES: tuple[Policy, ...] = get_args(Policy)
@@ -59,23 +60,6 @@ class Shape:
         """What was likely meant, if that is accepted."""
         meant = self.meant(value)
         return None if meant is None or self.wrong(meant) else meant
-
-
-def as_toml(value: object) -> str:
-    """A value as contextdb.toml writes it; what is inside tables and inner lists is left out."""
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join("[…]" if isinstance(v, (list, tuple)) else as_toml(v) for v in value) + "]"
-    if isinstance(value, Mapping):
-        return "{…}" if value else "{}"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool)) else str(value)
-
-
-def what(value: object) -> str:
-    """The type of a value, in a word for a message."""
-    for types, word in ((str, "text"), (bool, "true or false"), (numbers.Real, "a number"), (Mapping, "a table")):
-        if isinstance(value, types):
-            return word
-    return "a list" if isinstance(value, (list, tuple)) else "nothing" if value is None else f"a {type(value).__name__}"
 
 
 def wrong_name(value: object) -> str | None:

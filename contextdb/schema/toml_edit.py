@@ -14,7 +14,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from contextdb.schema.toml_values import TOKEN, Path, as_toml, dotted, end_of_line, keys_of, merged
+from contextdb.files.toml_text import Path, as_toml, dotted
+from contextdb.schema.toml_values import TOKEN, end_of_line, keys_of, merged
 
 
 @dataclass(frozen=True, slots=True)

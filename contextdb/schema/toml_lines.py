@@ -12,8 +12,8 @@ import tomllib
 from collections.abc import Mapping
 
 from contextdb.errors import Fault, Place, SchemaError, in_quotes, shown
+from contextdb.files.toml_text import Path as Path
 from contextdb.schema.toml_edit import statements
-from contextdb.schema.toml_values import Path as Path
 
 MOST_PARTS = 256
 """A key of more parts, a.b.c, is refused: reading it would cost the square of them."""

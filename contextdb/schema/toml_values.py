@@ -5,8 +5,6 @@ Nothing here knows where in a file a value stands.
 
 from __future__ import annotations
 
-import datetime
-import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-Path = tuple[str, ...]
+from contextdb.files.toml_text import Path, as_toml, dotted
 
 TOKEN = re.compile(
     r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+'  # strings over several lines
@@ -22,24 +20,6 @@ TOKEN = re.compile(
     r"|#[^\n]*|[\[\]{},=\n]|[^\s\[\]{},=#\"']+|[^\S\n]+",
     re.DOTALL,
 )
-
-
-def as_toml(value: object) -> str:
-    """A value as TOML writes it, on one line."""
-    if isinstance(value, Mapping):
-        inner = ", ".join(f"{dotted((key,))} = {as_toml(item)}" for key, item in value.items())
-        return f"{{ {inner} }}" if inner else "{}"
-    if isinstance(value, (list, tuple)):
-        inner = ", ".join(map(as_toml, value))
-        return f"[ {inner} ]" if any(isinstance(item, Mapping) for item in value) else f"[{inner}]"
-    if isinstance(value, (str, bool)):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return value.isoformat() if isinstance(value, (datetime.date, datetime.time)) else str(value)
-
-
-def dotted(path: Path) -> str:
-    """A path as a header writes it: conditions."Defender.Tags"."""
-    return ".".join(key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else as_toml(key) for key in path)
 
 
 @lru_cache(4096)

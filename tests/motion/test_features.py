@@ -78,7 +78,7 @@ REFUSED = {
     "a rate of nothing": ({**POINTS, "rate": 0}, "[features.loco] rate = 0: this is out of range."),
     "a rate that is nan": (
         {**POINTS, "rate": math.nan},
-        "[features.loco] rate = NaN: this is a number that is not finite, not a number.",
+        "[features.loco] rate = nan: this is not a finite number.",
     ),
     "a misspelt key": (
         {**POINTS, "rat": 3},

@@ -172,7 +172,7 @@ REFUSED = {
     "a flag that is a number": (("databases", "jog", "mirror"), 0, "Did you mean mirror = false?"),
     "a list of names to mirror": (("databases", "jog", "mirror"), ["walk"], "this is a list, neither true nor false."),
     "a bias in quotes": (("databases", "jog", "base_bias"), "0.5", "Did you mean base_bias = 0.5?"),
-    "a bias without end": (("databases", "jog", "continuing_bias"), float("-inf"), "this is a number that is not finite"),
+    "a bias without end": (("databases", "jog", "continuing_bias"), float("-inf"), "this is not a finite number"),
     "an end that is negative": (
         ("databases", "jog", "end_s"),
         -0.3,

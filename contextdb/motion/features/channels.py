@@ -33,8 +33,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeGuard, cast, get_args
 
-from contextdb.errors import in_quotes
-from contextdb.motion.reading import Section, as_number, as_toml, what_is
+from contextdb.errors import in_quotes, shown
+from contextdb.files.toml_text import as_toml, what
+from contextdb.motion.reading import Section, as_number
 
 ChannelType = Literal["position", "velocity", "trajectory", "direction", "orientation", "angular_velocity", "phase", "custom"]
 What = Literal["position", "direction", "velocity", "speed", "direction_to_velocity"]
@@ -191,7 +192,7 @@ def read_channel(section: Section, i: int, item: object) -> Channel | None:
     where = f"{section.where} channel {i + 1}"
     if not isinstance(item, Mapping):
         section.add(
-            f"{where} is {as_toml(item)}: this is {what_is(item)}, not a table.", '{ type = "position", bone = "LeftFoot" }'
+            f"{where} is {shown(as_toml(item))}: this is {what(item)}, not a table.", '{ type = "position", bone = "LeftFoot" }'
         )
         return None
     n_faults = len(section.faults)

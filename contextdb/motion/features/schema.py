@@ -13,14 +13,15 @@ from functools import cached_property
 import numpy as np
 
 from contextdb.cells.arguments import require_mapping, require_text
-from contextdb.errors import Fault, SchemaError, in_quotes, nearest, some
+from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
+from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.mirror import Pairs, pattern_fault
 from contextdb.motion.clips.poses import Poses
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.features.channels import Channel, check_together, is_pair, read_channel, read_pair
-from contextdb.motion.reading import Mapped, Section, as_toml, what_is
+from contextdb.motion.reading import Mapped, Section
 
 __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
 
@@ -169,13 +170,13 @@ def _read_mirror(section: Section) -> Pairs:
     """The pairs of names or patterns; whether a skeleton has the bones is asked when a clip is mirrored."""
     value = section.part["mirror"]
     if not isinstance(value, (list, tuple)) or not value:
-        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what_is(value)}, not a list"
+        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what(value)}, not a list"
         section.wrong("mirror", why, A_MIRROR)
         return ()
     for i, item in enumerate(value):
         why = pattern_fault(item[0], item[1]) if is_pair(item) else "this is not a pair of different names"
         if why:
-            section.add(f"{section.where} mirror pair {i + 1} is {as_toml(item)}: {why}.", A_MIRROR)
+            section.add(f"{section.where} mirror pair {i + 1} is {shown(as_toml(item))}: {why}.", A_MIRROR)
     return tuple((item[0], item[1]) for item in value if is_pair(item))
 
 
@@ -185,7 +186,7 @@ def _read_channels(section: Section) -> list[Channel]:
         return []
     value = section.part["channels"]
     if not isinstance(value, (list, tuple)) or not value:
-        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what_is(value)}, not a list"
+        why = "the list is empty" if isinstance(value, (list, tuple)) else f"this is {what(value)}, not a list"
         section.wrong("channels", why, accepted)
         return []
     read = [read_channel(section, i, item) for i, item in enumerate(value)]

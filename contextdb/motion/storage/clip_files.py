@@ -12,6 +12,7 @@ from pathlib import Path
 
 from contextdb.disk import path_in_quotes, read_bytes
 from contextdb.errors import Fault, MotionError, Place, in_quotes
+from contextdb.files.toml_text import as_toml
 from contextdb.motion.clips import bvh, mirror
 from contextdb.motion.clips import clip as clips
 from contextdb.motion.clips.doubts import Measures, measure
@@ -19,7 +20,6 @@ from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.features.extraction import ClipFeatures, clip_features
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.reading import as_toml
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.feature_cache import FeatureCache, key_of
 

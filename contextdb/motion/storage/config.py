@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
 
 from contextdb.cells.arguments import require_mapping, require_text
-from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, some
+from contextdb.errors import Fault, Place, SchemaError, in_quotes, nearest, shown, some
+from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips import clip as clips
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
-from contextdb.motion.reading import Mapped, Section, as_toml, what_is
+from contextdb.motion.reading import Mapped, Section
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.controller import Clock, Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings, read_controllers
@@ -169,10 +170,10 @@ def _named_parts(mapping: Mapped, section: str, faults: list[Fault], file: str |
     whole = mapping.get(section, {})
     parts = whole if isinstance(whole, Mapping) else {}
     if not isinstance(whole, Mapping):
-        faults.append(Fault(f"{section} is {what_is(whole)}, not a table.", f"[{section}.NAME] and its keys", place=Place(file)))
+        faults.append(Fault(f"{section} is {what(whole)}, not a table.", f"[{section}.NAME] and its keys", place=Place(file)))
     for name, part in parts.items():
         if not isinstance(part, Mapping):
-            found = f"{section}.{name} = {as_toml(part)}: this is {what_is(part)}, not a table."
+            found = f"{section}.{name} = {shown(as_toml(part))}: this is {what(part)}, not a table."
             faults.append(Fault(found, f"[{section}.{name}] and its keys", place=Place(file)))
     return {name: part for name, part in parts.items() if isinstance(part, Mapping)}
 
@@ -209,7 +210,7 @@ def _read_selectors(
 def _read_step(section: Section, i: int, step: object, n_steps: int, known: list[str]) -> tuple[str | None, float | None]:
     where = f"{section.where} order {i + 1}"
     if not isinstance(step, Mapping):
-        section.add(f"{where} is {as_toml(step)}: this is {what_is(step)}, not a table.", '{ database = "jog" }')
+        section.add(f"{where} is {shown(as_toml(step))}: this is {what(step)}, not a table.", '{ database = "jog" }')
         return None, None
     part = Section(where, step, STEP_KEYS, section.faults, section.file)
     database = part.one_of("database", known, "database") if part.has("database", some(known) or "the name of a database") else None
@@ -233,7 +234,7 @@ def _check_one_schema(section: Section, databases: list[str | None], parts: Mapp
     """Costs can be compared when they come from one feature schema."""
     schemas = {name: parts[name].get("features") for name in databases if name is not None}
     if len(set(map(as_toml, schemas.values()))) > 1:
-        told = ", ".join(f"{in_quotes(name)} {as_toml(schema)}" for name, schema in schemas.items())
+        told = ", ".join(f"{in_quotes(name)} {shown(as_toml(schema))}" for name, schema in schemas.items())
         section.add(
             f"{section.where} has databases of different features: {told}.", "one feature schema, so that costs can be compared"
         )

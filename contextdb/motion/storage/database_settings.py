@@ -25,10 +25,11 @@ from pathlib import PureWindowsPath
 from typing import Any
 
 from contextdb.errors import Fault, some
+from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Up
 from contextdb.motion.features.channels import MOST_WEIGHT
 from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.reading import Mapped, Section, as_toml, what_is
+from contextdb.motion.reading import Mapped, Section
 
 KEYS = (
     "table",
@@ -170,7 +171,7 @@ def _read_flag(section: Section, key: str) -> bool | None:
         return value
     meant = FLAG_WORDS.get(str(value).strip().casefold())
     mend = "" if meant is None else f"{key} = {as_toml(meant)}"
-    section.wrong(key, f"this is {what_is(value)}, neither true nor false", "true or false", mend)
+    section.wrong(key, f"this is {what(value)}, neither true nor false", "true or false", mend)
     return None
 
 
@@ -178,7 +179,7 @@ def _read_weights(section: Section, schema: FeatureSchema | None) -> dict[str, f
     """Weights by the names of channels; without a schema the names are not looked at, as its own faults are reported already."""
     value = section.part["weights"]
     if not isinstance(value, Mapping):
-        section.wrong("weights", f"this is {what_is(value)}, not a table", '{ "NAME OF A CHANNEL" = 2.0 }')
+        section.wrong("weights", f"this is {what(value)}, not a table", '{ "NAME OF A CHANNEL" = 2.0 }')
         return None
     names = list(value) if schema is None else [channel.name for channel in schema.channels]
     inner = Section(f"{section.where} weights", value, names, section.faults, section.file)

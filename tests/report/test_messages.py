@@ -36,10 +36,12 @@ def rules_in(tree: ast.AST, in_tuples: bool) -> Iterator[str]:
             found = [node.value] if node.arg == "rule" else []
         elif isinstance(node, ast.AnnAssign):
             found = [node.value] if isinstance(node.target, ast.Name) and node.target.id == "rule" else []
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        elif isinstance(node, ast.Assign):
+            found = [node.value for target in node.targets if isinstance(target, ast.Name) and target.id == "rule"]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id != "partial":
             at = RULE_ARGUMENT.get(node.func.id, len(node.args))
             found = [*node.args[at : at + 1]]
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in METHODS:
+        elif isinstance(node, ast.Call) and (not isinstance(node.func, ast.Attribute) or node.func.attr in METHODS):
             found = [a for a, b in pairwise(node.args) if isinstance(b, ast.Constant) and b.value in LEVELS]
         elif in_tuples and isinstance(node, ast.Tuple):
             found = [a for a, b in pairwise(node.elts) if isinstance(b, ast.Constant) and b.value in LEVELS]
@@ -50,6 +52,18 @@ def rules_of(*patterns: str, package: str = "contextdb") -> set[str]:
     """Every rule that the modules of a package name."""
     paths = [path for pattern in patterns for path in (ROOT / package).glob(pattern)]
     return {rule for path in paths for rule in rules_in(ast.parse(path.read_text(encoding="utf-8")), package == "contextdb")}
+
+
+def module_of(path: Path) -> str:
+    """The name of a module below contextdb."""
+    return ".".join(path.relative_to(ROOT / "contextdb").with_suffix("").parts).removesuffix(".__init__")
+
+
+MODULES = {
+    module_of(path): set(rules_in(ast.parse(path.read_text(encoding="utf-8")), in_tuples=True))
+    for path in sorted((ROOT / "contextdb").rglob("*.py"))
+}
+"""The rules that each module reports."""
 
 
 def fenced(section: str, language: str) -> str | None:
@@ -75,6 +89,11 @@ def test_every_rule_that_the_code_names_has_its_section_and_the_other_way_round(
 def test_every_rule_of_a_check_carries_its_own_help():
     assert rules_of("checks/run.py", "cells/grammar.py", "tables/alike.py", "errors.py") <= set(RULES) <= rules_of("**/*.py")
     assert set(TABLE_RULES) < set(RULES)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_rule_is_reported_by_the_modules_that_the_catalogue_names_and_by_no_other(rule: str):
+    assert RULES[rule].modules == tuple(module for module, rules in MODULES.items() if rule in rules)
 
 
 def test_no_rule_has_two_sections():

@@ -19,6 +19,8 @@ from xml.etree import ElementTree
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import TEXT, Domain
+from contextdb.cells.output_types import OUTPUT_TYPES, OutputValue
+from contextdb.cells.outputs import Output
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, nearest, plural, shown, some
 from contextdb.exchange.conflicts import require_no_conflicts
@@ -30,6 +32,7 @@ from contextdb.exchange.proposals import propose_type
 from contextdb.exchange.reading import Reading, Remark, capped, listed
 from contextdb.expressions.rules import check_rule
 from contextdb.files.csv_source import name_faults
+from contextdb.schema.outputs import outputs_faults, outputs_to_toml
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
 
 POLICIES: dict[str, Any] = {"UNIQUE": "unique", "FIRST": "first", "PRIORITY": "priority", "ANY": "collect", "COLLECT": "collect"}
@@ -48,6 +51,8 @@ _NAMES = ("name", "id")
 _NOTE = InputType("annotation")
 
 Element = ElementTree.Element
+Given = tuple[tuple[str, OutputValue], ...]
+"""Names and values of outputs."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
     types = Types.of(root)
     tests, values, texts = (_entries(rules, tag) for tag in ("inputEntry", "outputEntry", "annotationEntry"))
     inputs = [_input(one, at, _at(tests, at), types) for at, one in enumerate(children_of(element, "input"))]
-    outputs = [_output(one, at, _at(values, at), name) for at, one in enumerate(children_of(element, "output"))]
+    outputs = [_output(one, at, _at(values, at), name, types) for at, one in enumerate(children_of(element, "output"))]
     notes = [_annotation(one, at, _at(texts, at)) for at, one in enumerate(children_of(element, "annotation"))]
     notes += _descriptions(rules)
     if not outputs:
@@ -107,12 +112,14 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
     if faults:
         raise TableError(*faults)
     plain = tuple(column.name for column in data[1:])
-    fallback, lost_defaults = _fallback(outputs)
+    typed, lost_outputs = _typed(outputs[1:])
+    fallback, given, lost_defaults = _fallback(outputs, typed)
     priority = _priority_name(columns, policy)
     rule_name = when[0].name if when else None
     settings = TableSettings(
         name, asset=data[0].name, outputs=plain, policy=policy, priority=priority, fallback=fallback, when=rule_name
     )
+    settings = replace(settings, typed=typed, fallback_outputs=given)
     schema = Schema(conditions={**declared, **rules_of_rows.facts}, tables={name: settings})
     lost = [*lost, *lost_values, *_notes_on_entries(rules)]
     told = (
@@ -121,6 +128,7 @@ def read_dmn(raw: bytes, file: str, decision: str | None = None) -> Reading:
         *_expressions(element),
         *_results(root, inputs),
         *lost_types,
+        *lost_outputs,
         *lost_defaults,
         *rules_of_rows.remarks(),
     )
@@ -208,12 +216,13 @@ def _input(element: Element, at: int, entries: Sequence[str], types: Types) -> _
     return _Column(name, InputType(kind.kind, allowed), entries)
 
 
-def _output(element: Element, at: int, entries: Sequence[str], decision: str) -> _Column:
+def _output(element: Element, at: int, entries: Sequence[str], decision: str, types: Types) -> _Column:
     name = element.get("name") or element.get("label") or (decision if at == 0 else f"output {at + 1}")
     values = text_of(next(iter(children_of(element, "outputValues")), None))
     found = tuple(strings_of(values))
     default = text_of(next(iter(children_of(element, "defaultOutputEntry")), None))
-    return _Column(name, InputType(), entries, found, default)
+    kind = types.named(element.get("typeRef") or "")
+    return _Column(name, InputType(kind.kind, values or kind.allowed), entries, found, default)
 
 
 def _annotation(element: Element, at: int, entries: Sequence[str]) -> _Column:
@@ -350,14 +359,38 @@ def _judged(one: _Column) -> Condition:
     return conditions_from_dict({one.name: _said(one) or {"type": "text"}})[one.name]
 
 
-def _fallback(outputs: Sequence[_Column]) -> tuple[str | None, list[Remark]]:
-    """What the first output is when no rule holds: the table's fallback. Defaults of others have no place in a table."""
-    value = value_of(outputs[0].default)
-    given = [one for one in outputs if one.default and (one is not outputs[0] or value is None)]
-    lost = [
-        Remark(f"the default {in_quotes(one.default)} is not kept.", f"output {in_quotes(one.name)}", is_loss=True) for one in given
-    ]
-    return value or None, lost
+def _typed(outputs: Sequence[_Column]) -> tuple[tuple[Output, ...], list[Remark]]:
+    """The outputs whose type the file tells, where all their entries are values of it; the others are texts."""
+    typed, remarks = list[Output](), list[Remark]()
+    for one in outputs:
+        domain, lost = domain_of(one.kind, [], place := f"output {in_quotes(one.name)}")
+        remarks += lost
+        if domain is None or domain.kind not in OUTPUT_TYPES:
+            continue
+        output = Output(one.name, domain.kind, None, domain.minimum, domain.maximum, domain.values or ())
+        wrong = next((entry for entry in one.entries if not output.reads(value_of(entry) or "")), None)
+        said = outputs_to_toml([one.name], [output])
+        if wrong is not None:
+            told = f"{in_quotes(wrong)} is no value of its type" if wrong else "an entry is empty"
+            remarks.append(Remark(f"{told}, so it is read as text.", place))
+        elif not any(outputs_faults({"outputs": said})):
+            typed.append(output)
+    return tuple(typed), remarks
+
+
+def _fallback(outputs: Sequence[_Column], typed: Sequence[Output]) -> tuple[str | None, Given, list[Remark]]:
+    """What the outputs are when no rule holds: the table's fallback, if the first, the asset, has a default."""
+    asset, known = value_of(outputs[0].default) or None, {output.name: output for output in typed}
+    given, lost = list[tuple[str, OutputValue]](), list[Remark]()
+    for one in outputs:
+        if not one.default or (one is outputs[0] and asset is not None):
+            continue
+        output, value = known.get(one.name, Output(one.name)), value_of(one.default)
+        if asset is not None and value is not None and output.reads(value):
+            given.append((one.name, output.read(value)))
+        else:
+            lost.append(Remark(f"the default {in_quotes(one.default)} is not kept.", f"output {in_quotes(one.name)}", is_loss=True))
+    return asset, tuple(given), lost
 
 
 def _results(root: Element, inputs: Sequence[_Column]) -> Iterator[Remark]:

@@ -84,7 +84,7 @@ class Types:
     def of_input(self, expression: Element | None, said: str) -> InputType:
         """The type of an input, by its own reference or by that of the datum that it names."""
         own = expression.get("typeRef") if expression is not None else None
-        return self._resolved(own or self._type_of_path(said))
+        return self.named(own or self._type_of_path(said))
 
     def paths(self) -> list[str]:
         """The names of all facts, and of the parts of those that are structures: Applicant.age."""
@@ -98,7 +98,8 @@ class Types:
         name, _, rest = path.partition(".")
         return f"{_plain(self.facts.get(name, ''))}.{rest}" if rest else self.facts.get(path, "")
 
-    def _resolved(self, name: str) -> InputType:
+    def named(self, name: str) -> InputType:
+        """A type by its name, with the values that it allows."""
         allowed = ""
         for _ in range(MOST_LINKS):
             item = self.items.get(name, self.items.get(_plain(name)))

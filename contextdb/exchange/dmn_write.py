@@ -1,7 +1,8 @@
 """A table as a DMN 1.3 decision table: conditions are inputs, the asset the first output, other columns further outputs.
 
-What unary tests cannot say is reported with its place: a row that can never match or is disabled is left out, a soft cell excludes
-nothing, a column of tags becomes an annotation.
+An output of type bool, int, number or enum has its FEEL type, and an empty cell of it the default. What unary tests cannot say is
+reported with its place: a row that can never match or is disabled is left out, a soft cell excludes nothing, a column of tags
+becomes an annotation.
 """
 
 from __future__ import annotations
@@ -9,9 +10,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from xml.sax.saxutils import escape
 
-from contextdb.cells.domains import Domain
+from contextdb.cells.domains import NUMBER, Domain
+from contextdb.cells.output_types import OutputValue
+from contextdb.cells.outputs import Output
 from contextdb.console import printable
 from contextdb.errors import Fault, Place, TableError, in_quotes, row_name
 from contextdb.exchange.feel import feel_number, feel_type, literal, unary_tests
@@ -43,7 +47,7 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
     outputs = [table.asset_column, *(name for name in _plain(table) if name != table.asset_column)]
     parts = [
         *(_input(column) for column in inputs),
-        *(_output(at, name, table.settings.fallback if at == 1 else None) for at, name in enumerate(outputs, 1)),
+        *(_output(at, name, table) for at, name in enumerate(outputs, 1)),
         *(f'<annotation name="{_attribute(column.condition.name)}"/>' for column in tags),
         *(_rule(table, row, inputs, outputs, tags) for row in rows),
     ]
@@ -112,16 +116,48 @@ def _bounds(domain: Domain) -> str:
     return f"[{low}..{high}]"
 
 
-def _output(number: int, name: str, default: str | None) -> str:
-    entry = f"<defaultOutputEntry><text>{_attribute(literal(default))}</text></defaultOutputEntry>" if default else ""
-    return f'<output id="output_{number}" name="{_attribute(name)}" typeRef="string">{entry}</output>'
+def _output(number: int, name: str, table: Table) -> str:
+    output = table.settings.output(name) or Output(name)
+    values = ",".join(map(literal, output.values)) or _bounds(replace(NUMBER, minimum=output.minimum, maximum=output.maximum))
+    allowed = f"<outputValues><text>{_attribute(values)}</text></outputValues>" if values and not output.type.has_size else ""
+    default = literal(table.settings.fallback or "") if name == table.asset_column else _fallback(table, output)
+    entry = f"<defaultOutputEntry><text>{_attribute(default)}</text></defaultOutputEntry>" if default not in ("", '""') else ""
+    kind = _feel_type(output)
+    return f'<output id="output_{number}" name="{_attribute(name)}" typeRef="{kind}">{allowed}{entry}</output>'
+
+
+def _feel_type(output: Output) -> str:
+    is_number = output.type.is_numeric and not output.type.has_size
+    return "number" if is_number else "boolean" if output.type.choices else "string"
+
+
+def _fallback(table: Table, output: Output) -> str:
+    """What an output is where no rule holds, as far as the table's fallback says it."""
+    value = dict(table.settings.fallback_outputs).get(output.name, output.default)
+    return "" if value is None or not table.settings.fallback else _value(output, value)
+
+
+def _entry(table: Table, row: int, name: str) -> str:
+    """A cell that is no condition; empty, which means null, where it gives no value."""
+    text, output = table.text(row, name), table.settings.output(name)
+    if output is None:
+        return literal(text)
+    return "" if not text.strip() and output.needs_cell else _value(output, output.read(text, wants_mend=False))
+
+
+def _value(output: Output, value: OutputValue) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float) and math.isinf(value):
+        return ""
+    return output.written(value) if isinstance(value, (int, float)) else literal(output.written(value))
 
 
 def _rule(
     table: Table, row: int, inputs: Sequence[ConditionColumn], outputs: Sequence[str], tags: Sequence[ConditionColumn]
 ) -> str:
     entries = [("inputEntry", unary_tests(column.cell(row), column.condition.domain) or "-") for column in inputs]
-    entries += [("outputEntry", literal(table.text(row, name))) for name in outputs]
+    entries += [("outputEntry", _entry(table, row, name)) for name in outputs]
     entries += [("annotationEntry", column.texts[row]) for column in tags]
     return f"<rule>{''.join(f'<{tag}><text>{_attribute(text)}</text></{tag}>' for tag, text in entries)}</rule>"
 
@@ -139,6 +175,17 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
     for job in ("once", "cooldown_s", "cooldown_turns"):
         if name := getattr(table.settings, job):
             yield Remark("becomes an output: a decision does not remember what was picked.", f"column {in_quotes(name)}", True)
+    for output in table.settings.typed:
+        if output.type.has_size or output.type.is_whole:
+            said = (
+                "lists of numbers become texts."
+                if output.type.has_size
+                else "whole numbers become numbers: FEEL has one type of both."
+            )
+            yield Remark(said, f"column {in_quotes(output.name)}", True)
+        values = [value for column in table.output_columns if column.output is output for value in column.values]
+        if any(isinstance(value, float) and math.isinf(value) for value in values):
+            yield Remark("infinite numbers become empty: FEEL has none.", f"column {in_quotes(output.name)}", True)
     if table.settings.policy == "priority":
         yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
     if table.settings.when:

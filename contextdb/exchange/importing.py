@@ -145,7 +145,7 @@ def table_of(
     declared = {c.name: c.declared for _, c in kept if c.is_new and c.job == "condition" and c.declared is not None}
     beside = _named_beside(reading, [column for _, column in kept], schema)
     schema = replace(schema, conditions={**schema.conditions, **conditions_from_dict(declared), **beside})
-    settings = _settings(settings, [column for _, column in kept], reading)
+    settings = _settings(settings, kept, reading)
     faults = list(job_faults(settings, [column.name for _, column in kept], schema))
     if faults:
         raise TableError(*(fault.at(Place(str(path) if path else None)) for fault in faults))
@@ -175,15 +175,17 @@ def _source(reading: Reading, path: Path | None) -> AnySource | None:
     return reading.source if is_same else None
 
 
-def _settings(settings: TableSettings, kept: Sequence[Mapped], reading: Reading) -> TableSettings:
+def _settings(settings: TableSettings, placed: Sequence[tuple[int, Mapped]], reading: Reading) -> TableSettings:
     """The settings under the jobs of the columns; what the file itself keeps of fallback, policy and assumptions is taken over."""
+    kept = [column for _, column in placed]
     said: dict[str, Any] = {"asset": next(column.name for column in kept if column.job == "asset")}
     for job in PLAIN_JOBS:
         said[job] = next((column.name for column in kept if column.job == job), None)
     own = next(iter(reading.schema.tables.values()), None)
     if own is not None and settings == TableSettings(settings.name, settings.file):
         said |= {"fallback": own.fallback, "policy": own.policy, "assume": own.assume}
-        said |= {"typed": own.typed, "fallback_outputs": own.fallback_outputs}
+        named = own.renamed({reading.columns[at].name: column.name for at, column in placed}.get)
+        said |= {"typed": named.typed, "fallback_outputs": named.fallback_outputs}
     return replace(settings, **said).with_outputs(column.name for column in kept if column.job == "output")
 
 

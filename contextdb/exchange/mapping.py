@@ -87,7 +87,7 @@ def propose(
     renames = renames or {}
     _require_known(renames, reading.names)
     kept = next(iter(reading.schema.tables.values()), None)
-    merged = _merged(settings, kept)
+    merged = _merged(settings, kept, renames)
     asset = _asset(reading, merged, renames)
     known = _Known.of(schema, len(reading.columns))
     mapped = tuple(_mapped(column, asset, reading, known, merged, renames) for column in reading.columns)
@@ -195,11 +195,11 @@ def _require_different(mapped: Sequence[Mapped]) -> None:
         seen[column.name] = column.source
 
 
-def _merged(settings: TableSettings, kept: TableSettings | None) -> TableSettings:
-    """What the project says of the table, and where it says nothing, what the file itself keeps."""
+def _merged(settings: TableSettings, kept: TableSettings | None, renames: Mapping[str, str]) -> TableSettings:
+    """What the project says of the table, and where it says nothing, what the file itself keeps, under the new names."""
     if kept is None or settings != TableSettings(settings.name, settings.file):
         return settings
-    return replace(kept, name=settings.name, file=settings.file)
+    return replace(kept.renamed(lambda name: renames.get(name, name) or None), name=settings.name, file=settings.file)
 
 
 def _asset(reading: Reading, settings: TableSettings, renames: Mapping[str, str]) -> str:

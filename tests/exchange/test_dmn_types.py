@@ -219,7 +219,7 @@ def test_strings_that_look_like_truths_stay_texts():
     assert reading.columns[1].to_list() == ["True", "False x"]
 
 
-def test_a_default_output_is_the_fallback_and_those_of_others_are_told():
+def test_the_default_outputs_are_the_fallback():
     outputs = (
         '<output name="asset"><defaultOutputEntry><text>"MidAir_Default"</text></defaultOutputEntry></output>'
         '<output name="slots"><defaultOutputEntry><text>"Ball"</text></defaultOutputEntry></output>'
@@ -227,8 +227,14 @@ def test_a_default_output_is_the_fallback_and_those_of_others_are_told():
     reading = read_dmn(document("", "", outputs=outputs), "moves.dmn")
     assert reading.schema is not None
     assert reading.schema.tables["Moves"].fallback == "MidAir_Default"
-    (loss,) = losses(reading)
-    assert loss.startswith('output "slots": ')
+    assert reading.schema.tables["Moves"].fallback_outputs == (("slots", "Ball"),)
+    assert not losses(reading)
+
+
+def test_a_default_of_an_output_without_one_of_the_asset_is_told():
+    outputs = '<output name="asset"/><output name="slots"><defaultOutputEntry><text>"Ball"</text></defaultOutputEntry></output>'
+    (loss,) = losses(read_dmn(document("", "", outputs=outputs), "moves.dmn"))
+    assert loss == 'output "slots": the default \'"Ball"\' is not kept.'
 
 
 def test_an_input_that_another_decision_gives_is_told():

@@ -58,6 +58,9 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
         f'    <decisionTable id="table" hitPolicy="{_POLICIES.get(table.settings.policy, "COLLECT")}">\n      {body}\n'
         "    </decisionTable>\n  </decision>\n</definitions>\n"
     )
+    if found := _NEVER.search(text):
+        said = f"{in_quotes(text[max(0, found.start() - 10) : found.end()])} has a character that XML cannot hold."
+        raise TableError(Fault(said, "text without it, in contextdb.toml too"))
     return text.encode(), (*remarks, *_about(table, tags))
 
 
@@ -175,17 +178,7 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
     for job in ("once", "cooldown_s", "cooldown_turns"):
         if name := getattr(table.settings, job):
             yield Remark("becomes an output: a decision does not remember what was picked.", f"column {in_quotes(name)}", True)
-    for output in table.settings.typed:
-        if output.type.has_size or output.type.is_whole:
-            said = (
-                "lists of numbers become texts."
-                if output.type.has_size
-                else "whole numbers become numbers: FEEL has one type of both."
-            )
-            yield Remark(said, f"column {in_quotes(output.name)}", True)
-        values = [value for column in table.output_columns if column.output is output for value in column.values]
-        if any(isinstance(value, float) and math.isinf(value) for value in values):
-            yield Remark("infinite numbers become empty: FEEL has none.", f"column {in_quotes(output.name)}", True)
+    yield from _about_outputs(table)
     if table.settings.policy == "priority":
         yield Remark("the priorities are an output; DMN orders by the list of output values instead.", is_loss=True)
     if table.settings.when:
@@ -193,3 +186,15 @@ def _about(table: Table, tags: Sequence[ConditionColumn]) -> Iterator[Remark]:
         yield Remark(said, f"column {in_quotes(table.settings.when)}", True)
     if table.settings.assume:
         yield Remark("assume is not kept: a decision table has no equivalent.", is_loss=True)
+
+
+def _about_outputs(table: Table) -> Iterator[Remark]:
+    """What FEEL has no words for in the types and values of outputs."""
+    for column in table.output_columns:
+        kind, place = column.output.type, f"column {in_quotes(column.output.name)}"
+        if kind.has_size:
+            yield Remark("lists of numbers become texts.", place, True)
+        elif kind.is_whole:
+            yield Remark("whole numbers become numbers: FEEL has one type for both.", place, True)
+        if any(isinstance(value, float) and math.isinf(value) for value in column.values):
+            yield Remark("infinite numbers become empty: FEEL has none.", place, True)

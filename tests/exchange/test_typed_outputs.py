@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, given
 from test_outputs import plain, same, tables
 
+from contextdb.errors import TableError
 from contextdb.exchange.formats import FORMATS, read, write
 from contextdb.exchange.importing import plan_import, table_of
 from contextdb.exchange.mapping import propose
@@ -90,7 +91,7 @@ def test_a_typed_output_is_written_with_its_type_its_values_and_what_the_fallbac
     }
     assert b"<outputEntry><text>false</text></outputEntry><outputEntry><text>3</text></outputEntry>" in raw
     assert [str(remark) for remark in remarks if remark.is_loss] == [
-        'column "damage": whole numbers become numbers: FEEL has one type of both.',
+        'column "damage": whole numbers become numbers: FEEL has one type for both.',
         'column "offset": lists of numbers become texts.',
     ]
 
@@ -102,6 +103,19 @@ def test_bounds_and_values_come_back_from_dmn_into_the_proposed_declaration(tmp_
     assert 'hit = { type = "bool" }' in text
     assert 'blend = { type = "number", min = 0.0, max = 1.0 }' in text
     assert 'kind = { type = "enum", values = ["Fire", "Half Back"] }' in text
+
+
+def test_infinite_numbers_become_empty_and_are_told():
+    declared = settings_with(TableSettings("t", asset="Asset"), {"outputs": {"far": {"type": "number"}}})
+    raw, remarks = write(Table.from_columns({"Asset": ["a"], "far": ["inf"]}, settings=declared), FORMATS["dmn"])
+    assert b"<outputEntry><text></text></outputEntry>" in raw
+    assert [str(remark) for remark in remarks] == ['column "far": infinite numbers become empty: FEEL has none.']
+
+
+def test_a_declared_value_that_xml_cannot_hold_is_refused():
+    declared = settings_with(TableSettings("t", asset="Asset"), {"outputs": {"kind": {"type": "enum", "values": ["a", "b\x01"]}}})
+    with pytest.raises(TableError, match="a character that XML cannot hold"):
+        write(Table.from_columns({"Asset": ["x"], "kind": ["a"]}, settings=declared), FORMATS["dmn"])
 
 
 @pytest.mark.parametrize("entry", ["", "x + 1", '"much"'])

@@ -390,7 +390,9 @@ def test_a_motion_search_takes_fewer_rows_and_many_answers_where_there_are_many_
     ],
 )
 def test_what_was_given_by_position_is_still_taken_with_a_warning_that_names_the_new_way(old, new):
-    with pytest.warns(DeprecationWarning, match=r"give unknown=\.\.\.(, actors=\.\.\., prefer=\.\.\.)? by name") as caught:
+    with pytest.warns(
+        DeprecationWarning, match=r"by position goes away .* Use unknown=\.\.\.(, actors=\.\.\., prefer=\.\.\.)?\."
+    ) as caught:
         found = old(MOVES)
     assert found == new(MOVES)
     assert caught[0].filename == __file__

@@ -51,7 +51,7 @@ def soft_table(rng: random.Random, n_rows: int) -> CompiledTable:
 
 def costs_in_python(compiled: CompiledTable, unknown: str, facts: Facts) -> tuple[int, list[float]]:
     try:
-        return OK, compiled.penalties(facts, unknown).tolist()  # type: ignore[arg-type]
+        return OK, compiled.penalties(facts, unknown=unknown).tolist()  # type: ignore[arg-type]
     except ContextError:
         return -1, [0.0] * compiled.n_rows
 

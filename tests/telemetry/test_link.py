@@ -19,6 +19,7 @@ from contextdb import motion
 from contextdb.cells.facts import FactSet
 from contextdb.compiled.live import AskingLiveContext, LiveContext
 from contextdb.telemetry.link.lines import given_facts
+from contextdb.telemetry.link.listeners import FileListener
 from contextdb.telemetry.link.ring import MOST_ENTRIES, Moments, Picked, Ring, Source, newest
 
 __all__ = ["meeting"]
@@ -496,3 +497,13 @@ def test_a_listener_that_wants_the_newest_gets_each_character_of_a_table(link: c
         finally:
             link._publisher.lock.acquire()
     assert sorted((line["who"], line.get("pick", {}).get("asset")) for line in lines) == [("a", None), ("b", None), ("npc", picked)]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no disk that is always full")
+def test_a_game_goes_on_when_the_disk_of_its_recording_is_full(caplog: pytest.LogCaptureFixture):
+    full = FileListener(Path("m.jsonl"), open("/dev/full", "wb", buffering=0))  # noqa: SIM115
+    for _ in range(3):
+        full.offer(b"{}\n")
+        full.send()
+    full.close()
+    assert caplog.messages == ["m.jsonl: the recording ends here: No space left on device"]

@@ -3,6 +3,7 @@
     BVH clips ─► features ─► MotionDatabase ─► search(query, valid) ─► Hit
     markup ───────────────────────┘   Selector: priority databases in order ─► Choice
                                       Controller: one character in time ─► Decision ─► Trace
+                                      PoseStream: its decisions as poses, from a PoseBank ─► Pose
                                       ControllerGroup: a crowd of them, searched for at once
                                       MatchNode, MatchGate: one-offs that end at a target
 
@@ -36,6 +37,9 @@ from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
 from contextdb.motion.nodes.warping import Target, WarpShare
+from contextdb.motion.output.bank import PoseBank, Sample
+from contextdb.motion.output.settings import PoseSettings
+from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
 from contextdb.motion.search.filters import Biases
@@ -98,12 +102,18 @@ __all__ = [
     "MotionError",
     "Normalisation",
     "Playing",
+    "Pose",
+    "PoseBank",
+    "PoseSettings",
+    "PoseState",
+    "PoseStream",
     "Poses",
     "QueryError",
     "Reason",
     "Recorder",
     "ReservedTag",
     "RootMotion",
+    "Sample",
     "Search",
     "Selector",
     "SelectorSettings",

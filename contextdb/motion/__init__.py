@@ -55,6 +55,7 @@ from contextdb.motion.selection.variation import Variation
 from contextdb.motion.storage.building import Built, build, build_all, open_or_build, saved_path
 from contextdb.motion.storage.config import MotionConfig, SelectorSettings
 from contextdb.motion.storage.database_settings import DatabaseSettings
+from contextdb.motion.storage.pose_files import open_or_build_poses, open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
 from contextdb.motion.trace.session import Trace
 
@@ -148,14 +149,18 @@ __all__ = [
     "mirrored_path",
     "open_database",
     "open_or_build",
+    "open_or_build_poses",
+    "open_poses",
     "parse_bvh",
     "partners_of",
     "pose_schema",
     "poses_of",
+    "poses_path",
     "query_from",
     "resampled",
     "root_trajectory",
     "save_database",
+    "save_poses",
     "saved_path",
     "steady_path",
     "steered_path",

@@ -40,6 +40,7 @@ from contextdb.motion.nodes.warping import Target, WarpShare
 from contextdb.motion.output.bank import PoseBank, Sample
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
+from contextdb.motion.output.track import clip_of_poses, pose_arrays
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
 from contextdb.motion.search.filters import Biases
@@ -57,6 +58,7 @@ from contextdb.motion.storage.config import MotionConfig, SelectorSettings
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.pose_files import open_or_build_poses, open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
+from contextdb.motion.storage.written_poses import write_poses
 from contextdb.motion.trace.session import Trace
 
 __all__ = [
@@ -134,6 +136,7 @@ __all__ = [
     "build_all",
     "build_databases",
     "clip_features",
+    "clip_of_poses",
     "descriptions",
     "doubts_of",
     "features_of",
@@ -153,6 +156,7 @@ __all__ = [
     "open_poses",
     "parse_bvh",
     "partners_of",
+    "pose_arrays",
     "pose_schema",
     "poses_of",
     "poses_path",
@@ -169,4 +173,5 @@ __all__ = [
     "with_paths",
     "write_bvh",
     "write_made_clips",
+    "write_poses",
 ]

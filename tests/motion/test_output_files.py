@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from played import SCHEMA, bank, clips
+from played import RATE, SCHEMA, bank, clips, decisions
 
-from contextdb.errors import ArtefactError, ClipError, ContextError
+from contextdb.errors import ArtefactError, ClipError, ContextError, FileError
 from contextdb.motion import (
     MotionConfig,
     PoseBank,
+    PoseSettings,
+    PoseStream,
+    load_bvh,
     open_or_build_poses,
     open_poses,
+    pose_arrays,
+    poses_of,
     poses_path,
     save_poses,
     write_bvh,
+    write_poses,
 )
 from contextdb.motion.features.schema_dict import schema_to_dict
 from contextdb.motion.storage.building import build_all
@@ -100,3 +106,44 @@ def test_arguments_of_another_type_are_told(wrong):
 def test_a_bank_of_one_clip_is_a_bank():
     one = PoseBank.build(clips()[:1], SCHEMA)
     assert (one.n_joints, len(one.assets)) == (bank().n_joints, 1)
+
+
+# ---- poses in files of others
+
+
+@pytest.fixture
+def poses():
+    stream = PoseStream(bank(), PoseSettings(root="animation"))
+    segments = [("walk_turn_left_90", 0.3, 20), ("run", 0.2, 20, True)]
+    return [stream.update(each, 1.0 / RATE if each.tick else 0.0) for each in decisions(segments, 1.0 / RATE)]
+
+
+def test_poses_written_as_bvh_are_read_again_where_they_were(tmp_path, poses):
+    write_poses(poses, bank(), tmp_path / "shown.bvh", RATE)
+    read = poses_of(load_bvh(tmp_path / "shown.bvh"))
+    np.testing.assert_allclose(read.positions, [pose.positions for pose in poses], atol=1e-6)
+    assert read.rate == pytest.approx(RATE, rel=1e-4)
+
+
+def test_poses_written_as_arrays_are_what_was_shown(tmp_path, poses):
+    write_poses(poses, bank(), tmp_path / "shown.npz", RATE)
+    with np.load(tmp_path / "shown.npz") as found:
+        wanted = pose_arrays(poses, bank(), RATE)
+        assert set(found) == set(wanted)
+        for name in wanted:
+            np.testing.assert_array_equal(found[name], wanted[name])
+        assert found["jumped"].tolist() == [i == 20 for i in range(40)]
+        assert found["forced"].tolist() == [i == 20 for i in range(40)]
+
+
+def test_no_poses_are_written_as_none(tmp_path):
+    write_poses([], bank(), tmp_path / "none.npz", RATE)
+    write_poses([], bank(), tmp_path / "none.bvh", RATE)
+    assert load_bvh(tmp_path / "none.bvh").n_frames == 0
+
+
+def test_another_ending_is_refused(tmp_path, poses):
+    with pytest.raises(FileError, match="ends in"):
+        write_poses(poses, bank(), tmp_path / "shown.fbx", RATE)
+    with pytest.raises(ContextError):
+        write_poses(["walk"], bank(), tmp_path / "shown.npz", RATE)

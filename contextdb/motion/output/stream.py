@@ -34,8 +34,8 @@ class Pose:
     ----------
     playing : Playing or None
         What it is a pose of.
-    is_jump : bool
-        Whether something else began to play.
+    is_jump, is_forced : bool
+        Whether something else began to play, and whether it had to: because what played could not play on.
     root : (x, z, heading)
         Where the body is: metres and radians.
     rotations : float64 array, shape (J, 4)
@@ -52,6 +52,7 @@ class Pose:
 
     playing: Playing | None
     is_jump: bool
+    is_forced: bool
     root: Place3
     rotations: Floats
     translations: Floats
@@ -152,7 +153,7 @@ class PoseStream:
             after.append(own)
         rate = _play_rate(decision, state, dt)
         self._state = PoseState(self.settings, playing or state.playing, clip, tuple(after), rate)
-        return self._placed(posture, playing, left is not None and decision.action is not Action.LOOP, rate)
+        return self._placed(posture, decision, rate)
 
     def _posture(self, playing: Playing) -> tuple[Posture, Sample]:
         """The clip's own pose and place."""
@@ -180,10 +181,10 @@ class PoseStream:
             return bank.sample_of(number, end_s), bank.sample_of(number, 0.0)
         return None, None
 
-    def _placed(self, posture: Posture, playing: Playing | None, is_jump: bool, rate: float) -> Pose:
+    def _placed(self, posture: Posture, decision: Decision, rate: float) -> Pose:
         from contextdb.motion.output import kernels
 
-        rig = self._rig
+        rig, playing, is_jump = self._rig, decision.playing, decision.action is Action.JUMP
         translations = rig.translations(posture.positions)
         positions, world = np.empty((rig.n_joints, 3)), np.empty((rig.n_joints, 4))
         kernels.place(rig.skeleton.parents, translations, posture.rotations, *posture.root, positions, world)
@@ -191,7 +192,8 @@ class PoseStream:
         if playing is not None:
             bank, number = self._find(playing)
             contacts = bank.contacts_at(number, playing.time_s)
-        return Pose(playing, is_jump, posture.root, posture.rotations, translations, positions, contacts, rate)
+        is_forced = is_jump and decision.continuing_cost is None
+        return Pose(playing, is_jump, is_forced, posture.root, posture.rotations, translations, positions, contacts, rate)
 
     def _find(self, playing: Playing) -> tuple[PoseBank, int]:
         """The bank of what plays, and its range there."""

@@ -28,7 +28,14 @@ def test_every_fault_is_told_with_what_is_accepted_and_the_nearest_mend():
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"root": "mixd"}, {"blend": None}, {"halflife_s": 0.0}, {"position_weight": 1.5}, {"rotation_clamp_deg": float("nan")}],
+    [
+        {"root": "mixd"},
+        {"blend": None},
+        {"halflife_s": 0.0},
+        {"position_weight": 1.5},
+        {"rotation_clamp_deg": float("nan")},
+        {"foot_lock": 1},
+    ],
 )
 def test_settings_made_in_python_are_checked_too(wrong):
     with pytest.raises(MotionError, match=next(iter(wrong))):
@@ -38,3 +45,9 @@ def test_settings_made_in_python_are_checked_too(wrong):
 def test_what_is_no_mapping_is_told():
     with pytest.raises(ContextError):
         PoseSettings.from_dict("mixed")
+
+
+def test_a_lock_that_is_neither_true_nor_false_is_told():
+    with pytest.raises(SchemaError, match=r'foot_lock = "yes": this is text. Accepted: true or false'):
+        PoseSettings.from_dict({"foot_lock": "yes"})
+    assert not PoseSettings.from_dict({"foot_lock": False}).foot_lock

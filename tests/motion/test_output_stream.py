@@ -19,9 +19,10 @@ from contextdb.motion.output.spring import Offsets, decayed, kept
 from contextdb.motion.output.stages import damping
 from contextdb.motion.selection.playhead import Playhead
 
-OFF = PoseSettings(root="animation", blend="none")
-SPRING = PoseSettings(root="animation", halflife_s=0.1)
-DEAD = PoseSettings(root="animation", blend="dead", fade_s=0.4, fade_halflife_s=0.1)
+OFF = PoseSettings(root="animation", blend="none", foot_lock=False)
+SPRING = PoseSettings(root="animation", halflife_s=0.1, foot_lock=False)
+DEAD = PoseSettings(root="animation", blend="dead", fade_s=0.4, fade_halflife_s=0.1, foot_lock=False)
+LOCKED = PoseSettings(root="animation")
 STEP = 1.0 / RATE
 
 between_frames = st.integers(0, 120).map(lambda n: n / 100 + 0.0021)
@@ -90,7 +91,7 @@ def test_bones_keep_their_lengths_whatever_is_blended():
     parents = bank().skeleton.parents
     fixed = np.setdiff1d(np.arange(bank().n_joints), bank().moving)
     wanted = np.linalg.norm(bank().skeleton.offsets[fixed], axis=-1)
-    for settings in (SPRING, DEAD):
+    for settings in (SPRING, DEAD, LOCKED):
         for pose in streamed(segments, settings):
             found = np.linalg.norm(pose.positions[fixed] - pose.positions[parents[fixed]], axis=-1)
             np.testing.assert_allclose(found, wanted, atol=1e-9)
@@ -225,7 +226,7 @@ def test_what_was_left_has_faded_after_its_time_and_nothing_remains():
 
 @given(segments=plays, data=st.data(), blend=st.sampled_from(["spring", "dead", "none"]))
 def test_a_stream_restored_at_any_tick_gives_the_same_poses_again(segments, data, blend):
-    settings = PoseSettings(root="mixed", blend=blend)
+    settings = PoseSettings(root="mixed", blend=blend, foot_lock=blend != "none")
     stream, ticks = PoseStream(bank(), settings), list(decisions(segments, STEP))
     states, shown = [], []
 

@@ -243,3 +243,74 @@ def place(parents, translations, rotations, x, z, heading, to_positions, to_worl
             to_positions[j, i] = start[i] + moved[i]
         for i in range(4):
             to_world[j, i] = turned[i]
+
+
+# ---- legs
+
+
+@compiled
+def _about(axis, angle):
+    """The rotation about a unit axis."""
+    sine = math.sin(0.5 * angle)
+    return (math.cos(0.5 * angle), sine * axis[0], sine * axis[1], sine * axis[2])
+
+
+@compiled
+def _length(v):
+    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+
+
+@compiled
+def _arc(u, v):
+    """The shortest rotation of one direction to another; none for directions without length, or opposite ones."""
+    size = _length(u) * _length(v)
+    w = size + u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    if size < 1e-12 or w < 1e-9 * size:
+        return (1.0, 0.0, 0.0, 0.0)
+    c = _cross(u, v)
+    n = math.sqrt(w * w + c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+    return (w / n, c[0] / n, c[1] / n, c[2] / n)
+
+
+@compiled
+def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations):
+    """Bend a leg, its joints `leg` (hip, knee, ankle), so that its ankle comes to a target; the foot keeps its rotation.
+
+    `positions` and `world` place the joints; the leg's `rotations` against their parents are written. A knee that would be
+    straighter than `straight` (radians), and than it is, goes only a quarter of what is over: it never slams. `ahead` is where a
+    stretched leg's knee bends to.
+    """
+    hip, knee, ankle = leg[0], leg[1], leg[2]
+    a = (positions[hip, 0], positions[hip, 1], positions[hip, 2])
+    b = (positions[knee, 0], positions[knee, 1], positions[knee, 2])
+    c = (positions[ankle, 0], positions[ankle, 1], positions[ankle, 2])
+    thigh, shin = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - b[0], c[1] - b[1], c[2] - b[2])
+    way = (target[0] - a[0], target[1] - a[1], target[2] - a[2])
+    upper, lower = _length(thigh), _length(shin)
+    if upper < 1e-9 or lower < 1e-9:
+        return
+    far = min(max(_length(way), abs(upper - lower) + 1e-9), upper + lower)
+    dot = -(thigh[0] * shin[0] + thigh[1] * shin[1] + thigh[2] * shin[2]) / (upper * lower)
+    now = math.acos(min(max(dot, -1.0), 1.0))
+    wanted = math.acos(min(max((upper * upper + lower * lower - far * far) / (2.0 * upper * lower), -1.0), 1.0))
+    limit = max(straight, now)
+    if wanted > limit:
+        wanted = limit + 0.25 * (wanted - limit)
+    axis = _cross(thigh, shin)
+    if _length(axis) < 1e-5 * upper * lower:
+        axis = _cross((ahead[0], ahead[1], ahead[2]), (a[0] - c[0], a[1] - c[1], a[2] - c[2]))
+    size = _length(axis)
+    if size < 1e-12:
+        return
+    bend = _about((axis[0] / size, axis[1] / size, axis[2] / size), now - wanted)
+    moved = _turned(bend, shin)
+    swing = _arc((thigh[0] + moved[0], thigh[1] + moved[1], thigh[2] + moved[2]), way)
+    old_hip, old_knee, foot = world[hip], world[knee], world[ankle]
+    new_hip = _product(swing, (old_hip[0], old_hip[1], old_hip[2], old_hip[3]))
+    new_knee = _product(swing, _product(bend, (old_knee[0], old_knee[1], old_knee[2], old_knee[3])))
+    above = world[parents[hip]]
+    first = _product((above[0], -above[1], -above[2], -above[3]), new_hip)
+    second = _product(_inverse(new_hip), new_knee)
+    third = _product(_inverse(new_knee), (foot[0], foot[1], foot[2], foot[3]))
+    for i in range(4):
+        rotations[hip, i], rotations[knee, i], rotations[ankle, i] = first[i], second[i], third[i]

@@ -12,6 +12,9 @@
     halflife_s = 0.1           # of the spring, for joints and root
     fade_s = 0.5               # dead: how long what was left fades
     fade_halflife_s = 0.25     # dead: how fast it slows down
+    foot_lock = true           # feet that are down in the clip stay where they came down
+    foot_halflife_s = 0.1      # how fast a foot that was let go comes to the clip
+    foot_radius_m = 0.2        # a foot is let go where the clip has it so far away
 
 Reading touches no file.
 Source of the defaults: orangeduck/Motion-Matching, `controller.cpp`, and its dead blending demo.
@@ -41,13 +44,17 @@ NUMBERS = {
     "halflife_s": ("seconds from 0.001 to 60, such as 0.1", LEAST_HALFLIFE_S, 60.0),
     "fade_s": ("seconds from 0.001 to 60, such as 0.5", LEAST_HALFLIFE_S, 60.0),
     "fade_halflife_s": ("seconds from 0.001 to 60, such as 0.25", LEAST_HALFLIFE_S, 60.0),
+    "foot_halflife_s": ("seconds from 0.001 to 60, such as 0.1", LEAST_HALFLIFE_S, 60.0),
+    "foot_radius_m": ("metres from 0 to 10, such as 0.2", 0.0, 10.0),
 }
-KEYS = tuple({**WORDS, **NUMBERS})
+LOCK, TRUTH = "foot_lock", "true or false"
+KEYS = (*WORDS, *NUMBERS, LOCK)
 
 
 @dataclass(frozen=True, slots=True)
 class PoseSettings:
-    """How a pose stream goes about it. The clip as it is, and nothing done to it: `PoseSettings(root="animation", blend="none")`.
+    """How a pose stream goes about it. The clip as it is, and nothing done to it: `PoseSettings(root="animation", blend="none",
+    foot_lock=False)`.
 
     Attributes
     ----------
@@ -65,6 +72,10 @@ class PoseSettings:
         Of the spring, for joints and root; dead blending takes it for the root.
     fade_s, fade_halflife_s : float
         Dead blending: how long what was left fades, and how fast it slows down.
+    foot_lock : bool
+        Whether a foot that is down in the clip stays where it came down.
+    foot_halflife_s, foot_radius_m : float
+        How fast a foot that was let go comes to the clip's place, and how far from that it is let go.
 
     Raises
     ------
@@ -83,6 +94,9 @@ class PoseSettings:
     halflife_s: float = 0.1
     fade_s: float = 0.5
     fade_halflife_s: float = 0.25
+    foot_lock: bool = True
+    foot_halflife_s: float = 0.1
+    foot_radius_m: float = 0.2
 
     def __post_init__(self) -> None:
         if faults := list(_faults({field.name: getattr(self, field.name) for field in fields(self)})):
@@ -104,6 +118,10 @@ class PoseSettings:
         section = Section(f"[output.{name}]", part, KEYS, faults, file)
         said: dict[str, Any] = {key: section.one_of(key, WORDS[key], "word") for key in WORDS if key in part}
         said |= {key: section.number(key, *NUMBERS[key]) for key in NUMBERS if key in part}
+        if LOCK in part:
+            said[LOCK] = part[LOCK]
+            if not isinstance(part[LOCK], bool):
+                section.wrong(LOCK, f"this is {what_is(part[LOCK])}", TRUTH)
         if faults:
             raise SchemaError(*faults)
         return cls(**said)
@@ -117,6 +135,8 @@ def _faults(said: Mapping[str, object]) -> Iterator[Fault]:
             near = nearest(value, words) if isinstance(value, str) else ""
             found = f"{key} is {in_quotes(value) if isinstance(value, str) else what_is(value)}."
             yield Fault(found, some(words), in_quotes(near) if near else "")
+    if not isinstance(said[LOCK], bool):
+        yield Fault(f"{LOCK} is {said[LOCK]!r}.", TRUTH)
     for key, (accepted, least, most) in NUMBERS.items():
         number = as_number(said[key])
         if number is None or not least <= number <= most:

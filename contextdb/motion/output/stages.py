@@ -1,6 +1,6 @@
 """The stages between what plays and the pose that is shown. Each is a small function of a posture and a state of its own.
 
-    clip ─► joints (spring or dead blending) ─► root (animation, code or both; its spring) ─► Posture
+    clip ─► joints (spring or dead blending) ─► root (animation, code or both; its spring) ─► feet (lock) ─► Posture
 
 A stage takes the posture so far, what happened in this tick and its state, and gives the posture and its next state. It changes
 nothing in place, so that old states stay good for a rollback. J joints, M of them with positions of their own.
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.output.bank import Place3, Sample
+from contextdb.motion.output.bank import Flags, Place3, Sample
 from contextdb.motion.selection.root_motion import RootMotion
 
 
@@ -41,6 +41,10 @@ class Tick:
         How much of its movement is to come from the clip.
     body : (x, z, heading) or None
         Where the game has the body.
+    clip : Posture
+        What plays, as the clip has it.
+    contacts : bool array, shape (n feet,)
+        Which feet are down in the clip.
     """
 
     dt_s: float
@@ -49,6 +53,8 @@ class Tick:
     root_motion: RootMotion
     root_weight: float
     body: Place3 | None
+    clip: Posture
+    contacts: Flags
 
 
 class Stage(Protocol):

@@ -8,7 +8,7 @@ decisions give the same poses.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stages import Posture, Tick
 from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.root_motion import NO_MOTION
 
 DEFAULT_SETTINGS = PoseSettings()
 A_BODY = "a Steered, or x and z in metres and a heading in radians"
@@ -97,9 +98,9 @@ class PoseStream:
         self._only = bank if isinstance(bank, PoseBank) else None
         self._banks = {} if isinstance(bank, PoseBank) else _checked(bank)
         self.settings = settings
-        self._stages = stages_of(settings)
         self._state = PoseState(settings)
         self._rig = self._only or next(iter(self._banks.values()))
+        self._stages = stages_of(settings, self._rig)
 
     @property
     def state(self) -> PoseState:
@@ -144,7 +145,8 @@ class PoseStream:
         else:
             clip, sample = self._posture(playing)
         left, entered = self._seam(decision, sample)
-        tick = Tick(dt, left, entered, decision.root_motion, decision.root_weight, place)
+        contacts = self._contacts(playing)
+        tick = Tick(dt, left, entered, decision.root_motion, decision.root_weight, place, clip, contacts)
         posture = clip
         begun = state.stages or tuple(stage.begin(clip, place) for stage in self._stages)
         after = []
@@ -153,7 +155,7 @@ class PoseStream:
             after.append(own)
         rate = _play_rate(decision, state, dt)
         self._state = PoseState(self.settings, playing or state.playing, clip, tuple(after), rate)
-        return self._placed(posture, decision, rate)
+        return self._placed(posture, decision, rate, contacts)
 
     def _posture(self, playing: Playing) -> tuple[Posture, Sample]:
         """The clip's own pose and place."""
@@ -181,19 +183,22 @@ class PoseStream:
             return bank.sample_of(number, end_s), bank.sample_of(number, 0.0)
         return None, None
 
-    def _placed(self, posture: Posture, decision: Decision, rate: float) -> Pose:
+    def _placed(self, posture: Posture, decision: Decision, rate: float, contacts: Flags) -> Pose:
         from contextdb.motion.output import kernels
 
         rig, playing, is_jump = self._rig, decision.playing, decision.action is Action.JUMP
         translations = rig.translations(posture.positions)
         positions, world = np.empty((rig.n_joints, 3)), np.empty((rig.n_joints, 4))
         kernels.place(rig.skeleton.parents, translations, posture.rotations, *posture.root, positions, world)
-        contacts = np.zeros(len(rig.feet), np.bool_)
-        if playing is not None:
-            bank, number = self._find(playing)
-            contacts = bank.contacts_at(number, playing.time_s)
         is_forced = is_jump and decision.continuing_cost is None
         return Pose(playing, is_jump, is_forced, posture.root, posture.rotations, translations, positions, contacts, rate)
+
+    def _contacts(self, playing: Playing | None) -> Flags:
+        """Which feet are down in the clip; none where nothing plays."""
+        if playing is None:
+            return np.zeros(len(self._rig.feet), np.bool_)
+        bank, number = self._find(playing)
+        return bank.contacts_at(number, playing.time_s)
 
     def _find(self, playing: Playing) -> tuple[PoseBank, int]:
         """The bank of what plays, and its range there."""
@@ -235,7 +240,7 @@ def _checked(banks: object) -> dict[Any, PoseBank]:
 
 def _first(tick: Tick) -> Tick:
     """The first tick of a character: it appears where it is, and has not moved."""
-    return Tick(0.0, None, None, type(tick.root_motion)(), tick.root_weight, tick.body)
+    return replace(tick, dt_s=0.0, left=None, entered=None, root_motion=NO_MOTION)
 
 
 def _play_rate(decision: Decision, state: PoseState, dt_s: float) -> float:

@@ -25,8 +25,11 @@ from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.output import kernels
 from contextdb.motion.output.bank import Place3, PoseBank
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import Posture, Tick, damping
+from contextdb.motion.output.stages import Posture, Tick, damping, decayed
 
+Triple = tuple[float, float, float]
+
+STILL: Triple = (0.0, 0.0, 0.0)
 STRAIGHT = math.radians(170.0)
 """A knee that is straighter is damped."""
 FAR_M = 1.0
@@ -48,10 +51,10 @@ class FootState:
 
     is_down: bool
     point: tuple[float, float] | None
-    offset: Floats
-    speed: Floats
-    free: Floats
-    shown: Floats
+    offset: Triple
+    speed: Triple
+    free: Triple
+    shown: Triple
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,39 +85,38 @@ class Feet:
             if leg is None:
                 after.append(None)
                 continue
-            toe = positions[leg.toe].copy()
+            toe: Triple = tuple(positions[leg.toe].tolist())
             now = self._moved(own, toe, float(heights[leg.toe]), bool(tick.contacts[i]), tick.dt_s)
-            shown = now.shown
-            if np.abs(shown - toe).max() > 0.0:
+            if now.shown != toe:
                 ankle = positions[leg.joints[2]]
-                ahead = toe - ankle if leg.toe != leg.joints[2] else world[leg.joints[1], 1:]
-                target = ankle + shown - toe
+                ahead = positions[leg.toe] - ankle if leg.toe != leg.joints[2] else world[leg.joints[1], 1:]
+                target = ankle + _apart(now.shown, toe)
                 parents = self.bank.skeleton.parents
                 kernels.bend_leg(parents, positions, world, leg.joints, target, ahead, STRAIGHT, rotations)
             after.append(now)
         return replace(posture, rotations=rotations), tuple(after)
 
-    def _moved(self, state: FootState | None, toe: Floats, height: float, is_down: bool, dt_s: float) -> FootState:
+    def _moved(self, state: FootState | None, toe: Triple, height: float, is_down: bool, dt_s: float) -> FootState:
         """The foot after this tick, whose toe is at a place without a lock and has a height in the clip."""
-        ground, still = (float(toe[0]), float(toe[2])), np.zeros(3)
-        if state is None or np.linalg.norm(toe - state.free) > FAR_M:
+        ground = (toe[0], toe[2])
+        if state is None or math.dist(toe, state.free) > FAR_M:
             if is_down:
-                return _locked(ground, toe - _over(ground, height), still, height, toe)
-            return _free(False, still, still, toe)
+                return _locked(ground, _apart(toe, _over(ground, height)), STILL, height, toe)
+            return _free(False, STILL, STILL, toe)
         y = damping(self.settings.foot_halflife_s)
         if state.point is not None and not is_down:
-            return _free(False, *_decayed(state.shown - state.free, still, y, dt_s), toe)
-        offset, speed = _decayed(state.offset, state.speed, y, dt_s)
+            return _free(False, *decayed(_apart(state.shown, state.free), STILL, y, dt_s), toe)
+        offset, speed = decayed(state.offset, state.speed, y, dt_s)
         if state.point is not None:
-            place = _over(state.point, height) + offset
+            place = _sum(_over(state.point, height), offset)
             if math.hypot(state.point[0] - ground[0], state.point[1] - ground[1]) <= self.settings.foot_radius_m:
                 return _locked(state.point, offset, speed, height, toe)
-            velocity = (toe - state.free) / dt_s if dt_s > 0.0 else still
-            return _free(True, place - toe, speed - velocity, toe)
+            velocity = _over_time(_apart(toe, state.free), dt_s)
+            return _free(True, _apart(place, toe), _apart(speed, velocity), toe)
         if is_down and not state.is_down:
-            shown = toe + offset
-            point = (float(shown[0]), float(shown[2]))
-            return _locked(point, shown - _over(point, height), still, height, toe)
+            shown = _sum(toe, offset)
+            point = (shown[0], shown[2])
+            return _locked(point, _apart(shown, _over(point, height)), STILL, height, toe)
         return _free(is_down, offset, speed, toe)
 
     def _placed(self, posture: Posture) -> tuple[Floats, Floats]:
@@ -136,22 +138,29 @@ def _leg(rig: Skeleton, foot: str) -> Leg | None:
     return Leg(np.array([above[1], above[0], ankle], np.int64), (toes or [ankle])[0])
 
 
-def _locked(point: tuple[float, float], offset: Floats, speed: Floats, height: float, toe: Floats) -> FootState:
+def _locked(point: tuple[float, float], offset: Triple, speed: Triple, height: float, toe: Triple) -> FootState:
     """A foot that is down and locked."""
-    return FootState(True, point, offset, speed, toe, _over(point, height) + offset)
+    return FootState(True, point, offset, speed, toe, _sum(_over(point, height), offset))
 
 
-def _free(is_down: bool, offset: Floats, speed: Floats, toe: Floats) -> FootState:
+def _free(is_down: bool, offset: Triple, speed: Triple, toe: Triple) -> FootState:
     """A foot that is not locked."""
-    return FootState(is_down, None, offset, speed, toe, toe + offset)
+    return FootState(is_down, None, offset, speed, toe, _sum(toe, offset))
 
 
-def _over(point: tuple[float, float], height: float) -> Floats:
+def _over(point: tuple[float, float], height: float) -> Triple:
     """A place over the ground at a height."""
-    return np.array([point[0], height, point[1]])
+    return point[0], height, point[1]
 
 
-def _decayed(offset: Floats, speed: Floats, y: float, dt_s: float) -> tuple[Floats, Floats]:
-    """An offset and its change a second some time later: x = e^{-yt} (x0 + (v0 + x0 y) t)."""
-    fade, pushed = math.exp(-y * dt_s), speed + offset * y
-    return fade * (offset + pushed * dt_s), fade * (speed - pushed * y * dt_s)
+def _sum(first: Triple, second: Triple) -> Triple:
+    return first[0] + second[0], first[1] + second[1], first[2] + second[2]
+
+
+def _apart(first: Triple, second: Triple) -> Triple:
+    return first[0] - second[0], first[1] - second[1], first[2] - second[2]
+
+
+def _over_time(way: Triple, dt_s: float) -> Triple:
+    """A velocity; none where no time passes."""
+    return (way[0] / dt_s, way[1] / dt_s, way[2] / dt_s) if dt_s > 0.0 else STILL

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 from contextdb.motion.output.bank import Place3
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import Posture, Tick, damping
+from contextdb.motion.output.stages import Posture, Tick, damping, decayed
 from contextdb.motion.selection.root_motion import RootMotion
 
 MOST_PULL = 0.5
@@ -54,7 +54,7 @@ class Root:
         base = self._moved(state, tick, position_share, rotation_share)
         offset, speed = state.offset, state.offset_speed
         if self.settings.blend != "none":
-            offset, speed = _decayed(offset, speed, damping(self.settings.halflife_s), tick.dt_s)
+            offset, speed = decayed(offset, speed, damping(self.settings.halflife_s), tick.dt_s)
             speed = _sum(speed, _step(tick, base[2], position_share, rotation_share))
         if self.settings.root == "mixed" and tick.body is not None:
             base = self._clamped(base, offset, tick.body)
@@ -114,15 +114,6 @@ def _after(base: Place3, motion: RootMotion, position_share: float, rotation_sha
     sin, cos = math.sin(base[2]), math.cos(base[2])
     left, ahead = position_share * motion.left_m, position_share * motion.ahead_m
     return base[0] + cos * left + sin * ahead, base[1] - sin * left + cos * ahead, base[2] + rotation_share * motion.turn_rad
-
-
-def _decayed(offset: Place3, speed: Place3, y: float, dt_s: float) -> tuple[Place3, Place3]:
-    """An offset and its change a second some time later: x = e^{-yt} (x0 + (v0 + x0 y) t)."""
-    fade = math.exp(-y * dt_s)
-    pushed = [v + x * y for x, v in zip(offset, speed, strict=True)]
-    a, b, c = (fade * (x + p * dt_s) for x, p in zip(offset, pushed, strict=True))
-    d, e, f = (fade * (v - p * y * dt_s) for v, p in zip(speed, pushed, strict=True))
-    return (a, b, c), (d, e, f)
 
 
 def _step(tick: Tick, heading: float, position_share: float, rotation_share: float) -> Place3:

@@ -70,3 +70,12 @@ class Stage(Protocol):
 def damping(halflife_s: float) -> float:
     """The damping of a spring of a half-life, critically damped: 2 ln 2 / h."""
     return 2.0 * math.log(2.0) / halflife_s
+
+
+def decayed(offset: Place3, speed: Place3, y: float, dt_s: float) -> tuple[Place3, Place3]:
+    """An offset of three numbers and its change a second some time later: x = e^{-yt} (x0 + (v0 + x0 y) t)."""
+    fade = math.exp(-y * dt_s)
+    pushed = [v + x * y for x, v in zip(offset, speed, strict=True)]
+    a, b, c = (fade * (x + p * dt_s) for x, p in zip(offset, pushed, strict=True))
+    d, e, f = (fade * (v - p * y * dt_s) for v, p in zip(speed, pushed, strict=True))
+    return (a, b, c), (d, e, f)

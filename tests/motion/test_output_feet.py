@@ -152,6 +152,14 @@ def test_the_foot_keeps_its_rotation(rotations, way):
     assert abs(one @ other) == pytest.approx(1.0, abs=1e-9)
 
 
+def test_a_stretched_leg_bends_its_knee_ahead():
+    still = turned(np.zeros((RIG.n_joints, 3)))
+    hip = placed(still)[0][LEG[0]]
+    _, after, _ = bent(still, hip - np.array([0.0, 0.6, 0.0]), straight=math.pi)
+    assert (after[LEG[1]] - hip)[2] > 0.2
+    np.testing.assert_allclose(after[LEG[2]], hip - np.array([0.0, 0.6, 0.0]), atol=1e-9)
+
+
 def test_a_place_out_of_reach_stretches_the_leg_toward_it_and_the_knee_never_slams():
     rotations = turned(np.zeros((RIG.n_joints, 3)))
     rotations[LEG[1]] = [math.cos(0.3), math.sin(0.3), 0.0, 0.0]

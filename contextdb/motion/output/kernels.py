@@ -290,19 +290,20 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
     if upper < 1e-9 or lower < 1e-9:
         return
     far = min(max(_length(way), abs(upper - lower) + 1e-9), upper + lower)
-    dot = -(thigh[0] * shin[0] + thigh[1] * shin[1] + thigh[2] * shin[2]) / (upper * lower)
-    now = math.acos(min(max(dot, -1.0), 1.0))
+    axis = _cross(thigh, shin)
+    now = math.pi - math.atan2(_length(axis), thigh[0] * shin[0] + thigh[1] * shin[1] + thigh[2] * shin[2])
     wanted = math.acos(min(max((upper * upper + lower * lower - far * far) / (2.0 * upper * lower), -1.0), 1.0))
     limit = max(straight, now)
     if wanted > limit:
         wanted = limit + 0.25 * (wanted - limit)
-    axis = _cross(thigh, shin)
-    if _length(axis) < 1e-5 * upper * lower:
-        axis = _cross((ahead[0], ahead[1], ahead[2]), (a[0] - c[0], a[1] - c[1], a[2] - c[2]))
+    straighten = (1.0, 0.0, 0.0, 0.0)
+    if _length(axis) < 1e-6 * upper * lower:  # stretched: bent to no side of its own
+        straighten, now = _arc(shin, thigh), math.pi
+        axis = _cross(thigh, _cross(_cross((a[0] - c[0], a[1] - c[1], a[2] - c[2]), (ahead[0], ahead[1], ahead[2])), thigh))
     size = _length(axis)
     if size < 1e-12:
         return
-    bend = _about((axis[0] / size, axis[1] / size, axis[2] / size), now - wanted)
+    bend = _product(_about((axis[0] / size, axis[1] / size, axis[2] / size), now - wanted), straighten)
     moved = _turned(bend, shin)
     swing = _arc((thigh[0] + moved[0], thigh[1] + moved[1], thigh[2] + moved[2]), way)
     old_hip, old_knee, foot = world[hip], world[knee], world[ankle]

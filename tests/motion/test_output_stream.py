@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from played import NAMES, RATE, SCHEMA, bank, clips, database, decisions, playing_at, range_of
 
 from contextdb.errors import ContextError, MotionError
-from contextdb.motion import Action, Decision, PoseBank, PoseSettings, PoseState, PoseStream, mirrored, poses_of
+from contextdb.motion import Action, Decision, PoseBank, PoseSettings, PoseState, PoseStream, RootMotion, mirrored, poses_of
 from contextdb.motion.clips import quaternions
 from contextdb.motion.output import kernels
 from contextdb.motion.output.spring import Offsets, decayed, kept
@@ -244,6 +245,26 @@ def test_a_stream_restored_at_any_tick_gives_the_same_poses_again(segments, data
             np.testing.assert_array_equal(again.rotations, was.rotations)
             np.testing.assert_array_equal(again.positions, was.positions)
             assert (again.root, again.play_rate, again.is_jump) == (was.root, was.play_rate, was.is_jump)
+
+
+def test_a_state_may_be_pickled_for_a_saved_game():
+    stream, other = PoseStream(bank(), LOCKED), PoseStream(bank(), LOCKED)
+    *before, last = decisions([("walk", 0.1, 9), ("run", 0.2, 4)], STEP)
+    for decision in before:
+        stream.update(decision, STEP if decision.tick else 0.0)
+    other.restore(pickle.loads(pickle.dumps(stream.state)))
+    np.testing.assert_array_equal(other.update(last, STEP).positions, stream.update(last, STEP).positions)
+
+
+@pytest.mark.parametrize("blend", ["spring", "dead"])
+def test_after_a_very_long_pause_nothing_is_left_of_a_jump(blend):
+    segments = [("run", 0.1, 5), ("idle", 0.5, 2)]
+    settings = PoseSettings(root="animation", blend=blend, foot_lock=False)
+    stream, (*before, last) = PoseStream(bank(), settings), decisions(segments, STEP)
+    for decision in before:
+        stream.update(decision, STEP if decision.tick else 0.0)
+    pose = stream.update(replace(last, root_motion=RootMotion()), 1e9)
+    np.testing.assert_allclose(pose.rotations, bank().sample("idle", last.playing.time_s).rotations, atol=1e-12)
 
 
 def test_the_play_rate_is_the_clips_time_over_the_games():

@@ -10,11 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from played import LOOPS, NAMES, RATE, SCHEMA, bank, clips, database
 
-from contextdb import motion
+from contextdb import console, motion
 from contextdb.errors import ContextError, MotionError
 from contextdb.motion import PoseBank, forward_kinematics, local_poses, make_clip, mirrored, poses_of, resampled
 from contextdb.motion.clips.poses import LocalPoses
 from contextdb.motion.clips.quaternions import about_axis, multiply, rotate
+from contextdb.motion.output import kernels
+from contextdb.motion.output.bank import loops
 
 
 def placed(bank, number, time_s):
@@ -170,3 +172,12 @@ def test_the_same_clips_give_the_same_bank():
     again = PoseBank.build([make_clip(name).clip for name in NAMES], SCHEMA, mirror=True, markup=LOOPS)
     for name in ("rotations", "positions", "root", "contacts", "starts", "moving"):
         np.testing.assert_array_equal(getattr(again, name), getattr(bank(), name))
+
+
+def test_it_is_said_when_loops_are_compiled_for_the_first_time(monkeypatch, caplog):
+    if not kernels.IS_COMPILED:
+        pytest.skip("numba is not installed")
+    monkeypatch.setattr(console, "was_compiled", lambda loop: False)
+    caplog.set_level("INFO", logger="contextdb.loops")
+    loops.__wrapped__()
+    assert caplog.messages == [console.PREPARING]

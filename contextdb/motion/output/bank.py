@@ -14,12 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_kind, require_many, require_real, require_text
+from contextdb.console import announce
 from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural, some
 from contextdb.motion.clips import mirror as mirrors
 from contextdb.motion.clips import quaternions
@@ -40,6 +42,16 @@ Place3 = tuple[float, float, float]
 SAME_M = 1e-6
 """A joint that is never farther from its offset keeps it."""
 FARTHEST_M = 1e6
+
+
+@cache
+def loops() -> ModuleType:
+    """The loops over joints, with a word where they are compiled for the first time on this machine."""
+    from contextdb.motion.output import kernels
+
+    if kernels.IS_COMPILED:
+        announce(kernels.sample)
+    return kernels
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -188,8 +200,7 @@ class PoseBank:
 
     def sample_of(self, range_number: int, time_s: float) -> Sample:
         """As `sample`, of a range's number, without a look at the arguments."""
-        from contextdb.motion.output import kernels
-
+        kernels = loops()
         low, high, share = self._between(range_number, time_s)
         rotations, positions = np.empty((self.n_joints, 4)), np.empty((len(self.moving), 3))
         spins, velocities = np.empty((self.n_joints, 3)), np.empty((len(self.moving), 3))

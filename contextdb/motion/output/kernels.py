@@ -315,3 +315,7 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
     third = _product(_inverse(new_knee), (foot[0], foot[1], foot[2], foot[3]))
     for i in range(4):
         rotations[hip, i], rotations[knee, i], rotations[ankle, i] = first[i], second[i], third[i]
+
+
+IS_COMPILED = hasattr(sample, "stats")
+"""Whether the loops are numba's."""

@@ -17,7 +17,7 @@ from contextdb.cells.arguments import require_kind, require_mapping, require_rea
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
-from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample
+from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample, loops
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stages import Posture, Tick
 from contextdb.motion.selection.decision import Action, Decision, Playing
@@ -184,12 +184,10 @@ class PoseStream:
         return None, None
 
     def _placed(self, posture: Posture, decision: Decision, rate: float, contacts: Flags) -> Pose:
-        from contextdb.motion.output import kernels
-
         rig, playing, is_jump = self._rig, decision.playing, decision.action is Action.JUMP
         translations = rig.translations(posture.positions)
         positions, world = np.empty((rig.n_joints, 3)), np.empty((rig.n_joints, 4))
-        kernels.place(rig.skeleton.parents, translations, posture.rotations, *posture.root, positions, world)
+        loops().place(rig.skeleton.parents, translations, posture.rotations, *posture.root, positions, world)
         is_forced = is_jump and decision.continuing_cost is None
         return Pose(playing, is_jump, is_forced, posture.root, posture.rotations, translations, positions, contacts, rate)
 

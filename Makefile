@@ -70,6 +70,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/reload.py
 	$(PY) benchmarks/c_header.py
 	$(PY) benchmarks/search.py
+	$(PY) benchmarks/poses.py
 	$(PY) benchmarks/editor.py
 	$(PY) benchmarks/start.py
 	$(PY) benchmarks/no_numba.py

@@ -196,6 +196,7 @@ class PoseBank:
         ContextError
             `time_s` is no finite number.
         """
+        require_text(asset, "asset")
         return self.sample_of(self.range_of(asset, mirrored), require_real(time_s, "time_s"))
 
     def sample_of(self, range_number: int, time_s: float) -> Sample:

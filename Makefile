@@ -72,6 +72,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/c_header.py
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/crowd.py
+	$(PY) benchmarks/poses.py
 	$(PY) benchmarks/editor.py
 	$(PY) benchmarks/start.py
 	$(PY) benchmarks/no_numba.py

@@ -30,6 +30,7 @@ from benchmarks import timing
 from benchmarks.coverage_peers import PUBLISHED, diagram_of, diagrams, published_figures
 from benchmarks.coverage_tables import SHAPES, SIZES, made_table
 from benchmarks.sections import print_aligned
+from contextdb.compiled.table import data_of
 from contextdb.covering import coverage
 from contextdb.covering.count import uncovered_share
 from contextdb.covering.engine import WORK, finding_steps, search_steps
@@ -90,7 +91,7 @@ def main() -> None:
 
 def measured(table: cdb.Table, work: int, peer: Any) -> dict[str, Any]:
     """Each part of one table's coverage, with its time."""
-    compiled = table.compile()
+    compiled = data_of(table.compile())
     space, space_s = _timed(lambda: Space.of(compiled))
     left, count_s = _timed(lambda: uncovered_share(space, space.boxes, work))
     sampler = Sampler(space)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import contextdb as cdb
+from contextdb.compiled.table import data_of
 from contextdb.covering.count import uncovered_share
 from contextdb.covering.gaps import find_gaps
 from contextdb.covering.space import Box, Space
@@ -91,7 +92,7 @@ def _size(box: list[tuple[int, int]]) -> float:
 def published_figures(n_columns: int, n_rows: int) -> dict[str, Any]:
     """Every overlap and gap of a table of a published size, and how long they take."""
     table = published_table(n_columns, n_rows)
-    compiled = table.compile()
+    compiled = data_of(table.compile())
     start = time.perf_counter()
     space = Space.of(compiled)
     rows = BoxSet.of(space.full, space.boxes)

@@ -14,12 +14,13 @@ import polars as pl
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.sets import NumberSet, ValueSet
+from contextdb.compiled.table import data_of
 from contextdb.tables.table import Table
 
 
 def table_frame(table: Table) -> tuple[pl.DataFrame, str]:
     """The table with a list of values, or two ends, for each condition, null for Any; and the condition to join on."""
-    compiled = table.compile()
+    compiled = data_of(table.compile())
     columns: list[pl.Series] = [pl.Series("row", range(table.n_rows))]
     n_named: dict[str, int] = {}
     for at, condition in enumerate(compiled.conditions):

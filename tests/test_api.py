@@ -9,9 +9,10 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, MutableMapping
 from pathlib import Path
 from types import ModuleType
+from typing import get_type_hints
 
 import pytest
 
@@ -46,6 +47,8 @@ def value_of(name: str) -> object:
     first, *rest = name.split(".")
     value: object = MODULES.get(first) or getattr(cdb, first)
     for part in rest:
+        if isinstance(value, property):
+            value = get_type_hints(value.fget)["return"]
         if isinstance(value, type) and not hasattr(value, part):
             is_field = dataclasses.is_dataclass(value) and part in {f.name for f in dataclasses.fields(value)}
             assert is_field or re.search(rf"\bself\.{part}\b", inspect.getsource(value)), f"there is no {name}"
@@ -127,6 +130,25 @@ def test_a_public_name_has_a_docstring_and_a_call_says_what_it_raises(name: str)
     assert said, f"{name} has no docstring"
     if name in CALLS and signature_of(value) != "()":
         assert re.search(r"\b[Rr]aise|Never fails", said), f"{name} does not say what it raises"
+
+
+@pytest.mark.parametrize("kind", [cdb.CompiledTable, cdb.LiveContext, cdb.Picker, cdb.Pick])
+def test_a_class_shows_the_names_of_the_page_and_no_others(kind: type):
+    """What an editor offers after the dot; the names of a mapping are those of every mapping."""
+    fields = {field.name for field in dataclasses.fields(kind)} if dataclasses.is_dataclass(kind) else set()
+    shown = {name for name in {*dir(kind), *fields} if not name.startswith("_")}
+    on_page = {name.split(".")[1] for name in NAMES if name.startswith(f"{kind.__name__}.")}
+    inherited = set(dir(MutableMapping)) if issubclass(kind, MutableMapping) else set()
+    assert sorted(shown - inherited) == sorted(on_page - inherited)
+
+
+def test_a_compiled_table_holds_nothing_else_that_is_public_and_takes_nothing():
+    compiled = cdb.Table.from_columns({"Asset": ["a"], "speed": ["1"]}, {"speed": {"type": "number"}}).compile()
+    compiled.query({"speed": 1.0})
+    assert {name for name in dir(compiled) if not name.startswith("_")} <= set(dir(cdb.CompiledTable))
+    for name in ("name", "masks"):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(compiled, name, "another")
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)

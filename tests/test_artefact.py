@@ -24,7 +24,7 @@ from safetensors.numpy import save as as_safetensors
 from contextdb.cells.facts import cell
 from contextdb.cells.kinds import KINDS
 from contextdb.compiled.classes import FLAT_BYTES, NumberMasks, TagMasks, ValueMasks, WideMasks
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ArtefactError, FileError
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
@@ -131,13 +131,13 @@ def test_an_opened_table_answers_many_contexts_as_the_saved_one(
 def test_every_kind_of_column_and_all_settings_come_back(tmp_path: Path, flat_bytes: int):
     before = full_table(flat_bytes)
     after = CompiledTable.open(saved(before, tmp_path))
-    kinds = {type(m) for m in after.masks}
+    kinds = {type(m) for m in data_of(after).masks}
     assert kinds == {ValueMasks, TagMasks, NumberMasks if flat_bytes else WideMasks}
     assert (after.name, after.policy, after.fallback) == ("names ünd 表", "priority", "idle ☂")
     assert list(after.assets) == ROWS["Asset"]
     assert after.conditions == before.conditions
     assert [after.priorities.tolist(), after.row_weights.tolist()] == [[1, -2, 0], [0.5, 1.0, 3.0]]
-    assert [column.to_list() for column in after.texts] == [ROWS[name] for name in SCHEMA]
+    assert [column.to_list() for column in data_of(after).texts] == [ROWS[name] for name in SCHEMA]
     assert after.query(CONTEXT).assets == before.query(CONTEXT).assets == ["run", "jump ✈"]
     assert after.penalties(CONTEXT).tolist() == [0.0, 1.0, 0.0]
     assert after.pick(CONTEXT, rng=1) == "run"
@@ -196,8 +196,8 @@ def test_any_reader_of_safetensors_can_read_the_file(tmp_path: Path):
 @COLUMNS
 def test_masks_are_views_of_the_mapped_file_and_cannot_be_written(tmp_path: Path, flat_bytes: int):
     opened = CompiledTable.open(saved(full_table(flat_bytes), tmp_path))
-    arrays = [opened.enabled, opened.priorities, opened.row_weights, *(column.codes for column in opened.texts)]
-    for masks in opened.masks:
+    arrays = [data_of(opened).enabled, opened.priorities, opened.row_weights, *(column.codes for column in data_of(opened).texts)]
+    for masks in data_of(opened).masks:
         arrays += [masks.low, masks.high, masks.any_mask, masks.bounds] if isinstance(masks, WideMasks) else [masks.masks]
     for array in arrays:
         assert not array.flags.writeable

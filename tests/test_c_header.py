@@ -47,7 +47,7 @@ from contextdb.compiled.c_header import c_header_of
 from contextdb.compiled.c_header.face import reader_names
 from contextdb.compiled.c_header.naming import Names
 from contextdb.compiled.c_header.spelling import Wanted, distinct
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextDBError
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.project import Project
@@ -229,7 +229,7 @@ def set_fact(compiled: CompiledTable, condition: Condition, field: str, fact: ob
 
 def named(compiled: CompiledTable) -> tuple[dict[str, str], str, tuple[str, ...]]:
     """What conditions with values and their values are called in the header of this one table, its own name, and its fields."""
-    names = Names.of({compiled.name: compiled}, "guard", reader_names())
+    names = Names.of({compiled.name: data_of(compiled)}, "guard", reader_names())
     found: dict[str, str] = {}
     for condition, choices in names.choices.items():
         found[condition.name] = choices.type

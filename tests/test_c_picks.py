@@ -24,7 +24,7 @@ from asking_c import (
 from test_c_rules import moments_of, output_cells, ruled_table
 
 from contextdb.compiled.c_header.naming import conditions_of
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, PolicyError
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
@@ -51,7 +51,7 @@ def soft_table(rng: random.Random, n_rows: int) -> CompiledTable:
 
 def costs_in_python(compiled: CompiledTable, unknown: str, facts: Facts) -> tuple[int, list[float]]:
     try:
-        return OK, compiled.penalties(facts, unknown).tolist()  # type: ignore[arg-type]
+        return OK, compiled.penalties(facts, unknown=unknown).tolist()  # type: ignore[arg-type]
     except ContextError:
         return -1, [0.0] * compiled.n_rows
 
@@ -86,7 +86,7 @@ def test_costs_of_soft_cells_and_failing_cells_are_those_of_python(ask: Path, tm
     for turn in range(12 * TIMES):
         compiled = ruled_table(rng, 20) if turn % 4 == 0 else soft_table(rng, rng.choice([1, 20, 70]))
         moments = moments_of(rng, 12)
-        [answers] = all_asked(ask, tmp_path, conditions_of(compiled), [artefact(compiled, tmp_path)], moments, memory=1)
+        [answers] = all_asked(ask, tmp_path, conditions_of(data_of(compiled)), [artefact(compiled, tmp_path)], moments, memory=1)
         assert_told(compiled, answers, moments)
 
 
@@ -134,7 +134,7 @@ def picks_in_python(compiled: CompiledTable, moments: list[tuple[str, Facts]], m
 
 def assert_picks(ask: Path, folder: Path, compiled: CompiledTable, moments: list[tuple[str, Facts]], memory: int) -> int:
     """How many picks gave a row."""
-    about = conditions_of(compiled), [artefact(compiled, folder)], moments, 0, memory, compiled.outputs.declared
+    about = conditions_of(data_of(compiled)), [artefact(compiled, folder)], moments, 0, memory, compiled.outputs.declared
     [answers] = all_asked(ask, folder, *about)
     found = [(told.pick[0] > 0, told.pick[1], told.outputs) for told in answers.told]
     assert found == picks_in_python(compiled, moments, memory)

@@ -33,7 +33,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import BOOL
 from contextdb.cells.outputs import Output
 from contextdb.compiled.c_header.naming import conditions_of
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.expressions import read_expression
 from contextdb.schema.settings import TableSettings, conditions_from_dict
 from contextdb.tables.table import Table
@@ -102,12 +102,13 @@ def test_rules_and_derived_facts_are_computed_as_python_computes_them(ask: Path,
     for _ in range(40 * TIMES):
         compiled = ruled_table(rng, rng.choice([1, 5, 70]))
         moments = moments_of(rng, N_MOMENTS)
-        [(status, answers)] = asked(ask, tmp_path, conditions_of(compiled), [artefact(compiled, tmp_path)], moments)
+        [(status, answers)] = asked(ask, tmp_path, conditions_of(data_of(compiled)), [artefact(compiled, tmp_path)], moments)
         assert status == OK
         for moment, answer in zip(moments, answers, strict=True):
             expected = python_says(compiled, *moment)
             is_same = answer == expected or (answer[0] > 0 and expected[0] > 0)  # of two faults each names its first
-            assert is_same, (moment, answer, expected, compiled.when and [r.expression.text for r in compiled.when.rules])
+            rules = data_of(compiled).when
+            assert is_same, (moment, answer, expected, rules and [r.expression.text for r in rules.rules])
         n_valid += sum(rows > 0 for _, rows in answers)
         n_faults += sum(fault > 0 for fault, _ in answers)
     assert n_valid > 200
@@ -139,7 +140,7 @@ def test_every_function_gives_the_same_bits_as_in_python(ask: Path, tmp_path: Pa
         moments: list[tuple[str, Facts]] = [
             ("never", {"a": a, "b": b, "found": 0.0 if v is None else v}) for (a, b), v in zip(pairs, values, strict=True)
         ]
-        [(_, answers)] = asked(ask, tmp_path, conditions_of(compiled), [artefact(compiled, tmp_path)], moments)
+        [(_, answers)] = asked(ask, tmp_path, conditions_of(data_of(compiled)), [artefact(compiled, tmp_path)], moments)
         assert [rows for _, rows in answers] == [0 if v is None else 3 for v in values], form
 
 
@@ -149,7 +150,7 @@ def test_a_missing_fact_of_a_rule_and_a_rule_without_a_finite_value_are_named(as
         *((unknown, {"a": 1.0, "b": 0.0, "ok": True}) for unknown in ("error", "any", "never")),
         *((unknown, {"b": 1.0, "ok": True}) for unknown in ("error", "any", "never")),
     ]
-    [(_, answers)] = asked(ask, tmp_path, conditions_of(compiled), [artefact(compiled, tmp_path)], moments)
+    [(_, answers)] = asked(ask, tmp_path, conditions_of(data_of(compiled)), [artefact(compiled, tmp_path)], moments)
     assert answers == [(5, 0), (0, 0b11), (0, 0b10), (5, 0), (0, 0b11), (0, 0b10)]
     assert answers == [python_says(compiled, *moment) for moment in moments]
 
@@ -163,7 +164,7 @@ def test_a_condition_that_the_game_does_not_know_is_refused_or_any(ask: Path, tm
     }
     rules = ["a > 1", "new", "twice > 2", "odd"]
     compiled = plain_table(rules, schema, b=["1", "Any", "Any", "2"], new=["True"] * 4, odd=["False"] * 4)
-    known = tuple(c for c in conditions_of(compiled) if c.name != "new")
+    known = tuple(c for c in conditions_of(data_of(compiled)) if c.name != "new")
     moments: list[tuple[str, Facts]] = [("error", {"a": 1.0, "b": 1.0}), ("error", {"a": 2.0, "b": 2.0})]
     whole = artefact(compiled, tmp_path)
     assert asked(ask, tmp_path, known, [whole], moments) == [(OTHER_TABLE, [])]
@@ -175,7 +176,7 @@ def test_a_file_of_an_older_version_without_programs_is_refused(ask: Path, tmp_p
     with mock.patch("contextdb.compiled.artefact.programs_to_tensors", return_value={}):
         older = artefact(compiled, tmp_path)
     assert CompiledTable.open(tmp_path / "table.safetensors").query({"a": 2}).assets == ["row 0"]
-    assert asked(ask, tmp_path, conditions_of(compiled), [older], []) == [(OTHER_TABLE, [])]
+    assert asked(ask, tmp_path, conditions_of(data_of(compiled)), [older], []) == [(OTHER_TABLE, [])]
 
 
 @pytest.mark.parametrize("seed", range({1: 4, 8: 8}.get(TIMES, 70)))
@@ -184,6 +185,6 @@ def test_damaged_programs_are_refused_or_computed_and_never_crash_it(ask: Path, 
     compiled = ruled_table(rng, 40, {"policy": rng.choice(["specific", "cheapest", "collect", "first"])})
     whole = artefact(compiled, tmp_path)
     damaged = [damaged_program(rng, whole) if i % 3 else mutated(rng, whole) for i in range(1_500)]
-    about = conditions_of(compiled), [whole, *damaged], moments_of(rng, 4), seed % 2, 1, compiled.outputs.declared
+    about = conditions_of(data_of(compiled)), [whole, *damaged], moments_of(rng, 4), seed % 2, 1, compiled.outputs.declared
     found = all_asked(ask, tmp_path, *about)
     assert {answers.status for answers in found} >= {OK, BAD_FILE}

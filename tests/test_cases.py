@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.checks.cases import Case, check_cases, delete_case, exactly, judge, keep_case, read_cases, rename_case
+from contextdb.compiled.table import data_of
 from contextdb.errors import TableError
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
@@ -55,7 +56,7 @@ def test_an_asset_that_the_table_does_not_have_is_told_with_the_nearest():
 @pytest.mark.parametrize("expected", ["Any", "any", " "])
 def test_nothing_need_be_expected(expected):
     [case] = [Case("one", {"speed": "50"}, expected)]
-    assert judge(table_of().compile(), case).holds is None
+    assert judge(data_of(table_of().compile()), case).holds is None
 
 
 @pytest.mark.parametrize(
@@ -100,8 +101,8 @@ def test_findings_stand_in_the_order_of_the_file():
 def test_rows_that_cannot_be_read_are_left_out_of_a_judgement():
     compiled = table_of().compile()
     case = Case("one", {"speed": "1", "hit": "True"}, "walk")
-    assert judge(compiled, case).holds is True
-    assert judge(compiled, case, readable=0b1110).missing == ("walk",)
+    assert judge(data_of(compiled), case).holds is True
+    assert judge(data_of(compiled), case, readable=0b1110).missing == ("walk",)
 
 
 @given(st.floats(-5, 20).map(str), st.sampled_from(["True", "False", ""]))

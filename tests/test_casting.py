@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError
 from contextdb.schema.settings import TableSettings
 
@@ -206,7 +207,7 @@ def test_a_preference_that_cannot_be_meant_is_refused(prefer, told):
 
 def test_a_compiled_file_that_does_not_know_its_slots_is_not_asked_with_actors():
     with pytest.raises(ContextError, match="which slots are mandatory"):
-        replace(table_of([{}]), slots=None).query({"is_wet": True}, actors={})
+        CompiledTable(replace(data_of(table_of([{}])), slots=None)).query({"is_wet": True}, actors={})
 
 
 def test_a_table_without_rows_casts_nobody():

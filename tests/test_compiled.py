@@ -23,7 +23,7 @@ from contextdb import bitmask
 from contextdb.cells.facts import cell
 from contextdb.compiled import batch, kernels
 from contextdb.compiled.classes import FLAT_BYTES, NumberMasks, WideMasks
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, TableError
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
@@ -194,7 +194,7 @@ def test_an_angle_is_the_same_after_any_number_of_turns(low, high, n_turns, data
     table = compiled({"heading": ({"type": "angle"}, [f"{low!r}..{high!r}", f"({low!r}..{high!r})"])})
     edge = data.draw(st.sampled_from([low, high, 180.0, 0.0]))
     angle = math.nextafter(edge + 360.0 * n_turns, data.draw(st.sampled_from([-math.inf, edge + 360.0 * n_turns, math.inf])))
-    expected = [i for i, part in enumerate(table.texts[0].to_list()) if oracles.is_on_arc(part, angle)]
+    expected = [i for i, part in enumerate(data_of(table).texts[0].to_list()) if oracles.is_on_arc(part, angle)]
     assert found(table, {"heading": angle}) == expected
     assert found(table, {"heading": cell(repr(angle))}) == expected
 
@@ -218,7 +218,7 @@ def test_ten_thousand_bounds_at_ten_thousand_rows_take_at_most_10_mb_and_answer_
     lows = lows / 200 - 90.0 if kind == "angle" else lows
     highs = lows + (random.integers(0, 40, 10_000) / 7 if kind != "int" else random.integers(0, 40, 10_000))
     table = compiled({"x": ({"type": kind}, [f"{a!r}..{b!r}" for a, b in zip(lows.tolist(), highs.tolist(), strict=True)])})
-    assert isinstance(table.masks[0], WideMasks)
+    assert isinstance(data_of(table).masks[0], WideMasks)
     assert table.nbytes <= 10 << 20
     for fact in [lows.min(), lows.max(), highs.max(), *random.choice(lows, 20), *random.choice(highs, 20)]:
         expected = np.flatnonzero((lows <= float(fact)) & (float(fact) <= highs)).tolist()
@@ -253,15 +253,15 @@ def test_one_edit_compiles_one_column():
         {"speed": {"type": "number"}, "still": {"type": "bool"}, "tags": {"type": "tags"}},
     )
     before, after = table.compile(), table.with_cell(1, "speed", "3..4").compile()
-    assert [new is old for new, old in zip(after.masks, before.masks, strict=True)] == [False, True, True]
-    assert [new is old for new, old in zip(after.soft, before.soft, strict=True)] == [True, True, True]
+    assert [new is old for new, old in zip(data_of(after).masks, data_of(before).masks, strict=True)] == [False, True, True]
+    assert [new is old for new, old in zip(data_of(after).soft, data_of(before).soft, strict=True)] == [True, True, True]
     assert found(before, {"speed": 5, "still": False, "tags": []}) == [1]
     assert found(after, {"speed": 5, "still": False, "tags": []}) == []
 
 
 def test_compiling_the_same_table_again_compiles_nothing():
     table = strategies_table()
-    assert all(new is old for new, old in zip(table.compile().masks, table.compile().masks, strict=True))
+    assert all(new is old for new, old in zip(data_of(table.compile()).masks, data_of(table.compile()).masks, strict=True))
 
 
 def strategies_table() -> Table:
@@ -281,14 +281,14 @@ def test_a_table_with_a_cell_that_cannot_be_read_does_not_compile():
 def test_no_mask_has_a_bit_past_the_last_row(flat_bytes, table):
     with keeping(flat_bytes):
         ready = table.compile()
-    for masks in ready.masks:
+    for masks in data_of(ready).masks:
         parts = [masks.low, masks.high, masks.any_mask] if isinstance(masks, WideMasks) else [masks.masks]
         for part in parts:
             assert all(bitmask.to_int(part[place]) < 1 << table.n_rows for place in np.ndindex(part.shape[:-1]))
 
 
 def test_a_short_number_column_is_kept_flat():
-    assert isinstance(speed_table("0..5").masks[0], NumberMasks)
+    assert isinstance(data_of(speed_table("0..5")).masks[0], NumberMasks)
 
 
 # ---- several threads

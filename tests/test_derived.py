@@ -23,7 +23,7 @@ from contextdb.cells.facts import Fact
 from contextdb.cells.sets import ANY
 from contextdb.checks.cases import Case, judge
 from contextdb.cli import main
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, SchemaError
 from contextdb.expressions import derive
 from contextdb.schema.settings import Schema, read_schema
@@ -311,8 +311,8 @@ def test_the_command_evaluate_computes_derived_facts_of_every_context(tmp_path: 
 def test_a_saved_context_holds_the_facts_that_others_are_computed_from():
     case = Case("fast", {"speed": "6", "target_speed": "2", "is_hurt": "False"}, "b")
     table = compiled({"Asset Name": ["a", "b"], "closing_speed": ["0..2", "(2.."], "gait": ["Any", "Run"]})
-    assert judge(table, case).holds
-    wrong = judge(table, replace(case, facts={**case.facts, "gait": "Run"}))
+    assert judge(data_of(table), case).holds
+    wrong = judge(data_of(table), replace(case, facts={**case.facts, "gait": "Run"}))
     assert "never given" in str(wrong.faults[0])
 
 

@@ -22,6 +22,7 @@ from running import ROOT, Result, run
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import describe
 from contextdb.commands.evaluate_command import share
+from contextdb.compiled.table import data_of
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
 from contextdb.telemetry import evaluate_file
@@ -246,13 +247,13 @@ def test_each_context_of_a_file_is_answered_as_when_it_is_asked_alone(
 ):
     compiled = table.compile()
     drawn = [data.draw(strategies.contexts(table, has_missing=True))[0] for _ in range(data.draw(st.integers(0, 4)))]
-    facts = [compiled.read_context(context, unknown) for context in drawn]
+    facts = [data_of(compiled).read_context(context, unknown) for context in drawn]
     path = here / ("c.parquet" if is_parquet else "c.csv")
     if is_parquet:
-        columns = {n: [sorted(f[n]) if isinstance(f[n], frozenset) else f[n] for f in facts] for n in compiled.places}
+        columns = {n: [sorted(f[n]) if isinstance(f[n], frozenset) else f[n] for f in facts] for n in data_of(compiled).places}
         pl.DataFrame(columns).with_columns(frame=pl.lit(1)).write_parquet(path)
     else:
-        texts = {n: [_as_text(f[n], compiled.asked[n].domain) for f in facts] for n in compiled.places}
+        texts = {n: [_as_text(f[n], compiled.asked[n].domain) for f in facts] for n in data_of(compiled).places}
         pl.DataFrame(texts, schema=dict.fromkeys(texts, pl.String)).with_columns(frame=pl.lit("1")).write_csv(path)
         facts = [{n: None if f == frozenset() else f for n, f in fact.items()} for fact in facts]
     many = read_contexts(path, compiled).ask(compiled, unknown)

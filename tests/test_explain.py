@@ -18,7 +18,7 @@ from contextdb.cells.facts import cell
 from contextdb.cells.grammar import parse_cell
 from contextdb.compiled.classes import ColumnMasks
 from contextdb.compiled.explain import Explanation
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
@@ -65,7 +65,7 @@ def distance(compiled: CompiledTable, table: Table, context: dict[str, object], 
         fact = context.get(name)
         if name in failing(table, context, row, unknown):
             is_number = isinstance(fact, float) and math.isfinite(fact)
-            far += min(gap(texts[row], domain, fact) / width(domain, compiled.masks[at]), 1.0) if is_number else 1.0
+            far += min(gap(texts[row], domain, fact) / width(domain, data_of(compiled).masks[at]), 1.0) if is_number else 1.0
     return far
 
 

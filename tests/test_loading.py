@@ -47,9 +47,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-def test_every_command_is_here():
+def test_every_command_is_here_that_works_without_a_running_game():
     assert LOADS.keys() == COMMANDS.keys()
-    assert {name.split()[0].strip(",") for name in LOADS} - {"--version"} == cli.COMMANDS.keys()
+    assert {name.split()[0].strip(",") for name in LOADS} - {"--version"} == cli.COMMANDS.keys() - {"live"}
 
 
 @pytest.mark.parametrize("name", LOADS)

@@ -20,6 +20,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, NUMBER
 from contextdb.cells.facts import read_fact
 from contextdb.cells.mirroring import mirrored_fact, way_of
+from contextdb.compiled.table import data_of
 from contextdb.errors import ContextError
 from contextdb.schema.settings import EMPTY
 from contextdb.tables.table import Table
@@ -203,7 +204,7 @@ def test_derived_facts_are_computed_from_mirrored_ones_and_not_mirrored_themselv
     }
     columns = {"Asset": ["a", "b", "c"], "turn": ["40", "-20", "Any"], "is_left": ["Any", "Any", "False"]}
     compiled = Table.from_columns(columns, schema).compile()
-    assert list(compiled.mirroring) == ["direction"]
+    assert list(data_of(compiled).mirroring) == ["direction"]
     facts = {"direction": 30.0}
     answers = [compiled.query(facts), compiled.live(facts).matches(), compiled.query_many({"direction": [30.0]})[0]]
     assert [(m.assets, m.mirrored.assets) for m in answers] == [(["a"], ["b", "c"])] * 3
@@ -300,7 +301,7 @@ def test_a_compiled_file_asks_in_a_mirror_too(tmp_path):
     compiled = Table.from_columns({**TURN, "side": ["L", "R", "Any"]}, schema).compile()
     compiled.save(tmp_path / "t.safetensors")
     opened = cdb.CompiledTable.open(tmp_path / "t.safetensors")
-    assert opened.mirroring == compiled.mirroring
+    assert data_of(opened).mirroring == data_of(compiled).mirroring
     assert opened.query({"direction": 90.0, "side": "L"}).mirrored.assets == ["right"]
 
 

@@ -15,8 +15,10 @@ from running import Result, run
 
 from contextdb.cli import main
 from contextdb.commands.motion_build_command import MotionProject
-from contextdb.motion import make_clip, write_bvh
+from contextdb.files.tensors import read_tensors
+from contextdb.motion import inputs_of, make_clip, open_poses, write_bvh
 from contextdb.motion.storage import building
+from contextdb.motion.storage.pose_files import STORED_POSES
 from contextdb.motion.storage.stored import open_database
 
 TOML = """
@@ -363,3 +365,19 @@ def test_a_doubtful_clip_is_told_as_a_warning_and_built(here: Path):
     assert "Try metres_per_unit = 0.01 (centimetres)." in result.err
     [doubt] = result.json["databases"][1]["doubts"]
     assert (doubt["rule"], doubt["asset"], doubt["frame"]) == ("odd-size", "jog_tired", None)
+
+
+# ---- poses
+
+
+def test_with_poses_a_bank_is_saved_beside_each_database_and_opened_where_it_is_up_to_date(here: Path):
+    build("game", "--poses", "--database", "tired")
+    bank = open_poses("game/tired.poses.safetensors", verify=True)
+    database = open_database(TIRED)
+    assert (bank.assets, bank.n_frames) == (database.assets, database.n_frames)
+    assert inputs_of(TIRED) == read_tensors(Path("game/tired.poses.safetensors"), STORED_POSES)[1]["inputs"]
+    assert not Path("game/jog.poses.safetensors").exists()
+
+
+def test_poses_of_all_clips_cannot_be_had_where_faulty_ones_are_left_out():
+    assert "one of the two" in refused("game", "--poses", "--keep-going")

@@ -5,11 +5,22 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from running import Result, run
 
 from contextdb.commands.motion_stage import read_tags
-from contextdb.motion import MotionConfig, TagFilter, load_bvh, make_clip, open_or_build, query_from, steady_path, write_bvh
+from contextdb.motion import (
+    MotionConfig,
+    TagFilter,
+    load_bvh,
+    make_clip,
+    open_or_build,
+    poses_of,
+    query_from,
+    steady_path,
+    write_bvh,
+)
 from contextdb.motion.trace.session import Trace
 from contextdb.tables.project import Project
 
@@ -468,10 +479,46 @@ def test_a_stick_that_cannot_be_followed_is_refused_with_its_place(here: Path, t
         ),
         (["game", "player", "stick.csv", "--out", "new.parquet", "--k", "-1"], '"-1" is not a number of candidates.'),
         (["game", "player", "stick.csv", "--out", "new.parquet", "--seed", "x"], '"x" is not a seed.'),
+        (
+            ["game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.fbx"],
+            "new.fbx: poses cannot be written to such a file. Accepted: a name that ends in .bvh or .npz",
+        ),
+        (["game", "player", "stick.csv", "--out", "new.parquet", "--poses", "none/new.npz"], 'there is no folder "none".'),
     ],
 )
 def test_a_wrong_argument_of_a_run_is_told(arguments: list[str], message: str):
     assert message in refused("run", *arguments)
+
+
+def test_a_run_writes_the_poses_of_its_decisions_as_arrays_and_as_bvh(here: Path):
+    motion("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.npz")
+    motion("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.bvh")
+    decisions = list(Trace.load("new.parquet"))
+    with np.load(here / "new.npz") as poses:
+        assert poses["asset"].tolist() == [decision.playing.asset for decision in decisions]
+        assert poses["jumped"].tolist() == [decision.action == "jumps" for decision in decisions]
+        assert not (poses["forced"] & ~poses["jumped"]).any()
+        assert poses["positions"].shape == (len(decisions), len(poses["bones"]), 3)
+        assert poses["rate"] == 30.0
+        shown = poses_of(load_bvh(here / "new.bvh")).positions
+        np.testing.assert_allclose(shown, poses["positions"], atol=1e-5)
+
+
+def test_the_same_run_writes_the_same_poses(here: Path):
+    for name in ("one", "two"):
+        motion("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", f"{name}.npz")
+    assert (here / "one.npz").read_bytes() == (here / "two.npz").read_bytes()
+
+
+def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
+    toml = here / "game" / "contextdb.toml"
+    toml.write_text(toml.read_text(encoding="utf-8") + '\n[output.player]\nroot = "code"\n', encoding="utf-8")
+    (here / "ahead.csv").write_text(
+        "time_s,speed_mps,turn_dps,gait,speed,style\n0,1.2,0,Walk,1.2,normal\n2,1.2,0,Walk,1.2,normal\n", encoding="utf-8"
+    )
+    motion("run", "game", "player", "ahead.csv", "--out", "new.parquet", "--poses", "new.npz")
+    with np.load(here / "new.npz") as poses:
+        np.testing.assert_allclose(poses["root"][:, 1], 1.2 * np.arange(61) / 30.0, atol=1e-9)
 
 
 # ---- replay

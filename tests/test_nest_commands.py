@@ -10,6 +10,7 @@ from running import run
 
 import contextdb as cdb
 from contextdb import motion
+from contextdb.compiled.table import data_of
 from contextdb.tables.nesting.flat import FlatTable
 
 # ---- commands
@@ -96,9 +97,9 @@ def test_rows_inside_a_row_whose_rule_never_holds_cover_nothing(tmp_path: Path):
 def test_an_edit_of_the_outer_table_compiles_only_what_it_changed(tmp_path: Path):
     before = cdb.load(write(tmp_path) / "tackle.csv")
     first, second = before.compile(), before.with_cell(0, "speed", "1").compile()
-    at = first.places["in_air"]
-    assert second.masks[at] is first.masks[at]
-    assert second.masks[first.places["speed"]] is not first.masks[first.places["speed"]]
+    at = data_of(first).places["in_air"]
+    assert data_of(second).masks[at] is data_of(first).masks[at]
+    assert data_of(second).masks[data_of(first).places["speed"]] is not data_of(first).masks[data_of(first).places["speed"]]
     third = before.with_cell(0, "Asset", "@dive").compile()
     assert third.n_rows == first.n_rows + 2
 
@@ -128,7 +129,7 @@ def test_a_change_of_an_inner_table_reloads_the_outer_ones_alone(tmp_path: Path)
     assert watch["tackle"].query(AIR).leaves == ["Right", "Fall"]
     assert before["tackle"].query(AIR).leaves == ["Left", "Right", "Fall"]
     assert watch["other"] is before["other"]
-    assert watch["tackle"].masks[0] is before["tackle"].masks[0]
+    assert data_of(watch["tackle"]).masks[0] is data_of(before["tackle"]).masks[0]
     look("Asset,Weight,speed\n@tackle,1,Any\n")
     assert watch["tackle"].query(AIR).leaves == ["Right", "Fall"]
     assert [f.rule for e in errors for f in e.faults] == ["cyclic-tables", "cyclic-tables"]

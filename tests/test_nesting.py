@@ -19,7 +19,7 @@ import contextdb as cdb
 from contextdb import bitmask
 from contextdb.cells.grammar import format_cell
 from contextdb.compiled.pick import Outcome
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.project import Project, around_each_other
 
@@ -64,7 +64,7 @@ def test_tags_that_no_single_cell_can_say_meet_exactly(nest: Nest, data: st.Data
 def test_many_contexts_and_a_live_one_answer_as_single_ones(nest: Nest, data: st.DataObject):
     compiled = nest.outer.compile(nest.tables)
     asked = [data.draw(contexts(nest.all_cells()))[0] for _ in range(3)]
-    names = list(compiled.places)
+    names = list(data_of(compiled).places)
     asked = [{name: context[name] for name in names} for context in asked]
     single = [compiled.query(context) for context in asked]
     many = compiled.query_many({name: [context[name] for context in asked] for name in names} if names else {})
@@ -86,8 +86,8 @@ def test_an_opened_artefact_answers_as_the_table_does(tmp_path_factory, nest: Ne
     given_facts, plain = data.draw(contexts(nest.all_cells(), has_missing=unknown != "error"))
     assert_answers(opened, nest, given_facts, plain, unknown)
     assert [opened.way(row) for row in range(opened.n_rows)] == [compiled.way(row) for row in range(compiled.n_rows)]
-    assert [opened.cells(at) for at in range(len(opened.conditions))] == [
-        compiled.cells(at) for at in range(len(opened.conditions))
+    assert [data_of(opened).cells(at) for at in range(len(opened.conditions))] == [
+        data_of(compiled).cells(at) for at in range(len(opened.conditions))
     ]
     picks = [c.pick(given_facts, rng=7, unknown=unknown) for c in (compiled, opened)]
     assert picks[0] == picks[1]
@@ -101,7 +101,7 @@ def test_the_cells_that_an_explanation_names_are_those_that_fail(nest: Nest, dat
     for row, way in enumerate(nest.ways()):
         failing = [
             (table.name, inner, column.condition.name)
-            for column_name in compiled.places
+            for column_name in data_of(compiled).places
             for table, inner in way
             for column in table.conditions
             if column.condition.name == column_name
@@ -118,7 +118,7 @@ def test_a_pick_goes_through_the_tables_one_by_one(nest: Nest, seed: int, data: 
     compiled = nest.outer.compile(nest.tables)
     matches = compiled.query(given_facts)
     possible = {compiled.assets[row] for row in pickable(nest, matches.indices.tolist())}
-    outcome = Outcome(compiled, matches)
+    outcome = Outcome(data_of(compiled), matches)
     assert set(outcome.candidates.tolist()) == pickable(nest, matches.indices.tolist()) == set(outcome.chances)
     assert sum(outcome.chances.values()) == pytest.approx(1.0 if possible else 0.0)
     assert {row for row in matches if outcome.said_of([row]).startswith("picked")} == set(outcome.chances)
@@ -157,7 +157,7 @@ def test_the_covered_share_of_tags_is_that_of_every_set_of_tags(nest: Nest):
         return
     compiled = nest.outer.compile(nest.tables)
     sets = [frozenset(tags) for n in range(len(TAGS) + 1) for tags in combinations(TAGS, n)]
-    valid = [bool(compiled.query(dict.fromkeys(compiled.places, tags))) for tags in sets]
+    valid = [bool(compiled.query(dict.fromkeys(data_of(compiled).places, tags))) for tags in sets]
     assert math.isclose(cdb.coverage(compiled, samples=0).covered, sum(valid) / len(sets), abs_tol=1e-12)
 
 
@@ -181,7 +181,7 @@ def test_actors_are_cast_as_for_the_table_by_hand(nest: Nest, data: st.DataObjec
     actors = {"Defender": [{"id": i, "Tags": value} for i, value in enumerate(data.draw(st.lists(values, max_size=3)))]}
     facts = {name: fact for name, fact in given_facts.items() if name != "Defender.Tags"}
     compiled, by_hand = nest.outer.compile(nest.tables), hand_flattened(nest).compile()
-    actors = actors if "Defender.Tags" in compiled.places else {}
+    actors = actors if "Defender.Tags" in data_of(compiled).places else {}
     found, expected = (c.query(facts, actors=actors) for c in (compiled, by_hand))
     assert found.indices.tolist() == expected.indices.tolist()
     assert [found.casting(row) for row in found] == [expected.casting(row) for row in expected]

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from contextdb.compiled.memory import FEW, Memory, Rng
 from contextdb.compiled.pick import Outcome, pick_row
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, PolicyError
 from contextdb.schema.settings import TableSettings
 from contextdb.schema.shapes import Policy
@@ -85,7 +85,7 @@ def test_a_random_pick_is_a_valid_row_of_the_highest_priority_that_has_a_weight(
     table = table_of("collect", *((f"a{i}", str(x), str(p), str(w)) for i, (x, p, w) in enumerate(rows)))
     may = [i for i, (x, _, w) in enumerate(rows) if x and w > 0]
     top = max((rows[i][1] for i in may), default=None)
-    row = pick_row(table, table.query({"x": True}), seed)
+    row = pick_row(data_of(table), table.query({"x": True}), seed)
     assert row in [i for i in may if rows[i][1] == top] if may else row is None
 
 
@@ -240,14 +240,14 @@ def test_with_the_last_asset_given_a_generator_out_of_a_pickle_picks_as_the_one_
 def test_threads_that_share_the_tables_own_generator_get_no_asset_twice_in_a_row():
     table = table_of("collect", ("a", "True"), ("b", "True"), ("c", "True"))
     matches, seen = table.query({"x": True}), []
-    remember = table.memory.remember
+    remember = data_of(table).memory.remember
 
     def noted(rng: Rng, asset: str) -> None:
         time.sleep(0)  # let another thread go on between the look at what was last and this
         seen.append(asset)
         remember(rng, asset)
 
-    with mock.patch.object(table.memory, "remember", noted), ThreadPoolExecutor(4) as pool:
+    with mock.patch.object(data_of(table).memory, "remember", noted), ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda _: [table.pick(matches) for _ in range(100)], range(4)))
     assert len(seen) == 400
     assert all(one != other for one, other in pairwise(seen))
@@ -261,7 +261,7 @@ def test_all_who_give_no_generator_are_one_character():
 
 def test_a_newer_version_of_a_table_goes_on_with_what_was_picked():
     older, newer, rng = ABC, table_of("collect", ("a", "True"), ("b", "Any"), ("c", "Any")), random.Random(4)
-    newer.remember_as(older)
+    data_of(newer).remember_as(data_of(older))
     for _ in range(20):
         assert older.pick({"x": True}, rng) != newer.pick({"x": True}, rng)
 
@@ -326,7 +326,7 @@ def test_disabled_rows_are_never_picked():
 
 def said(table: CompiledTable) -> list[str]:
     matches = table.query({"x": True})
-    outcome = Outcome(table, matches)
+    outcome = Outcome(data_of(table), matches)
     return [outcome.said_of([row]) for row in matches]
 
 
@@ -355,12 +355,12 @@ ROWS = st.lists(st.tuples(st.booleans(), st.integers(0, 2), st.sampled_from([0.0
 def test_the_outcome_holds_just_the_rows_that_picks_give(rows: list[tuple[bool, int, float]], policy: Policy):
     table = table_of(policy, *((f"a{i}", str(x), str(p), str(w)) for i, (x, p, w) in enumerate(rows)))
     matches = table.query({"x": True})
-    outcome = Outcome(table, matches)
+    outcome = Outcome(data_of(table), matches)
     if policy == "unique" and len(matches) > 1:
         assert outcome.refusal is not None
         return
     rng = random.Random(1)
-    seen = {row for _ in range(60) if (row := pick_row(table, matches, rng, last="")) is not None}
+    seen = {row for _ in range(60) if (row := pick_row(data_of(table), matches, rng, last="")) is not None}
     assert seen == set(outcome.candidates.tolist()) == set(outcome.chances)
     assert outcome.chance(outcome.candidates.tolist()) == pytest.approx(1.0 if seen else 0.0)
     assert all(outcome.said_of([row]).startswith("picked") == (row in seen) for row in matches)

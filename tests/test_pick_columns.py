@@ -10,6 +10,7 @@ from running import run
 import contextdb as cdb
 from contextdb.checks.rows import check_rows
 from contextdb.checks.run import check
+from contextdb.compiled.table import data_of
 from contextdb.edits.edits import check_cell
 from contextdb.exchange.dmn_write import write_dmn
 from contextdb.schema.settings import TableSettings, read_schema
@@ -134,9 +135,9 @@ def test_what_rests_is_part_of_the_version_and_of_the_compiled_file(tmp_path: Pa
     compiled.save(tmp_path / "t.safetensors")
     opened = cdb.CompiledTable.open(tmp_path / "t.safetensors")
     assert opened.version == compiled.version
-    told = {name: array.tolist() for name, array in opened.picking.arrays.items()}
+    told = {name: array.tolist() for name, array in data_of(opened).picking.arrays.items()}
     assert told == {"specificities": [1.0, 3.0], "once": [False, True], "cooldown_s": [0.0, 2.5], "cooldown_turns": [0, 3]}
-    assert opened.picking.limited.tolist() == [1]
+    assert data_of(opened).picking.limited.tolist() == [1]
 
 
 @pytest.mark.parametrize(
@@ -152,7 +153,7 @@ def test_a_table_inside_that_picks_by_its_cells_needs_the_new_layout_too(tmp_pat
     outer = Table.from_columns({"asset": ["@inner", "y"]}, {}, TableSettings("outer"), "outer").compile({"inner": inner})
     outer.save(tmp_path / "t.safetensors")
     assert b'"contextdb":"3"' in (tmp_path / "t.safetensors").read_bytes()
-    assert cdb.CompiledTable.open(tmp_path / "t.safetensors").policies == {"collect", "specific"}
+    assert data_of(cdb.CompiledTable.open(tmp_path / "t.safetensors")).policies == {"collect", "specific"}
 
 
 def test_what_dmn_cannot_say_of_picks_is_told(tmp_path: Path):

@@ -21,7 +21,7 @@ from contextdb.compiled import choosing
 from contextdb.compiled import picker as picker_module
 from contextdb.compiled.chance import uniform, uniforms
 from contextdb.compiled.pick import Outcome, pick_row
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, PolicyError
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
@@ -117,7 +117,7 @@ def assert_alone(compiled: CompiledTable, picker, who, facts, expected, time_s) 
 def test_the_outcome_and_the_stateless_pick_know_what_the_policies_may_pick(tables: oracle.Tables, facts: oracle.Facts):
     compiled = tables.compile()
     matches = compiled.query(facts)
-    outcome = Outcome(compiled, matches)
+    outcome = Outcome(data_of(compiled), matches)
     try:
         expected = oracle.possible(tables, facts)
     except oracle.NotUnique:
@@ -125,7 +125,7 @@ def test_the_outcome_and_the_stateless_pick_know_what_the_policies_may_pick(tabl
         return
     assert [way_of(compiled, row) for row in outcome.candidates.tolist()] == expected
     rng = random.Random(3)
-    rows = {row for _ in range(40) if (row := pick_row(compiled, matches, rng, "")) is not None}
+    rows = {row for _ in range(40) if (row := pick_row(data_of(compiled), matches, rng, "")) is not None}
     assert rows <= set(outcome.candidates.tolist())
     assert bool(rows) == bool(expected)
     assert all(outcome.said_of([row]) for row in matches)
@@ -385,15 +385,15 @@ def test_conditions_count_by_their_weight_and_equal_sums_are_equal():
     columns = {"asset": ["xy", "z", "x"], "x": ["True", "", "True"], "y": ["True", "", ""], "z": ["", "True", ""]}
     table = Table.from_columns(columns, conditions, TableSettings("t", policy="specific")).compile()
     facts = {"x": True, "y": True, "z": True}
-    assert Outcome(table, table.query(facts)).candidates.tolist() == [0, 1]
-    assert table.picking.specificities is not None
-    assert table.picking.specificities.tolist() == [0.3, 0.3, 0.1]
+    assert Outcome(data_of(table), table.query(facts)).candidates.tolist() == [0, 1]
+    assert data_of(table).picking.specificities is not None
+    assert data_of(table).picking.specificities.tolist() == [0.3, 0.3, 0.1]
 
 
 def test_the_cheapest_row_is_picked_and_weight_decides_between_equals():
     table = table_of("cheapest", y=["True ~2", "False ~1", "Any ~9", "Any"], weight=["1", "1", "1", "0"])
     assert [table.pick({"x": True, "y": y}, rng=n) for y in (True, False) for n in range(1)]
-    may = {y: Outcome(table, table.query({"x": True, "y": y})).candidates.tolist() for y in (True, False)}
+    may = {y: Outcome(data_of(table), table.query({"x": True, "y": y})).candidates.tolist() for y in (True, False)}
     assert may == {True: [0, 2], False: [1, 2]}
 
 
@@ -401,7 +401,7 @@ def test_outcomes_say_what_the_policies_went_by():
     facts = {"x": True, "y": True}
 
     def said(table: CompiledTable) -> list[str]:
-        outcome = Outcome(table, table.query(facts))
+        outcome = Outcome(data_of(table), table.query(facts))
         return [outcome.said_of([row]) for row in table.query(facts)]
 
     assert said(table_of("specific", x=["True", "Any"], y=["True", "True"])) == ["picked", "outranked by a (specificity 2)"]

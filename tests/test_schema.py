@@ -80,6 +80,9 @@ order = [{ database = "jog" }]
 
 [controllers.player]
 selector = "loco"
+
+[output.player]
+root = "code"
 """
 
 
@@ -126,7 +129,9 @@ def test_a_whole_file_is_read_as_it_says():
     assert schema.databases == {"jog": {"table": "hit"}}
     assert schema.selectors == {"loco": {"order": [{"database": "jog"}]}}
     assert schema.controllers == {"player": {"selector": "loco"}}
-    assert schema.motion == {name: getattr(schema, name) for name in ("features", "databases", "selectors", "controllers")}
+    assert schema.output == {"player": {"root": "code"}}
+    sections = ("features", "databases", "selectors", "controllers", "output")
+    assert schema.motion == {name: getattr(schema, name) for name in sections}
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "\ufeff", "[conditions]\n[tables]\n"])
@@ -328,7 +333,7 @@ def test_a_wrong_value_in_a_table_is_said(line: str, message: str):
 
 SECTIONS_SAID = (
     "[project], [conditions.NAME], [tables.NAME], [blueprints.NAME], [features.NAME], [databases.NAME], [selectors.NAME], "
-    "[controllers.NAME]"
+    "[controllers.NAME], [output.NAME]"
 )
 
 

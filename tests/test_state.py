@@ -20,7 +20,7 @@ import contextdb as cdb
 from contextdb import motion
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.live import LiveContext
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 
@@ -348,7 +348,7 @@ def asked(compiled: CompiledTable, facts: Mapping[str, object]) -> CompiledTable
     compiled.query_many({name: [value] for name, value in facts.items()}).hits  # noqa: B018
     compiled.explain(facts).nearest()
     compiled.live(facts).matches()
-    _ = roles_of_table(compiled), compiled.version, compiled.penalties(facts)
+    _ = roles_of_table(data_of(compiled)), compiled.version, compiled.penalties(facts)
     return compiled
 
 

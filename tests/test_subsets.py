@@ -21,6 +21,7 @@ from test_mirroring import mirroring_tables, plain_in_mirror
 import contextdb as cdb
 from contextdb import motion
 from contextdb.bitmask import rows as rows_of
+from contextdb.compiled.table import data_of
 from contextdb.errors import QueryError
 from contextdb.tables.table import Table
 
@@ -111,7 +112,7 @@ def test_answers_are_combined_as_sets_of_rows_and_keep_what_belongs_to_a_row(dat
     for answer, rows, seen in pool:
         for same in (answer, copy.copy(answer), pickle.loads(pickle.dumps(answer))):
             assert_says(same, rows)
-            assert_says(same.mirrored, seen if compiled.mirroring else rows)
+            assert_says(same.mirrored, seen if data_of(compiled).mirroring else rows)
             assert_says(same.mirrored.mirrored, rows)
 
 
@@ -390,7 +391,9 @@ def test_a_motion_search_takes_fewer_rows_and_many_answers_where_there_are_many_
     ],
 )
 def test_what_was_given_by_position_is_still_taken_with_a_warning_that_names_the_new_way(old, new):
-    with pytest.warns(DeprecationWarning, match=r"give unknown=\.\.\.(, actors=\.\.\., prefer=\.\.\.)? by name") as caught:
+    with pytest.warns(
+        DeprecationWarning, match=r"by position goes away .* Use unknown=\.\.\.(, actors=\.\.\., prefer=\.\.\.)?\."
+    ) as caught:
         found = old(MOVES)
     assert found == new(MOVES)
     assert caught[0].filename == __file__

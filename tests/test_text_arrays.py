@@ -81,8 +81,8 @@ def test_missing_texts_are_missing_in_every_form(kind, form):
     texts = ["left", None, "right"]
     column = FORMS[form](texts) if form != "Enum" else pl.Series(texts, dtype=pl.Enum(["right", "left"]))
     assert (
-        compiled.query_many({"side": column}, "never").codes.tolist()
-        == compiled.query_many({"side": texts}, "never").codes.tolist()
+        compiled.query_many({"side": column}, unknown="never").codes.tolist()
+        == compiled.query_many({"side": texts}, unknown="never").codes.tolist()
     )
 
 

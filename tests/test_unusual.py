@@ -17,7 +17,7 @@ import pytest
 from contextdb.cells.facts import cell
 from contextdb.compiled.classes import FLAT_BYTES
 from contextdb.compiled.lookup import UNUSUAL, build_ask
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError
 from contextdb.tables.table import Table
 
@@ -93,7 +93,7 @@ def test_an_odd_fact_is_answered_or_refused_as_the_careful_way_does(flat_bytes: 
     table = compiled(flat_bytes)
     for value in ODD:
         context = FACTS | {name: value}
-        expected = answer(lambda context=context: table.query_with_care(context).indices.tolist())
+        expected = answer(lambda context=context: data_of(table).query_with_care(context).indices.tolist())
         for ask in (table.query, lambda context: table.live(context).matches()):
             assert answer(lambda ask=ask, context=context: ask(context).indices.tolist()) == expected, value
 
@@ -104,7 +104,7 @@ def test_an_array_of_no_dimension_is_answered_or_refused_alike_at_every_entrance
     table = compiled(flat_bytes)
     for value in (np.array(2.0), np.array(2), np.array(np.nan), np.array(True), np.array("Ground"), np.array([2.0])):
         context = FACTS | {name: value}
-        expected = answer(lambda context=context: table.query_with_care(context).indices.tolist())
+        expected = answer(lambda context=context: data_of(table).query_with_care(context).indices.tolist())
         many = {key: [fact] for key, fact in context.items()}
         asks = {
             "query": lambda context=context: table.query(context).indices.tolist(),
@@ -122,7 +122,8 @@ def test_an_array_of_no_dimension_is_answered_or_refused_alike_at_every_entrance
 def test_the_straight_way_raises_each_of_these_exceptions_for_odd_facts_and_no_other():
     raised: set[type[BaseException]] = set()
     for table in (compiled(), compiled(0)):
-        ask = build_ask(list(zip(table.conditions, table.masks, strict=True)), table.enabled_bits, table.answering)
+        data = data_of(table)
+        ask = build_ask(list(zip(data.conditions, data.masks, strict=True)), data.enabled_bits, data.answering)
         for context in (FACTS | {name: value} for name in CONDITIONS for value in ODD):
             try:
                 ask(context)

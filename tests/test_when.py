@@ -20,7 +20,7 @@ from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
 from contextdb.compiled.casting.roles import role_of
 from contextdb.compiled.stubs import stubs_of
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.edits.diffing import diff
 from contextdb.edits.edits import check_cell
 from contextdb.errors import ContextError, SchemaError, TableError
@@ -54,7 +54,7 @@ def refusal(rule: str) -> str:
 @pytest.mark.parametrize("nothing", ["", "-", "Any", " any "])
 def test_a_row_without_a_rule_is_asked_by_its_cells_alone(nothing):
     compiled = table_of(nothing, gait=["Run"]).compile()
-    assert compiled.when is None
+    assert data_of(compiled).when is None
     assert list(compiled.asked) == ["gait"]
     assert compiled.query({"gait": "Run"}).assets == ["a0"]
 
@@ -149,7 +149,7 @@ def test_a_rule_without_a_finite_value_is_an_error_where_its_row_is_left():
 
 
 def test_equal_rules_are_read_once_and_computed_once():
-    rules = table_of("speed > 1", " speed > 1 ", "speed > 2", "Any").compile().when
+    rules = data_of(table_of("speed > 1", " speed > 1 ", "speed > 2", "Any").compile()).when
     assert [(rule.expression.text, rule.rows) for rule in rules.rules] == [("speed > 1", 0b11), ("speed > 2", 0b100)]
     assert rules.of_row.tolist() == [0, 0, 1, -1]
 
@@ -189,7 +189,7 @@ def test_pick_soft_cells_saved_contexts_and_stubs_know_rules():
     assert compiled.live(facts).matches().penalties.tolist() == [3.0, 0.0]
     assert {compiled.pick(facts, rng=i) for i in range(30)} == {"a0", "a1"}
     assert compiled.pick({**facts, "target": 2}, rng=1) == "a1"
-    assert judge(compiled, Case("", {"speed": "2", "target": "3", "gait": "Run"}, "a1")).holds
+    assert judge(data_of(compiled), Case("", {"speed": "2", "target": "3", "gait": "Run"}, "a1")).holds
     assert all(f"'{name}'" in stubs_of({"table": compiled}) for name in ("speed", "target", "gait"))
 
 

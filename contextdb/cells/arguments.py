@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from operator import index
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.errors import ContextError, Fault, FileError, NoSuchPlace, Place, WrongType, in_quotes, plural
+from contextdb.errors import ContextError, Fault, FileError, NoSuchPlace, Place, WrongType, in_quotes, plural, warn_of_old
 
 MOST = 1e9
 """The most seconds, or whatever else is waited for or counted."""
@@ -120,8 +119,8 @@ def by_name(call: str, given: Sequence[object], **named: Any) -> dict[str, Any]:
     if len(given) > len(named):
         raise WrongType(Fault(f"{call} is given {plural(len(given) - len(named), 'argument')} too many.", ", ".join(named)))
     now = dict(zip(named, given, strict=False))
-    told = ", ".join(f"{name}=..." for name in now)
-    warnings.warn(f"{call}: give {told} by name; the next minor version takes it in no other way", DeprecationWarning, stacklevel=3)
+    what = "an argument" if len(now) == 1 else "arguments"
+    warn_of_old(f"{call} with {what} by position", ", ".join(f"{name}=..." for name in now), levels=4)
     return {**named, **now}
 
 

@@ -26,7 +26,8 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.cells.sets import TagSet, ValueSet
 from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.table import data_of
 from contextdb.disk import write_atomic
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, nearest, some
 from contextdb.files.csv_rewrite import Origin
@@ -235,7 +236,7 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
     if table.faults:
         return []
     try:
-        flat, compiled = table.flat(), table.compile()
+        flat, compiled = table.flat(), data_of(table.compile())
     except TableError:  # a table inside it cannot be used: said of the row that refers to it
         return []
     found = list(_doubtful(flat, cases, file))
@@ -253,7 +254,7 @@ def check_cases(table: Table, cases: Sequence[Case], file: str | None = None) ->
     return sorted(found, key=lambda finding: finding.line or 0)
 
 
-def judge(compiled: CompiledTable, case: Case, readable: int | None = None) -> Verdict:
+def judge(compiled: CompiledData, case: Case, readable: int | None = None) -> Verdict:
     """Whether what a case expects comes out. Facts that the table has no condition for are left out of the question.
 
     Parameters

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from contextdb.compiled.data import CompiledData
 from contextdb.disk import read_bytes
 from contextdb.errors import ArtefactError, ContextDBError, Fault, FileError, Place, in_quotes, plural
 
@@ -86,7 +85,7 @@ def _safetensors(path: Path) -> Told:
         yield "features of a clip", "cached by a build; the next build checks them and computes altered ones again"
     else:
         yield "compiled table", None
-        open_artefact(path, CompiledData)
+        open_artefact(path)
 
 
 def _parquet(path: Path) -> Told:

@@ -1,11 +1,12 @@
 """Build the motion databases that contextdb.toml declares from their clips, and save them.
 
-Each becomes a memory-mapped file NAME.motion.safetensors. The features of each clip are cached in .contextdb-cache, so the next
-build computes only changed clips.
+Each becomes a memory-mapped file NAME.motion.safetensors; with --poses its clips' poses become NAME.poses.safetensors beside it.
+The features of each clip are cached in .contextdb-cache, so the next build computes only changed clips.
 
   contextdb motion build tables/                       all databases, next to contextdb.toml
   contextdb motion build tables/ --out build/ --database jog
   contextdb motion build tables/ --keep-going            without faulty clips and databases
+  contextdb motion build tables/ --poses                 and their poses, for what plays them
 
 If a clip cannot be read, nothing is saved, all faults are reported, and the exit code is 2. With --keep-going such clips are left
 out and reported, and the exit code is 1. Clips that only look wrong, such as a body of 170 m, give warnings.
@@ -30,6 +31,7 @@ from contextdb.motion.storage.build_inputs import told_once
 from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.pose_files import open_or_build_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import save_database
 from contextdb.tables.project import SCHEMA_FILE, Project
 from contextdb.tables.table import leaf_assets
@@ -45,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep-going", action="store_true", help="leave out faulty clips and databases, build the rest, and exit with 1"
     )
+    parser.add_argument("--poses", action="store_true", help="save the poses of the clips too; not with --keep-going")
     parser.add_argument("--no-cache", action="store_true", help="compute every clip, and cache nothing")
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of a table")
 
@@ -53,6 +56,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Build and save; prints a line for each database."""
     project = MotionProject.load(arguments.path)
     targets = project.targets(arguments.out, arguments.database)
+    if arguments.poses and arguments.keep_going:
+        raise ContextDBError(Fault("--poses takes the poses of all clips, --keep-going leaves faulty ones out.", "one of the two"))
     left_out = LeftOut()
     with building_bar() as progress:
         built = building.build_all(
@@ -68,6 +73,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     for name, target in targets.items():
         make_folder(target.parent)
         save_database(built[name].database, target, inputs=built[name].digest)
+    if arguments.poses:
+        _save_poses(project, built, targets)
     warn(project.warnings(built))
     with output():
         if arguments.json:
@@ -78,6 +85,13 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             print("\n".join(aligned([HEADER, *cells], right=range(1, 8))))
     warn(left_out.sentences())
     return ExitCode.FOUND if left_out.errors else ExitCode.OK
+
+
+def _save_poses(project: MotionProject, built: Mapping[str, Built], targets: Mapping[str, Path]) -> None:
+    """Save the poses of some databases beside them."""
+    banks = open_or_build_poses(project.config, project.folder, project.assets, names=list(targets))
+    for name, bank in banks.items():
+        save_poses(bank, poses_path(targets[name].parent, name), inputs=built[name].digest)
 
 
 def warn(sentences: Iterable[str]) -> None:

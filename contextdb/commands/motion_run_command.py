@@ -3,9 +3,12 @@
 STICK is a CSV or Parquet file with a row for each moment, which lasts until the next. Its columns are time_s; speed_mps, turn_dps
 and strafe_deg as for `motion search`, or x_mps and z_mps, a velocity over the ground, and facing_deg. All other columns are facts.
 
+With --poses the poses of the character are written too, as BVH or as arrays of numpy; [output.CONTROLLER] says how they are made.
+
 Exits with 1 if nothing ever plays.
 
   contextdb motion run game/ player stick.csv --out session.parquet
+  contextdb motion run game/ player stick.csv --out session.parquet --poses session.bvh
   contextdb motion replay session.parquet
 """
 
@@ -15,7 +18,8 @@ import argparse
 import math
 import os
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +30,26 @@ from contextdb.commands.motion_stick import Moments, Stick, conditions_of
 from contextdb.console import ExitCode, output, progress
 from contextdb.disk import path_in_quotes
 from contextdb.errors import Fault, FileError, Place, in_quotes
-from contextdb.motion import FeatureSchema, Trajectory, steady_path, with_path
+from contextdb.motion import (
+    Decision,
+    FeatureSchema,
+    Pose,
+    PoseBank,
+    PoseStream,
+    Trajectory,
+    open_or_build_poses,
+    steady_path,
+    with_path,
+    write_poses,
+)
 from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.selection.controller import Controller
+from contextdb.motion.storage.written_poses import pose_file
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.views import summary_line
 from contextdb.report.render_json import as_json
+from contextdb.tables.table import leaf_assets
 
 SUFFIX = ".parquet"
 
@@ -43,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
     parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what the player requests, moment by moment")
     parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
+    parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh or .npz")
     parser.add_argument("--rate", metavar="HZ", type=_rate, help="updates per second (default: the rate of the features)")
     parser.add_argument("--k", metavar="N", type=_count, default=12, help="candidates of each search to keep (default: 12)")
     parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="seed of the controller's variation (default: 0)")
@@ -53,6 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Run a controller along a stick."""
     out = _out_file(Path(arguments.out), Path(arguments.stick))
+    poses_out = None if arguments.poses is None else _checked_file(pose_file(arguments.poses), Path(arguments.stick), "the poses")
     stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
     controller = stage.config.controller(arguments.controller, stage.databases, rng=random.Random(arguments.seed))
     trace = controller.recorder = Trace(arguments.k, controller.selector.databases)
@@ -63,8 +82,13 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     stick = Stick.read(path, conditions_of(tables))
     table_of = {name: table for name in names if (table := stage.config.databases[name].table) is not None}
     moments = Moments.read(path, table_of, tables, arguments.unknown)
-    steer(controller, stage.schema(names[0]), stick, moments, arguments.rate)
+    schema = stage.schema(names[0])
+    rate = schema.rate if arguments.rate is None else arguments.rate
+    show = None if poses_out is None else Show.of(stage, arguments.controller, names)
+    steer(controller, schema, stick, moments, rate, show)
     trace.save(out, timings=False)
+    if show is not None and poses_out is not None:
+        show.write(poses_out, rate)
     with output():
         if arguments.json:
             print(as_json({"format": 1, "file": str(out), "updates": len(trace), "bytes": out.stat().st_size}), end="")
@@ -81,16 +105,44 @@ def _project(folder: Path, out: Path) -> dict[str, str]:
         return {}
 
 
-def steer(controller: Controller, schema: FeatureSchema, stick: Stick, moments: Moments | None, rate: float | None) -> None:
-    """Update a controller from the stick's first moment to its last, so many times a second; by default at the schema's rate."""
-    per_s = schema.rate if rate is None else rate
+@dataclass(frozen=True, eq=False)
+class Show:
+    """The poses of a character, as they are made."""
+
+    stream: PoseStream
+    bank: PoseBank
+    poses: list[Pose] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, stage: Stage, controller: str, names: Sequence[str]) -> Show:
+        """For the controller of a name over some databases."""
+        assets = {table: leaf_assets(stage.project[table]) for table in stage.project.tables}
+        banks = open_or_build_poses(stage.config, stage.folder, assets, names=names)
+        return cls(PoseStream(banks, stage.config.output_of(controller)), banks[names[0]])
+
+    def take(self, decision: Decision, dt_s: float, body: Steered) -> None:
+        """Add the pose after a decision."""
+        self.poses.append(self.stream.update(decision, dt_s, body))
+
+    def write(self, path: Path, rate: float) -> None:
+        """Write all poses."""
+        write_poses(self.poses, self.bank, path, rate)
+
+
+def steer(
+    controller: Controller, schema: FeatureSchema, stick: Stick, moments: Moments | None, per_s: float, show: Show | None = None
+) -> None:
+    """Update a controller from the stick's first moment to its last, so many times a second."""
     n_updates = math.floor(stick.duration_s * per_s + 1e-6) + 1
     paths = _paths(stick, schema, per_s)
     for i in progress(range(n_updates), "steering"):
         moment, dt_s = stick.at(i / per_s), 1.0 / per_s if i else 0.0
-        query = with_path(schema, _pose(controller, schema, dt_s), next(paths))
+        path, body = next(paths)
+        query = with_path(schema, _pose(controller, schema, dt_s), path)
         valid, context = (None, None) if moments is None else (moments.valid[moment], moments.contexts[moment])
-        controller.update(dt_s, query, valid, context=context)
+        decision = controller.update(dt_s, query, valid, context=context)
+        if show is not None:
+            show.take(decision, dt_s, body)
 
 
 def _pose(controller: Controller, schema: FeatureSchema, dt_s: float) -> Features:
@@ -102,19 +154,31 @@ def _pose(controller: Controller, schema: FeatureSchema, dt_s: float) -> Feature
     return databases[upcoming.database].raw(upcoming.frame).astype(np.float32)
 
 
-def _paths(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[Trajectory]:
-    """The wished path at each update."""
+def _paths(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[tuple[Trajectory, Steered]]:
+    """The wished path at each update, and where the game has the body."""
     return _along_ground(stick, schema, per_s) if stick.is_velocity else _from_body(stick, schema, per_s)
 
 
-def _from_body(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[Trajectory]:
+def _from_body(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[tuple[Trajectory, Steered]]:
+    body = Steered()
     for i in _counting():
         moment = stick.at(i / per_s)
         speed, turn, strafe = (stick.value(name, moment) for name in ("speed_mps", "turn_dps", "strafe_deg"))
-        yield steady_path(speed, turn, strafe_deg=strafe, reach_s=reach_s(schema, speed), rate=schema.rate)
+        if i:
+            body = _after(body, speed, math.radians(turn), math.radians(strafe), 1.0 / per_s)
+        yield steady_path(speed, turn, strafe_deg=strafe, reach_s=reach_s(schema, speed), rate=schema.rate), body
 
 
-def _along_ground(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[Trajectory]:
+def _after(body: Steered, speed_mps: float, turn: float, strafe: float, dt_s: float) -> Steered:
+    """A body that goes at one speed and turns evenly, some time later: on an arc, whose chord points half the turn ahead."""
+    half = turn * dt_s / 2.0
+    chord = speed_mps * dt_s * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    way = body.heading + half + strafe
+    x, z = body.position
+    return replace(body, position=(x + chord * math.sin(way), z + chord * math.cos(way)), heading=body.heading + 2.0 * half)
+
+
+def _along_ground(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[tuple[Trajectory, Steered]]:
     """A body that follows the stick smoothly, as `contextdb.motion.clips.steering` has it."""
     body = Steered()
     past = [body]
@@ -127,7 +191,7 @@ def _along_ground(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator
             past.append(past[-1].moved(1.0 / per_s, wanted, facing))
         reach = reach_s(schema, math.hypot(*wanted))
         past = past[-math.ceil(reach * per_s) - 1 :]
-        yield steered_path(past, wanted, facing, reach_s=reach, rate=per_s)
+        yield steered_path(past, wanted, facing, reach_s=reach, rate=per_s), past[-1]
 
 
 def _counting() -> Iterator[int]:
@@ -142,11 +206,17 @@ def _out_file(out: Path, stick: Path) -> Path:
     place = Place(str(out))
     if out.suffix != SUFFIX:
         raise FileError(Fault("a session cannot be written to such a file.", f"a name that ends in {SUFFIX}", place=place))
+    return _checked_file(out, stick, "the session")
+
+
+def _checked_file(out: Path, stick: Path, what: str) -> Path:
+    """A file in a folder that there is, and not the stick."""
+    place = Place(str(out))
     if not os.path.isdir(out.parent):
         found = f"there is no folder {path_in_quotes(out.parent)}."
         raise FileError(Fault(found, "an existing folder", place=place, rule="no-such-path"))
     if out.resolve() == stick.resolve():
-        raise FileError(Fault("the session would be written over the stick.", "another file", place=place))
+        raise FileError(Fault(f"{what} would be written over the stick.", "another file", place=place))
     return out
 
 

@@ -22,7 +22,7 @@ from contextdb.commands import missing_facts_by_option
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.console import ExitCode, aligned, output, printable, styled, terminal_width, wants_colour, width_of
 from contextdb.errors import ContextError, Fault, in_quotes, plural
 from contextdb.report.render_json import as_json
@@ -137,8 +137,8 @@ def _split(text: str, compiled: CompiledTable) -> tuple[str, str]:
     for at in reversed(ends):
         if text[:at] in compiled.asked:
             return text[:at], text[at + 1 :]
-    if compiled.derivation is not None:
-        compiled.derivation.refuse(text[:at] for at in ends)
+    if (derivation := data_of(compiled).derivation) is not None:
+        derivation.refuse(text[:at] for at in ends)
     if ends:
         raise no_condition(text[: ends[0]], compiled.asked)
     raise ContextError(Fault(f"{in_quotes(text)} is not a fact.", "FACT=VALUE, without spaces round the =", in_quotes(f"{text}=…")))
@@ -155,7 +155,7 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
     matches = explanation.matches
     always = set(explanation.always_rows())
     context = {n: _json_fact(f, n, compiled) for n, f in explanation.facts.items() if f is not None}
-    outcome, undecided = Outcome(compiled, matches), explanation.undecided
+    outcome, undecided = Outcome(data_of(compiled), matches), explanation.undecided
     rows: list[dict[str, object]] = []
     for r in matches:
         rows.append({"row": r, "asset": compiled.assets[r], "always": r in always})
@@ -197,7 +197,7 @@ def _json_fact(fact: Fact, name: str, compiled: CompiledTable) -> object:
 
 def _condition(name: str, compiled: CompiledTable) -> Condition:
     """A condition of the table or of its rules."""
-    return next(c for c in (*compiled.conditions, *compiled.ruled) if c.name == name)
+    return next(c for c in (*compiled.conditions, *data_of(compiled).ruled) if c.name == name)
 
 
 def _explained(row: RowExplanation) -> dict[str, object]:
@@ -227,7 +227,7 @@ def _lines(compiled: CompiledTable, explanation: Explanation, explains: bool, mo
 def _matching(compiled: CompiledTable, explanation: Explanation) -> Iterator[tuple[str, ...]]:
     """The valid rows; where some only may be valid, with a word for that, and where the policy prefers some, how it does."""
     matches, undecided = explanation.matches, explanation.undecided
-    outcome = Outcome(compiled, matches)
+    outcome = Outcome(data_of(compiled), matches)
     cast = matches if isinstance(matches, CastMatches) else None
     head = [
         "row",

@@ -63,7 +63,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
@@ -90,8 +90,6 @@ from contextdb.files.tensors import (
 from contextdb.schema.settings import Schema
 
 __all__ = ["SUFFIX", "open_artefact", "save"]
-
-Compiled = TypeVar("Compiled", bound=CompiledData)
 
 COMPILED = FileKind(
     "contextdb", 1, "one that contextdb compiled", "a file that this version of contextdb compiled", "to compile the table again"
@@ -154,8 +152,8 @@ def _kind_of(compiled: CompiledData) -> FileKind:
     return WITH_RULES if is_more else COMPILED
 
 
-def open_artefact(path: Path, kind: type[Compiled]) -> Compiled:
-    """Open a compiled table by memory map, checked; `kind` is the class to make of it.
+def open_artefact(path: Path) -> CompiledData:
+    """Open a compiled table by memory map, checked.
 
     Raises
     ------
@@ -169,14 +167,14 @@ def open_artefact(path: Path, kind: type[Compiled]) -> Compiled:
         about = metadata["about"]
         if digest_of(tensors, about) != metadata.get("digest"):
             raise COMPILED.refused(path, "the file was altered: its contents do not match its digest.")
-        return _table(json.loads(about), tensors, kind)
+        return _table(json.loads(about), tensors)
 
 
-def _table(about: dict[str, Any], tensors: Tensors, kind: type[Compiled]) -> Compiled:
+def _table(about: dict[str, Any], tensors: Tensors) -> CompiledData:
     conditions = tuple(_condition_from_json(c) for c in about["conditions"])
     n_rows = about["rows"]
     numbered = [(f"{at:03d}", kinds) for at, kinds in enumerate(about["columns"])]
-    return kind(
+    return CompiledData(
         name=about["name"],
         assets=texts_from_array(tensors["assets"]),
         conditions=conditions,

@@ -15,14 +15,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, ClassVar, Never, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.bitmask import Words, read_only
-from contextdb.cells.arguments import by_name, require_row
+from contextdb.cells.arguments import require_row
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
 from contextdb.cells.grammar import parse_cell, reads
@@ -53,7 +53,7 @@ SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompiledData(Unchanging):
-    """A table as masks: what every way to ask it needs. `CompiledTable` has the ways.
+    """A table as masks: what every way to ask it needs. `CompiledTable` holds it and has the ways.
 
     It can be pickled at any time. The copy gives the same answers; only the memory of `pick` is not pickled.
     """
@@ -102,8 +102,12 @@ class CompiledData(Unchanging):
         return len(self.assets)
 
     def __repr__(self) -> str:
+        return self.described(type(self).__name__)
+
+    def described(self, kind: str) -> str:
+        """What it is, in one line: as what, its name, and its size."""
         size = f"{plural(self.n_rows, 'row')} x {plural(len(self.conditions), 'condition')}, {plural(self.nbytes, 'byte')}"
-        return one_line(type(self).__name__, self.name, size)
+        return one_line(kind, self.name, size)
 
     @property
     def leaves(self) -> Sequence[str]:
@@ -135,7 +139,7 @@ class CompiledData(Unchanging):
         """The rows that may match at all, as an integer."""
         return bitmask.to_int(self.enabled)
 
-    def query(self, context: Context, *, unknown: Unknown = "error") -> Matches:
+    def query(self, context: Context, unknown: Unknown = "error") -> Matches:
         """Find the rows whose every cell accepts its fact; see `CompiledTable.query`, which casts actors too."""
         if unknown != "error":
             check_mode(unknown)
@@ -155,16 +159,8 @@ class CompiledData(Unchanging):
             self.heard.asked(context, found)
         return self.bound(found, kept_facts(context), unknown) if self.is_bound else found
 
-    def encode(self, context: Context, *old: Never, unknown: Unknown = "error") -> NDArray[np.int32]:
-        """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.compiled.stack`.
-
-        Raises
-        ------
-        ContextError
-            As `query`; a fact is a set of values; the table has rules, which have no codes.
-        """
-        if old:
-            return self.encode(context, **by_name("encode", old, unknown=unknown))
+    def encode(self, context: Context, unknown: Unknown = "error") -> NDArray[np.int32]:
+        """The class of every fact, as codes; see `CompiledTable.encode`."""
         self.refuse_rules("codes do not keep the facts that its rules need")
         facts = self.read_context(context, unknown)
         local: list[tuple[int, ...] | None] = []

@@ -55,7 +55,7 @@ def unhear(compiled: CompiledData) -> None:
 
 def made_ready(compiled: CompiledData) -> None:
     """Have a table build what answers its queries, so that `hear` finds it."""
-    CompiledData.query(compiled, {}, unknown="any")
+    compiled.query({}, unknown="any")
 
 
 class _Heard:

@@ -26,6 +26,7 @@ from contextdb.compiled.batch_costs import CostsOfPairs, costs_of_pairs
 from contextdb.compiled.casting.stage import CastMatches
 from contextdb.compiled.chance import uniform, uniforms
 from contextdb.compiled.choosing import Choosing, highest, starts_of
+from contextdb.compiled.choosing_masks import EvenChoosing
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.matches import Matches
@@ -103,6 +104,8 @@ class _Known:
     """The number of each row's asset: int64 [n]."""
     limits: Rows
     """The column of each row that rests: int64 [L]."""
+    even: EvenChoosing | None
+    """What decides on masks; None where pairs of contexts and rows are to."""
 
     @cached_property
     def asset_list(self) -> list[int]:
@@ -214,19 +217,28 @@ class Picker:
         time = _time(known, time_s)
         ids = _characters(who, len(many))
         slots = self._picked.slots_of(ids)
+        if known.even is not None:
+            fresh = known.even.fresh(many.mask, self._picked.recent[slots])
+            rows = known.even.drawn(fresh, uniforms(self._seed, ids, self._picked.turns[slots], 0))
+        else:
+            rows = self._drawn_by_pairs(known, many, ids, slots, time)
+        self._keep(known, slots, rows, time)
+        return read_only(rows)
+
+    def _drawn_by_pairs(self, known: _Known, many: ManyMatches, ids: Rows, slots: Rows, time_s: float) -> Rows:
+        """The row of each of many characters, -1 for none, by the pairs of a context and a row that is valid in it."""
+        compiled, masks = many.compiled, many.mask
         rows = np.full(len(many), -1, np.int64)
-        masks = many.mask
         costs = costs_of_pairs(many) if "cheapest" in compiled.policies else None
         block = max(1, MOST_PAIRS // max(1, compiled.n_rows))
         for start in range(0, len(many), block):
             contexts, valid = bitmask.places(masks[start : start + block])
             contexts += start
-            *_, kept = self._left(known, contexts, valid, slots, costs, time)
+            *_, kept = self._left(known, contexts, valid, slots, costs, time_s)
             of, at = contexts[kept], valid[kept]
             drawn = known.choosing.drawn(of, at, lambda d, c: uniforms(self._seed, ids[c], self._picked.turns[slots[c]], d))
             rows[of[drawn]] = at[drawn]
-        self._keep(known, slots, rows, time)
-        return read_only(rows)
+        return rows
 
     def forget(self, who: int | Sequence[int] | NDArray[np.integer[Any]] | None = None) -> None:
         """Forget what all characters picked, or some: nothing rests, and nothing was picked lately. Their chance goes on.
@@ -281,7 +293,8 @@ class Picker:
         if known is None or known.choosing.compiled is not compiled:
             choosing = compiled.once(Choosing.of)
             limits = np.empty(0, np.int64) if choosing.limits is None else self._picked.limit_columns(choosing.limits)
-            known = self._known = _Known(choosing, self._picked.asset_numbers(compiled.assets), limits)
+            assets = self._picked.asset_numbers(compiled.assets)
+            known = self._known = _Known(choosing, assets, limits, EvenChoosing.of(choosing, assets, self._memory))
         return known
 
     # ---- one pick, and many

@@ -18,8 +18,8 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.outputs import Output
 from contextdb.cells.words import format_number
-from contextdb.compiled.data import CompiledData
 from contextdb.compiled.stub_contexts import NUMBERS, accepted, contexts_of
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import shown
 
 _HEAD = '''"""The facts that each table asks for, as types. Written by `contextdb compile --stubs`: do not edit."""
@@ -37,7 +37,7 @@ _TAKEN = (
 )
 
 
-def stubs_of(tables: Mapping[str, CompiledData]) -> str:
+def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
     """The text of a Python module with the types of all tables; the same tables give the same text."""
     names = _Names()
     literals: dict[Condition, str] = {}
@@ -91,12 +91,12 @@ def _with_those_above(tag: str) -> Iterator[str]:
     return (".".join(parts[: n + 1]) for n in range(len(parts)))
 
 
-def _facts(name: str, table: CompiledData, literals: Mapping[Condition, str]) -> str:
+def _facts(name: str, table: CompiledTable, literals: Mapping[Condition, str]) -> str:
     lines = [f"        {c.name!r}: {_type(c, literals.get(c))},{_comment(c)}\n" for c in table.asked.values()]
     return _typed_dict(name, table, lines)
 
 
-def _outputs(names: _Names, table: CompiledData) -> str:
+def _outputs(names: _Names, table: CompiledTable) -> str:
     """The outputs of a row, as `compiled.outputs.of_row` gives them, with a Literal for the values of each enum."""
     types, literals = dict[str, str](), ""
     for output in table.outputs.declared:
@@ -110,7 +110,7 @@ def _outputs(names: _Names, table: CompiledData) -> str:
     return literals + _typed_dict(names.of(f"{table.name} outputs"), table, lines)
 
 
-def _typed_dict(name: str, table: CompiledData, lines: Sequence[str]) -> str:
+def _typed_dict(name: str, table: CompiledTable, lines: Sequence[str]) -> str:
     fields = "{\n" + "".join(lines) + "    }" if lines else "{}"
     return f"# table {shown(table.name, 200)}\n{name} = TypedDict(\n    {name!r},\n    {fields},\n)\n"
 

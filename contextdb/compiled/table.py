@@ -1,4 +1,8 @@
-"""A compiled table with every way to ask it: one context or many, kept between frames, explained, picked from, saved."""
+"""A compiled table with every way to ask it: one context or many, kept between frames, explained, picked from, saved.
+
+A `CompiledTable` is what a user sees, and its public names are those of docs/api.md. What they work with is its `CompiledData`: the
+rest of the package takes that, through `data_of` where a user gives a table.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.cells.arguments import by_name, require_path
+from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Unknown, check_mode, require_context
 from contextdb.compiled.artefact import open_artefact, save
 from contextdb.compiled.batch import query_codes, query_many
@@ -25,10 +30,14 @@ from contextdb.compiled.lookup import UNUSUAL
 from contextdb.compiled.many import ManyMatches
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.memory import Rng
+from contextdb.compiled.outputs import Outputs
 from contextdb.compiled.pick import pick
 from contextdb.compiled.picker import Picker
 from contextdb.compiled.preparing import prepare
+from contextdb.compiled.unchanging import Unchanging
+from contextdb.compiled.ways import Step
 from contextdb.errors import ContextError, Fault, WrongType
+from contextdb.schema.shapes import Policy
 
 if TYPE_CHECKING:
     import polars as pl
@@ -37,11 +46,87 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CompiledTable(CompiledData):
+class CompiledTable(Unchanging):
     """A table as masks. Get one from `Table.compile()` or `CompiledTable.open(path)`.
 
     It can be pickled at any time. The copy gives the same answers; only the memory of `pick` is not pickled.
     """
+
+    _data: CompiledData
+
+    def __repr__(self) -> str:
+        return self._data.described(type(self).__name__)
+
+    @property
+    def name(self) -> str:
+        """The name of the table."""
+        return self._data.name
+
+    @property
+    def n_rows(self) -> int:
+        """The number of rows."""
+        return self._data.n_rows
+
+    @property
+    def assets(self) -> Sequence[str]:
+        """The asset of each row."""
+        return self._data.assets
+
+    @property
+    def leaves(self) -> Sequence[str]:
+        """The asset of each row, without the path that it has in a table inside the table."""
+        return self._data.leaves
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """The columns that are conditions."""
+        return self._data.conditions
+
+    @property
+    def asked(self) -> dict[str, Condition]:
+        """The conditions whose facts a caller gives: those of the table and of its rules, and for derived ones those that they are
+        computed from."""
+        return self._data.asked
+
+    @property
+    def policy(self) -> Policy:
+        """How `pick` chooses among the valid rows."""
+        return self._data.policy
+
+    @property
+    def fallback(self) -> str | None:
+        """The asset that `pick` gives where no row is valid."""
+        return self._data.fallback
+
+    @property
+    def priorities(self) -> NDArray[np.int64]:
+        """The priority of each row: int64 [n_rows]."""
+        return self._data.priorities
+
+    @property
+    def row_weights(self) -> NDArray[np.float64]:
+        """The weight of each row: float64 [n_rows]."""
+        return self._data.row_weights
+
+    @property
+    def outputs(self) -> Outputs:
+        """What the rows give the game besides their assets; one without columns where the table has none."""
+        return self._data.outputs
+
+    @property
+    def version(self) -> str:
+        """A digest of the table's contents: the same for two tables with the same contents, wherever they were compiled."""
+        return self._data.version
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the masks take."""
+        return self._data.nbytes
+
+    def way(self, row: int) -> tuple[Step, ...]:
+        """The rows of tables that a row comes from, outermost first, each with its file and line; for a table without tables inside
+        one step, the row itself. Raises NoSuchPlace for a row that there is not."""
+        return self._data.way(row)
 
     def query(
         self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
@@ -76,16 +161,16 @@ class CompiledTable(CompiledData):
         if old:
             return self.query(context, **by_name("query", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
-            cast = query_with_actors(self, context, Ask(actors, prefer, unknown))
-            if self.heard is not None:
-                self.heard.asked(context, cast, actors)
+            cast = query_with_actors(self._data, context, Ask(actors, prefer, unknown))
+            if self._data.heard is not None:
+                self._data.heard.asked(context, cast, actors)
             return cast
         if unknown != "error":
-            return super().query(context, unknown=unknown)
+            return self._data.query(context, unknown)
         try:  # as there, without a call more: the way of every question
-            return self._ask(context)
+            return self._data._ask(context)
         except UNUSUAL:
-            return self.query_with_care(context)
+            return self._data.query_with_care(context)
         except Exception:  # no mapping, which can raise anything, or a fault of ours
             require_context(context)
             raise
@@ -115,8 +200,8 @@ class CompiledTable(CompiledData):
         if old:
             return self.query_many(contexts, **by_name("query_many", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
-            return query_many_with_actors(self, contexts, Ask(actors, prefer, unknown))  # type: ignore[arg-type]
-        return query_many(self, contexts, unknown)
+            return query_many_with_actors(self._data, contexts, Ask(actors, prefer, unknown))  # type: ignore[arg-type]
+        return query_many(self._data, contexts, unknown)
 
     def live(
         self,
@@ -137,7 +222,7 @@ class CompiledTable(CompiledData):
         if old:
             return self.live(facts, **by_name("live", old, unknown=unknown, actors=actors, prefer=prefer))
         check_mode(unknown)
-        live = live_context(self, unknown)
+        live = live_context(self._data, unknown)
         live.update({} if facts is None else facts)
         live.actors(actors, prefer=prefer)
         return live
@@ -155,11 +240,23 @@ class CompiledTable(CompiledData):
 
         Raises nothing: it asks without facts.
         """
-        prepare(self, casting, batches)
+        prepare(self._data, casting, batches)
+
+    def encode(self, context: Context, *old: Never, unknown: Unknown = "error") -> NDArray[np.int32]:
+        """The class of every fact, as codes for `query_codes`: int32 [n_slots]; see `contextdb.compiled.stack`.
+
+        Raises
+        ------
+        ContextError
+            As `query`; a fact is a set of values; the table has rules, which have no codes.
+        """
+        if old:
+            return self.encode(context, **by_name("encode", old, unknown=unknown))
+        return self._data.encode(context, unknown)
 
     def query_codes(self, codes: NDArray[np.int32]) -> Matches:
         """The rows for codes that `encode` made; raises ContextError for other codes."""
-        return query_codes(self, codes)
+        return query_codes(self._data, codes)
 
     def explain(
         self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
@@ -169,8 +266,8 @@ class CompiledTable(CompiledData):
         if old:
             return self.explain(context, **by_name("explain", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
-            return explain_with_actors(self, context, Ask(actors, prefer, unknown))
-        return explain(self, context, unknown)
+            return explain_with_actors(self._data, context, Ask(actors, prefer, unknown))
+        return explain(self._data, context, unknown)
 
     def penalties(
         self, context: Context, *old: Never, unknown: Unknown = "error", actors: Actors | None = None, prefer: Prefer = None
@@ -185,7 +282,7 @@ class CompiledTable(CompiledData):
             return self.penalties(context, **by_name("penalties", old, unknown=unknown, actors=actors, prefer=prefer))
         if actors is not None:
             return self.query(context, unknown=unknown, actors=actors, prefer=prefer).penalties
-        return self.plain_penalties(context, unknown)
+        return self._data.plain_penalties(context, unknown)
 
     def pick(
         self,
@@ -225,7 +322,7 @@ class CompiledTable(CompiledData):
         elif actors is not None:
             found = "actors are for a query, and this is the answer to one."
             raise ContextError(Fault(found, "facts with actors, or the answer to a query with actors"))
-        return pick(self, context, rng, last)
+        return pick(self._data, context, rng, last)
 
     def picker(self, seed: int = 0, memory: int = 1) -> Picker:
         """Picks for one character or for many, which it remembers: see `contextdb.compiled.picker.Picker`.
@@ -246,7 +343,7 @@ class CompiledTable(CompiledData):
 
     def save(self, path: str | Path) -> None:
         """Write the compiled file for the game, a .safetensors file, atomically; raises FileError where it cannot be written."""
-        save(self, require_path(path))
+        save(self._data, require_path(path))
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
@@ -259,4 +356,9 @@ class CompiledTable(CompiledData):
         FileError
             It is missing, or cannot be read.
         """
-        return open_artefact(require_path(path), cls)
+        return cls(open_artefact(require_path(path)))
+
+
+def data_of(table: CompiledTable) -> CompiledData:
+    """What is inside a compiled table, for the rest of the package; a game has no use for it."""
+    return table._data

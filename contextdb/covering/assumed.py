@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 from contextdb.cells.arguments import require_kind, require_many
 from contextdb.cells.conditions import Condition
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.ruled import RuledTable, without_rules
@@ -29,7 +30,7 @@ from contextdb.tables.table import EitherTable, Table
 class Opened:
     """A table ready to be measured."""
 
-    compiled: CompiledTable
+    compiled: CompiledData
     table: EitherTable | None
     """None where a compiled table was given: it has no lines and no assumptions."""
     space: Space
@@ -56,11 +57,12 @@ def opened(
     """
     require_kind(table, (Table, FlatTable, CompiledTable), "table", "a Table, or a CompiledTable")
     if isinstance(table, CompiledTable):
-        table.refuse_rules("what they leave is worked out from the table itself")
-        return Opened(table, None, _space(table, impossible, weights, progress, is_cut), None)
+        data = data_of(table)
+        data.refuse_rules("what they leave is worked out from the table itself")
+        return Opened(data, None, _space(data, impossible, weights, progress, is_cut), None)
     ruled = without_rules(table.flat())
     table = ruled.table
-    compiled = table.compile()
+    compiled = data_of(table.compile())
     impossible = list(require_many(impossible, "impossible", "a list of mappings of conditions to cells"))
     if not assume and not ruled.rules:
         return Opened(compiled, table, _space(compiled, impossible, weights, progress, is_cut), None, ruled=ruled)
@@ -80,7 +82,7 @@ def opened(
 
 
 def _space(
-    compiled: CompiledTable, impossible: Sequence[CellBox], weights: WeightsOf | None, progress: Progress, is_cut: bool
+    compiled: CompiledData, impossible: Sequence[CellBox], weights: WeightsOf | None, progress: Progress, is_cut: bool
 ) -> Space:
     if not is_cut:
         require_measurable(compiled)

@@ -21,7 +21,7 @@ from contextdb import bitmask
 from contextdb.bitmask import Flags
 from contextdb.cells.grammar import format_cell
 from contextdb.cells.sets import Cell, NumberSet, TagSet, ValueSet, union
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 from contextdb.covering.count import Bounds, uncovered_within
 from contextdb.covering.factors import TagFactor
 from contextdb.covering.progress import SILENT, Progress
@@ -101,7 +101,7 @@ def _add(seen: BoxSet, box: Box) -> Box:
 
 def described(
     space: Space,
-    compiled: CompiledTable,
+    compiled: CompiledData,
     found: Sequence[Box],
     measure: Measure,
     most: int,
@@ -145,7 +145,7 @@ class NearRows:
     """The rows of a table, to be asked which of them is nearest to a gap."""
 
     space: Space
-    compiled: CompiledTable
+    compiled: CompiledData
     rows: BoxSet
 
     def nearest(self, gap: Sides) -> Nearest | None:

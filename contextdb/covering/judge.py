@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb import bitmask
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 from contextdb.console import PREPARING
 from contextdb.covering.draw import Drawer
 from contextdb.covering.progress import SILENT, Progress
@@ -57,7 +57,7 @@ class Judge:
     """Asks the questions of one table, with so many search steps for all of them."""
 
     space: Space
-    compiled: CompiledTable
+    compiled: CompiledData
     table: EitherTable | None
     steps: int
     progress: Progress = SILENT

@@ -25,7 +25,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import format_cell, parse_cell
 from contextdb.cells.plain_ends import plain
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagMeet, TagSet
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import Factor, NumberFactor, TagFactor, ValueFactor, tag_factors, weighted
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.errors import ContextError, Fault, Place, TableError, in_quotes, nearest, plural, some
@@ -70,7 +70,7 @@ class Space:
     @classmethod
     def of(
         cls,
-        compiled: CompiledTable,
+        compiled: CompiledData,
         impossible: Sequence[CellBox] = (),
         weights: WeightsOf | None = None,
         progress: Progress = SILENT,
@@ -106,7 +106,7 @@ class Space:
         return space._with_boxes(compiled, excluded, progress, most_rows)
 
     def _with_boxes(
-        self, compiled: CompiledTable, excluded: Sequence[Mapping[str, Cell]], progress: Progress, most_rows: int | None
+        self, compiled: CompiledData, excluded: Sequence[Mapping[str, Cell]], progress: Progress, most_rows: int | None
     ) -> Space:
         columns: list[dict[int, tuple[int, ...]]] = []
         for at in range(len(self.conditions)):
@@ -254,7 +254,7 @@ class Space:
         }
 
 
-def comparable_rows(compiled: CompiledTable) -> int:
+def comparable_rows(compiled: CompiledData) -> int:
     """How many rows of a table, from the first on, may be compared with each other without growing out of time or memory."""
     n_rows = min(compiled.n_rows, math.isqrt(MOST_COMPARED // max(1, len(compiled.conditions))))
     while n_rows > 1 and n_rows * _n_cells(compiled, n_rows) > MOST_HELD:
@@ -262,7 +262,7 @@ def comparable_rows(compiled: CompiledTable) -> int:
     return n_rows
 
 
-def require_measurable(compiled: CompiledTable) -> None:
+def require_measurable(compiled: CompiledData) -> None:
     """Raise TableError where the bits of a table's rows would not fit into memory."""
     n_cells = _n_cells(compiled, compiled.n_rows)
     if compiled.n_rows * n_cells > MOST_HELD:
@@ -271,11 +271,11 @@ def require_measurable(compiled: CompiledTable) -> None:
         raise TableError(Fault(f"{found}{plural(n_cells, 'different cell')}.", accepted))
 
 
-def _n_cells(compiled: CompiledTable, n_rows: int) -> int:
+def _n_cells(compiled: CompiledData, n_rows: int) -> int:
     return sum(len(_codes_of(compiled, at, n_rows)) for at in range(len(compiled.conditions)))
 
 
-def _codes_of(compiled: CompiledTable, at: int, most_rows: int | None) -> Sequence[int]:
+def _codes_of(compiled: CompiledData, at: int, most_rows: int | None) -> Sequence[int]:
     """The codes of a condition's cells that the first rows use; of all rows those that no row uses, too."""
     texts = compiled.texts[at]
     if most_rows is None or most_rows >= compiled.n_rows:

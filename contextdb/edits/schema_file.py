@@ -289,7 +289,7 @@ def _require_said(text: str, wanted: Changes, theirs: Schema, path: Path) -> Non
     before, after = _said_by(theirs), _said_by(now)
     expected = {key: value for key, value in before.items() if key not in wanted}
     expected |= {key: value for key, (_, value) in wanted.items() if value is not None}
-    same = ("features", "databases", "controllers")
+    same = ("features", "databases", "controllers", "output")
     if after != expected or any(getattr(now, section) != getattr(theirs, section) for section in same):
         keys = [f"[{dotted(key[:-1])}] {key[-1]}" for key in wanted]
         found = f"{some(keys)} cannot be changed without changing more of the file."

@@ -3,6 +3,7 @@
     BVH clips ─► features ─► MotionDatabase ─► search(query, valid) ─► Hit
     markup ───────────────────────┘   Selector: priority databases in order ─► Choice
                                       Controller: one character in time ─► Decision ─► Trace
+                                      PoseStream: its decisions as poses, from a PoseBank ─► Pose
                                       ControllerGroup: a crowd of them, searched for at once
                                       MatchNode, MatchGate: one-offs that end at a target
 
@@ -36,6 +37,10 @@ from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
 from contextdb.motion.nodes.warping import Target, WarpShare
+from contextdb.motion.output.bank import PoseBank, Sample
+from contextdb.motion.output.settings import PoseSettings
+from contextdb.motion.output.stream import Pose, PoseState, PoseStream
+from contextdb.motion.output.track import clip_of_poses, pose_arrays
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
 from contextdb.motion.search.filters import Biases
@@ -51,7 +56,9 @@ from contextdb.motion.selection.variation import Variation
 from contextdb.motion.storage.building import Built, build, build_all, open_or_build, saved_path
 from contextdb.motion.storage.config import MotionConfig, SelectorSettings
 from contextdb.motion.storage.database_settings import DatabaseSettings
+from contextdb.motion.storage.pose_files import open_or_build_poses, open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
+from contextdb.motion.storage.written_poses import write_poses
 from contextdb.motion.trace.session import Trace
 
 __all__ = [
@@ -98,12 +105,18 @@ __all__ = [
     "MotionError",
     "Normalisation",
     "Playing",
+    "Pose",
+    "PoseBank",
+    "PoseSettings",
+    "PoseState",
+    "PoseStream",
     "Poses",
     "QueryError",
     "Reason",
     "Recorder",
     "ReservedTag",
     "RootMotion",
+    "Sample",
     "Search",
     "Selector",
     "SelectorSettings",
@@ -123,6 +136,7 @@ __all__ = [
     "build_all",
     "build_databases",
     "clip_features",
+    "clip_of_poses",
     "descriptions",
     "doubts_of",
     "features_of",
@@ -138,14 +152,19 @@ __all__ = [
     "mirrored_path",
     "open_database",
     "open_or_build",
+    "open_or_build_poses",
+    "open_poses",
     "parse_bvh",
     "partners_of",
+    "pose_arrays",
     "pose_schema",
     "poses_of",
+    "poses_path",
     "query_from",
     "resampled",
     "root_trajectory",
     "save_database",
+    "save_poses",
     "saved_path",
     "steady_path",
     "steered_path",
@@ -154,4 +173,5 @@ __all__ = [
     "with_paths",
     "write_bvh",
     "write_made_clips",
+    "write_poses",
 ]

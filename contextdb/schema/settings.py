@@ -1,8 +1,8 @@
 """What contextdb.toml says, as frozen data.
 
 `contextdb.schema.shapes` describes what each key accepts; here stands how keys and sections go together. All is checked before
-anything is used, so that every fault of the file is reported at once. `features`, `databases`, `selectors` and `controllers` are
-kept as plain data, for `contextdb.motion` to read. Nothing here reads a file.
+anything is used, so that every fault of the file is reported at once. `features`, `databases`, `selectors`, `controllers` and
+`output` are kept as plain data, for `contextdb.motion` to read. Nothing here reads a file.
 """
 
 from __future__ import annotations
@@ -135,6 +135,7 @@ class Schema:
     databases: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     selectors: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     controllers: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    output: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     file: str | None = None
 
     def __repr__(self) -> str:
@@ -171,6 +172,7 @@ class Schema:
             "databases": self.databases,
             "selectors": self.selectors,
             "controllers": self.controllers,
+            "output": self.output,
         }
 
     def settings_for(self, file: str) -> TableSettings:
@@ -536,6 +538,7 @@ def _schema(document: Section, file: str) -> Schema:
         _parts(document, "databases"),
         _parts(document, "selectors"),
         _parts(document, "controllers"),
+        _parts(document, "output"),
         file,
     )
 

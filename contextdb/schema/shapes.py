@@ -262,5 +262,6 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
     "databases": None,
     "selectors": None,
     "controllers": None,
+    "output": None,
 }
 """The sections and their keys; None: kept as they are. All but `project` hold named tables."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from contextdb import bitmask
 from contextdb.cells.outputs import SLOT_COLUMNS
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.pick_columns import NOTHING
-from contextdb.compiled.table import CompiledTable
 from contextdb.expressions.rules.rules import WhenRules
 from contextdb.tables.data import TableData
 
 
-def compile_table(table: TableData) -> CompiledTable:
+def compile_table(table: TableData) -> CompiledData:
     """Compile a flat table whose cells can all be read; columns compiled before are taken as they are."""
     when = WhenRules.of(table.when)
-    return CompiledTable(
+    return CompiledData(
         name=table.name,
         assets=table.assets,
         conditions=tuple(c.condition for c in table.conditions),

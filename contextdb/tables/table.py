@@ -118,7 +118,7 @@ class Table(TableData):
             Cells that cannot be read, all of them; in tables inside the table too.
         """
         self.require_readable()
-        return compile_table(self.flat(tables))
+        return CompiledTable(compile_table(self.flat(tables)))
 
     def flat(self, tables: Mapping[str, Table] | None = None) -> Table | FlatTable:
         """The table with the rows of its inner tables in place of those that refer to them: the rows that a query answers with.

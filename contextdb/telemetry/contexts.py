@@ -16,7 +16,7 @@ from contextdb.cells.facts import Unknown, read_fact_text
 from contextdb.cells.sets import Cell
 from contextdb.compiled.batch import query_encoded
 from contextdb.compiled.many import ManyMatches
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes, nearest
 from contextdb.files.csv_source import text_columns
@@ -39,7 +39,7 @@ class Contexts:
     def ask(self, compiled: CompiledTable, unknown: Unknown) -> ManyMatches:
         """The valid rows in every context; a ContextError names file, line and fact."""
         try:
-            return query_encoded(compiled, self.facts, unknown)
+            return query_encoded(data_of(compiled), self.facts, unknown)
         except ContextError as error:
             raise ContextError(*(replace(fault, place=self._place(fault.place)) for fault in error.faults)) from None
 

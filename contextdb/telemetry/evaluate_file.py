@@ -23,7 +23,7 @@ import polars as pl
 from contextdb.bitmask import Rows
 from contextdb.cells.facts import Unknown
 from contextdb.compiled.batch import query_encoded
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.console import printable
 from contextdb.errors import ContextDBError, Fault, FileError, Place
 from contextdb.telemetry.contexts import contexts_in
@@ -143,7 +143,7 @@ def _write(question: Question, facts: pl.DataFrame, counts: Rows, first: int, fi
 
 
 def _answers(question: Question, facts: pl.DataFrame, first: int, file: str) -> pl.DataFrame:
-    many = query_encoded(question.compiled, facts, question.unknown)
+    many = query_encoded(data_of(question.compiled), facts, question.unknown)
     contexts = np.arange(first, first + len(many))
     rows = pl.Series("rows", rows_of(many.mask))
     assets = pl.Series("assets", list(question.compiled.assets), dtype=pl.String).gather(rows)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from contextdb.cells.angles import wrap_angles
 from contextdb.cells.sets import covers
 from contextdb.compiled.classes import NumberMasks, TagMasks, ValueMasks, WideMasks
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import TagFactor
 from contextdb.telemetry.facts_read import FactColumn
 from contextdb.telemetry.keys import KeyWords, add_classes, add_numbers
@@ -34,7 +34,7 @@ BITS = 64
 class Fields:
     """The fields of a table's keys. P of them; the first n_codes are the codes of a context."""
 
-    compiled: CompiledTable
+    compiled: CompiledData
     tags: Mapping[str, tuple[TagFactor, ...]]
     """For each condition of tags its factors."""
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from contextdb.cells.arguments import require_many, require_path, require_text
 from contextdb.compiled.classes import TagMasks
+from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
 from contextdb.covering.factors import TagFactor
@@ -157,7 +158,7 @@ def _tell(progress: Tell | None, n_done: float, n_files: int) -> None:
         progress(n_done, n_files)
 
 
-def _tag_factors(space: Space, compiled: CompiledTable) -> dict[str, tuple[TagFactor, ...]]:
+def _tag_factors(space: Space, compiled: CompiledData) -> dict[str, tuple[TagFactor, ...]]:
     found = {}
     for at, condition in enumerate(compiled.conditions):
         if isinstance(compiled.masks[at], TagMasks):
@@ -166,7 +167,7 @@ def _tag_factors(space: Space, compiled: CompiledTable) -> dict[str, tuple[TagFa
 
 
 def _observed(
-    compiled: CompiledTable, total: Part, unread: Sequence[BadFile], gaps: tuple[SeenGap, ...], elsewhere: float
+    compiled: CompiledData, total: Part, unread: Sequence[BadFile], gaps: tuple[SeenGap, ...], elsewhere: float
 ) -> Observed:
     outside = [FactNote(n, total.outside[n], total.examples[n]) for n in compiled.asked if total.outside[n]]
     return Observed(

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import TagFactor
 from contextdb.errors import Fault, TableError
 from contextdb.telemetry.facts_read import MOST_EXAMPLES
@@ -29,7 +29,7 @@ Keys = NDArray[np.int32]
 class Plan:
     """What is asked of each file."""
 
-    compiled: CompiledTable
+    compiled: CompiledData
     count: str | None
     tags: Mapping[str, tuple[TagFactor, ...]]
     """For each condition of tags its factors; their classes are behind the codes in a key."""

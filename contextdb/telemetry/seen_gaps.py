@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags
 from contextdb.compiled.classes import TagMasks, ValueMasks
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import Factor, NumberFactor, ValueFactor
 from contextdb.covering.gaps import NearRows, gap_id, widened
 from contextdb.covering.space import Box, Space
@@ -35,7 +35,7 @@ class SeenGaps:
     elsewhere: float
 
 
-def seen_gaps(space: Space, compiled: CompiledTable, part: Part, most: int, known: Sequence[Box] = ()) -> SeenGaps:
+def seen_gaps(space: Space, compiled: CompiledData, part: Part, most: int, known: Sequence[Box] = ()) -> SeenGaps:
     """Widen the contexts without a row that lie in no known gap, those of most moments first, until `most` gaps are found.
 
     Of the known gaps those are named that the game was in.
@@ -100,7 +100,7 @@ def _ranked(
     return [boxes[i] for i in sorted(range(len(boxes)), key=key.__getitem__)]
 
 
-def _points(space: Space, compiled: CompiledTable, part: Part) -> Points:
+def _points(space: Space, compiled: CompiledData, part: Part) -> Points:
     """Each context's class in every factor."""
     stack, keys = compiled.stack, part.open_keys
     points = np.full((len(keys), len(space.factors)), -1, np.int64)

@@ -12,6 +12,7 @@ from strategies import examples
 
 import contextdb as cdb
 from contextdb.cells.grammar import parse_cell
+from contextdb.compiled.table import data_of
 from contextdb.covering import coverage
 from contextdb.covering.space import Space
 from contextdb.tables.alike import identical_rows
@@ -218,7 +219,7 @@ def test_changing_the_cells_of_the_nearest_row_closes_the_gap(seed):
 @given(SEEDS)
 def test_no_row_needs_fewer_changes_than_the_nearest_and_no_earlier_one_as_few(seed):
     table = random_table(random.Random(seed), most_rows=12)
-    space = Space.of(table.compile())
+    space = Space.of(data_of(table.compile()))
     for gap in coverage(table, samples=0).gaps:
         if not space.boxes:
             assert gap.nearest is None
@@ -240,5 +241,5 @@ def test_samples_lie_in_the_space_and_give_the_same_report_twice(seed):
 
 def test_a_space_has_the_enabled_rows_that_accept_something():
     table = random_table(random.Random(7))
-    space = Space.of(table.compile())
+    space = Space.of(data_of(table.compile()))
     assert set(space.rows) <= set(range(table.n_rows))

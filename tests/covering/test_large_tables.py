@@ -18,6 +18,7 @@ from contextdb import bitmask
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import ValueSet
 from contextdb.checks.rows import check_rows
+from contextdb.compiled.table import data_of
 from contextdb.covering import coverage, pairs
 from contextdb.covering.assumed import opened
 from contextdb.covering.factors import ValueFactor
@@ -66,7 +67,7 @@ def test_coverage_of_a_large_table_says_that_the_last_rows_are_not_compared(monk
 def test_rows_whose_bits_would_not_fit_are_cut_by_a_check_and_refused_by_coverage(monkeypatch: pytest.MonkeyPatch):
     table = table_of([("True", "Any", "False")] * 16)
     monkeypatch.setattr("contextdb.covering.space.MOST_HELD", 24)
-    assert comparable_rows(table.compile()) == 8
+    assert comparable_rows(data_of(table.compile())) == 8
     assert "undecided-rows" in {f.rule for f in check_rows(table)}
     for measure in (coverage, pairs):
         with pytest.raises(TableError, match="too large for coverage: 16 rows x 3 different cells"):
@@ -104,7 +105,7 @@ def test_the_flags_of_bits_are_those_bits(n_rows: int, data: st.DataObject):
 
 @given(st.integers(0, 2**32))
 def test_boxes_added_one_by_one_answer_as_those_given_at_once(seed: int):
-    space = Space.of(random_table(random.Random(seed)).compile())
+    space = Space.of(data_of(random_table(random.Random(seed)).compile()))
     at_once, one_by_one = BoxSet.of(space.full, space.boxes), BoxSet.of(space.full, ())
     for box in space.boxes:
         one_by_one.add(box)
@@ -116,7 +117,7 @@ def test_boxes_added_one_by_one_answer_as_those_given_at_once(seed: int):
 def test_the_nearest_row_has_fewest_cells_that_do_not_hold_the_gap(seed: int):
     rng = random.Random(seed)
     table = random_table(rng)
-    compiled = table.compile()
+    compiled = data_of(table.compile())
     space = Space.of(compiled, random_boxes(rng, table))
     near = NearRows(space, compiled, BoxSet.of(space.full, space.boxes))
     for box in find_gaps(space, (), 20, 1000).boxes:

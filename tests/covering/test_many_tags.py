@@ -13,6 +13,7 @@ import contextdb as cdb
 from contextdb.cells.domains import Domain
 from contextdb.cells.sets import TagSet, covered_by, covers
 from contextdb.checks.rows import check_rows
+from contextdb.compiled.table import data_of
 from contextdb.covering import coverage
 from contextdb.covering.count import Bounds, uncovered_share
 from contextdb.covering.factors import TagFactor, tag_factors
@@ -52,7 +53,7 @@ def test_boxes_that_share_no_factor_are_counted_apart():
     table = cdb.Table.from_columns(
         {"Asset": [f"A{r}" for r in range(n // 2)], **columns}, {f"c{i}": {"type": "bool"} for i in range(n)}
     )
-    space = Space.of(table.compile())
+    space = Space.of(data_of(table.compile()))
     assert uncovered_share(space, space.boxes, 1000).lower == pytest.approx(0.75 ** (n // 2))
 
 
@@ -62,7 +63,7 @@ def test_a_loop_that_nests_too_deep_gives_bounds(monkeypatch: pytest.MonkeyPatch
     table = cdb.Table.from_columns(
         {"Asset": [f"A{r}" for r in range(n - 1)], **columns}, {f"c{i}": {"type": "bool"} for i in range(n)}
     )
-    space = Space.of(table.compile())
+    space = Space.of(data_of(table.compile()))
     whole = uncovered_share(space, space.boxes, 10_000_000)
     monkeypatch.setattr("contextdb.covering.count.MOST_DEPTH", 12)
     cut = uncovered_share(space, space.boxes, 10_000_000)

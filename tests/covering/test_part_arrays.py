@@ -7,6 +7,7 @@ import pytest
 from numpy.random import default_rng
 
 import contextdb as cdb
+from contextdb.compiled.table import data_of
 from contextdb.covering import count_kernels, part_arrays, part_kernels, search_kernels
 from contextdb.covering.count import scratch_of, table_of
 from contextdb.covering.space import Space
@@ -25,7 +26,7 @@ def made_table() -> cdb.Table:
 @pytest.mark.parametrize("n_boxes", [1, 3, 64, 65, 200])
 @pytest.mark.parametrize("kept", [1.0, 0.3])
 def test_a_part_by_numpy_is_that_of_the_loops(n_boxes: int, kept: float):
-    space, rng = Space.of(made_table().compile()), default_rng(n_boxes)
+    space, rng = Space.of(data_of(made_table().compile())), default_rng(n_boxes)
     table = table_of(space.boxes, space.full, [len(f.weights) for f in space.factors])
     weights = np.concatenate([f.weights for f in space.factors])
     weights = weights * (rng.random(len(weights)) < kept)
@@ -40,7 +41,7 @@ def test_a_part_by_numpy_is_that_of_the_loops(n_boxes: int, kept: float):
 @pytest.mark.parametrize("n_boxes", [1, 3, 64, 65, 200])
 @pytest.mark.parametrize("n_listed", [1, 4, 12])
 def test_the_boxes_within_others_by_numpy_are_those_of_the_loops(n_boxes: int, n_listed: int):
-    space, rng = Space.of(made_table().compile()), default_rng(n_boxes)
+    space, rng = Space.of(data_of(made_table().compile())), default_rng(n_boxes)
     table = table_of(space.boxes, space.full, [len(f.weights) for f in space.factors])
     weights = np.concatenate([f.weights for f in space.factors])
     boxes = np.sort(rng.choice(len(space.boxes), min(n_boxes, len(space.boxes)), replace=False))
@@ -58,7 +59,7 @@ def test_the_boxes_within_others_by_numpy_are_those_of_the_loops(n_boxes: int, n
 
 @pytest.mark.parametrize("n_boxes", [1, 3, 64, 65, 200])
 def test_the_first_box_around_each_by_numpy_is_that_of_the_loops(n_boxes: int):
-    space, rng = Space.of(made_table().compile()), default_rng(n_boxes)
+    space, rng = Space.of(data_of(made_table().compile())), default_rng(n_boxes)
     table = table_of(space.boxes, space.full, [len(f.weights) for f in space.factors])
     weights = np.concatenate([f.weights for f in space.factors])
     boxes = np.sort(rng.choice(len(space.boxes), min(n_boxes, len(space.boxes)), replace=False))

@@ -16,6 +16,7 @@ from contextdb.cells.intervals import above, below, complement
 from contextdb.cells.plain_ends import cuts_of, plain
 from contextdb.cells.sets import NumberSet
 from contextdb.checks.effects import effects
+from contextdb.compiled.table import data_of
 from contextdb.covering import coverage
 from contextdb.covering.gaps import find_gaps
 from contextdb.covering.pairs import pairs
@@ -97,7 +98,7 @@ def test_a_written_gap_holds_the_classes_of_the_gap_and_no_other_number_that_peo
     cells: list[str], schema: dict[str, dict[str, object]], policy: str
 ):
     table = table_of(cells, schema, policy)
-    space = Space.of(table.compile())
+    space = Space.of(data_of(table.compile()))
     for box in find_gaps(space, (), 20, 1000).boxes:
         exact = space.accepted(0, space.sides_of(box))
         assert isinstance(exact, NumberSet)

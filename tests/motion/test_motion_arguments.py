@@ -37,6 +37,11 @@ MANY_STEERED = motion.ManySteered.of(STEERED)
 CONFIG = motion.MotionConfig()
 FALLS = motion.footfalls(CLIP)
 NODE = motion.MatchNode(motion.MotionDatabase.build([CLIP], SCHEMA))
+BANK = motion.PoseBank.build([CLIP], SCHEMA)
+BUILT = motion.MotionDatabase.build([CLIP], SCHEMA)
+DECISION = motion.Controller(motion.Selector([motion.Entry("only", BUILT)])).update(0.0, BUILT.raw(0))
+BY_CLIP = motion.PoseSettings(root="animation")
+POSED = [motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1)]
 Call = Callable[[object], object]
 CALLS: dict[str, Call] = {
     "load_bvh(path)": lambda x: motion.load_bvh(x),
@@ -206,6 +211,33 @@ CALLS: dict[str, Call] = {
     "MotionConfig.controller()": lambda x: CONFIG.controller(x, {}),
     "Footfalls.is_down(foot)": lambda x: FALLS.is_down(x, 0.1),
     "MotionDatabase.channel_costs()": lambda x: DATABASE.channel_costs(x, QUERY),
+    "PoseBank.build(clips)": lambda x: motion.PoseBank.build(x, SCHEMA),
+    "PoseBank.build(clips), one": lambda x: motion.PoseBank.build([x], SCHEMA),
+    "PoseBank.build(schema)": lambda x: motion.PoseBank.build([CLIP], x),
+    "PoseBank.sample(asset)": lambda x: BANK.sample(x, 0.0),
+    "PoseBank.sample(time_s)": lambda x: BANK.sample("idle", x),
+    "save_poses(bank)": lambda x: motion.save_poses(x, "/nowhere/x.poses.safetensors"),
+    "save_poses(path)": lambda x: isinstance(x, (str, Path)) or motion.save_poses(BANK, x),
+    "open_poses(path)": lambda x: motion.open_poses(x),
+    "open_or_build_poses(config)": lambda x: motion.open_or_build_poses(x, "/nowhere"),
+    "open_or_build_poses(folder)": lambda x: motion.open_or_build_poses(CONFIG, x),
+    "poses_path(folder)": lambda x: motion.poses_path(x, "a"),
+    "poses_path(name)": lambda x: motion.poses_path("/nowhere", x),
+    "PoseStream(banks)": lambda x: motion.PoseStream(x),
+    "PoseStream(settings)": lambda x: motion.PoseStream(BANK, x),
+    "PoseStream.update(decision)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(x, 0.1),
+    "PoseStream.update(dt)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(DECISION, x),
+    "PoseStream.update(body)": lambda x: x is None or motion.PoseStream(BANK).update(DECISION, 0.1, x),
+    "PoseStream.restore(state)": lambda x: motion.PoseStream(BANK).restore(x),
+    "clip_of_poses(poses)": lambda x: motion.clip_of_poses(x, BANK, 30.0),
+    "clip_of_poses(poses), one": lambda x: motion.clip_of_poses([x], BANK, 30.0),
+    "clip_of_poses(bank)": lambda x: motion.clip_of_poses(POSED, x, 30.0),
+    "clip_of_poses(rate)": lambda x: motion.clip_of_poses(POSED, BANK, x),
+    "pose_arrays(poses)": lambda x: motion.pose_arrays(x, BANK, 30.0),
+    "pose_arrays(bank)": lambda x: motion.pose_arrays(POSED, x, 30.0),
+    "pose_arrays(rate)": lambda x: motion.pose_arrays(POSED, BANK, x),
+    "write_poses(poses)": lambda x: motion.write_poses(x, BANK, "/nowhere/x.bvh", 30.0),
+    "write_poses(path)": lambda x: isinstance(x, (str, Path)) or motion.write_poses(POSED, BANK, x, 30.0),
     "MotionDatabase.raw_many(frames)": lambda x: DATABASE.raw_many(x),
     "MotionDatabase.raw_many(frames), one": lambda x: DATABASE.raw_many([x]),
     "Selector.search_many(queries)": lambda x: SELECTOR.search_many(x),

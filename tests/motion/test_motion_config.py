@@ -7,7 +7,7 @@ import copy
 import pytest
 
 from contextdb.errors import ClipError, MotionError, SchemaError
-from contextdb.motion import DatabaseSettings, MotionConfig, Reason, make_clip, query_from, steady_path, write_bvh
+from contextdb.motion import DatabaseSettings, MotionConfig, PoseSettings, Reason, make_clip, query_from, steady_path, write_bvh
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.storage.building import build
 
@@ -272,3 +272,19 @@ def test_a_controller_of_a_selector_that_is_not_there_is_told_beside_other_fault
         MotionConfig.from_dict(sections)
     assert len(error.value.faults) == 2
     assert 'Did you mean selector = "locomotion"?' in str(error.value)
+
+
+def test_the_output_of_a_controller_is_read_and_default_without_a_section():
+    sections = SECTIONS | {"output": {"player": {"root": "code", "halflife_s": 0.2}}}
+    config = MotionConfig.from_dict(sections)
+    assert config.output_of("player") == PoseSettings(root="code", halflife_s=0.2)
+    assert config.output_of("npc") == PoseSettings()
+
+
+def test_the_faults_of_outputs_are_told_beside_others():
+    sections = SECTIONS | {"output": {"player": {"root": "cod"}}, "controllers": {"player": {"selector": "locomotoin"}}}
+    with pytest.raises(SchemaError) as error:
+        MotionConfig.from_dict(sections, file="contextdb.toml")
+    assert len(error.value.faults) == 2
+    assert '[output.player] root = "cod"' in str(error.value)
+    assert 'Did you mean root = "code"?' in str(error.value)

@@ -18,6 +18,7 @@ from contextdb.cells.facts import Fact
 from contextdb.compiled.casting import Actor, CastMatches
 from contextdb.compiled.explain import Explanation
 from contextdb.compiled.matches import Matches
+from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextDBError, ContextError, Fault
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.nesting.flat import FlatTable
@@ -47,7 +48,7 @@ class Asked:
         try:
             self.compiled = compile_table(self.flat)
             given = {name: fact for name, fact in facts.items() if fact is not None and name in self.compiled.asked}
-            self.explained = self.compiled.explain(given, unknown="any", actors=actors or None)
+            self.explained = CompiledTable(self.compiled).explain(given, unknown="any", actors=actors or None)
         except ContextError as error:
             self.fault = self.fault or error.faults[0]
 

@@ -33,7 +33,7 @@ from contextdb.checks.cases import (
     read_expected,
     rename_case,
 )
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.data import CompiledData
 from contextdb.disk import CASES_SUFFIX
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, some
 from contextdb.tables.compiling import compile_table
@@ -177,7 +177,7 @@ class ContextList:
         self.conditions = wanted_by(table).given
         """The conditions whose facts are kept: those that a person may give, computed ones not among them."""
         self._verdicts: dict[int, Verdict] = {}
-        self._compiled: tuple[CompiledTable, int] | None = None
+        self._compiled: tuple[CompiledData, int] | None = None
         """The table compiled, and its rows whose cells can all be read."""
 
     # ---- where one is
@@ -243,7 +243,7 @@ class ContextList:
         return sum(verdict is not None and verdict.holds is False for verdict in map(self.verdict, range(len(self.cases))))
 
     @property
-    def compiled(self) -> tuple[CompiledTable, int]:
+    def compiled(self) -> tuple[CompiledData, int]:
         """The table compiled, with those inside it, and its rows whose cells can all be read.
 
         Raises

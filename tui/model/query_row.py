@@ -28,7 +28,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Fact
 from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
-from contextdb.compiled.data import costs_of
+from contextdb.compiled.data import CompiledData, costs_of
 from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome
 from contextdb.compiled.table import CompiledTable
@@ -72,7 +72,7 @@ class QueryRow:
         self._inner: dict[str, QueryRow] = {}
         self._rules: tuple[WhenColumn | None, WhenRules | None] | None = None
         self._rules_left: tuple[int, int] | None = None
-        self._ranked: tuple[TableSettings, tuple[object, ...], CompiledTable] | None = None
+        self._ranked: tuple[TableSettings, tuple[object, ...], CompiledData] | None = None
         self._assets: TextColumn | None = None
         self.is_nested = False
         """Whether some row refers to another table."""
@@ -315,7 +315,7 @@ class QueryRow:
                 self._outcome = Outcome(compiled, compiled.matches(self.bits).with_penalties(self._costs))
         return self._outcome
 
-    def _ranks(self) -> CompiledTable:
+    def _ranks(self) -> CompiledData:
         """The policy, priorities and weights of the rows, and how specific they are, without their cells: those are answered for
         here. Columns that are the same as before are not read again."""
         table, settings = self._table, replace(self._table.settings, when=None, enabled=None, assume=())
@@ -445,7 +445,7 @@ class QueryRow:
         return [row for row in found if all(bits >> row.row & 1 for bits in self._readable.values())][:most]
 
     def _explained(self) -> Explanation:
-        compiled = compile_table(self._table)
+        compiled = CompiledTable(compile_table(self._table))
         return compiled.explain({name: fact for name, fact in self.given.items() if name in compiled.asked}, unknown="any")
 
     def _read(self, fresh: Container[str] = ()) -> None:

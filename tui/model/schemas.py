@@ -74,7 +74,7 @@ def _three_way(was: Mapping[str, Any], mine: Mapping[str, Any], yours: Mapping[s
 
 def _rest(schema: Schema) -> dict[str, Any]:
     """What edits do not change."""
-    names = ("name", "tables", "features", "databases", "controllers", "file")
+    names = ("name", "tables", "features", "databases", "controllers", "output", "file")
     return {name: getattr(schema, name) for name in names}
 
 

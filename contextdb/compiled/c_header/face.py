@@ -22,6 +22,7 @@ from contextdb.compiled.c_header.outputs import output_enums, output_functions, 
 from contextdb.compiled.c_header.spelling import comment, literal
 from contextdb.compiled.c_header.watching import WATCH
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.table import CompiledTable, data_of
 
 READER = 3
 """Raised when what is in `reader/` changes: headers with different readers do not go into one file."""
@@ -80,7 +81,7 @@ def plain_of(kind: Kind) -> Plain:
     return _TRUTH if kind.is_truth else _TEXT
 
 
-def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H") -> str:
+def c_header_of(tables: Mapping[str, CompiledTable], guard: str = "CDB_TABLES_H") -> str:
     """The text of the header, ASCII with line feeds; the same tables give the same text.
 
     Raises
@@ -88,10 +89,11 @@ def c_header_of(tables: Mapping[str, CompiledData], guard: str = "CDB_TABLES_H")
     ContextDBError
         A name cannot be a text of C.
     """
-    names = Names.of(tables, guard, reader_names())
+    inside = {name: data_of(table) for name, table in tables.items()}
+    names = Names.of(inside, guard, reader_names())
     written: set[Condition] = set()
     parts = []
-    for name, table in tables.items():
+    for name, table in inside.items():
         for condition in conditions_of(table):
             if condition in names.choices and condition not in written:
                 written.add(condition)

@@ -14,6 +14,7 @@ from contextdb.compiled.c_header.face import given_conditions, plain_of, reader_
 from contextdb.compiled.c_header.naming import Choices, Names, TableFace
 from contextdb.compiled.c_header.spelling import Wanted, comment, distinct, literal
 from contextdb.compiled.data import CompiledData
+from contextdb.compiled.table import CompiledTable, data_of
 
 _HEAD = """/* Written by `contextdb compile --c-link`: do not edit. It goes with {header}, which was written with it. */
 
@@ -41,10 +42,11 @@ _FOOT = """
 """
 
 
-def c_link_of(tables: Mapping[str, CompiledData], header: str, guard: str = "CDB_LINK_H") -> str:
+def c_link_of(tables: Mapping[str, CompiledTable], header: str, guard: str = "CDB_LINK_H") -> str:
     """The text of the file, ASCII with line feeds. `header` is how it includes the header of the same tables."""
-    names = Names.of(tables, f"CDB_{PurePosixPath(header).stem}_H", reader_names())  # as in the header
-    faces = [(table, names.tables[name]) for name, table in tables.items()]
+    inside = {name: data_of(table) for name, table in tables.items()}
+    names = Names.of(inside, f"CDB_{PurePosixPath(header).stem}_H", reader_names())  # as in the header
+    faces = [(table, names.tables[name]) for name, table in inside.items()]
     [guard] = distinct([Wanted(guard.removeprefix("CDB_"), "CDB_", is_upper=True)])
     reader = files("contextdb.compiled.c_header").joinpath("reader", "link.h").read_text(encoding="ascii")
     head = _HEAD.format(header=comment(header)[3:-3], guard=guard, include=literal(header), reader=reader)

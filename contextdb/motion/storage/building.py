@@ -116,7 +116,7 @@ def build_all(
     build goes on without. Of the databases of one schema, which share a normalisation, those that are not among `names` take part.
     Raises what `build` raises.
     """
-    root = _checked(config, folder, assets, names)
+    root = checked(config, folder, assets, names)
     kept = None if cache is None else FeatureCache(root / require_path(cache, "cache"))
     faults, built = Faults(tolerates), {}
     inputs = Inputs.of(config, root, assets or {}, names, faults)
@@ -163,7 +163,7 @@ def open_or_build(
     MotionError, FileError
         As `build`. A saved database that cannot be used is built anew.
     """
-    root = _checked(config, folder, assets, names)
+    root = checked(config, folder, assets, names)
     opened = _opened(config, root, root / (require_path(saved, "saved") if saved else ""), assets or {}, names)
     missing = [name for name, database in opened.items() if database is None]
     built = build_all(config, root, assets, progress, names=missing, cache=cache, tolerates=tolerates) if missing else {}
@@ -189,7 +189,7 @@ def saved_path(folder: Path, name: str) -> Path:
     return require_path(folder, "folder") / file_name(require_text(name, "name"), SAVED_SUFFIX)
 
 
-def _checked(config: object, folder: object, assets: object, names: object) -> Path:
+def checked(config: object, folder: object, assets: object, names: object) -> Path:
     """The folder, after a look at what was given with it."""
     require_kind(config, MotionConfig, "config", "a MotionConfig")
     if assets is not None:

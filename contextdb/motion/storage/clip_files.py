@@ -155,6 +155,11 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     return Extracted(file, computed, measures, keys, is_computed=True, unevenness=_unevenness(file, skeleton))
 
 
+def read_clip(file: ClipFile) -> clips.Clip:
+    """The clip itself; raises ClipError and FileError."""
+    return _parsed(file, read_bytes(file.path))
+
+
 def _skeleton(file: ClipFile, content: bytes) -> Skeleton:
     """The skeleton of a clip whose features are known, so that it could be read."""
     return bvh.read_skeleton(clips.text_of(content, str(file.path)))

@@ -4,6 +4,7 @@
     [databases.NAME]    which clips, by which features; `table` names the table whose assets it holds
     [selectors.NAME]    databases in order: all but the last with the threshold under which they win outright
     [controllers.NAME]  a selector, and how often and how a character may jump with it
+    [output.NAME]       how what the controller of that name decides becomes poses
 
 Reading touches no file; only `load_clips` and what builds do.
 """
@@ -21,6 +22,7 @@ from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips import clip as clips
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
+from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.reading import Mapped, Section
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.controller import Clock, Controller
@@ -33,7 +35,7 @@ from contextdb.motion.storage.database_settings import DatabaseSettings, read_da
 
 __all__ = ["DatabaseSettings", "MotionConfig", "SelectorSettings"]
 
-SECTIONS = ("features", "databases", "selectors", "controllers")
+SECTIONS = ("features", "databases", "selectors", "controllers", "output")
 STEP_KEYS = ("database", "threshold")
 MOST_COST = 1e30
 
@@ -50,7 +52,7 @@ class SelectorSettings:
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """The sections `features`, `databases`, `selectors` and `controllers` of a contextdb.toml.
+    """The sections `features`, `databases`, `selectors`, `controllers` and `output` of a contextdb.toml.
 
     A controller is the name of its selector and its settings.
     """
@@ -59,17 +61,18 @@ class MotionConfig:
     databases: Mapping[str, DatabaseSettings] = field(default_factory=dict)
     selectors: Mapping[str, SelectorSettings] = field(default_factory=dict)
     controllers: Mapping[str, tuple[str, ControllerSettings]] = field(default_factory=dict)
+    output: Mapping[str, PoseSettings] = field(default_factory=dict)
     file: str | None = None
 
     @classmethod
     def from_dict(cls, mapping: Mapped, *, tables: Collection[str] | None = None, file: str | None = None) -> MotionConfig:
-        """Read the four sections; other keys of `mapping` are passed over.
+        """Read the five sections; other keys of `mapping` are passed over.
 
         Parameters
         ----------
         mapping : mapping
-            `{"features": {...}, "databases": {...}, "selectors": {...}, "controllers": {...}}`, as contextdb.toml holds them; each
-            may be absent. `Schema.motion` is one.
+            `{"features": {...}, "databases": {...}, "selectors": {...}, "controllers": {...}, "output": {...}}`, as contextdb.toml
+            holds them; each may be absent. `Schema.motion` is one.
         tables : collection of str, optional
             The names of the tables there are. Default: any name is accepted.
         file : str, optional
@@ -91,9 +94,10 @@ class MotionConfig:
         selectors = dict(_read_selectors(parts, faults, file))
         known = read_controllers(parts["controllers"], parts["selectors"], faults, file)
         controllers = {name: (selector, settings) for name, selector, settings in known}
+        output = dict(_read_output(parts["output"], faults, file))
         if faults:
             raise SchemaError(*faults)
-        return cls(schemas, databases, selectors, controllers, file)
+        return cls(schemas, databases, selectors, controllers, output, file)
 
     def database(self, name: str) -> DatabaseSettings:
         """The settings of the database of a name; an unknown name raises SchemaError with the nearest."""
@@ -142,6 +146,10 @@ class MotionConfig:
         """The selector of the controller of a name."""
         return _known("controllers", controller, self.controllers, self.file)[0]
 
+    def output_of(self, controller: str) -> PoseSettings:
+        """The settings of `[output.NAME]` for the controller of a name; the default ones where there is no such section."""
+        return self.output.get(controller, PoseSettings())
+
     def controller(self, name: str, databases: Mapping[str, MotionDatabase], **options: Unpack[ControllerOptions]) -> Controller:
         """The controller of a name over built databases; `recorder`, `rng` and `clock` are those of `Controller`."""
         selector, settings = _known("controllers", name, self.controllers, self.file)
@@ -182,6 +190,14 @@ def _read_schemas(parts: Mapping[str, Mapped], faults: list[Fault], file: str | 
     for name, part in parts.items():
         try:
             yield name, FeatureSchema.from_dict(name, part, file=file)
+        except SchemaError as error:
+            faults.extend(error.faults)
+
+
+def _read_output(parts: Mapping[str, Mapped], faults: list[Fault], file: str | None) -> Iterator[tuple[str, PoseSettings]]:
+    for name, part in parts.items():
+        try:
+            yield name, PoseSettings.from_dict(part, name=name, file=file)
         except SchemaError as error:
             faults.extend(error.faults)
 

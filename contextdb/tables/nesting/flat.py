@@ -93,7 +93,7 @@ class FlatTable(TableData):
 
     def compile(self) -> CompiledTable:
         """Compile into masks, as `Table.compile`."""
-        return compile_table(self)
+        return CompiledTable(compile_table(self))
 
 
 def _way_table(name: str, table: TableData) -> WayTable:

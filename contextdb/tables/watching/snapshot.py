@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from contextdb.cells.notebook import one_line
-from contextdb.compiled.table import CompiledTable
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, plural
@@ -130,7 +130,7 @@ def _compiled(table: Table, older: CompiledTable | None) -> CompiledTable:
     older version."""
     compiled = table.compile()
     if older is not None:
-        compiled.remember_as(older)
+        data_of(compiled).remember_as(data_of(older))
     compiled.query({}, unknown="any")
     return compiled
 

@@ -12,9 +12,11 @@ from __future__ import annotations
 
 import hmac
 import json
+import logging
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import IO, Protocol
 
@@ -163,7 +165,7 @@ def _names(given: object) -> frozenset[str] | None:
 
 
 class FileListener:
-    """A file that takes every line."""
+    """A file that takes every line, until the disk refuses one: that is logged, and the game goes on without the file."""
 
     wants_every = True
     has_room = True
@@ -171,6 +173,7 @@ class FileListener:
     def __init__(self, path: Path, file: IO[bytes]) -> None:
         self.path, self._file = path, file
         self._n_lost = 0
+        self._is_refused = False
 
     def wants(self, moment: Moment) -> bool:
         """Every moment."""
@@ -181,7 +184,7 @@ class FileListener:
         if self._n_lost:
             line = dumped({"line": LOST, "count": self._n_lost}) + line
             self._n_lost = 0
-        self._file.write(line)
+        self._try(partial(self._file.write, line))
 
     def lose(self, n_lines: int) -> None:
         """Learn that lines are lost."""
@@ -189,10 +192,21 @@ class FileListener:
 
     def send(self) -> None:
         """Hand what was written to the system."""
-        self._file.flush()
+        self._try(self._file.flush)
 
     def close(self) -> None:
         """End the file."""
         if self._n_lost:
             self.offer(b"")
-        self._file.close()
+        self._try(self._file.flush)
+        with suppress(OSError):
+            self._file.close()
+
+    def _try(self, write: Callable[[], object]) -> None:
+        if self._is_refused:
+            return
+        try:
+            write()
+        except OSError as error:
+            self._is_refused = True
+            logging.getLogger("contextdb").error("%s: the recording ends here: %s", self.path, error.strerror)

@@ -19,6 +19,7 @@ from contextdb.compiled.data import CompiledData
 from contextdb.compiled.heard import hear, hear_live, made_ready, unhear, unhear_live
 from contextdb.compiled.live import LiveContext
 from contextdb.compiled.matches import Matches
+from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, Fault, in_quotes
 from contextdb.telemetry.link.ring import UNNAMED, Picked, Ring, Source, WithActors
 
@@ -217,15 +218,15 @@ class ControllerTap:
 class _Folder:
     """A mapping of tables that may hold others later."""
 
-    def __init__(self, tables: Mapping[str, CompiledData], who: Who) -> None:
+    def __init__(self, tables: Mapping[str, CompiledTable], who: Who) -> None:
         self.who = who
         self._tables = tables
-        self._seen: Mapping[str, CompiledData] | None = None
+        self._seen: Mapping[str, CompiledTable] | None = None
 
-    def new_tables(self) -> list[CompiledData]:
+    def new_tables(self) -> list[CompiledTable]:
         """The tables that were not there when this was last asked."""
         snapshot = getattr(self._tables, "snapshot", None)
-        now: Mapping[str, CompiledData] = self._tables if snapshot is None else snapshot()
+        now: Mapping[str, CompiledTable] = self._tables if snapshot is None else snapshot()
         if now is self._seen and snapshot is not None:
             return []
         known = () if self._seen is None else list(self._seen.values())
@@ -261,12 +262,12 @@ class Taps:
         ContextError
             It is none of these, or another link watches it.
         """
-        if isinstance(what, CompiledData):
-            self._watch_table(what, who, True)
+        if isinstance(what, CompiledTable):
+            self._watch_table(data_of(what), who, True)
         elif isinstance(what, LiveContext):
             table = self._watch_table(what._compiled, None, False)
             self._put(what, who, lambda: LiveTap(what, table, self.ring, who))
-        elif isinstance(what, Mapping) and all(isinstance(table, CompiledData) for table in what.values()):
+        elif isinstance(what, Mapping) and all(isinstance(table, CompiledTable) for table in what.values()):
             self._folders.append(_Folder(what, who))
             self.follow()
         elif hasattr(what, "recorder") and callable(getattr(what, "update", None)):
@@ -281,7 +282,7 @@ class Taps:
         """Watch the tables that folders have now."""
         for folder in self._folders:
             for table in folder.new_tables():
-                self._watch_table(table, folder.who, True)
+                self._watch_table(data_of(table), folder.who, True)
 
     def sources(self) -> dict[str, Source]:
         """The tables that are watched, the newest of a name."""

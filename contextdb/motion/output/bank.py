@@ -1,0 +1,361 @@
+"""The poses of clips, to be played: each frame against the place and heading of the body in it.
+
+A frame of a clip is where its root is on the ground and which way it faces, as in a motion database, and each joint against its
+parent; the first joint is against the root. So a pose can be put wherever a character is. A skeleton whose hips hang below other
+joints, which stay behind at the origin, has these joints at the root.
+
+Frames are at the schema's rate, one range for each clip and one for each that is mirrored too, as in a database of the same clips
+and schema. Lengths in metres, y up, angles in radians. N frames, R ranges, J joints, M of them with positions of their own: the
+first, and those that do not keep their offset in every clip. All others lie at the rig's offsets, mirrored ranges too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.arguments import require_kind, require_many, require_real, require_text
+from contextdb.console import announce
+from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural, some
+from contextdb.motion.clips import mirror as mirrors
+from contextdb.motion.clips import quaternions
+from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.feet import feet_of, footfalls_of
+from contextdb.motion.clips.poses import Poses, forward_kinematics, local_poses, resampled
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints, Skeleton
+from contextdb.motion.clips.trajectory import root_trajectory
+from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.markup.markup import Markup
+
+Flags = NDArray[np.bool_]
+Singles = NDArray[np.float32]
+Place3 = tuple[float, float, float]
+"""x and z in metres and a heading in radians, or their change a second."""
+
+SAME_M = 1e-6
+"""A joint that is never farther from its offset keeps it."""
+FARTHEST_M = 1e6
+
+
+@cache
+def loops() -> ModuleType:
+    """The loops over joints, with a word where they are compiled for the first time on this machine."""
+    from contextdb.motion.output import kernels
+
+    if kernels.IS_COMPILED:
+        announce(kernels.sample)
+    return kernels
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sample:
+    """A moment of a clip: rotations [J, 4] and positions [M, 3], and how fast they change: spins [J, 3], velocities [M, 3].
+
+    `root_velocity` is in the body's own frame: to its left, ahead, and its turning.
+    """
+
+    rotations: Floats
+    positions: Floats
+    spins: Floats
+    velocities: Floats
+    root_velocity: Place3
+
+
+@dataclass(frozen=True, eq=False)
+class PoseBank:
+    """Poses of clips. Made by `build`, or opened by `open_poses`.
+
+    Attributes
+    ----------
+    skeleton : Skeleton
+        The rig: that of the first clip, its offsets in metres.
+    rate : float
+        Frames a second.
+    starts, stops : int64 array, shape (R,)
+    assets : tuple of str, length R
+    mirrored, looping : bool array, shape (R,)
+    moving : int64 array, shape (M,)
+        The joints with positions of their own.
+    rotations : float32 array, shape (N, J, 4)
+    positions : float32 array, shape (N, M, 3)
+    root : float32 array, shape (N, 3)
+        x, z and heading, unwrapped.
+    feet : tuple of str
+        Left and right; empty where no bones are named like feet.
+    contacts : bool array, shape (N, len(feet))
+        Whether each foot is down in the clip.
+    """
+
+    skeleton: Skeleton
+    rate: float
+    starts: Ints
+    stops: Ints
+    assets: tuple[str, ...]
+    mirrored: Flags
+    looping: Flags
+    moving: Ints
+    rotations: Singles
+    positions: Singles
+    root: Singles
+    feet: tuple[str, ...]
+    contacts: Flags
+
+    @classmethod
+    def build(
+        cls,
+        clips: Iterable[Clip],
+        schema: FeatureSchema,
+        *,
+        mirror: bool | Collection[str] = False,
+        markup: Markup | None = None,
+    ) -> PoseBank:
+        """The poses of some clips, at the schema's rate.
+
+        Parameters
+        ----------
+        clips : iterable of Clip
+            All of one rig: the same bones below the same parents.
+        schema : FeatureSchema
+            Says the rate, the root and the facing, and the pairs to mirror by; that of the database with which the bank is used.
+        mirror : bool or collection of str
+            Whether all clips, or those of these names, are there a second time with left and right exchanged.
+        markup : Markup, optional
+            Says which clips loop.
+
+        Raises
+        ------
+        MotionError
+            No clip, one without frames, of another rig or with numbers too large for a body, or two of one name; or they cannot be
+            mirrored. All faults together.
+        ContextError
+            An argument of another type.
+        """
+        require_kind(schema, FeatureSchema, "schema", "a FeatureSchema")
+        require_kind(markup, (Markup, type(None)), "markup", "a Markup, or None")
+        for name in () if isinstance(mirror, bool) else require_many(mirror, "mirror", "True, False, or the names of clips"):
+            require_text(name, "one of mirror")
+        parts: list[_Part] = []
+        faults: list[Fault] = []
+        seen: set[str] = set()
+        rig: Skeleton | None = None
+        for clip in require_many(clips, "clips", "a list of Clip"):
+            require_kind(clip, Clip, "one of clips", "a Clip")
+            rig = clip.skeleton if rig is None else rig
+            wrong = list(_faults(clip, rig, seen))
+            seen.add(clip.name)
+            if wrong:
+                faults += [fault.at(Place(clip.name)) for fault in wrong]
+                continue
+            both = mirror if isinstance(mirror, bool) else clip.name in mirror
+            try:
+                loops = markup is not None and markup.is_looping(clip.name)
+                parts += [_Part.of(clip, schema, side, loops) for side in ((False, True) if both else (False,))]
+            except MotionError as error:
+                faults += [fault.at(Place(clip.name)) for fault in error.faults]
+        if not parts and not faults:
+            faults.append(Fault("there is no clip to take poses of.", "at least one clip"))
+        if faults:
+            raise MotionError(*faults)
+        return _joined(parts, schema.rate)
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames all ranges have."""
+        return len(self.root)
+
+    @property
+    def n_joints(self) -> int:
+        """How many joints a pose has."""
+        return self.skeleton.n_joints
+
+    def range_of(self, asset: str, mirrored: bool = False) -> int:
+        """The range of an asset. Raises MotionError when there is none, with the nearest name."""
+        found = self._ranges.get((asset, bool(mirrored)))
+        if found is None:
+            raise MotionError(self._unknown(asset))
+        return found
+
+    def last_s(self, range_number: int) -> float:
+        """Seconds from the first frame of a range to its last."""
+        return float(self.stops[range_number] - self.starts[range_number] - 1) / self.rate
+
+    def sample(self, asset: str, time_s: float, mirrored: bool = False) -> Sample:
+        """A moment of an asset, between frames too: before its beginning its first pose, behind its end its last; a loop goes on.
+
+        Raises
+        ------
+        MotionError
+            There is no such asset, or not mirrored.
+        ContextError
+            `time_s` is no finite number.
+        """
+        require_text(asset, "asset")
+        return self.sample_of(self.range_of(asset, mirrored), require_real(time_s, "time_s"))
+
+    def sample_of(self, range_number: int, time_s: float) -> Sample:
+        """As `sample`, of a range's number, without a look at the arguments."""
+        kernels = loops()
+        low, high, share = self._between(range_number, time_s)
+        rotations, positions = np.empty((self.n_joints, 4)), np.empty((len(self.moving), 3))
+        spins, velocities = np.empty((self.n_joints, 3)), np.empty((len(self.moving), 3))
+        kernels.sample(self.rotations, self.positions, low, high, share, rotations, positions)
+        kernels.slopes(self.rotations, self.positions, low, high, self.rate, spins, velocities)
+        return Sample(rotations, positions, spins, velocities, self._root_velocity(low, high, share))
+
+    def root_at(self, range_number: int, time_s: float) -> Place3:
+        """Where the clip itself has the body at a moment of a range."""
+        low, high, share = self._between(range_number, time_s)
+        (x, z, heading), (to_x, to_z, to_heading) = self.root[low].tolist(), self.root[high].tolist()
+        return x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)
+
+    def contacts_at(self, range_number: int, time_s: float) -> Flags:
+        """Which feet are down at a moment of a range: in the nearest frame."""
+        low, high, share = self._between(range_number, time_s)
+        return np.asarray(self.contacts[high if share >= 0.5 else low])
+
+    def translations(self, positions: Floats) -> Floats:
+        """Each joint against its parent [J, 3], of the positions [M, 3] of those that have some of their own."""
+        found = self.skeleton.offsets.copy()
+        found[self.moving] = positions
+        return found
+
+    @cached_property
+    def _ranges(self) -> dict[tuple[str, bool], int]:
+        return {(asset, bool(side)): i for i, (asset, side) in enumerate(zip(self.assets, self.mirrored.tolist(), strict=True))}
+
+    def _between(self, range_number: int, time_s: float) -> tuple[int, int, float]:
+        """The two frames about a moment, and the share of the second."""
+        start, n_steps = int(self.starts[range_number]), int(self.stops[range_number] - self.starts[range_number]) - 1
+        frame = time_s * self.rate
+        if self.looping[range_number] and n_steps > 0 and not 0.0 <= frame <= n_steps:
+            frame %= n_steps
+        frame = min(max(frame, 0.0), float(n_steps))
+        low = min(int(frame), max(n_steps - 1, 0))
+        return start + low, start + min(low + 1, n_steps), frame - low
+
+    def _root_velocity(self, low: int, high: int, share: float) -> Place3:
+        x, z, heading = self.root[low].tolist()
+        to_x, to_z, to_heading = self.root[high].tolist()
+        x, z, turn = (to_x - x) * self.rate, (to_z - z) * self.rate, to_heading - heading
+        sin, cos = math.sin(heading + share * turn), math.cos(heading + share * turn)
+        return cos * x - sin * z, sin * x + cos * z, turn * self.rate
+
+    def _unknown(self, asset: str) -> Fault:
+        names = list(dict.fromkeys(self.assets))
+        if asset in names:
+            return Fault(f"{in_quotes(asset)} has no mirrored poses.", "a bank built with mirror = true, as its database is")
+        near = nearest(asset, names)
+        return Fault(f"there are no poses of {in_quotes(asset)}.", some(names), in_quotes(near) if near else "")
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One clip, as recorded or mirrored: positions of all joints [F, J, 3]."""
+
+    asset: str
+    is_mirrored: bool
+    is_looping: bool
+    rig: Skeleton
+    rotations: Floats
+    positions: Floats
+    root: Floats
+    feet: tuple[str, ...]
+    contacts: Flags
+
+    @classmethod
+    def of(cls, clip: Clip, schema: FeatureSchema, is_mirrored: bool, is_looping: bool) -> _Part:
+        with np.errstate(all="ignore"):  # numbers too large become infinite or NaN, and are refused below
+            local = resampled(local_poses(clip), schema.rate)
+            if is_mirrored:
+                if not schema.mirror:
+                    raise MotionError(mirrors.undeclared(clip.skeleton, schema.name))
+                local = mirrors.mirrored(local, schema.mirror)
+            poses = forward_kinematics(local)
+        if not np.isfinite(poses.positions).all() or np.abs(poses.positions).max() > FARTHEST_M:
+            raise MotionError(Fault("its numbers are too large to be a body.", f"joints within {FARTHEST_M:g} m of the origin"))
+        path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
+        root = np.column_stack((path.positions, path.headings)).astype(np.float32).astype(np.float64)
+        rotations, positions = local.rotations, local.positions.copy()
+        above = poses.skeleton.ancestors(poses.skeleton.hips)
+        rotations[:, above], positions[:, above] = [1.0, 0.0, 0.0, 0.0], 0.0
+        tops = _tops(poses.skeleton)
+        back = quaternions.about_axis("y", -root[:, 2])[:, None]
+        ground = np.stack((root[:, 0], np.zeros(len(root)), root[:, 1]), axis=-1)[:, None]
+        positions[:, tops] = quaternions.rotate(back, poses.positions[:, tops] - ground)
+        rotations[:, tops] = quaternions.multiply(back, poses.rotations[:, tops])
+        feet, contacts = _contacts(poses)
+        return cls(clip.name, is_mirrored, is_looping, _rig(clip), rotations, positions, root, feet, contacts)
+
+
+def _tops(skeleton: Skeleton) -> list[int]:
+    """The joints that hang on the root: the first, or those below the joints above the hips."""
+    above = {-1, *skeleton.ancestors(skeleton.hips)}
+    return [joint for joint, parent in enumerate(skeleton.parents.tolist()) if parent in above and joint not in above]
+
+
+def _rig(clip: Clip) -> Skeleton:
+    """The clip's skeleton in metres, the joints above its hips at the root."""
+    offsets = clip.skeleton.offsets * clip.metres_per_unit
+    offsets[[0, *clip.skeleton.ancestors(clip.skeleton.hips)]] = 0.0
+    ends = tuple(
+        (joint, (x * clip.metres_per_unit, y * clip.metres_per_unit, z * clip.metres_per_unit))
+        for joint, (x, y, z) in clip.skeleton.end_sites
+    )
+    return replace(clip.skeleton, offsets=offsets, end_sites=ends)
+
+
+def _contacts(poses: Poses) -> tuple[tuple[str, ...], Flags]:
+    """The feet, and in which frames each is down."""
+    try:
+        feet = feet_of(poses.skeleton)
+    except MotionError:
+        return (), np.zeros((poses.n_frames, 0), np.bool_)
+    falls = footfalls_of(poses, feet)
+    frames = np.arange(poses.n_frames) / poses.rate
+    down = [[(a - 1e-9 <= frames) & (frames <= b + 1e-9) for a, b in falls.down[foot].tolist()] for foot in feet]
+    none = np.zeros(poses.n_frames, np.bool_)
+    return feet, np.column_stack([np.logical_or.reduce([none, *each]) for each in down])
+
+
+def _faults(clip: Clip, rig: Skeleton, seen: set[str]) -> Iterator[Fault]:
+    """What keeps a clip out of a bank."""
+    if clip.name in seen:
+        yield Fault(f"two clips are named {in_quotes(clip.name)}.", "a different name for each asset", rule="duplicate")
+    if clip.n_frames == 0:
+        yield Fault("the clip has no frame.", "a clip with at least one frame")
+    names = clip.skeleton.names
+    if names != rig.names:
+        other = [name for name in names if name not in rig] or [name for name in rig.names if name not in clip.skeleton]
+        differ = f"its bones are not those of the first clip: {some(other)}" if other else "its bones come in another order"
+        yield Fault(f"{differ}.", f"the same {plural(rig.n_joints, 'bone')} in every clip of a bank")
+    elif not np.array_equal(clip.skeleton.parents, rig.parents):
+        yield Fault("its bones hang on other parents than those of the first clip.", "one rig for every clip of a bank")
+
+
+def _joined(parts: list[_Part], rate: float) -> PoseBank:
+    rig = parts[0].rig
+    away = [np.abs(part.positions - rig.offsets).max(axis=(0, 2)) for part in parts if not part.is_mirrored]
+    moving = sorted({*_tops(rig), *np.flatnonzero(np.max(away, axis=0) > SAME_M).tolist()})
+    stops = np.cumsum([len(part.root) for part in parts])
+    return PoseBank(
+        rig,
+        rate,
+        stops - [len(part.root) for part in parts],
+        stops,
+        tuple(part.asset for part in parts),
+        np.array([part.is_mirrored for part in parts], np.bool_),
+        np.array([part.is_looping for part in parts], np.bool_),
+        np.array(moving, np.int64),
+        np.concatenate([part.rotations for part in parts]).astype(np.float32),
+        np.concatenate([part.positions[:, moving] for part in parts]).astype(np.float32),
+        np.concatenate([part.root for part in parts]).astype(np.float32),
+        parts[0].feet,
+        np.concatenate([part.contacts for part in parts]),
+    )

@@ -1,0 +1,321 @@
+"""Loops over the joints of one pose: sampling, blending and placing. Arrays only.
+
+J joints, M of them with positions of their own. Rotations are unit quaternions (w, x, y, z), turns rotation vectors: an axis times
+an angle in radians. What a loop writes to is its last arguments. Compiled by numba where it is installed, else run as they are: a
+pose is too small for numpy, whose every call costs as much as a whole loop here.
+
+Sources: D. Holden, "Spring-It-On", 2021, and "Dead Blending", 2023; orangeduck/Motion-Matching, `spring.h` (the decay);
+J. Solà and others, "A micro Lie theory for state estimation in robotics", 2018 (the Jacobian of a rotation vector).
+"""
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return"
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+try:
+    import numba
+except ImportError:  # pragma: no cover - the same loops, slower
+    numba = None  # type: ignore[assignment]
+
+
+def compiled(loop: Any) -> Any:
+    """The loop compiled by numba; as it is without numba, or where numba has no place to keep what it compiles."""
+    if numba is None:  # pragma: no cover - the same loops, slower
+        return loop
+    try:
+        return numba.njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")(loop)
+    except RuntimeError:  # pragma: no cover - a folder that nobody may write to
+        return loop
+
+
+# ---- one rotation
+
+
+@compiled
+def _product(a, b):
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
+        a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
+    )
+
+
+@compiled
+def _inverse(a):
+    return (a[0], -a[1], -a[2], -a[3])
+
+
+@compiled
+def _cross(a, b):
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@compiled
+def _turned(q, v):
+    """The vector turned by the rotation."""
+    axis = (q[1], q[2], q[3])
+    t = _cross(axis, v)
+    t = (2.0 * t[0], 2.0 * t[1], 2.0 * t[2])
+    u = _cross(axis, t)
+    return (v[0] + q[0] * t[0] + u[0], v[1] + q[0] * t[1] + u[1], v[2] + q[0] * t[2] + u[2])
+
+
+@compiled
+def _rotation(turn):
+    """The rotation of a rotation vector."""
+    angle = math.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
+    share = math.sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
+    return (math.cos(0.5 * angle), share * turn[0], share * turn[1], share * turn[2])
+
+
+@compiled
+def _turn(q):
+    """The rotation vector of a rotation, the shorter way round: at most π long."""
+    sign = -1.0 if q[0] < 0.0 else 1.0
+    sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    share = sign * (2.0 * math.atan2(sine, abs(q[0])) / sine if sine > 1e-12 else 2.0)
+    return (share * q[1], share * q[2], share * q[3])
+
+
+@compiled
+def _spin_of(turn, speed):
+    """How fast exp(turn) spins, in the outer frame, while its rotation vector changes at `speed`."""
+    a = math.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
+    if a < 1e-4:
+        first, second = 0.5, 1.0 / 6.0
+    else:
+        first, second = (1.0 - math.cos(a)) / (a * a), (a - math.sin(a)) / (a * a * a)
+    one = _cross(turn, speed)
+    two = _cross(turn, one)
+    return (
+        speed[0] + first * one[0] + second * two[0],
+        speed[1] + first * one[1] + second * two[1],
+        speed[2] + first * one[2] + second * two[2],
+    )
+
+
+@compiled
+def _speed_of(turn, spin):
+    """The inverse of `_spin_of`: how fast the rotation vector changes while exp(turn) spins; angles up to π."""
+    a = math.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
+    second = 1.0 / 12.0 if a < 1e-3 else (1.0 - 0.5 * a / math.tan(0.5 * a)) / (a * a)
+    one = _cross(turn, spin)
+    two = _cross(turn, one)
+    return (
+        spin[0] - 0.5 * one[0] + second * two[0],
+        spin[1] - 0.5 * one[1] + second * two[1],
+        spin[2] - 0.5 * one[2] + second * two[2],
+    )
+
+
+# ---- one pose of a clip
+
+
+@compiled
+def sample(rotations, positions, low, high, share, to_rotations, to_positions):
+    """The pose between two frames: rotations on the shorter way, positions on the straight line."""
+    for j in range(rotations.shape[1]):
+        dot = 0.0
+        for i in range(4):
+            dot += rotations[low, j, i] * rotations[high, j, i]
+        other = -share if dot < 0.0 else share
+        size = 0.0
+        for i in range(4):
+            to_rotations[j, i] = (1.0 - share) * rotations[low, j, i] + other * rotations[high, j, i]
+            size += to_rotations[j, i] * to_rotations[j, i]
+        size = math.sqrt(size)
+        for i in range(4):
+            to_rotations[j, i] /= size
+    for j in range(positions.shape[1]):
+        for i in range(3):
+            to_positions[j, i] = (1.0 - share) * positions[low, j, i] + share * positions[high, j, i]
+
+
+@compiled
+def slopes(rotations, positions, low, high, rate, to_spins, to_velocities):
+    """How fast the joints turn (in their parents' frames) and move from one frame to the next."""
+    for j in range(rotations.shape[1]):
+        a = (rotations[low, j, 0], rotations[low, j, 1], rotations[low, j, 2], rotations[low, j, 3])
+        b = (rotations[high, j, 0], rotations[high, j, 1], rotations[high, j, 2], rotations[high, j, 3])
+        turn = _turn(_product(b, _inverse(a)))
+        for i in range(3):
+            to_spins[j, i] = rate * turn[i]
+    for j in range(positions.shape[1]):
+        for i in range(3):
+            to_velocities[j, i] = rate * (positions[high, j, i] - positions[low, j, i])
+
+
+# ---- the spring: offsets to what plays, which decay
+
+
+@compiled
+def decay(offsets, speeds, damping, dt, to_offsets, to_speeds):
+    """Offsets [n, 3] and their speeds after some time: x = e^{-yt} (x0 + (v0 + x0 y) t)."""
+    fade = math.exp(-damping * dt)
+    for j in range(offsets.shape[0]):
+        for i in range(3):
+            pushed = speeds[j, i] + offsets[j, i] * damping
+            to_offsets[j, i] = fade * (offsets[j, i] + pushed * dt)
+            to_speeds[j, i] = fade * (speeds[j, i] - pushed * damping * dt)
+
+
+@compiled
+def leave(offsets, speeds, from_rotations, from_spins, to_rotations, to_spins, new_offsets, new_speeds):
+    """The turns that keep the shown pose and its velocity, where another animation begins to play under them."""
+    for j in range(offsets.shape[0]):
+        turn, speed = (offsets[j, 0], offsets[j, 1], offsets[j, 2]), (speeds[j, 0], speeds[j, 1], speeds[j, 2])
+        old, new = from_rotations[j], to_rotations[j]
+        offset = _rotation(turn)
+        shown = _product(offset, (old[0], old[1], old[2], old[3]))
+        own = _spin_of(turn, speed)
+        carried = _turned(offset, (from_spins[j, 0], from_spins[j, 1], from_spins[j, 2]))
+        rest = _product(shown, (new[0], -new[1], -new[2], -new[3]))
+        left = _turn(rest)
+        under = _turned(rest, (to_spins[j, 0], to_spins[j, 1], to_spins[j, 2]))
+        spin = (own[0] + carried[0] - under[0], own[1] + carried[1] - under[1], own[2] + carried[2] - under[2])
+        pace = _speed_of(left, spin)
+        for i in range(3):
+            new_offsets[j, i] = left[i]
+            new_speeds[j, i] = pace[i]
+
+
+@compiled
+def turn_by(offsets, rotations, to_rotations):
+    """Rotations, each turned by its offset."""
+    for j in range(offsets.shape[0]):
+        q = rotations[j]
+        turned = _product(_rotation((offsets[j, 0], offsets[j, 1], offsets[j, 2])), (q[0], q[1], q[2], q[3]))
+        for i in range(4):
+            to_rotations[j, i] = turned[i]
+
+
+# ---- dead blending: the pose that was left goes on, ever slower, while it fades
+
+
+@compiled
+def fade_turns(left, spins, reach, share, slope, braking, playing, playing_spins, to_rotations, to_spins):
+    """Rotations that were left, gone on by their spins times `reach`, mixed with what plays; and how fast the mix spins.
+
+    `share` of what plays, which grows by `slope` a second; the spins are `braking` of what they were.
+    """
+    for j in range(left.shape[0]):
+        a, b = left[j], playing[j]
+        gone = _product(_rotation((reach * spins[j, 0], reach * spins[j, 1], reach * spins[j, 2])), (a[0], a[1], a[2], a[3]))
+        between = _product((b[0], b[1], b[2], b[3]), _inverse(gone))
+        way = _turn(between)
+        part = (share * way[0], share * way[1], share * way[2])
+        over = _rotation(part)
+        mixed = _product(over, gone)
+        own = (braking * spins[j, 0], braking * spins[j, 1], braking * spins[j, 2])
+        carried = _turned(between, own)
+        p = playing_spins[j]
+        pace = _speed_of(way, (p[0] - carried[0], p[1] - carried[1], p[2] - carried[2]))
+        grown = (slope * way[0] + share * pace[0], slope * way[1] + share * pace[1], slope * way[2] + share * pace[2])
+        spin = _spin_of(part, grown)
+        under = _turned(over, own)
+        for i in range(4):
+            to_rotations[j, i] = mixed[i]
+        for i in range(3):
+            to_spins[j, i] = spin[i] + under[i]
+
+
+# ---- placing
+
+
+@compiled
+def place(parents, translations, rotations, x, z, heading, to_positions, to_world):
+    """Forward kinematics of one pose whose first joint is placed against (x, 0, z), facing `heading`."""
+    for j in range(parents.shape[0]):
+        p = parents[j]
+        t, q = translations[j], rotations[j]
+        if p < 0:
+            above = (math.cos(0.5 * heading), 0.0, math.sin(0.5 * heading), 0.0)
+            start = (x, 0.0, z)
+        else:
+            above = (to_world[p, 0], to_world[p, 1], to_world[p, 2], to_world[p, 3])
+            start = (to_positions[p, 0], to_positions[p, 1], to_positions[p, 2])
+        moved = _turned(above, (t[0], t[1], t[2]))
+        turned = _product(above, (q[0], q[1], q[2], q[3]))
+        for i in range(3):
+            to_positions[j, i] = start[i] + moved[i]
+        for i in range(4):
+            to_world[j, i] = turned[i]
+
+
+# ---- legs
+
+
+@compiled
+def _about(axis, angle):
+    """The rotation about a unit axis."""
+    sine = math.sin(0.5 * angle)
+    return (math.cos(0.5 * angle), sine * axis[0], sine * axis[1], sine * axis[2])
+
+
+@compiled
+def _length(v):
+    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+
+
+@compiled
+def _arc(u, v):
+    """The shortest rotation of one direction to another; none for directions without length, or opposite ones."""
+    size = _length(u) * _length(v)
+    w = size + u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    if size < 1e-12 or w < 1e-9 * size:
+        return (1.0, 0.0, 0.0, 0.0)
+    c = _cross(u, v)
+    n = math.sqrt(w * w + c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+    return (w / n, c[0] / n, c[1] / n, c[2] / n)
+
+
+@compiled
+def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations):
+    """Bend a leg, its joints `leg` (hip, knee, ankle), so that its ankle comes to a target; the foot keeps its rotation.
+
+    `positions` and `world` place the joints; the leg's `rotations` against their parents are written. A knee that would be
+    straighter than `straight` (radians), and than it is, goes only a quarter of what is over: it never slams. `ahead` is where a
+    stretched leg's knee bends to.
+    """
+    hip, knee, ankle = leg[0], leg[1], leg[2]
+    a = (positions[hip, 0], positions[hip, 1], positions[hip, 2])
+    b = (positions[knee, 0], positions[knee, 1], positions[knee, 2])
+    c = (positions[ankle, 0], positions[ankle, 1], positions[ankle, 2])
+    thigh, shin = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - b[0], c[1] - b[1], c[2] - b[2])
+    way = (target[0] - a[0], target[1] - a[1], target[2] - a[2])
+    upper, lower = _length(thigh), _length(shin)
+    if upper < 1e-9 or lower < 1e-9:
+        return
+    far = min(max(_length(way), abs(upper - lower) + 1e-9), upper + lower)
+    axis = _cross(thigh, shin)
+    now = math.pi - math.atan2(_length(axis), thigh[0] * shin[0] + thigh[1] * shin[1] + thigh[2] * shin[2])
+    wanted = math.acos(min(max((upper * upper + lower * lower - far * far) / (2.0 * upper * lower), -1.0), 1.0))
+    limit = max(straight, now)
+    if wanted > limit:
+        wanted = limit + 0.25 * (wanted - limit)
+    straighten = (1.0, 0.0, 0.0, 0.0)
+    if _length(axis) < 1e-6 * upper * lower:  # stretched: bent to no side of its own
+        straighten, now = _arc(shin, thigh), math.pi
+        axis = _cross(thigh, _cross(_cross((a[0] - c[0], a[1] - c[1], a[2] - c[2]), (ahead[0], ahead[1], ahead[2])), thigh))
+    size = _length(axis)
+    if size < 1e-12:
+        return
+    bend = _product(_about((axis[0] / size, axis[1] / size, axis[2] / size), now - wanted), straighten)
+    moved = _turned(bend, shin)
+    swing = _arc((thigh[0] + moved[0], thigh[1] + moved[1], thigh[2] + moved[2]), way)
+    old_hip, old_knee, foot = world[hip], world[knee], world[ankle]
+    new_hip = _product(swing, (old_hip[0], old_hip[1], old_hip[2], old_hip[3]))
+    new_knee = _product(swing, _product(bend, (old_knee[0], old_knee[1], old_knee[2], old_knee[3])))
+    above = world[parents[hip]]
+    first = _product((above[0], -above[1], -above[2], -above[3]), new_hip)
+    second = _product(_inverse(new_hip), new_knee)
+    third = _product(_inverse(new_knee), (foot[0], foot[1], foot[2], foot[3]))
+    for i in range(4):
+        rotations[hip, i], rotations[knee, i], rotations[ankle, i] = first[i], second[i], third[i]
+
+
+IS_COMPILED = hasattr(sample, "stats")
+"""Whether the loops are numba's."""

@@ -1,0 +1,130 @@
+"""Where the body is: moved by the animation, by the game, or by both, and without a step in its velocity where what plays jumps.
+
+In the mode "mixed" a share of the movement is the animation's and the rest the game's. What then lies between the character and the
+game's body is made up for by and by, by at most half as far as the character moves itself, so that nobody slides while standing;
+and never is it farther away than the clamp.
+
+A jump moves nobody, but it changes the velocity of what plays. The difference decays as the offsets of joints do: the body runs on
+or falls back a little, and comes to the path of what plays.
+
+Source: Root Motion Weight in EA's talk; the adjustment and the clamp of orangeduck/Motion-Matching, `controller.cpp`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.settings import PoseSettings
+from contextdb.motion.output.stages import Posture, Tick, damping, decayed
+from contextdb.motion.selection.root_motion import RootMotion
+
+MOST_PULL = 0.5
+"""The pull is at most this share of the character's own movement."""
+TURN_PER_M = 1.0
+"""So many radians of turning a metre of way allows the pull as well: who walks straight may be turned."""
+NOTHING: Place3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class RootState:
+    """Where the root is without its offset, the offset and its change a second, and where the game's body was."""
+
+    base: Place3
+    offset: Place3
+    offset_speed: Place3
+    body: Place3 | None
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """The stage: the root's place and heading."""
+
+    settings: PoseSettings
+
+    def begin(self, posture: Posture, body: Place3 | None) -> RootState:
+        """At the game's body; without one where the posture has the root."""
+        return RootState(posture.root if body is None else body, NOTHING, NOTHING, body)
+
+    def apply(self, posture: Posture, tick: Tick, state: object) -> tuple[Posture, RootState]:
+        """The posture at its place."""
+        assert isinstance(state, RootState)
+        position_share, rotation_share = self._shares(tick)
+        base = self._moved(state, tick, position_share, rotation_share)
+        offset, speed = state.offset, state.offset_speed
+        if self.settings.blend != "none":
+            offset, speed = decayed(offset, speed, damping(self.settings.halflife_s), tick.dt_s)
+            speed = _sum(speed, _step(tick, base[2], position_share, rotation_share))
+        if self.settings.root == "mixed" and tick.body is not None:
+            base = self._clamped(base, offset, tick.body)
+        return replace(posture, root=_sum(base, offset)), RootState(base, offset, speed, tick.body or state.body)
+
+    def _shares(self, tick: Tick) -> tuple[float, float]:
+        """How much of the movement and of the turning is the animation's."""
+        if self.settings.root == "animation":
+            return 1.0, 1.0
+        if self.settings.root == "code":
+            return 0.0, 0.0
+        return tick.root_weight * self.settings.position_weight, tick.root_weight * self.settings.rotation_weight
+
+    def _moved(self, state: RootState, tick: Tick, position_share: float, rotation_share: float) -> Place3:
+        """The base after this tick's movement and the pull to the game's body."""
+        body = tick.body
+        if body is None or self.settings.root == "animation":
+            return _after(state.base, tick.root_motion, position_share, rotation_share)
+        if self.settings.root == "code":
+            return body
+        x, z, heading = _after(state.base, tick.root_motion, position_share, rotation_share)
+        before = body if state.body is None else state.body
+        x += (1.0 - position_share) * (body[0] - before[0])
+        z += (1.0 - position_share) * (body[1] - before[1])
+        heading += (1.0 - rotation_share) * math.remainder(body[2] - before[2], math.tau)
+        way = math.hypot(x - state.base[0], z - state.base[1])
+        turned = abs(heading - state.base[2]) + TURN_PER_M * way
+        return self._pulled((x, z, heading), body, way, turned, tick.dt_s)
+
+    def _pulled(self, base: Place3, body: Place3, way: float, turned: float, dt_s: float) -> Place3:
+        """The base nearer to the game's body, by what it moved and turned itself at most."""
+        x, z, heading = body[0] - base[0], body[1] - base[1], math.remainder(body[2] - base[2], math.tau)
+        apart = math.hypot(x, z)
+        share = _made_up(self.settings.position_pull_s, dt_s)
+        share = min(share, MOST_PULL * way / apart) if apart > 0.0 else 0.0
+        turn_share = _made_up(self.settings.rotation_pull_s, dt_s)
+        turn = math.copysign(min(turn_share * abs(heading), MOST_PULL * turned), heading)
+        return base[0] + share * x, base[1] + share * z, base[2] + turn
+
+    def _clamped(self, base: Place3, offset: Place3, body: Place3) -> Place3:
+        """The base from which the shown root is within the clamp."""
+        x, z, heading = _sum(base, offset)
+        left, ahead, turn = x - body[0], z - body[1], math.remainder(heading - body[2], math.tau)
+        apart, most = math.hypot(left, ahead), self.settings.position_clamp_m
+        share = most / apart - 1.0 if apart > most else 0.0
+        most_turn = math.radians(self.settings.rotation_clamp_deg)
+        over = turn - min(max(turn, -most_turn), most_turn)
+        return base[0] + share * left, base[1] + share * ahead, base[2] - over
+
+
+def _sum(first: Place3, second: Place3) -> Place3:
+    return first[0] + second[0], first[1] + second[1], first[2] + second[2]
+
+
+def _after(base: Place3, motion: RootMotion, position_share: float, rotation_share: float) -> Place3:
+    """A place after a share of a movement in its own frame."""
+    sin, cos = math.sin(base[2]), math.cos(base[2])
+    left, ahead = position_share * motion.left_m, position_share * motion.ahead_m
+    return base[0] + cos * left + sin * ahead, base[1] - sin * left + cos * ahead, base[2] + rotation_share * motion.turn_rad
+
+
+def _step(tick: Tick, heading: float, position_share: float, rotation_share: float) -> Place3:
+    """By how much the velocity of what plays drops at a seam, over the ground of the world."""
+    if tick.left is None or tick.entered is None:
+        return NOTHING
+    left, ahead, turn = (a - b for a, b in zip(tick.left.root_velocity, tick.entered.root_velocity, strict=True))
+    x, z, _ = _after((0.0, 0.0, heading), RootMotion(left, ahead), position_share, 0.0)
+    return x, z, rotation_share * turn
+
+
+def _made_up(halflife_s: float, dt_s: float) -> float:
+    """The share of a difference that is gone after some time; none where no half-life is set."""
+    return 1.0 - math.exp(-math.log(2.0) * dt_s / halflife_s) if halflife_s > 0.0 else 0.0

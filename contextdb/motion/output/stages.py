@@ -1,0 +1,81 @@
+"""The stages between what plays and the pose that is shown. Each is a small function of a posture and a state of its own.
+
+    clip ─► joints (spring or dead blending) ─► root (animation, code or both; its spring) ─► feet (lock) ─► Posture
+
+A stage takes the posture so far, what happened in this tick and its state, and gives the posture and its next state. It changes
+nothing in place, so that old states stay good for a rollback. J joints, M of them with positions of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.output.bank import Flags, Place3, Sample
+from contextdb.motion.selection.root_motion import RootMotion
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Posture:
+    """A pose in the making: rotations [J, 4] and positions [M, 3], and where the root is: x, z and heading."""
+
+    rotations: Floats
+    positions: Floats
+    root: Place3
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Tick:
+    """What happens in one update.
+
+    Attributes
+    ----------
+    dt_s : float
+    left, entered : Sample or None
+        Where what plays has a seam: the moment that would have been shown, and the one that is shown instead. None without a seam.
+    root_motion : RootMotion
+        How the clip moved the body since the last update.
+    root_weight : float
+        How much of its movement is to come from the clip.
+    body : (x, z, heading) or None
+        Where the game has the body.
+    clip : Posture
+        What plays, as the clip has it.
+    contacts : bool array, shape (n feet,)
+        Which feet are down in the clip.
+    """
+
+    dt_s: float
+    left: Sample | None
+    entered: Sample | None
+    root_motion: RootMotion
+    root_weight: float
+    body: Place3 | None
+    clip: Posture
+    contacts: Flags
+
+
+class Stage(Protocol):
+    """A stage; `begin` gives its state before the first update."""
+
+    def begin(self, posture: Posture, body: Place3 | None) -> object:
+        """The state of a character that first appears in a posture."""
+
+    def apply(self, posture: Posture, tick: Tick, state: object) -> tuple[Posture, object]:
+        """The posture after this stage, and the state after it."""
+
+
+def damping(halflife_s: float) -> float:
+    """The damping of a spring of a half-life, critically damped: 2 ln 2 / h."""
+    return 2.0 * math.log(2.0) / halflife_s
+
+
+def decayed(offset: Place3, speed: Place3, y: float, dt_s: float) -> tuple[Place3, Place3]:
+    """An offset of three numbers and its change a second some time later: x = e^{-yt} (x0 + (v0 + x0 y) t)."""
+    fade = math.exp(-y * dt_s)
+    pushed = [v + x * y for x, v in zip(offset, speed, strict=True)]
+    a, b, c = (fade * (x + p * dt_s) for x, p in zip(offset, pushed, strict=True))
+    d, e, f = (fade * (v - p * y * dt_s) for v, p in zip(speed, pushed, strict=True))
+    return (a, b, c), (d, e, f)

@@ -1,0 +1,251 @@
+"""A pose stream: what a controller decides, tick by tick, as poses.
+
+The decision says which clip plays and when in it. The clip's pose is sampled between frames, goes through the stages of
+`contextdb.motion.output.stages`, and is placed joint by joint. A stream reads no clock and draws no random number: the same
+decisions give the same poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from contextdb.cells.arguments import require_kind, require_mapping, require_real
+from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.steering import Steered
+from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample, loops
+from contextdb.motion.output.settings import PoseSettings
+from contextdb.motion.output.stages import Posture, Tick
+from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.root_motion import NO_MOTION
+
+DEFAULT_SETTINGS = PoseSettings()
+A_BODY = "a Steered, or x and z in metres and a heading in radians"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pose:
+    """A pose to show.
+
+    Attributes
+    ----------
+    playing : Playing or None
+        What it is a pose of.
+    is_jump, is_forced : bool
+        Whether something else began to play, and whether it had to: because what played could not play on.
+    root : (x, z, heading)
+        Where the body is: metres and radians.
+    rotations : float64 array, shape (J, 4)
+        Each joint against its parent, the first against the root.
+    translations : float64 array, shape (J, 3)
+        Likewise, in metres; the rig's offset for a joint without a position of its own.
+    positions : float64 array, shape (J, 3)
+        Each joint in the world.
+    contacts : bool array, shape (n feet,)
+        Which of `PoseBank.feet` are down in the clip.
+    play_rate : float
+        Seconds of the clip that pass in a second of play.
+    """
+
+    playing: Playing | None
+    is_jump: bool
+    is_forced: bool
+    root: Place3
+    rotations: Floats
+    translations: Floats
+    positions: Floats
+    contacts: Flags
+    play_rate: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PoseState:
+    """Where a stream is: all that its next pose depends on beside the next decision. Never changed, so it may be kept as it is."""
+
+    settings: PoseSettings = DEFAULT_SETTINGS
+    playing: Playing | None = None
+    clip: Posture | None = None
+    stages: tuple[object, ...] = ()
+    play_rate: float = 1.0
+
+
+class PoseStream:
+    """Gives the poses of one character.
+
+    Parameters
+    ----------
+    bank : PoseBank, or mapping of str to PoseBank
+        By the names of the databases where a selector has several; all of one rig. One bank alone serves decisions of any
+        database.
+    settings : PoseSettings
+
+    Raises
+    ------
+    MotionError
+        No bank, or banks of different rigs.
+    ContextError
+        `bank` or `settings` are none.
+    """
+
+    def __init__(self, bank: PoseBank | Mapping[str, PoseBank], settings: PoseSettings = DEFAULT_SETTINGS) -> None:
+        from contextdb.motion.output.pipeline import stages_of
+
+        require_kind(settings, PoseSettings, "settings", "PoseSettings")
+        self._only = bank if isinstance(bank, PoseBank) else None
+        self._banks = {} if isinstance(bank, PoseBank) else _checked(bank)
+        self.settings = settings
+        self._state = PoseState(settings)
+        self._rig = self._only or next(iter(self._banks.values()))
+        self._stages = stages_of(settings, self._rig)
+
+    @property
+    def state(self) -> PoseState:
+        """Where the stream is, to come back to with `restore`."""
+        return self._state
+
+    def restore(self, state: PoseState) -> None:
+        """Go on from a state of this stream, or of another one with the same banks and settings.
+
+        Raises ContextError for what is no state, or one of another rig or other settings.
+        """
+        require_kind(state, PoseState, "state", "a PoseState, what `state` gives")
+        if state.settings != self.settings or (state.clip and len(state.clip.rotations) != self._rig.n_joints):
+            raise ContextError(Fault("the state is of a stream of other settings or of another rig.", "a state of this stream"))
+        self._state = state
+
+    def update(self, decision: Decision, dt: float, body: Steered | tuple[float, float, float] | None = None) -> Pose:
+        """The pose after a decision.
+
+        Parameters
+        ----------
+        decision : Decision
+            What `Controller.update` gave for this tick.
+        dt : float
+            Seconds since the last update, as the controller had them.
+        body : Steered or (x, z, heading), optional
+            Where the game has the body now; the root modes "code" and "mixed" need it.
+
+        Raises
+        ------
+        MotionError
+            The bank has no poses of what plays, or the root mode needs a body. The stream then stands where it stood.
+        ContextError
+            An argument of another type.
+        """
+        require_kind(decision, Decision, "decision", "a Decision")
+        dt = require_real(dt, "dt", 0.0)
+        place = self._place_of(body)
+        state, playing = self._state, decision.playing
+        if playing is None:
+            clip, sample = state.clip or self._rest(), None
+        else:
+            clip, sample = self._posture(playing)
+        left, entered = self._seam(decision, sample)
+        contacts = self._contacts(playing)
+        tick = Tick(dt, left, entered, decision.root_motion, decision.root_weight, place, clip, contacts)
+        posture = clip
+        begun = state.stages or tuple(stage.begin(clip, place) for stage in self._stages)
+        after = []
+        for stage, own in zip(self._stages, begun, strict=True):
+            posture, own = stage.apply(posture, tick if state.stages else _first(tick), own)
+            after.append(own)
+        rate = _play_rate(decision, state, dt)
+        self._state = PoseState(self.settings, playing or state.playing, clip, tuple(after), rate)
+        return self._placed(posture, decision, rate, contacts)
+
+    def _posture(self, playing: Playing) -> tuple[Posture, Sample]:
+        """The clip's own pose and place."""
+        bank, number = self._find(playing)
+        sample = bank.sample_of(number, playing.time_s)
+        return Posture(sample.rotations, sample.positions, bank.root_at(number, playing.time_s)), sample
+
+    def _rest(self) -> Posture:
+        """The rig at rest, for a character that has not played anything yet."""
+        rotations = np.zeros((self._rig.n_joints, 4))
+        rotations[:, 0] = 1.0
+        return Posture(rotations, self._rig.skeleton.offsets[self._rig.moving], (0.0, 0.0, 0.0))
+
+    def _seam(self, decision: Decision, sample: Sample | None) -> tuple[Sample | None, Sample | None]:
+        """Where what plays jumps, or goes over the end of a loop: what would have been shown, and what is shown instead."""
+        before, playing = decision.before or self._state.playing, decision.playing
+        if playing is None or before is None or self._state.playing is None:
+            return None, None
+        if decision.action in (Action.JUMP, Action.START):
+            bank, number = self._find(before)
+            return bank.sample_of(number, before.time_s), sample
+        if decision.action is Action.LOOP:
+            bank, number = self._find(playing)
+            end_s = bank.last_s(number)
+            return bank.sample_of(number, end_s), bank.sample_of(number, 0.0)
+        return None, None
+
+    def _placed(self, posture: Posture, decision: Decision, rate: float, contacts: Flags) -> Pose:
+        rig, playing, is_jump = self._rig, decision.playing, decision.action is Action.JUMP
+        translations = rig.translations(posture.positions)
+        positions, world = np.empty((rig.n_joints, 3)), np.empty((rig.n_joints, 4))
+        loops().place(rig.skeleton.parents, translations, posture.rotations, *posture.root, positions, world)
+        is_forced = is_jump and decision.continuing_cost is None
+        return Pose(playing, is_jump, is_forced, posture.root, posture.rotations, translations, positions, contacts, rate)
+
+    def _contacts(self, playing: Playing | None) -> Flags:
+        """Which feet are down in the clip; none where nothing plays."""
+        if playing is None:
+            return np.zeros(len(self._rig.feet), np.bool_)
+        bank, number = self._find(playing)
+        return bank.contacts_at(number, playing.time_s)
+
+    def _find(self, playing: Playing) -> tuple[PoseBank, int]:
+        """The bank of what plays, and its range there."""
+        bank = self._only or self._banks.get(playing.database)
+        if bank is None:
+            near = nearest(playing.database, self._banks)
+            found = f"there is no pose bank of the database {in_quotes(playing.database)}."
+            raise MotionError(Fault(found, some(self._banks), in_quotes(near) if near else ""))
+        return bank, bank.range_of(playing.asset, playing.mirrored)
+
+    def _place_of(self, body: object) -> Place3 | None:
+        """Where the game's body is."""
+        if body is None:
+            if self.settings.root != "animation":
+                found = f'root = "{self.settings.root}" needs a body, and none was given.'
+                raise MotionError(Fault(found, A_BODY, 'root = "animation"'))
+            return None
+        if isinstance(body, Steered):
+            return body.position[0], body.position[1], body.heading
+        if not isinstance(body, (tuple, list, np.ndarray)) or len(body) != 3:
+            raise ContextError(Fault(f"body is {body!r}.", A_BODY))
+        return require_real(body[0], "x"), require_real(body[1], "z"), require_real(body[2], "heading")
+
+
+def _checked(banks: object) -> dict[Any, PoseBank]:
+    """Banks by name, all of one rig."""
+    named = dict(require_mapping(banks, "bank", "a PoseBank, or a mapping of databases to them"))
+    for each in named.values():
+        require_kind(each, PoseBank, "one of bank", "a PoseBank")
+    if not named:
+        raise MotionError(Fault("there is no pose bank.", "at least one"))
+    rig, *others = named.values()
+    for other in others:
+        same = rig.skeleton.names == other.skeleton.names and np.array_equal(rig.skeleton.parents, other.skeleton.parents)
+        if not same or not np.array_equal(rig.moving, other.moving):
+            raise MotionError(Fault("the banks are of different rigs.", "banks of one rig"))
+    return named
+
+
+def _first(tick: Tick) -> Tick:
+    """The first tick of a character: it appears where it is, and has not moved."""
+    return replace(tick, dt_s=0.0, left=None, entered=None, root_motion=NO_MOTION)
+
+
+def _play_rate(decision: Decision, state: PoseState, dt_s: float) -> float:
+    """Seconds of the clip in a second of play, where it plays on; else what it was."""
+    playing, before = decision.playing, state.playing
+    if decision.action is Action.HOLD:
+        return 0.0
+    if decision.action is not Action.CONTINUE or playing is None or before is None or dt_s <= 0.0:
+        return state.play_rate or 1.0
+    return (playing.time_s - before.time_s) / dt_s

@@ -1,0 +1,105 @@
+"""Poses one after another: as a clip, to write as BVH, and as arrays.
+
+T ticks, J joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.arguments import require_kind, require_many_of, require_real
+from contextdb.motion.clips import quaternions
+from contextdb.motion.clips.clip import CENTIMETRE, Clip
+from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import POSITIONS, Skeleton
+from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.output.stream import Pose
+
+TURNS = ("Zrotation", "Xrotation", "Yrotation")
+AXES = "zxy"
+
+
+def clip_of_poses(poses: Sequence[Pose], bank: PoseBank, rate: float, *, name: str = "poses") -> Clip:
+    """Poses as a clip of the bank's rig, in centimetres, y up: for `write_bvh`.
+
+    Parameters
+    ----------
+    poses : sequence of Pose
+        Of a stream of this bank.
+    bank : PoseBank
+    rate : float
+        Poses a second.
+    name : str
+
+    Raises
+    ------
+    ContextError
+        An argument of another type.
+    """
+    listed, rig = _checked(poses, bank, rate), bank.skeleton
+    placed = sorted({0, *bank.moving.tolist()})
+    rotations, translations = _stacked(listed, rig)
+    angles = np.rad2deg(quaternions.to_euler(AXES, rotations))
+    columns: list[Floats] = []
+    for joint in range(rig.n_joints):
+        if joint in placed:
+            columns.append(translations[:, joint] / CENTIMETRE)
+        columns.append(angles[:, joint])
+    channels = tuple((*POSITIONS, *TURNS) if joint in placed else TURNS for joint in range(rig.n_joints))
+    ends = tuple((joint, (x / CENTIMETRE, y / CENTIMETRE, z / CENTIMETRE)) for joint, (x, y, z) in rig.end_sites)
+    skeleton = Skeleton(rig.names, rig.parents, rig.offsets / CENTIMETRE, channels, ends)
+    return Clip(name, skeleton, 1.0 / rate, np.concatenate(columns, axis=1))
+
+
+def pose_arrays(poses: Sequence[Pose], bank: PoseBank, rate: float) -> dict[str, NDArray[Any]]:
+    """Poses as arrays, those of a `.npz` file.
+
+    Returns
+    -------
+    dict
+        `positions` float32 [T, J, 3], metres, y up, of the joints `bones` [J] below `parents` int64 [J]; `root` float64 [T, 3], x,
+        z and heading; `asset` [T], empty where nothing plays, `time_s` float64, `mirrored`, `jumped` and `forced` bool [T]; and
+        `rate`, poses a second.
+
+    Raises
+    ------
+    ContextError
+        An argument of another type.
+    """
+    listed, rig = _checked(poses, bank, rate), bank.skeleton
+    playing = [pose.playing for pose in listed]
+    return {
+        "positions": np.array([pose.positions for pose in listed], np.float32).reshape(-1, rig.n_joints, 3),
+        "bones": np.array(rig.names),
+        "parents": rig.parents,
+        "root": np.array([pose.root for pose in listed], np.float64).reshape(-1, 3),
+        "asset": np.array(["" if each is None else each.asset for each in playing], np.str_),
+        "time_s": np.array([0.0 if each is None else each.time_s for each in playing], np.float64),
+        "mirrored": np.array([each is not None and each.mirrored for each in playing], np.bool_),
+        "jumped": np.array([pose.is_jump for pose in listed], np.bool_),
+        "forced": np.array([pose.is_forced for pose in listed], np.bool_),
+        "rate": np.array(rate, np.float64),
+    }
+
+
+def _checked(poses: object, bank: object, rate: object) -> list[Pose]:
+    require_kind(bank, PoseBank, "bank", "a PoseBank")
+    require_real(rate, "rate", LEAST_RATE, MOST_RATE)
+    return require_many_of(poses, Pose, "poses", "a list of Pose")
+
+
+def _stacked(poses: list[Pose], rig: Skeleton) -> tuple[Floats, Floats]:
+    """Local rotations [T, J, 4] and translations [T, J, 3], the first joint's in the world."""
+    rotations = np.array([pose.rotations for pose in poses], np.float64).reshape(-1, rig.n_joints, 4)
+    translations = np.array([pose.translations for pose in poses], np.float64).reshape(-1, rig.n_joints, 3)
+    roots = np.array([pose.root for pose in poses], np.float64).reshape(-1, 3)
+    turns = quaternions.about_axis("y", roots[:, 2])
+    ground = np.stack((roots[:, 0], np.zeros(len(roots)), roots[:, 1]), axis=-1)
+    translations[:, 0] = ground + quaternions.rotate(turns, translations[:, 0])
+    rotations[:, 0] = quaternions.multiply(turns, rotations[:, 0])
+    return rotations, translations

@@ -1,0 +1,169 @@
+"""Pose banks on disk, beside their databases: .safetensors, opened by memory map, never pickled. An edge: this touches the disk.
+
+Tensors, as `PoseBank` has them, R ranges, N frames, J joints, M of them with positions of their own; every number little-endian:
+
+    starts, stops          int64 [R]
+    mirrored, looping      bool [R]
+    assets                 uint8                 JSON list of R texts
+    parents                int64 [J]             of the rig, as are
+    offsets                float64 [J, 3]
+    moving                 int64 [M]
+    rotations              float32 [N, J, 4]
+    positions              float32 [N, M, 3]
+    root                   float32 [N, 3]
+    contacts               bool [N, feet]
+
+The metadata hold `contextdb.poses` (the version of this layout), `about` (JSON: rate, feet, and what of the rig is no array),
+`inputs` (the digest of the database of the same clips), `digest` of all but the large arrays, and `large_digest` of these.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from contextdb.cells.arguments import require_kind, require_path, require_text
+from contextdb.errors import ArtefactError, FileError
+from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
+from contextdb.motion.clips.skeleton import Skeleton
+from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.storage.build_inputs import Assets, Inputs
+from contextdb.motion.storage.building import checked
+from contextdb.motion.storage.clip_files import read_clip
+from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.feature_cache import file_name
+
+STORED_POSES = FileKind(
+    "contextdb.poses",
+    1,
+    "a pose bank of contextdb",
+    "a pose bank that this version of contextdb built",
+    "to build it again with `contextdb motion build --poses`",
+)
+LARGE = ("rotations", "positions", "root", "contacts")
+"""What grows with frames, and holds no index."""
+ARRAYS = ("starts", "stops", "mirrored", "looping", "moving", *LARGE)
+SAVED_SUFFIX = ".poses.safetensors"
+
+
+def save_poses(bank: PoseBank, path: str | PathLike[str], *, inputs: str = "") -> None:
+    """Write a bank; the old file is whole until the new one is. The same bank gives the same bytes.
+
+    Parameters
+    ----------
+    bank : PoseBank
+    path : path
+        Whose name ends in .safetensors, as a rule in .poses.safetensors.
+    inputs : str
+        The digest of what the bank was built of; see `inputs_of`.
+
+    Raises
+    ------
+    FileError
+        The disk refuses.
+    ContextError
+        `bank` is none, or `path` is none.
+    """
+    require_kind(bank, PoseBank, "bank", "a PoseBank")
+    target = require_path(path)
+    rig = bank.skeleton
+    tensors: Tensors = {name: getattr(bank, name) for name in ARRAYS}
+    tensors |= {"assets": texts_to_array(list(bank.assets)), "parents": rig.parents, "offsets": rig.offsets}
+    about = json.dumps(
+        {"rate": bank.rate, "feet": bank.feet, "names": rig.names, "channels": rig.channels, "end_sites": rig.end_sites}
+    )
+    small, large = _divided(tensors)
+    digests = {"digest": digest_of(small, about, inputs), "large_digest": digest_of(large)}
+    write_tensors(target, STORED_POSES, tensors, {"about": about, "inputs": inputs, **digests})
+
+
+def open_poses(path: str | PathLike[str], *, verify: bool = False) -> PoseBank:
+    """Open a saved bank by memory map: poses are read from the disk when they are first shown.
+
+    Parameters
+    ----------
+    path : path
+    verify : bool
+        Read all poses and compare with their digest too. Default: all but the poses is checked.
+
+    Raises
+    ------
+    ArtefactError
+        The file is truncated, altered, of another layout, or no pose bank; with the reason and the mend.
+    FileError
+        The file cannot be read.
+    """
+    file = require_path(path)
+    tensors, metadata = read_tensors(file, STORED_POSES, writeable=True)  # as built ones are: compiled loops tell the two apart
+    with STORED_POSES.reading(file):
+        small, large = _divided(tensors)
+        is_whole = digest_of(small, metadata["about"], metadata["inputs"]) == metadata["digest"]
+        if not is_whole or (verify and digest_of(large) != metadata["large_digest"]):
+            raise STORED_POSES.refused(file, "the file was altered: its contents do not match its digest.")
+        return _bank(json.loads(metadata["about"]), tensors)
+
+
+def poses_path(folder: str | PathLike[str], name: str) -> Path:
+    """Where the bank of the database of a name is saved. Raises ContextError for what is no path and no name."""
+    return require_path(folder, "folder") / file_name(require_text(name, "name"), SAVED_SUFFIX)
+
+
+def open_or_build_poses(
+    config: MotionConfig,
+    folder: str | PathLike[str],
+    assets: Assets | None = None,
+    *,
+    names: Collection[str] | None = None,
+    saved: str | PathLike[str] | None = None,
+) -> dict[str, PoseBank]:
+    """The pose banks of the databases of a project: those that are saved and up to date opened, the others built in memory.
+
+    Parameters
+    ----------
+    config, folder, assets, names
+        As for `build`.
+    saved : path, optional
+        Where `contextdb motion build --poses` has put them; a relative one lies in `folder`. Default: `folder`.
+
+    Raises
+    ------
+    MotionError, FileError
+        As `build`. A saved bank that cannot be used is built anew.
+    """
+    root = checked(config, folder, assets, names)
+    place = root / (require_path(saved, "saved") if saved else "")
+    inputs = Inputs.of(config, root, assets or {}, names)
+    digests = inputs.digests(inputs.keys())
+    return {name: _open(poses_path(place, name), digests[name]) or _built(inputs, name) for name in inputs.wanted}
+
+
+def _built(inputs: Inputs, name: str) -> PoseBank:
+    settings = inputs.config.databases[name]
+    clips = [read_clip(file) for file in inputs.files[name]]
+    return PoseBank.build(clips, inputs.config.features[settings.features], mirror=settings.mirror, markup=inputs.markups.get(name))
+
+
+def _open(path: Path, digest: str) -> PoseBank | None:
+    """The saved bank of a digest, or None."""
+    try:
+        return open_poses(path) if digest and read_tensors(path, STORED_POSES)[1].get("inputs") == digest else None
+    except (ArtefactError, FileError):
+        return None
+
+
+def _divided(tensors: Tensors) -> tuple[Tensors, Tensors]:
+    """All but the large arrays, and the large ones."""
+    large = {name: tensors[name] for name in LARGE}
+    return {name: array for name, array in tensors.items() if name not in large}, large
+
+
+def _bank(about: dict[str, Any], tensors: Tensors) -> PoseBank:
+    channels = tuple(map(tuple, about["channels"]))
+    ends = tuple((joint, tuple(offset)) for joint, offset in about["end_sites"])
+    rig = Skeleton(tuple(about["names"]), tensors["parents"], tensors["offsets"], channels, ends)
+    arrays: dict[str, Any] = {name: tensors[name] for name in ARRAYS}
+    assets = tuple(texts_from_array(tensors["assets"]))
+    return PoseBank(skeleton=rig, rate=about["rate"], feet=tuple(about["feet"]), assets=assets, **arrays)

@@ -1,0 +1,175 @@
+"""Feet that are down stay where they came down, and legs bend to them without growing."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from played import RATE, bank, decisions
+
+from contextdb.motion import PoseSettings, PoseStream
+from contextdb.motion.output import kernels
+
+STEP = 1.0 / RATE
+RIG = bank().skeleton
+TOES = [RIG.index(name) for name in ("LeftToe", "RightToe")]
+LEG = np.array([RIG.index(name) for name in ("LeftUpLeg", "LeftLeg", "LeftFoot")])
+
+
+def streamed(segments, body=None, **said):
+    stream = PoseStream(bank(), PoseSettings(**{"root": "animation", **said}))
+    return [
+        stream.update(d, STEP if d.tick else 0.0, None if body is None else body(d.tick * STEP)) for d in decisions(segments, STEP)
+    ]
+
+
+def slides(poses):
+    """How far each toe moves over the ground while its foot stays down in the clip: metres a tick, and how high it moves."""
+    over, up = [], []
+    for one, other in pairwise(poses):
+        for foot, toe in enumerate(TOES):
+            if one.contacts[foot] and other.contacts[foot]:
+                moved = other.positions[toe] - one.positions[toe]
+                over.append(math.hypot(moved[0], moved[2]))
+                up.append(abs(moved[1]))
+    return np.array(over), np.array(up)
+
+
+def test_a_foot_that_is_down_does_not_move_at_a_body_that_goes_another_way_than_its_clip():
+    def body(t):
+        return (0.06 * math.sin(3.0 * t), 1.25 * t, 0.05 * math.sin(2.0 * t))
+
+    free, locked = (streamed([("walk", 0.0, 90)], body, root="code", foot_lock=lock) for lock in (False, True))
+    assert slides(free)[0].mean() > 0.004
+    assert slides(locked)[0].max() < 0.001
+
+
+def test_a_foot_that_is_down_does_not_move_through_jumps():
+    segments = [("walk", 0.1, 25), ("walk_turn_left_90", 0.9333, 20), ("walk", 1.6, 30)]
+    free, locked = (streamed(segments, foot_lock=lock) for lock in (False, True))
+    assert slides(free)[0].max() > 0.03
+    assert slides(locked)[0].max() < 0.001
+
+
+@pytest.mark.parametrize(("name", "near_m"), [("idle", 1e-6), ("run", 1e-6), ("walk", 0.005), ("jog", 0.015)])
+def test_a_locked_clip_is_the_clip_but_for_what_its_own_feet_slide(name, near_m):
+    plain, locked = (streamed([(name, 0.3, 60)], blend="none", foot_lock=lock) for lock in (False, True))
+    for one, other in zip(plain, locked, strict=True):
+        np.testing.assert_allclose(other.positions, one.positions, atol=near_m)
+
+
+def test_a_foot_is_let_go_without_a_step_and_comes_to_its_clip():
+    def body(t):
+        return (0.15 * min(t, 1.0), 1.2 * t, 0.0)
+
+    free, locked = (streamed([("walk", 0.0, 120)], body, root="code", foot_lock=lock) for lock in (False, True))
+    for toe in TOES:
+        steps, own = (np.linalg.norm(np.diff([pose.positions[toe] for pose in each], axis=0), axis=1) for each in (locked, free))
+        assert steps.max() < own.max() + 0.06
+
+
+def test_a_foot_is_never_farther_from_its_clip_than_the_radius_when_it_is_locked():
+    def body(t):
+        return (0.0, 3.0 * t, 0.0)
+
+    free, locked = (streamed([("idle", 0.0, 60)], body, root="code", foot_lock=lock, foot_radius_m=0.1) for lock in (False, True))
+    for one, other in zip(free[40:], locked[40:], strict=True):
+        assert np.linalg.norm(one.positions[TOES] - other.positions[TOES], axis=1).max() < 0.1
+
+
+def test_a_character_that_is_put_elsewhere_stands_there_at_once():
+    poses = streamed([("idle", 0.0, 20)], lambda t: (0.0 if t < 0.3 else 50.0, 0.0, 0.0), root="code")
+    free = streamed([("idle", 0.0, 20)], lambda t: (0.0 if t < 0.3 else 50.0, 0.0, 0.0), root="code", foot_lock=False)
+    np.testing.assert_allclose(poses[-1].positions, free[-1].positions, atol=0.01)
+
+
+# ---- the leg
+
+
+STRAIGHT = math.radians(170.0)
+
+
+def bent(rotations, target, straight=STRAIGHT, ahead=(0.0, 0.0, 1.0)):
+    """The leg's joints before and after it is bent to a target, and its rotations."""
+    positions, world = placed(rotations)
+    after = rotations.copy()
+    kernels.bend_leg(RIG.parents, positions, world, LEG, np.asarray(target), np.array(ahead), straight, after)
+    return positions, placed(after)[0], after
+
+
+def placed(rotations):
+    translations = bank().translations(np.array([[0.0, 1.0, 0.0]]))
+    positions, world = np.empty((RIG.n_joints, 3)), np.empty((RIG.n_joints, 4))
+    kernels.place(RIG.parents, translations, rotations, 0.0, 0.0, 0.0, positions, world)
+    return positions, world
+
+
+def turned(turns):
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (len(turns), 1))
+    rotations = np.empty_like(still)
+    kernels.turn_by(turns, still, rotations)
+    return rotations
+
+
+poses = st.lists(st.floats(-0.5, 0.5), min_size=3 * RIG.n_joints, max_size=3 * RIG.n_joints).map(
+    lambda numbers: turned(np.array(numbers).reshape(-1, 3))
+)
+vectors = st.tuples(*[st.floats(-0.6, 0.6)] * 3).map(np.array)
+
+
+@given(poses, vectors)
+def test_an_ankle_comes_to_any_place_in_reach_and_bones_keep_their_lengths(rotations, way):
+    before = placed(rotations)[0]
+    hip, knee, ankle = before[LEG]
+    upper, lower = np.linalg.norm(knee - hip), np.linalg.norm(ankle - knee)
+    target = hip + way
+    before, after, _ = bent(rotations, target, straight=math.pi)
+    lengths = [np.linalg.norm(each[LEG[1:]] - each[LEG[:2]], axis=1) for each in (before, after)]
+    np.testing.assert_allclose(lengths[1], lengths[0], atol=1e-9)
+    far = np.linalg.norm(way)
+    assert np.isfinite(after).all()
+    current = ankle - hip
+    assume(abs(upper - lower) + 1e-6 < far < upper + lower - 1e-6)
+    assume(current @ way > -0.999 * far * np.linalg.norm(current))
+    np.testing.assert_allclose(after[LEG[2]], target, atol=1e-6)
+
+
+@given(poses)
+def test_an_ankle_that_is_where_it_should_be_changes_nothing(rotations):
+    before, after, _ = bent(rotations, placed(rotations)[0][LEG[2]])
+    np.testing.assert_allclose(after, before, atol=1e-6)
+
+
+@given(poses, vectors)
+def test_the_foot_keeps_its_rotation(rotations, way):
+    hip = placed(rotations)[0][LEG[0]]
+    _, _, after = bent(rotations, hip + way)
+    one, other = (placed(each)[1][LEG[2]] for each in (rotations, after))
+    assert abs(one @ other) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_stretched_leg_bends_its_knee_ahead():
+    still = turned(np.zeros((RIG.n_joints, 3)))
+    hip = placed(still)[0][LEG[0]]
+    _, after, _ = bent(still, hip - np.array([0.0, 0.6, 0.0]), straight=math.pi)
+    assert (after[LEG[1]] - hip)[2] > 0.2
+    np.testing.assert_allclose(after[LEG[2]], hip - np.array([0.0, 0.6, 0.0]), atol=1e-9)
+
+
+def test_a_place_out_of_reach_stretches_the_leg_toward_it_and_the_knee_never_slams():
+    rotations = turned(np.zeros((RIG.n_joints, 3)))
+    rotations[LEG[1]] = [math.cos(0.3), math.sin(0.3), 0.0, 0.0]
+    hip = placed(rotations)[0][LEG[0]]
+    angles = []
+    for far in np.linspace(0.85, 1.2, 200):
+        _, after, _ = bent(rotations, hip - np.array([0.0, far, 0.0]))
+        a, b, c = after[LEG]
+        np.testing.assert_allclose((c - a)[[0, 2]], 0.0, atol=1e-9)
+        angles.append(math.degrees(math.acos((a - b) @ (c - b) / np.linalg.norm(a - b) / np.linalg.norm(c - b))))
+    assert max(angles) < 173.0
+    assert np.diff(angles).min() > -1e-9
+    assert np.linalg.norm(c - a) > 0.997 * (0.46 + 0.45)

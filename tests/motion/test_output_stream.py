@@ -1,0 +1,333 @@
+"""Pose streams: the clip where nothing is done to it, and no step in pose or velocity where it jumps."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from played import NAMES, RATE, SCHEMA, bank, clips, database, decisions, playing_at, range_of
+
+from contextdb.errors import ContextError, MotionError
+from contextdb.motion import Action, Decision, PoseBank, PoseSettings, PoseState, PoseStream, RootMotion, mirrored, poses_of
+from contextdb.motion.clips import quaternions
+from contextdb.motion.output import kernels
+from contextdb.motion.output.spring import Offsets, decayed, kept
+from contextdb.motion.output.stages import damping
+from contextdb.motion.selection.playhead import Playhead
+
+OFF = PoseSettings(root="animation", blend="none", foot_lock=False)
+SPRING = PoseSettings(root="animation", halflife_s=0.1, foot_lock=False)
+DEAD = PoseSettings(root="animation", blend="dead", fade_s=0.4, fade_halflife_s=0.1, foot_lock=False)
+LOCKED = PoseSettings(root="animation")
+STEP = 1.0 / RATE
+
+between_frames = st.integers(0, 120).map(lambda n: n / 100 + 0.0021)
+"""Velocities of clips change at their frames: seconds that are 2 ms or more from any."""
+moments = st.tuples(st.sampled_from(NAMES), between_frames, st.integers(1, 12), st.booleans())
+plays = st.lists(moments, min_size=2, max_size=5)
+vectors = st.lists(st.floats(-1.7, 1.7), min_size=3, max_size=3).map(lambda v: np.array([v]))
+
+
+def streamed(segments, settings, dt=STEP):
+    stream = PoseStream(bank(), settings)
+    return [stream.update(decision, dt if decision.tick else 0.0) for decision in decisions(segments, dt)]
+
+
+def branched(segments, settings, then, dt):
+    """What is shown dt after some plays, and again dt later: as they play on, and as another clip begins."""
+    stream = PoseStream(bank(), settings)
+    for last in decisions(segments, STEP):
+        stream.update(last, STEP if last.tick else 0.0)
+    state, found = stream.state, []
+    for jumps in (False, True):
+        stream.restore(state)
+        now, before = last.playing, []
+        for i in range(2):
+            move = Playhead.of(database(), now.range, RATE).moved(now.time_s, dt)
+            on = playing_at(now.asset, move.time_s, now.mirrored)
+            jump = jumps and i == 0
+            now = then if jump else on
+            action = Action.JUMP if jump else Action.CONTINUE
+            decision = Decision(last.tick + 1 + i, 0.0, action, "", jump, now, on, root_motion=move.motion)
+            before.append(stream.update(decision, dt))
+        found.append(before)
+    return found
+
+
+# ---- all off
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_with_everything_off_the_poses_are_the_clips(name, is_mirrored):
+    clip = next(clip for clip in clips() if clip.name == name)
+    wanted = mirrored(poses_of(clip, RATE), SCHEMA.mirror) if is_mirrored else poses_of(clip, RATE)
+    poses = streamed([(name, 0.0, wanted.n_frames, is_mirrored)], OFF)
+    shown = np.stack([pose.positions for pose in poses])
+    np.testing.assert_allclose(shown, wanted.positions, atol=1e-5)
+
+
+@pytest.mark.parametrize("settings", [SPRING, DEAD])
+def test_without_a_jump_the_rotations_are_the_clips_bit_for_bit(settings):
+    for on, off in zip(*(streamed([("start_walk", 0.1, 40)], each) for each in (settings, OFF)), strict=True):
+        np.testing.assert_array_equal(on.rotations, off.rotations)
+        np.testing.assert_array_equal(on.positions, off.positions)
+
+
+def test_a_walk_that_loops_walks_on():
+    poses = streamed([("walk", 0.0, 400)], SPRING)
+    steps = np.diff([pose.root[1] for pose in poses])
+    assert steps.min() > 0.5 * steps.mean() > 0.0
+    joints = np.diff([pose.positions for pose in poses], axis=0)
+    assert np.linalg.norm(joints, axis=-1).max() < 0.2
+
+
+def test_bones_keep_their_lengths_whatever_is_blended():
+    segments = [("run", 0.2, 9), ("idle", 1.0, 5), ("walk", 0.3, 8, True), ("jog", 0.1, 9)]
+    parents = bank().skeleton.parents
+    fixed = np.setdiff1d(np.arange(bank().n_joints), bank().moving)
+    wanted = np.linalg.norm(bank().skeleton.offsets[fixed], axis=-1)
+    for settings in (SPRING, DEAD, LOCKED):
+        for pose in streamed(segments, settings):
+            found = np.linalg.norm(pose.positions[fixed] - pose.positions[parents[fixed]], axis=-1)
+            np.testing.assert_allclose(found, wanted, atol=1e-9)
+
+
+# ---- seams
+
+
+@pytest.mark.parametrize("settings", [SPRING, DEAD])
+@given(segments=plays, then=st.tuples(st.sampled_from(NAMES), between_frames, st.booleans()))
+def test_a_jump_changes_neither_the_pose_nor_its_velocity(settings, segments, then):
+    short = 1e-5
+    on, jumped = branched(segments, settings, playing_at(*then), short)
+    np.testing.assert_allclose(jumped[0].positions, on[0].positions, atol=1e-9)
+    velocities = [(late.positions - early.positions) / short for early, late in (on, jumped)]
+    fastest = max(1.0, np.abs(velocities[0]).max())
+    np.testing.assert_allclose(velocities[1], velocities[0], atol=0.02 * fastest)
+
+
+def test_the_shown_pose_is_off_by_no_more_than_the_jump_and_comes_to_the_clip():
+    poses = streamed([("run", 0.1, 10), ("idle", 0.5, 60)], SPRING)
+    plain = streamed([("run", 0.1, 10), ("idle", 0.5, 60)], OFF)
+    apart = [np.abs(a.rotations - b.rotations).max() for a, b in zip(poses, plain, strict=True)]
+    assert apart[10] > 0.1
+    assert max(apart[50:]) < 1e-4
+
+
+def test_four_jumps_a_second_stay_bounded():
+    segments = [(NAMES[1 + i % 3], 0.13 * (i % 7), 7, i % 2 == 0) for i in range(40)]
+    for settings in (SPRING, DEAD):
+        poses = streamed(segments, settings)
+        heights = np.array([pose.positions[:, 1] for pose in poses])
+        assert heights.min() > -0.3
+        assert heights.max() < 2.2
+
+
+def test_where_a_database_is_gone_the_last_moment_shown_counts_as_left():
+    stream = PoseStream(bank(), SPRING)
+    walk, run = playing_at("walk", 0.5), playing_at("run", 0.2)
+    first = stream.update(Decision(0, 0.0, Action.START, "", True, walk, None), 0.0)
+    stream.update(Decision(1, 0.0, Action.NOTHING, "", True, None, None), 0.0)
+    after = stream.update(Decision(2, 0.0, Action.START, "", True, run, None), 0.0)
+    np.testing.assert_allclose(after.positions, first.positions, atol=1e-9)
+
+
+def test_a_character_that_has_played_nothing_stands_as_its_rig_does():
+    pose = PoseStream(bank(), OFF).update(Decision(0, 0.0, Action.NOTHING, "", True, None, None), 0.0)
+    assert pose.playing is None
+    np.testing.assert_array_equal(pose.rotations, np.tile([1.0, 0.0, 0.0, 0.0], (bank().n_joints, 1)))
+    np.testing.assert_allclose(pose.positions[1], bank().skeleton.offsets[1])
+
+
+# ---- closed forms
+
+
+@given(vectors, vectors, st.floats(0.02, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_offsets_decay_in_closed_form_whatever_the_steps(x, v, halflife_s, a, b):
+    start = Offsets(x, v, x, v)
+    twice, once = decayed(decayed(start, halflife_s, a), halflife_s, b), decayed(start, halflife_s, a + b)
+    y = damping(halflife_s)
+    expected = np.exp(-y * (a + b)) * (x + (v + x * y) * (a + b))
+    for found in (twice, once):
+        np.testing.assert_allclose(found.turns, expected, atol=1e-9)
+        np.testing.assert_allclose(found.shifts, expected, atol=1e-9)
+    np.testing.assert_allclose(twice.turn_speeds, once.turn_speeds, atol=1e-8)
+
+
+def test_after_one_halflife_three_fifths_of_a_resting_offset_are_left():
+    x, v = np.array([[1.0, -2.0, 0.5]]), np.zeros((1, 3))
+    np.testing.assert_allclose(decayed(Offsets(x, v, x, v), 0.1, 0.1).turns, 0.5 * (1.0 + 2.0 * math.log(2.0)) * 0.5 * x)
+
+
+@given(segments=plays, parts=st.integers(2, 4))
+def test_a_step_of_time_may_be_taken_in_parts(segments, parts):
+    whole = streamed(segments, SPRING)
+    stream, shown = PoseStream(bank(), SPRING), []
+    ticks = list(decisions(segments, STEP))
+    for decision in ticks:
+        if decision.tick == 0:
+            shown.append(stream.update(decision, 0.0))
+            continue
+        still = Decision(0, 0.0, Action.CONTINUE, "", False, ticks[decision.tick - 1].playing, None)
+        for _ in range(parts - 1):
+            stream.update(still, STEP / parts)
+        shown.append(stream.update(decision, STEP - (parts - 1) * (STEP / parts)))
+    for one, many in zip(whole, shown, strict=True):
+        np.testing.assert_allclose(many.rotations, one.rotations, atol=1e-9)
+
+
+@given(vectors, vectors, vectors, vectors, vectors, vectors)
+def test_a_seam_keeps_pose_and_spin_for_any_offset(turn, speed, left, left_spin, entered, entered_spin):
+    def sample(rotation, spin):
+        rotations = np.empty((1, 4))
+        kernels.turn_by(rotation, np.array([[1.0, 0.0, 0.0, 0.0]]), rotations)
+        return replace(bank().sample_of(0, 0.0), rotations=rotations, spins=spin, positions=turn, velocities=spin)
+
+    a, b = sample(left, left_spin), sample(entered, entered_spin)
+    before = Offsets(turn, speed, turn, speed)
+    after = kept(before, a, b)
+    assert np.linalg.norm(after.turns) <= math.pi + 1e-9
+
+    def shown(offsets, moment, t):
+        under = np.empty((1, 4))
+        kernels.turn_by(t * moment.spins, moment.rotations, under)
+        over = np.empty((1, 4))
+        kernels.turn_by(offsets.turns + t * offsets.turn_speeds, under, over)
+        return over
+
+    tiny = 1e-6
+    old, new = (
+        quaternions.rotation_vectors(quaternions.multiply(shown(o, m, tiny), quaternions.inverse(shown(o, m, 0.0)))) / tiny
+        for o, m in ((before, a), (after, b))
+    )
+    assert abs(float((shown(before, a, 0.0) * shown(after, b, 0.0)).sum())) == pytest.approx(1.0, abs=1e-12)
+    if np.linalg.norm(after.turns) < 3.0:  # close to π the shorter way changes sides
+        np.testing.assert_allclose(new, old, atol=1e-4)
+
+
+# ---- dead blending
+
+
+def test_what_was_left_has_faded_after_its_time_and_nothing_remains():
+    segments = [("run", 0.1, 10), ("idle", 0.5, 30)]
+    shown, plain = streamed(segments, DEAD), streamed(segments, OFF)
+    for one, other in zip(shown[10 + 13 :], plain[10 + 13 :], strict=True):
+        np.testing.assert_array_equal(one.rotations, other.rotations)
+    assert np.abs(shown[11].rotations - plain[11].rotations).max() > 0.1
+
+
+# ---- state
+
+
+@given(segments=plays, data=st.data(), blend=st.sampled_from(["spring", "dead", "none"]))
+def test_a_stream_restored_at_any_tick_gives_the_same_poses_again(segments, data, blend):
+    settings = PoseSettings(root="mixed", blend=blend, foot_lock=blend != "none")
+    stream, ticks = PoseStream(bank(), settings), list(decisions(segments, STEP))
+    states, shown = [], []
+
+    def update(at, decision):
+        return at.update(decision, STEP if decision.tick else 0.0, (0.01 * decision.tick, 0.04 * decision.tick, 0.0))
+
+    for decision in ticks:
+        states.append(stream.state)
+        shown.append(update(stream, decision))
+    back = data.draw(st.integers(0, len(ticks) - 1))
+    for other in (stream, PoseStream(bank(), settings)):
+        other.restore(states[back])
+        for decision, was in zip(ticks[back:], shown[back:], strict=True):
+            again = update(other, decision)
+            np.testing.assert_array_equal(again.rotations, was.rotations)
+            np.testing.assert_array_equal(again.positions, was.positions)
+            assert (again.root, again.play_rate, again.is_jump) == (was.root, was.play_rate, was.is_jump)
+
+
+def test_a_state_may_be_pickled_for_a_saved_game():
+    stream, other = PoseStream(bank(), LOCKED), PoseStream(bank(), LOCKED)
+    *before, last = decisions([("walk", 0.1, 9), ("run", 0.2, 4)], STEP)
+    for decision in before:
+        stream.update(decision, STEP if decision.tick else 0.0)
+    other.restore(pickle.loads(pickle.dumps(stream.state)))
+    np.testing.assert_array_equal(other.update(last, STEP).positions, stream.update(last, STEP).positions)
+
+
+@pytest.mark.parametrize("blend", ["spring", "dead"])
+def test_after_a_very_long_pause_nothing_is_left_of_a_jump(blend):
+    segments = [("run", 0.1, 5), ("idle", 0.5, 2)]
+    settings = PoseSettings(root="animation", blend=blend, foot_lock=False)
+    stream, (*before, last) = PoseStream(bank(), settings), decisions(segments, STEP)
+    for decision in before:
+        stream.update(decision, STEP if decision.tick else 0.0)
+    pose = stream.update(replace(last, root_motion=RootMotion()), 1e9)
+    np.testing.assert_allclose(pose.rotations, bank().sample("idle", last.playing.time_s).rotations, atol=1e-12)
+
+
+def test_the_play_rate_is_the_clips_time_over_the_games():
+    stream = PoseStream(bank(), OFF)
+    rates = [stream.update(d, 0.8 * STEP if d.tick else 0.0).play_rate for d in decisions([("walk", 0.0, 9)], STEP)]
+    assert rates[1:] == pytest.approx([1.25] * 8)
+
+
+def test_a_jump_is_marked_and_a_start_is_not():
+    poses = streamed([("walk", 0.0, 3), ("run", 0.0, 3)], SPRING)
+    assert [pose.is_jump for pose in poses] == [False, False, False, True, False, False]
+
+
+# ---- faults
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: PoseStream({}), "there is no pose bank"),
+        (lambda: PoseStream({"jog": bank()}).update(walking(), 0.0, (0, 0, 0)), 'no pose bank of the database "loco"'),
+        (lambda: PoseStream(PoseBank.build(clips()[:1], SCHEMA)).update(walking(), 0.0, (0, 0, 0)), 'no poses of "walk"'),
+        (lambda: PoseStream(bank()).update(walking(), 0.0), "needs a body"),
+    ],
+)
+def test_what_a_stream_cannot_do_is_told(wrong, said):
+    with pytest.raises(MotionError, match=said):
+        wrong()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: PoseStream("walk"),
+        lambda: PoseStream({"loco": "walk"}),
+        lambda: PoseStream(bank(), {"root": "code"}),
+        lambda: PoseStream(bank(), OFF).update("walk", 0.0),
+        lambda: PoseStream(bank(), OFF).update(walking(), -1.0),
+        lambda: PoseStream(bank()).update(walking(), 0.0, (0.0, 0.0)),
+        lambda: PoseStream(bank()).update(walking(), 0.0, (0.0, "ahead", 0.0)),
+        lambda: PoseStream(bank()).restore(None),
+        lambda: PoseStream(bank()).restore(PoseStream(bank(), OFF).state),
+    ],
+)
+def test_arguments_of_another_type_are_told(wrong):
+    with pytest.raises(ContextError):
+        wrong()
+
+
+def test_a_fault_leaves_the_stream_where_it_stood():
+    stream = PoseStream(PoseBank.build(clips()[:2], SCHEMA), SPRING)
+    stream.update(walking(), 0.0)
+    state = stream.state
+    with pytest.raises(MotionError):
+        stream.update(Decision(1, 0.0, Action.JUMP, "", True, playing_at("run", 0.0), walking().playing), STEP)
+    assert stream.state is state
+    assert isinstance(state, PoseState)
+
+
+def walking():
+    return Decision(0, 0.0, Action.START, "", True, playing_at("walk", 0.2), None)
+
+
+def test_banks_by_database_serve_each_its_own():
+    stream = PoseStream({"loco": bank(), "spare": PoseBank.build(clips()[:1], SCHEMA)}, OFF)
+    assert stream.update(walking(), 0.0).playing.range == range_of("walk")

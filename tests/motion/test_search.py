@@ -163,13 +163,14 @@ def allowed_frames(database, given):
 
 
 def by(engine, database):
-    """The database as it is, or as it searches where numba cannot be installed."""
-    if engine == "numpy":
+    """The database as it is, or as it searches where numba cannot be installed: all frames, or those that boxes leave."""
+    if engine != "numba":
         vars(database._searcher)["_compiled"] = None
+        database._searcher.many = 1 if engine == "numpy, by boxes" else database.n_frames
     return database
 
 
-engines = pytest.mark.parametrize("engine", ["numba", "numpy"])
+engines = pytest.mark.parametrize("engine", ["numba", "numpy", "numpy, by boxes"])
 
 
 @engines

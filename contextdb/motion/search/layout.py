@@ -143,6 +143,13 @@ class Layout:
         ranges[self.frames] = np.repeat(self.box_ranges, self.box_sizes)
         return ranges
 
+    @cached_property
+    def frame_boxes(self) -> Ints:
+        """The box of each frame, -1 between ranges: int64 [N]."""
+        boxes = np.full(self.n_frames, -1, np.int64)
+        boxes[self.frames] = np.repeat(np.arange(len(self.box_sizes)), self.box_sizes)
+        return boxes
+
     @property
     def frames(self) -> Ints:
         """Every frame that is in a range, ascending: int64."""

@@ -49,6 +49,7 @@ class Searcher:
         self.layout, self.kinds, self.normalisation = layout, kinds, normalisation
         self.slices, self.weights, self.feature_names = slices, weights, feature_names
         self._shape = (layout.n_features,)
+        self.many = scan.MANY
 
     def least(self, query: ArrayLike, chosen: Filter, within: float, n: int) -> tuple[int, Floats, Ints]:
         """The lowest totals not above `within` and their frames: one of all frames (n = 1), or one for each range (n = R).
@@ -58,7 +59,7 @@ class Searcher:
         totals, frames = np.empty(n), np.empty(n, np.int64)
         if self._compiled is None:
             wanted = self.normalised(query)
-            scan.least(self.layout, wanted, self.slices, self.weights, chosen, self.kinds, within, totals, frames)
+            scan.least(self.layout, wanted, self.slices, self.weights, chosen, self.kinds, within, totals, frames, self.many)
             return self.layout.range_of(int(frames[0])), totals, frames
         kernels, pack = self._compiled
         is_plain = type(query) is np.ndarray and query.dtype == np.float64 and query.flags.c_contiguous

@@ -56,7 +56,9 @@ def types_of(table: Table) -> dict[str, str]:
 @given(tables())
 def test_outputs_come_back_from_dmn_with_their_types_and_values(drawn: tuple[Table, dict, list[dict], dict]):
     table, declared, rows, _ = drawn
-    assume(all(character.isprintable() for column in table.columns for text in column.texts for character in text))
+    declares = [text for o in table.settings.declared_outputs for text in (*o.values, o.default) if isinstance(text, str)]
+    gives = [value for _, value in table.settings.fallback_outputs if isinstance(value, str)]
+    assume(all(text.isprintable() for text in (*declares, *gives, *(text for column in table.columns for text in column.texts))))
     again = through_dmn(table)
     outputs = again.compile().outputs
     assert outputs.names == tuple(declared)

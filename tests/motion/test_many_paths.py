@@ -25,7 +25,8 @@ def schemas(draw):
     channels = [{"type": "position", "bone": "LeftFoot"}]
     for what in draw(st.lists(st.sampled_from(WHATS), unique=True)):
         how = draw(st.sampled_from(["at", "along"]))
-        channels.append({"type": "trajectory", "what": what, how: draw(st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=3))})
+        points = draw(st.sets(st.floats(-3.0, 3.0).map(lambda point: point + 0.0), min_size=1, max_size=3))  # one zero
+        channels.append({"type": "trajectory", "what": what, how: sorted(points)})
     return FeatureSchema.from_dict("crowd", {"rate": 30.0, "channels": channels})
 
 

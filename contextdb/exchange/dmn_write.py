@@ -59,8 +59,8 @@ def write_dmn(table: Table) -> tuple[bytes, tuple[Remark, ...]]:
         "    </decisionTable>\n  </decision>\n</definitions>\n"
     )
     if found := _NEVER.search(text):
-        said = f"{in_quotes(text[max(0, found.start() - 10) : found.end()])} has a character that XML cannot hold."
-        raise TableError(Fault(said, "text without it, in contextdb.toml too"))
+        said = f"contextdb.toml declares a text with {in_quotes(found[0])}, a character that XML cannot hold."
+        raise TableError(Fault(said, "text without it"))
     return text.encode(), (*remarks, *_about(table, tags))
 
 

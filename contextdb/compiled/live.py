@@ -14,6 +14,7 @@ from operator import and_
 from typing import Any, Never, Self
 
 from contextdb.cells.arguments import by_name
+from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
 from contextdb.cells.mirroring import kept_facts
 from contextdb.cells.notebook import one_line
@@ -254,6 +255,11 @@ class LiveContext(MutableMapping[str, object]):
         if actors is not None:
             self._cast = LiveActors(self._compiled, Ask(actors, prefer, self._unknown))
             self._odd[CAST] = (0, False)
+
+    @property
+    def asked(self) -> dict[str, Condition]:
+        """The conditions whose facts can be set, by name."""
+        return self._compiled.asked
 
     @property
     def facts(self) -> dict[str, object]:

@@ -5,6 +5,7 @@
                                       Controller: one character in time ─► Decision ─► Trace
                                       PoseStream: its decisions as poses, from a PoseBank ─► Pose
                                       ControllerGroup: a crowd of them, searched for at once
+                                      Character, Crowd: stick, body, facts, table and all of this in one update
                                       MatchNode, MatchGate: one-offs that end at a target
 
 A table's query says which assets are valid; this finds the best frame among theirs. It takes masks and names, never a table.
@@ -12,6 +13,10 @@ Metres, seconds, y up; angles are positive to the left. numba makes the search f
 """
 
 from contextdb.errors import ClipError, MotionError, QueryError
+from contextdb.motion.characters.character import Character, CharacterState, Updated
+from contextdb.motion.characters.crowd import Crowd
+from contextdb.motion.characters.facts import FACTS, Moment
+from contextdb.motion.characters.paths import path_from
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
@@ -63,6 +68,7 @@ from contextdb.motion.trace.session import Trace
 
 __all__ = [
     "ANY_TAGS",
+    "FACTS",
     "RECIPES",
     "Action",
     "Biases",
@@ -70,6 +76,8 @@ __all__ = [
     "Candidate",
     "Candidates",
     "Channel",
+    "Character",
+    "CharacterState",
     "Choice",
     "Clip",
     "ClipError",
@@ -79,6 +87,7 @@ __all__ = [
     "ControllerGroup",
     "ControllerSettings",
     "ControllerState",
+    "Crowd",
     "CustomFunction",
     "DatabaseSettings",
     "Decision",
@@ -100,6 +109,7 @@ __all__ = [
     "MatchGate",
     "MatchNode",
     "MatchPlay",
+    "Moment",
     "MotionConfig",
     "MotionDatabase",
     "MotionError",
@@ -129,6 +139,7 @@ __all__ = [
     "Target",
     "Trace",
     "Trajectory",
+    "Updated",
     "Variation",
     "WarpShare",
     "best_start",
@@ -156,6 +167,7 @@ __all__ = [
     "open_poses",
     "parse_bvh",
     "partners_of",
+    "path_from",
     "pose_arrays",
     "pose_schema",
     "poses_of",

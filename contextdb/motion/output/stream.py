@@ -103,6 +103,11 @@ class PoseStream:
         self._stages = stages_of(settings, self._rig)
 
     @property
+    def rig(self) -> PoseBank:
+        """A bank of the rig that the poses are of, such as for `write_poses`."""
+        return self._rig
+
+    @property
     def state(self) -> PoseState:
         """Where the stream is, to come back to with `restore`."""
         return self._state

@@ -15,6 +15,7 @@ DoNotChoose, NextNaturalOnly and root motion weight of EA's talk.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
@@ -122,6 +123,12 @@ class Controller:
         if self._moved is None or self._moved[0] != asked:
             self._moved = asked, Ongoing.of(*asked)
         return self._moved[1]
+
+    def copy(self) -> Controller:
+        """Another controller that stands where this one does, with the same selector and settings, and no recorder."""
+        copied = Controller(self.selector, self.settings, rng=deepcopy(self._rng), clock=self._clock)
+        copied._state = self._state
+        return copied
 
     @property
     def state(self) -> ControllerState:

@@ -15,5 +15,6 @@ COMMANDS = {
     "search": "the best frames of one database, with what each channel adds to their cost",
     "select": "which database of a selector wins, with which frame, and why",
     "run": "steer a character along a recorded stick, and record what it decides",
+    "probe": "drive a character over the contexts of its tables by itself, and measure how well it moves",
     "replay": "what was decided in a recorded session, and why",
 }

@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what the player requests, moment by moment")
     parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
     parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh or .npz")
-    parser.add_argument("--rate", metavar="HZ", type=_rate, help="updates per second (default: the rate of the features)")
+    parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
     parser.add_argument("--k", metavar="N", type=_count, default=12, help="candidates of each search to keep (default: 12)")
     parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="seed of the controller's variation (default: 0)")
     parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
@@ -187,7 +187,8 @@ def _checked_file(out: Path, stick: Path, what: str) -> Path:
     return out
 
 
-def _rate(text: str) -> float:
+def rate_of(text: str) -> float:
+    """Updates a second, as an option gives them."""
     try:
         rate = float(text)
     except ValueError:

@@ -103,6 +103,11 @@ class PoseStream:
         self._stages = stages_of(settings, self._rig)
 
     @property
+    def banks(self) -> PoseBank | Mapping[str, PoseBank]:
+        """The pose bank, or those of the databases by their names."""
+        return self._only or self._banks
+
+    @property
     def rig(self) -> PoseBank:
         """A bank of the rig that the poses are of, such as for `write_poses`."""
         return self._rig

@@ -141,13 +141,14 @@ def test_the_group_lists_its_commands(arguments: list[str]):
         "search",
         "select",
         "run",
+        "probe",
         "replay",
     ]
     assert run("motion") == Result(2, "", result.out)
     assert run("help", "motion") == result
 
 
-@pytest.mark.parametrize("command", ["build", "search", "select", "run", "replay"])
+@pytest.mark.parametrize("command", ["build", "search", "select", "run", "probe", "replay"])
 @pytest.mark.parametrize("width", [60, 100])
 def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("COLUMNS", str(width))
@@ -519,6 +520,85 @@ def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
     motion("run", "game", "player", "ahead.csv", "--out", "new.parquet", "--poses", "new.npz")
     with np.load(here / "new.npz") as poses:
         np.testing.assert_allclose(poses["root"][:, 1], 1.2 * np.arange(61) / 30.0, atol=1e-9)
+
+
+def test_the_character_s_own_facts_are_computed_where_the_file_gives_none(here: Path):
+    (here / "own.csv").write_text(
+        "time_s,x_mps,z_mps,gait,speed,style\n0,0,1.3,Walk,,normal\n1,0,1.3,Walk,0.75,normal\n2,0,1.3,Walk,,normal\n",
+        encoding="utf-8",
+    )
+    motion("run", "game", "player", "own.csv", "--out", "own.parquet")
+    speeds = [decision.context["speed"] for decision in Trace.load("own.parquet").brief()]
+    assert speeds[0] == 0.0
+    assert speeds[:30] == sorted(speeds[:30])
+    assert speeds[30:60] == [0.75] * 30
+    assert speeds[60] == pytest.approx(1.3, abs=0.01)
+    whole = (here / "own.csv").read_text(encoding="utf-8").replace(",speed", "").replace(",,", ",").replace("0.75,", "")
+    (here / "own.csv").write_text(whole, encoding="utf-8")
+    motion("run", "game", "player", "own.csv", "--out", "without.parquet")
+    assert Trace.load("without.parquet")[20].context["speed"] == speeds[20]
+
+
+def test_a_table_that_asks_for_the_character_s_own_facts_alone_filters_without_facts_in_the_file(here: Path):
+    (here / "game" / "moves.csv").write_text("Asset,speed\nidle,0..0.3\njog,>0.3\n", encoding="utf-8")
+    (here / "own.csv").write_text("time_s,speed_mps\n0,0\n1,1.3\n2,1.3\n", encoding="utf-8")
+    motion("run", "game", "player", "own.csv", "--out", "own.parquet")
+    played = [decision.playing.asset for decision in Trace.load("own.parquet").brief()]
+    assert (played[10], played[40]) == ("idle", "jog")
+
+
+def test_a_session_is_the_same_with_and_without_its_poses(here: Path):
+    motion("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.npz")
+    assert (here / "new.parquet").read_bytes() == (here / "session.parquet").read_bytes()
+
+
+# ---- probe
+
+
+KEYS = {
+    "file", "seconds", "jumps_per_s", "forced_jumps", "jump_cm", "skate_cm_s", "skate_raw_cm_s", "accel_p99", "accel_raw_p99",
+    "path_rms_m", "heading_rms_deg", "reach_s", "stay_s", "frames_used_share", "assets_never_used",
+}  # fmt: skip
+"""What `motion measure --json` has of each session."""
+
+
+def test_a_probe_chooses_contexts_and_speeds_and_measures_each_drive(here: Path):
+    result = motion("probe", "game", "player", "--drive", "straight", "--drive", "stops", "--json", "--out", "probed")
+    sessions = result.json["sessions"]
+    assert result.json["format"] == 1
+    assert {session["facts"]["style"] for session in sessions} == {"normal", "tired"}
+    assert {session["drive"] for session in sessions} == {"straight", "starts and stops"}
+    assert all(session.keys() >= KEYS for session in sessions)
+    for session in sessions:
+        trace = Trace.load(session["file"])
+        assert trace[-1].time_s == pytest.approx(session["seconds"], abs=0.05)
+        assert {decision.context["style"] for decision in trace.brief()} == {session["facts"]["style"]}
+        if session["drive"] == "straight":
+            assert session["path_rms_m"] < 0.15
+    assert "drives style=normal at" in result.err
+    assert "gait=Idle while the stick asks for about 0.0" in result.err
+
+
+def test_a_probe_exits_with_1_where_a_drive_is_over_a_bar():
+    drive = ("probe", "game", "player", "--drive", "straight", "--speed", "1.2")
+    assert motion(*drive, "--max-skate", "1000", "--max-jumps", "30").lines[-1] == "2 drives"
+    result = motion(*drive, "--max-jumps", "0", code=1)
+    assert "straight at 1.2 m/s: " in result.err
+    assert "jumps a second, over the bar of 0" in result.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["game", "plyer"], 'there is no [controllers.plyer]. Accepted: "player". Did you mean "player"?'),
+        (["game", "player", "--drive", "loops"], "invalid choice"),
+        (["game", "player", "--speed", "fast"], '"fast" is not a speed to drive at. Accepted: 0.1 to 100 m/s'),
+        (["game", "player", "--max-skate", "-1"], '"-1" is not a bar.'),
+        (["game", "player", "--out", "stick.csv"], "stick.csv: this is a file. Accepted: a folder."),
+    ],
+)
+def test_a_wrong_argument_of_a_probe_is_told(arguments: list[str], message: str):
+    assert message in refused("probe", *arguments)
 
 
 # ---- replay

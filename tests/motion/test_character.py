@@ -307,6 +307,12 @@ def test_a_path_from_a_root_begins_there_and_comes_to_the_body_s_path_without_a_
     np.testing.assert_allclose(apart[1], apart[0], atol=0.02 * (1.0 + np.abs(apart[0]).max()))  # no velocity at first
 
 
+def test_a_character_that_faces_far_away_is_told_to_be_45_degrees_away():
+    path = motion.steered_path([motion.Steered()], (0.0, 1.0))
+    assert motion.path_from((0.0, 0.0, 3.0), path).headings[0] == pytest.approx(math.radians(45.0))
+    assert motion.path_from((0.0, 0.0, -3.0), path).headings[0] == pytest.approx(-math.radians(45.0))
+
+
 def test_a_body_that_is_where_its_root_is_keeps_its_path():
     path = motion.steered_path([motion.Steered()], (0.0, 1.0))
     assert motion.path_from((0.0, 0.0, math.tau), path) is path

@@ -42,6 +42,7 @@ BUILT = motion.MotionDatabase.build([CLIP], SCHEMA)
 DECISION = motion.Controller(motion.Selector([motion.Entry("only", BUILT)])).update(0.0, BUILT.raw(0))
 BY_CLIP = motion.PoseSettings(root="animation")
 POSED = [motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1)]
+PLAYER = motion.Character(motion.Controller(motion.Selector([motion.Entry("only", BUILT)])), SCHEMA, None, motion.PoseStream(BANK))
 Call = Callable[[object], object]
 CALLS: dict[str, Call] = {
     "load_bvh(path)": lambda x: motion.load_bvh(x),
@@ -271,6 +272,38 @@ CALLS: dict[str, Call] = {
     "Steered.moved(dt_s)": lambda x: motion.Steered().moved(x, (0.0, 1.0)),
     "Steered.moved(wanted)": lambda x: motion.Steered().moved(0.1, x),
     "Steered(position)": lambda x: motion.Steered(x),
+    "Character(controller)": lambda x: motion.Character(x, SCHEMA),
+    "Character(schema)": lambda x: motion.Character(PLAYER.controller, x),
+    "Character(tables)": lambda x: motion.Character(PLAYER.controller, SCHEMA, x),
+    "Character(stream)": lambda x: motion.Character(PLAYER.controller, SCHEMA, None, x),
+    "Character(body)": lambda x: motion.Character(PLAYER.controller, SCHEMA, None, None, x),
+    "Character(own_facts)": lambda x: motion.Character(PLAYER.controller, SCHEMA, own_facts=x),
+    "Character(pose)": lambda x: motion.Character(PLAYER.controller, SCHEMA, pose=x),
+    "Character(unknown)": lambda x: motion.Character(PLAYER.controller, SCHEMA, unknown=x),
+    "Character.of(project)": lambda x: motion.Character.of(x, "player"),
+    "Character.record(n_candidates)": lambda x: PLAYER.copy().record(x),
+    "Character.body": lambda x: setattr(PLAYER.copy(), "body", x),
+    "Character.restore(state)": lambda x: PLAYER.restore(x),
+    "Character.update(dt)": lambda x: PLAYER.copy().update(x),
+    "Character.update(stick)": lambda x: PLAYER.copy().update(0.1, x),
+    "Character.update(facts)": lambda x: PLAYER.copy().update(0.1, facts=x),
+    "Character.update(facing)": lambda x: PLAYER.copy().update(0.1, facing=x),
+    "Character.update(body)": lambda x: PLAYER.copy().update(0.1, body=x),
+    "Character.update(path)": lambda x: PLAYER.copy().update(0.1, path=x),
+    "Character.update(tags)": lambda x: PLAYER.copy().update(0.1, tags=x),
+    "Character.update(valid)": lambda x: PLAYER.copy().update(0.1, valid=x),
+    "path_from(root)": lambda x: motion.path_from(x, PATH),
+    "path_from(path)": lambda x: motion.path_from((0.0, 0.0, 0.0), x),
+    "path_from(halflife_s)": lambda x: motion.path_from((0.0, 0.0, 1.0), PATH, halflife_s=x),
+    "Crowd(characters)": lambda x: motion.Crowd(x),
+    "Crowd(characters), one": lambda x: motion.Crowd([x]),
+    "Crowd.add(character)": lambda x: motion.Crowd().add(x),
+    "Crowd.remove(character)": lambda x: motion.Crowd().remove(x),
+    "Crowd.restore(states)": lambda x: motion.Crowd([PLAYER.copy()]).restore(x),
+    "Crowd.update(dt)": lambda x: motion.Crowd([PLAYER.copy()]).update(x, [(0.0, 1.0)]),
+    "Crowd.update(sticks)": lambda x: motion.Crowd([PLAYER.copy()]).update(0.1, x),
+    "Crowd.update(facts)": lambda x: motion.Crowd([PLAYER.copy()]).update(0.1, [(0.0, 1.0)], x),
+    "Crowd.update(facing)": lambda x: motion.Crowd([PLAYER.copy()]).update(0.1, [(0.0, 1.0)], facing=x),
     "Marks.left_out(tags)": lambda x: DATABASE.marks.left_out(x),
     "Marks.tag_biases(tags)": lambda x: DATABASE.marks.tag_biases(x),
 }

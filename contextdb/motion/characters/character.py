@@ -165,7 +165,7 @@ class Character:
             require_callable(function, f"the function of {in_quotes(name)}")
         if pose is not None:
             require_callable(pose, "pose")
-        if unknown not in UNKNOWN:
+        if not isinstance(unknown, str) or unknown not in UNKNOWN:
             raise ContextError(Fault(f"unknown is {unknown!r}.", some(UNKNOWN)))
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
         self.tables, self.own_facts, self.unknown = asking.checked(tables), own_facts, unknown
@@ -221,7 +221,10 @@ class Character:
         return copied
 
     def record(self, n_candidates: int = 12) -> Trace:
-        """Keep every decision from now on, with so many candidates of each search, in the trace that is given back."""
+        """Keep every decision from now on, with so many candidates of each search, in the trace that is given back.
+
+        Raises MotionError where that is no whole number from 0 up.
+        """
         trace = Trace(n_candidates, self.controller.selector.databases)
         self.controller.recorder = trace
         return trace
@@ -294,6 +297,8 @@ class Character:
         ContextDBError
             Facts that a table refuses, or an argument that cannot be used. The character then stands where it stood.
         """
+        if path is not None:
+            require_kind(path, Trajectory, "path", "a Trajectory over the ground")
         step = self.step(dt, stick, facts, facing, body)
         wished = self.wished(step, self.steered(step, stick, facing) if path is None else path)
         query = with_path(self.schema, self.features(step.dt_s, step.body), wished)
@@ -311,6 +316,8 @@ class Character:
         require_point(stick, "stick", "two numbers, x and z in metres a second")
         given = {} if facts is None else require_mapping(facts, "facts", "a mapping of names to facts")
         require_kind(body, (Steered, type(None)), "body", "a Steered")
+        if facing is not None:
+            require_real(facing, "facing")
         moved = self._body.moved(dt, stick, facing) if body is None else body
         return self.step_of(dt, stick, given, facing, moved)
 

@@ -12,12 +12,12 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_many_of, require_mapping, require_real
+from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_real
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
 from contextdb.motion.arguments import HasAssets
 from contextdb.motion.characters import tables as asking
 from contextdb.motion.characters.character import Character, CharacterState, Step, Updated
-from contextdb.motion.characters.paths import ahead_s, back_s, shares_left
+from contextdb.motion.characters.paths import MOST_TURN_RAD, ahead_s, back_s, shares_left
 from contextdb.motion.characters.tables import Facts, Table
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.many_steered import ManySteered, steered_paths
@@ -51,7 +51,8 @@ class Crowd(Sequence[Character]):
             self.add(character)
 
     def add(self, character: Character) -> None:
-        """Take one more, as the last."""
+        """Take one more, as the last. Raises MotionError for one that is there, ContextError for what is none."""
+        require_kind(character, Character, "character", "a Character")
         if any(own is character or own.controller is character.controller for own in self):
             raise MotionError(Fault("the crowd has this character already.", "one of its own, such as character.copy()"))
         self._characters.append(character)
@@ -207,7 +208,7 @@ def _paths_from(places: Floats, paths: ManyTrajectories) -> ManyTrajectories:
     """Each path from where its character is; see `path_from`."""
     apart = places[:, :2] - paths.positions[:, paths.now]
     turned = places[:, 2] - paths.headings[:, paths.now]
-    turned = turned - math.tau * np.rint(turned / math.tau)
+    turned = np.clip(turned - math.tau * np.rint(turned / math.tau), -MOST_TURN_RAD, MOST_TURN_RAD)
     left = shares_left(paths.headings.shape[1], paths.now, paths.rate)
     positions = paths.positions + left[None, :, None] * apart[:, None]
     return ManyTrajectories(paths.rate, positions, paths.headings + left * turned[:, None], paths.now)

@@ -21,6 +21,9 @@ from contextdb.motion.selection.root_motion import RootMotion
 
 RETURN_HALFLIFE_S = 0.27
 """How fast a character is wished to come to the path of the body; as fast as a body follows a stick."""
+MOST_TURN_RAD = math.radians(45.0)
+"""A character that faces farther away than this is told to be so far away: few clips turn more at once, and where none does, a path
+that asks for all of it makes the search jump to and fro."""
 SETTLED_HALFLIVES = 15.0
 """After so many half-lives a body goes straight on, and so does a path beyond its end."""
 LEAST_BACK_S = 2.0
@@ -53,7 +56,8 @@ def _points(schema: FeatureSchema) -> tuple[list[float], list[float]]:
 def path_from(root: Sequence[float], path: Trajectory, *, halflife_s: float = RETURN_HALFLIFE_S) -> Trajectory:
     """The path that a character is wished to take which is not where the game has the body: from its root to the body's path.
 
-    What lies between the two decays as a critically damped spring does, without a step in place or velocity.
+    What lies between the two decays as a critically damped spring does, without a step in place or velocity. Headings are at most
+    45 degrees apart.
 
     Parameters
     ----------
@@ -78,6 +82,7 @@ def path_from_place(place: Place3, path: Trajectory, halflife_s: float = RETURN_
     x, z = path.positions[path.now].tolist()
     apart = np.array([place[0] - x, place[1] - z])
     turned = math.remainder(place[2] - float(path.headings[path.now]), math.tau)
+    turned = min(max(turned, -MOST_TURN_RAD), MOST_TURN_RAD)
     if not turned and not apart.any():
         return path
     left = shares_left(len(path.headings), path.now, path.rate, halflife_s)

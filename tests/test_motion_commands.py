@@ -163,7 +163,7 @@ def test_each_command_has_a_help_that_fits_with_examples(command: str, width: in
 @pytest.mark.parametrize(("word", "near"), [("serch", "search"), ("Replay", "replay"), ("selekt", "select"), ("bild", "build")])
 def test_a_misspelt_command_of_the_group_is_named_with_the_nearest(word: str, near: str):
     assert refused(word, "game") == (
-        f'contextdb: there is no command "motion {word}". Accepted: build, search, select, run, replay. '
+        f'contextdb: there is no command "motion {word}". Accepted: build, search, select, run, probe, replay. '
         f'Did you mean "motion {near}"?\n'
     )
 
@@ -591,7 +591,7 @@ def test_a_probe_exits_with_1_where_a_drive_is_over_a_bar():
     ("arguments", "message"),
     [
         (["game", "plyer"], 'there is no [controllers.plyer]. Accepted: "player". Did you mean "player"?'),
-        (["game", "player", "--drive", "loops"], "invalid choice"),
+        (["game", "player", "--drive", "loops"], 'there is no "loops". Accepted: "straight", "turns"'),
         (["game", "player", "--speed", "fast"], '"fast" is not a speed to drive at. Accepted: 0.1 to 100 m/s'),
         (["game", "player", "--max-skate", "-1"], '"-1" is not a bar.'),
         (["game", "player", "--out", "stick.csv"], "stick.csv: this is a file. Accepted: a folder."),

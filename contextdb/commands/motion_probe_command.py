@@ -77,6 +77,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Drive, measure and report."""
     stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
     character = character_of(stage, arguments.controller, unknown="any")
+    if character.stream is None:
+        raise ContextDBError(Fault("there is no clip that the character could play.", "a database with a clip"))
     plan = plan_of(character, arguments.speed or ())
     for line in _chosen(plan):
         print(printable(f"contextdb: {line}"), file=sys.stderr)

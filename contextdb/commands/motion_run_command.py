@@ -30,18 +30,17 @@ from contextdb.commands.motion_stage import Stage, reach_s
 from contextdb.commands.motion_stick import Moments, Stick, conditions_of
 from contextdb.console import ExitCode, output, progress
 from contextdb.disk import path_in_quotes
-from contextdb.errors import Fault, FileError, Place, in_quotes
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes
 from contextdb.motion import (
     Character,
-    Pose,
     PoseStream,
     Steered,
     Trajectory,
     Updated,
-    open_or_build_poses,
     steady_path,
     write_poses,
 )
+from contextdb.motion.characters.project import banks_of
 from contextdb.motion.characters.tables import Facts, own_facts_of
 from contextdb.motion.storage.written_poses import pose_file
 from contextdb.motion.trace.views import summary_line
@@ -80,10 +79,12 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if moments is None:
         character.tables = None
     rate = character.schema.rate if arguments.rate is None else arguments.rate
-    poses = list(steer(character, stick, moments, rate))
+    if poses_out is not None and character.stream is None:
+        raise ContextDBError(Fault("there is no clip to take poses of.", "a database with a clip"))
+    poses = [updated.pose for updated in steer(character, stick, moments, rate)]
     trace.save(out, timings=False)
     if poses_out is not None and character.stream is not None:
-        write_poses(poses, character.stream.rig, poses_out, rate)
+        write_poses([pose for pose in poses if pose is not None], character.stream.rig, poses_out, rate)
     with output():
         if arguments.json:
             print(as_json({"format": 1, "file": str(out), "updates": len(trace), "bytes": out.stat().st_size}), end="")
@@ -101,27 +102,24 @@ def _project(folder: Path, out: Path) -> dict[str, str]:
 
 
 def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "error") -> Character:
-    """The character of a controller, with its poses."""
+    """The character of a controller, with its poses; without where its databases have no clips."""
     controller = stage.config.controller(name, stage.databases, rng=random.Random(seed))
     names = list(controller.selector.names)
     assets = {table: leaf_assets(stage.project[table]) for table in stage.project.tables}
-    banks = open_or_build_poses(stage.config, stage.folder, assets, names=names)
+    banks = banks_of(stage.config, stage.folder, assets, controller.selector.databases)
     tables = stage.tables(names)
     table_of = {each: tables[table] for each in names if (table := stage.config.databases[each].table) is not None}
-    stream = PoseStream(banks, stage.config.output_of(name))
+    stream = None if banks is None else PoseStream(banks, stage.config.output_of(name))
     return Character(controller, stage.schema(names[0]), table_of or None, stream, unknown=unknown)
 
 
-def steer(character: Character, stick: Stick, moments: Moments | None, per_s: float) -> Iterator[Pose]:
-    """Update a character from the stick's first moment to its last, so many times a second; its poses."""
+def steer(character: Character, stick: Stick, moments: Moments | None, per_s: float) -> Iterator[Updated]:
+    """Update a character from the stick's first moment to its last, so many times a second."""
     n_updates = math.floor(stick.duration_s * per_s + 1e-6) + 1
+    update = _over_ground if stick.is_velocity else _from_body
     for i in progress(range(n_updates), "steering"):
         moment, dt_s = stick.at(i / per_s), 1.0 / per_s if i else 0.0
-        facts = None if moments is None else moments.contexts[moment]
-        update = _over_ground if stick.is_velocity else _from_body
-        pose = update(character, stick, moment, dt_s, facts).pose
-        assert pose is not None, "a character with a stream has a pose"
-        yield pose
+        yield update(character, stick, moment, dt_s, None if moments is None else moments.contexts[moment])
 
 
 def _over_ground(character: Character, stick: Stick, moment: int, dt_s: float, facts: Facts | None) -> Updated:

@@ -12,6 +12,7 @@ from contextdb.motion.characters.tables import Table
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.storage.build_inputs import Assets
 from contextdb.motion.storage.building import open_or_build
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.pose_files import open_or_build_poses
@@ -56,6 +57,14 @@ class Parts:
         compiled = {table: project.tables[table].compile() for table in dict.fromkeys(table_of.values())}
         assets: dict[str, Sequence[str]] = {table: each.leaves for table, each in compiled.items()}
         databases = open_or_build(config, project.folder, assets, names=sharing)
-        banks = open_or_build_poses(config, project.folder, assets, names=names) if poses else None
+        banks = banks_of(config, project.folder, assets, {name: databases[name] for name in names}) if poses else None
         tables = {name: compiled[table_of[name]] for name in names if name in table_of}
         return cls(config, databases, banks, tables, config.features[features])
+
+
+def banks_of(
+    config: MotionConfig, folder: Path, assets: Assets, databases: Mapping[str, MotionDatabase]
+) -> dict[str, PoseBank] | None:
+    """The pose banks of some databases, of those that have any frame; None where none has."""
+    names = [name for name, database in databases.items() if database.n_frames]
+    return open_or_build_poses(config, folder, assets, names=names) if names else None

@@ -1,6 +1,6 @@
 """What the page of a session plays, as one JSON document: columns packed small, and the moments at which something was searched.
 
-Lengths are whole millimetres, times whole milliseconds, angles tenths of a milliradian. A column is deflated and in base64; one with
+Lengths are whole millimetres, times whole milliseconds, angles tenths of a milliradian. Columns are deflated and in base64; one with
 `delta` keeps of each row what it differs from the row before, which deflates better.
 """
 
@@ -189,7 +189,7 @@ def _session(session: SessionView, detail: Detail) -> dict[str, object]:
         "positions": _packed(_whole(local, 1000.0, np.int16).reshape(len(shown), -1), is_delta=True),
         "root": _packed(_root(session.roots[shown]), is_delta=True),
         "asset": _packed(asset[shown]),
-        "at": _packed(np.array([round(1000 * session.playing[i][1]) for i in shown], np.int32)),
+        "at": _packed(np.array([round(1000 * session.playing[i][1]) for i in shown.tolist()], np.int32)),
         "flags": _packed(_gathered(session.flags, step)),
         "contacts": _packed((session.contacts[shown] << np.arange(session.contacts.shape[1])).sum(axis=1).astype(np.uint8)),
     }
@@ -292,10 +292,8 @@ def _on_ground(roots: Floats) -> Floats:
 
 
 def _root(roots: Floats) -> NDArray[np.int32]:
-    heading = np.unwrap(roots[:, 2])
-    return np.stack(
-        (_whole(roots[:, 0], 1e3, np.int32), _whole(roots[:, 1], 1e3, np.int32), _whole(heading, 1e4, np.int32)), axis=1
-    )
+    places = np.stack((roots[:, 0] * 1e3, roots[:, 1] * 1e3, np.unwrap(roots[:, 2]) * 1e4), axis=1)
+    return _whole(places, 1.0, np.int32)
 
 
 def _whole(values: Floats, scale: float, kind: type[np.signedinteger]) -> NDArray[np.signedinteger]:

@@ -1,4 +1,4 @@
-"""Recorded sessions as one HTML page that needs no network: skeletons that play, a timeline to scrub, and why each moment came out so.
+"""Recorded sessions as one HTML page that needs no network: skeletons that play, a timeline to scrub, and the reason of each moment.
 
 What was measured and what changed is in the page as tables and reads without its script; the rest is drawn by it. Every text of a
 session is escaped, and nothing of it can become markup or script.
@@ -47,15 +47,17 @@ def _page(sessions: Sequence[SessionView], detail: Detail, parting: str) -> str:
     said = f"<p>{escape(parting)}</p>\n" if parting else ""
     document = json.dumps(document_of(sessions, detail), ensure_ascii=True, separators=(",", ":"), allow_nan=False)
     embedded = document.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    changes = "".join(_changes(session, name) for session, name in zip(sessions, names, strict=True))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>\n{_part('session.css')}</style>\n</head>\n<body>\n"
-        f"<header><h1>{escape(title)}</h1>\n{said}</header>\n<main>\n{_player(names)}{_measures(sessions, names)}"
-        f"{''.join(_changes(session, name) for session, name in zip(sessions, names, strict=True))}</main>\n"
+        f"<header><h1>{escape(title)}</h1>\n{said}</header>\n<main>\n"
+        f"{_player(names)}{_measures(sessions, names)}{changes}</main>\n"
         f'<footer><p class="muted">contextdb {__version__}</p></footer>\n'
-        f'<script type="application/json" id="session">{embedded}</script>\n<script>\n{_part("session.js")}</script>\n</body>\n</html>\n'
+        f'<script type="application/json" id="session">{embedded}</script>\n'
+        f"<script>\n{_part('session.js')}</script>\n</body>\n</html>\n"
     )
 
 
@@ -72,8 +74,8 @@ def _player(names: Sequence[str]) -> str:
         '<section id="player" aria-label="Playback" hidden>\n'
         '<div class="controls">\n'
         '<button type="button" id="play">Play</button>\n'
-        '<button type="button" id="back" aria-label="to the jump before">‹ jump</button>\n'
-        '<button type="button" id="on" aria-label="to the next jump">jump ›</button>\n'
+        '<button type="button" id="back" aria-label="to the jump before">« jump</button>\n'
+        '<button type="button" id="on" aria-label="to the next jump">jump »</button>\n'
         '<input type="range" id="time" min="0" value="0" aria-label="time">\n<span id="clock"></span>\n'
         f"{_choice('rate', 'speed of play', (('0.1', '0.1x'), ('0.25', '0.25x'), ('0.5', '0.5x'), ('1', '1x'), ('2', '2x')), '1')}"
         f"{_choice('span', 'time shown', (('0', 'all'), ('60', '60 s'), ('15', '15 s'), ('4', '4 s')), '0')}"
@@ -109,19 +111,20 @@ def _measures(sessions: Sequence[SessionView], names: Sequence[str]) -> str:
     if not rows:
         return ""
     lines = [[name, *values] for name, values in rows.items()]
-    return (
-        f"<h2>Measures</h2>\n{_table(['measure', *(names if len(names) > 1 else [''])], lines, numbers=range(1, 1 + len(names)))}"
-    )
+    head = ["measure", *(names if len(names) > 1 else ["value"])]
+    return f"<h2>Measures</h2>\n{_table(head, lines, numbers=range(1, len(head)))}"
 
 
 def _changes(session: SessionView, name: str) -> str:
-    lines = [
-        [f'<a href="#t={change.time_s:.2f}">{change.time_s:.2f} s</a>', *map(escape, change.texts)] for change in session.changes
-    ]
+    lines = [[_link(change.time_s), *map(escape, change.texts)] for change in session.changes]
     if not lines:
         return f"<h2>What changed in {escape(name)}</h2>\n<p>Nothing: one animation plays on.</p>\n"
     body = _table(["time", "what", "asset", "cost", "why"], lines, numbers=(3,), is_markup=True)
     return f"<h2>What changed in {escape(name)}</h2>\n{body}"
+
+
+def _link(time_s: float) -> str:
+    return f'<a href="#t={time_s:.2f}">{time_s:.2f} s</a>'
 
 
 def _table(head: Sequence[str], lines: Iterable[Sequence[str]], numbers: Iterable[int] = (), *, is_markup: bool = False) -> str:

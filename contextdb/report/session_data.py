@@ -1,6 +1,6 @@
 """What the page of a session plays, as one JSON document: columns packed small, and the moments at which something was searched.
 
-Lengths are whole millimetres, times whole milliseconds, angles tenths of a milliradian. Columns are deflated and in base64; one with
+Lengths are whole millimetres, times whole milliseconds, angles tenths of a milliradian. Columns are deflated, in base64; one with
 `delta` keeps of each row what it differs from the row before, which deflates better.
 """
 

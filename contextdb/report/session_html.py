@@ -1,4 +1,4 @@
-"""Recorded sessions as one HTML page that needs no network: skeletons that play, a timeline to scrub, and the reason of each moment.
+"""Recorded sessions as one HTML page that needs no network: skeletons that play, a timeline to scrub, the reason of each moment.
 
 What was measured and what changed is in the page as tables and reads without its script; the rest is drawn by it. Every text of a
 session is escaped, and nothing of it can become markup or script.

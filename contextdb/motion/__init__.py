@@ -50,6 +50,7 @@ from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
+from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.selector import Entry, Selector
 from contextdb.motion.selection.variation import Variation
@@ -59,7 +60,14 @@ from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.pose_files import open_or_build_poses, open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
 from contextdb.motion.storage.written_poses import write_poses
+from contextdb.motion.trace.reasked import Reasked
+from contextdb.motion.trace.reasked_decision import ReaskedDecision
+from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.session_diff import Parting, SessionDiff
+from contextdb.motion.trace.stats import SessionStats
+from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
+from contextdb.motion.trace.why_not import Change, WhyNot
 
 __all__ = [
     "ANY_TAGS",
@@ -69,6 +77,8 @@ __all__ = [
     "Built",
     "Candidate",
     "Candidates",
+    "Change",
+    "ChangedChoice",
     "Channel",
     "Choice",
     "Clip",
@@ -88,6 +98,7 @@ __all__ = [
     "Footfalls",
     "GateLook",
     "Hit",
+    "Inputs",
     "LeftOut",
     "LocalPoses",
     "MadeClip",
@@ -104,6 +115,7 @@ __all__ = [
     "MotionDatabase",
     "MotionError",
     "Normalisation",
+    "Parting",
     "Playing",
     "Pose",
     "PoseBank",
@@ -112,6 +124,9 @@ __all__ = [
     "PoseStream",
     "Poses",
     "QueryError",
+    "Reasked",
+    "ReaskedDecision",
+    "ReaskedSearch",
     "Reason",
     "Recorder",
     "ReservedTag",
@@ -120,6 +135,8 @@ __all__ = [
     "Search",
     "Selector",
     "SelectorSettings",
+    "SessionDiff",
+    "SessionStats",
     "Skeleton",
     "Skip",
     "Span",
@@ -131,6 +148,8 @@ __all__ = [
     "Trajectory",
     "Variation",
     "WarpShare",
+    "WhatIf",
+    "WhyNot",
     "best_start",
     "build",
     "build_all",

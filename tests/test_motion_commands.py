@@ -519,6 +519,8 @@ def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
     motion("run", "game", "player", "ahead.csv", "--out", "new.parquet", "--poses", "new.npz")
     with np.load(here / "new.npz") as poses:
         np.testing.assert_allclose(poses["root"][:, 1], 1.2 * np.arange(61) / 30.0, atol=1e-9)
+    bodies = [decision.body for decision in Trace.load("new.parquet")]
+    np.testing.assert_allclose(bodies, [(0.0, 0.04 * i, 0.0) for i in range(61)], atol=1e-9)
 
 
 # ---- replay

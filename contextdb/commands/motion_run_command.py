@@ -140,7 +140,7 @@ def steer(
         path, body = next(paths)
         query = with_path(schema, _pose(controller, schema, dt_s), path)
         valid, context = (None, None) if moments is None else (moments.valid[moment], moments.contexts[moment])
-        decision = controller.update(dt_s, query, valid, context=context)
+        decision = controller.update(dt_s, query, valid, context=context, body=body)
         if show is not None:
             show.take(decision, dt_s, body)
 

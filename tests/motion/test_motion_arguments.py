@@ -264,6 +264,7 @@ CALLS: dict[str, Call] = {
     "Selector.with_database(database)": lambda x: SELECTOR.with_database("only", x),
     "Controller.upcoming(dt_s)": lambda x: motion.Controller(SELECTOR).upcoming(x),
     "Controller.update(tags)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, tags=x),
+    "Controller.update(body)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, body=x),
     "Controller.update(context)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, context=x),
     "Controller.update(bias)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, bias=x),
     "Controller.update(among)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, among=x),

@@ -157,12 +157,9 @@ def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str
 
     A saved database that is the one which was recorded is opened without a look at the clips.
     """
-    said = {str(about["project"]) for about in trace.about.values() if "project" in about}
-    if project is None and not said:
-        return {}, "the session does not say which project it was recorded with; give it with --project FOLDER."
-    folder = os.path.normpath(os.path.join(os.path.dirname(file), said.pop())) if project is None else project
-    if project is None and not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
-        return {}, f"its project is no longer at {path_in_quotes(folder)}; give it with --project FOLDER."
+    folder, why = project_of(trace, project, file)
+    if why:
+        return {}, why
     opened = {name: _saved(saved_path(folder_of(Path(folder)), name), about) for name, about in trace.about.items()}
     if all(opened.values()):
         return {name: database for name, database in opened.items() if database is not None}, ""
@@ -170,6 +167,19 @@ def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str
     names = [name for name in trace.about if name in motion.config.databases]
     with building_bar() as progress:
         return open_or_build(motion.config, motion.folder, motion.assets, progress, names=names), ""
+
+
+def project_of(trace: Trace, project: str | None, file: str) -> tuple[str, str]:
+    """The folder of the project that a session was recorded with, or of the one that is given; or why there is none."""
+    if project is not None:
+        return project, ""
+    said = {str(about["project"]) for about in trace.about.values() if "project" in about}
+    if not said:
+        return "", "the session does not say which project it was recorded with; give it with --project FOLDER."
+    folder = os.path.normpath(os.path.join(os.path.dirname(file), said.pop()))
+    if not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
+        return "", f"its project is no longer at {path_in_quotes(folder)}; give it with --project FOLDER."
+    return folder, ""
 
 
 def _saved(path: Path, about: Mapping[str, object]) -> MotionDatabase | None:

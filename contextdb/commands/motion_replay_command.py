@@ -125,7 +125,8 @@ class Replay:
     def reasked(self, changes: Changes | None = None, *, with_tables: bool = False) -> Reasked:
         """The session asked again of its databases, and of the project's tables."""
         stock = Stock(self.databases)
-        if with_tables and (folder := folder_said(self.trace, self.asked.project, self.asked.file)) is not None:
+        folder, why = project_of(self.trace, self.asked.project, self.asked.file)
+        if with_tables and not why:
             stock = Stock.with_tables(self.databases, Project.load(folder))
         return Reasked(self.trace, self.trace.about, stock, changes or {})
 
@@ -278,24 +279,14 @@ class _Shown:
             yield from ("", f"{held}: {self.not_asked}")
 
 
-def folder_said(trace: Trace, project: str | None, file: str) -> str | None:
-    """The folder of the project that a session was recorded with, or that is given; None where neither says."""
-    said = {str(about["project"]) for about in trace.about.values() if "project" in about}
-    if project is not None or not said:
-        return project
-    return os.path.normpath(os.path.join(os.path.dirname(file), said.pop()))
-
-
 def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str, MotionDatabase], str]:
     """The databases that a session was recorded with, from the project's folder, or why there are none.
 
     A saved database that is the one which was recorded is opened without a look at the clips.
     """
-    folder = folder_said(trace, project, file)
-    if folder is None:
-        return {}, "the session does not say which project it was recorded with; give it with --project FOLDER."
-    if project is None and not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
-        return {}, f"its project is no longer at {path_in_quotes(folder)}; give it with --project FOLDER."
+    folder, why = project_of(trace, project, file)
+    if why:
+        return {}, why
     opened = {name: _saved(saved_path(folder_of(Path(folder)), name), about) for name, about in trace.about.items()}
     if all(opened.values()):
         return {name: database for name, database in opened.items() if database is not None}, ""
@@ -303,6 +294,19 @@ def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str
     names = [name for name in trace.about if name in motion.config.databases]
     with building_bar() as progress:
         return open_or_build(motion.config, motion.folder, motion.assets, progress, names=names), ""
+
+
+def project_of(trace: Trace, project: str | None, file: str) -> tuple[str, str]:
+    """The folder of the project that a session was recorded with, or of the one that is given; or why there is none."""
+    if project is not None:
+        return project, ""
+    said = {str(about["project"]) for about in trace.about.values() if "project" in about}
+    if not said:
+        return "", "the session does not say which project it was recorded with; give it with --project FOLDER."
+    folder = os.path.normpath(os.path.join(os.path.dirname(file), said.pop()))
+    if not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
+        return "", f"its project is no longer at {path_in_quotes(folder)}; give it with --project FOLDER."
+    return folder, ""
 
 
 def _saved(path: Path, about: Mapping[str, object]) -> MotionDatabase | None:

@@ -75,7 +75,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
     controller = stage.config.controller(arguments.controller, stage.databases, rng=random.Random(arguments.seed))
     trace = controller.recorder = Trace(arguments.k, controller.selector.databases)
-    trace.about = {name: {**about, **_project(stage.folder, out)} for name, about in trace.about.items()}
+    where = {**_project(stage.folder, out), "controller": arguments.controller}
+    trace.about = {name: {**about, **where} for name, about in trace.about.items()}
     names = list(controller.selector.names)
     tables = stage.tables(names)
     path = Path(arguments.stick)
@@ -140,7 +141,7 @@ def steer(
         path, body = next(paths)
         query = with_path(schema, _pose(controller, schema, dt_s), path)
         valid, context = (None, None) if moments is None else (moments.valid[moment], moments.contexts[moment])
-        decision = controller.update(dt_s, query, valid, context=context)
+        decision = controller.update(dt_s, query, valid, context=context, body=body)
         if show is not None:
             show.take(decision, dt_s, body)
 

@@ -33,6 +33,8 @@ from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import Span
+from contextdb.motion.measuring.measure import measure
+from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
@@ -111,6 +113,7 @@ __all__ = [
     "MatchGate",
     "MatchNode",
     "MatchPlay",
+    "Measures",
     "MotionConfig",
     "MotionDatabase",
     "MotionError",
@@ -167,6 +170,7 @@ __all__ = [
     "local_poses",
     "made_clips",
     "make_clip",
+    "measure",
     "mirrored",
     "mirrored_path",
     "open_database",

@@ -27,7 +27,7 @@ from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.trace.filter_rows import filter_row
-from contextdb.motion.trace.rows import TIMINGS, context_json
+from contextdb.motion.trace.rows import BODY, TIMINGS, context_json
 from contextdb.motion.trace.session import CHUNK, Trace
 
 # ---- decisions to draw
@@ -82,6 +82,7 @@ DECISIONS = st.builds(
     search_us=MAYBE,
     root_motion=st.builds(RootMotion, NUMBERS, NUMBERS, NUMBERS),
     root_weight=NUMBERS,
+    body=st.none() | st.tuples(NUMBERS, NUMBERS, NUMBERS),
 )
 
 
@@ -120,6 +121,12 @@ def test_without_timings_all_but_the_timings_comes_back(decision):
     loaded = Trace.from_bytes(trace_of([decision]).to_bytes(timings=False))
     assert as_told(loaded[0]) == as_told(replace(decision, search_us=None))
     assert loaded.to_bytes(timings=False) == trace_of([decision]).to_bytes(timings=False)
+
+
+def test_a_session_of_a_version_that_kept_no_bodies_is_read_without_them(tmp_path: Path):
+    path = tmp_path / "session.parquet"
+    path.write_bytes(altered(lambda frame: frame.drop(BODY)))
+    assert [decision.body for decision in Trace.load(path)] == [None] * 7
 
 
 @given(DECISIONS)

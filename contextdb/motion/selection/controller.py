@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from contextdb.cells.arguments import require_kind
 from contextdb.errors import Fault, MotionError, QueryError
 from contextdb.motion import arguments
+from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.reading import as_number
@@ -57,6 +58,7 @@ class Asking:
     context: Mapping[str, object] | None
     force: bool = False
     interrupt: bool = False
+    body: GroundPlace | None = None
 
     @property
     def query(self) -> Floats:
@@ -155,6 +157,7 @@ class Controller:
         among: Among | None = None,
         force: bool = False,
         interrupt: bool = False,
+        body: OfBody | None = None,
     ) -> Decision:
         """Move what plays on by some time, search if it is time to, and say what plays now.
 
@@ -173,14 +176,18 @@ class Controller:
             Search now, though no search is due. What plays may win.
         interrupt : bool
             Search now, and leave what plays if anything else may.
+        body : Steered or (x, z, heading), optional
+            Where the game has the body, for the recorder alone: `motion.measure` compares it with where the poses are.
 
         Raises
         ------
         QueryError
             A time, query, mask, tag or name that does not fit. The controller then stands where it stood.
+        ContextError
+            `body` is none.
         """
         asked = Asked(valid, tags, None, bias, among, None, penalties)
-        asking = self.ask(dt_s, self.checked(query), asked, context, force, interrupt)
+        asking = self.ask(dt_s, self.checked(query), asked, context, force, interrupt, place_of(body))
         if asking.wanted is None:
             return self.answer(asking)
         began_s = self.now_s()
@@ -188,13 +195,21 @@ class Controller:
         return self.answer(asking, choice, (self.now_s() - began_s) * 1e6)
 
     def ask(
-        self, dt_s: float, query: Floats, asked: Asked, context: Mapping[str, object] | None, force: bool, interrupt: bool
+        self,
+        dt_s: float,
+        query: Floats,
+        asked: Asked,
+        context: Mapping[str, object] | None,
+        force: bool,
+        interrupt: bool,
+        body: GroundPlace | None = None,
     ) -> Asking:
         """The first half of an update, of a `checked` query: move what plays on, say what is to be searched. Changes nothing."""
         dt_s = _seconds(dt_s)
         step = Step.of(self.selector, self.settings, self._state, dt_s, query, asked, self._ongoing(dt_s))
         cause = step.trigger(force, interrupt)
-        return Asking(step, cause, None if cause is None else step.wanted(cause), context, force, interrupt)
+        wanted = None if cause is None else step.wanted(cause)
+        return Asking(step, cause, wanted, context, force, interrupt, body)
 
     def answer(self, asking: Asking, choice: Choice | None = None, search_us: float = 0.0) -> Decision:
         """The second half: decide by what the selector chose, None where nothing was to be searched."""
@@ -237,6 +252,7 @@ class Controller:
             search_us=None if cause is None else search_us,
             root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
             root_weight=self._root_weight(outcome.playing),
+            body=asking.body,
             filters=filters,
             inputs=self._inputs(asking),
         )

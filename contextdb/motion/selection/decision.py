@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter
@@ -89,6 +90,8 @@ class Decision:
         How the playing animation moved the body since the last update.
     root_weight : float
         How much of its movement is to come from the animation, from 0 to 1; the rest is the game's.
+    body : (x, z, heading) or None
+        Where the game had the body, as it was given.
     filters : tuple of (database name, Filter)
         What could be chosen from in each database that was, or could have been, searched; empty without a search, and where no
         candidates are asked for.
@@ -112,6 +115,7 @@ class Decision:
     search_us: float | None = None
     root_motion: RootMotion = NO_MOTION
     root_weight: float = 1.0
+    body: GroundPlace | None = None
     filters: tuple[tuple[str, Filter], ...] = field(default=(), compare=False, repr=False)
     inputs: Inputs | None = field(default=None, compare=False, repr=False)
 

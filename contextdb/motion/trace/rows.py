@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import NOTHING, Hit
@@ -37,8 +38,9 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 """What the markup says of a frame of a database."""
 Events = dict[tuple[str, int], tuple[str, ...]]
 
-TIMINGS, FILTERS, INPUTS = "search_us", "filters", "inputs"
-"""The columns that a file may lack: another recording has other timings, and older versions kept no filters and no inputs."""
+TIMINGS, FILTERS, INPUTS, BODY = "search_us", "filters", "inputs", ("body_x", "body_z", "body_heading")
+OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY)
+"""The columns that a file may lack: another recording has other timings, and older versions kept no filters, inputs and bodies."""
 
 
 def columns() -> dict[str, PolarsType]:
@@ -88,6 +90,7 @@ def columns() -> dict[str, PolarsType]:
         "candidates": pl.List(pl.Struct(found)),
         "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
         "root_weight": number,
+        **dict.fromkeys(BODY, number),
         FILTERS: filter_type(),
         INPUTS: text,
         TIMINGS: number,
@@ -116,6 +119,7 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         "candidates": _kept(decision, events_of),
         "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
         "root_weight": float(decision.root_weight),
+        **dict(zip(BODY, (None, None, None) if decision.body is None else map(float, decision.body), strict=True)),
         FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
         INPUTS: None if decision.inputs is None else inputs_json(decision.inputs),
         TIMINGS: _number(decision.search_us),
@@ -244,6 +248,7 @@ def decision_of(row: Row) -> Decision:
         search_us=row.get(TIMINGS),
         root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
         root_weight=float(row["root_weight"]),
+        body=_body(row),
         filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
         inputs=None if row.get(INPUTS) is None else inputs_of(row[INPUTS]),
     )
@@ -260,6 +265,11 @@ def _told(row: Row) -> Iterator[tuple[str, int, list[str]]]:
             yield each["database"], each["frame"], each["events"]
     for found in row["candidates"]:
         yield from ((found["database"], each["frame"], each["events"]) for each in found["rows"])
+
+
+def _body(row: Row) -> GroundPlace | None:
+    x, z, heading = (row.get(name) for name in BODY)
+    return None if x is None or z is None or heading is None else (float(x), float(z), float(heading))
 
 
 def _known(value: Any) -> Any:

@@ -7,6 +7,9 @@
 A query is a frame's pose, a little disturbed. Half of the queries want to go on as that frame goes on, the other half another
 frame's way. Warm searches are told the frame that plays now, cold ones are not; filtered ones may choose from a share of the clips,
 another choice each round. The engines take turns, in rounds of other queries, each asked once; all must find frames of equal cost.
+
+A controller that searches at each update is timed without a recorder, with one, and with one that has the candidates worked out at
+once, as every recorder had before; then what it costs to ask a recorded search again, and with another weight.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ if __package__ in (None, ""):
 from benchmarks import captured, timing
 from benchmarks.captured import Frames
 from benchmarks.sections import print_aligned
-from contextdb.motion import MotionDatabase
+from contextdb.motion import Controller, ControllerSettings, Decision, Entry, MotionDatabase, Selector, Trace
 
 SIZES = (1, 4, 16)
 SHARES = (0.5, 0.1, 0.01)
@@ -225,6 +228,58 @@ def _others(database: MotionDatabase, asked: Questions) -> dict[str, Any]:
             each_us = _crowd_us(database, asked.queries[at], [asked.currents[i] for i in at], valid) / n
             print(f"  search_many, {n:,} characters, {what}: {each_us:.1f} each")
             found[f"search_many, {n}, {what}"] = each_us
+    return found | {"recording": _recording(database, asked), "asked_again": _asked_again(database, asked)}
+
+
+class _AtOnce(Trace):
+    """A trace that has the candidates of each search worked out when it is recorded."""
+
+    def record(self, decision: Decision) -> None:
+        """Keep a decision, and count its candidates."""
+        super().record(decision)
+        assert all(len(found) for _, found in decision.candidates), "a search has candidates"
+
+
+def _recording(database: MotionDatabase, asked: Questions) -> dict[str, float]:
+    """The median of an update that searches, in microseconds, with three recorders, which take turns."""
+    selector = Selector([Entry("all", database)])
+    recorders: dict[str, Callable[[], Trace | None]] = {
+        "off": lambda: None,
+        "on": lambda: Trace(databases=selector.databases),
+        "candidates at once": lambda: _AtOnce(databases=selector.databases),
+    }
+    times: dict[str, list[timing.Nanoseconds]] = {name: [] for name in recorders}
+    masks = asked.masks[0.5]
+    for some in np.array_split(np.arange(len(asked.queries)), N_ROUNDS):
+        for name, recorder in recorders.items():
+            controller = Controller(selector, ControllerSettings(search_every_s=0.0), recorder=recorder())
+            numbers = some[: max(2, len(some) // 5)] if name == "candidates at once" else some
+
+            def update(i: int, controller: Controller = controller) -> Decision:
+                return controller.update(1 / 60, asked.queries[i], {"all": masks[i]}, context={"speed": 1.0})
+
+            times[name].append(timing.timed(update, numbers.tolist()))
+    found = {name: float(np.median(np.concatenate(rounds))) / 1e3 for name, rounds in times.items()}
+    told = ", ".join(f"{name} {each_us:,.0f} ({each_us / found['off']:.1f} times)" for name, each_us in found.items())
+    print(f"  an update that searches, recording {told}")
+    return found
+
+
+def _asked_again(database: MotionDatabase, asked: Questions) -> dict[str, float]:
+    """The median of all costs of a recorded search, and of the same with another weight, in milliseconds."""
+    selector = Selector([Entry("all", database)])
+    trace = Trace(databases=selector.databases)
+    controller = Controller(selector, ControllerSettings(search_every_s=0.0), recorder=trace)
+    for query in asked.queries[:N_ROUNDS]:
+        controller.update(1 / 60, query)
+    each = [decision.searches["all"] for decision in trace.reasked()]
+    heavier = {database.channel_names[0]: 2.0}
+    steps: dict[str, Callable[[Any], Any]] = {
+        "costs": lambda one: one.costs,
+        "weighed": lambda one: one.with_weights(heavier).costs,
+    }
+    found = {name: timing.Summary.of([timing.timed(step, each)]).median_us / 1e3 for name, step in steps.items()}
+    print(f"  a recorded search asked again: all costs {found['costs']:.1f} ms, with another weight {found['weighed']:.2f} ms")
     return found
 
 

@@ -142,13 +142,14 @@ def test_the_group_lists_its_commands(arguments: list[str]):
         "select",
         "run",
         "probe",
+        "measure",
         "replay",
     ]
     assert run("motion") == Result(2, "", result.out)
     assert run("help", "motion") == result
 
 
-@pytest.mark.parametrize("command", ["build", "search", "select", "run", "probe", "replay"])
+@pytest.mark.parametrize("command", ["build", "search", "select", "run", "probe", "measure", "replay"])
 @pytest.mark.parametrize("width", [60, 100])
 def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("COLUMNS", str(width))
@@ -163,7 +164,7 @@ def test_each_command_has_a_help_that_fits_with_examples(command: str, width: in
 @pytest.mark.parametrize(("word", "near"), [("serch", "search"), ("Replay", "replay"), ("selekt", "select"), ("bild", "build")])
 def test_a_misspelt_command_of_the_group_is_named_with_the_nearest(word: str, near: str):
     assert refused(word, "game") == (
-        f'contextdb: there is no command "motion {word}". Accepted: build, search, select, run, probe, replay. '
+        f'contextdb: there is no command "motion {word}". Accepted: build, search, select, run, probe, measure, replay. '
         f'Did you mean "motion {near}"?\n'
     )
 
@@ -520,6 +521,8 @@ def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
     motion("run", "game", "player", "ahead.csv", "--out", "new.parquet", "--poses", "new.npz")
     with np.load(here / "new.npz") as poses:
         np.testing.assert_allclose(poses["root"][:, 1], 1.2 * np.arange(61) / 30.0, atol=1e-9)
+    bodies = [decision.body for decision in Trace.load("new.parquet")]
+    np.testing.assert_allclose(bodies, [(0.0, 0.04 * i, 0.0) for i in range(61)], atol=1e-9)
 
 
 def test_the_character_s_own_facts_are_computed_where_the_file_gives_none(here: Path):

@@ -16,5 +16,6 @@ COMMANDS = {
     "select": "which database of a selector wins, with which frame, and why",
     "run": "steer a character along a recorded stick, and record what it decides",
     "probe": "drive a character over the contexts of its tables by itself, and measure how well it moves",
+    "measure": "how good the motion of a session is, beside the clips that it is made of",
     "replay": "what was decided in a recorded session, and why",
 }

@@ -21,12 +21,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from contextdb.commands.motion_run_command import character_of, rate_of
+from contextdb.commands.motion_run_command import character_of, rate_of, say_where
 from contextdb.commands.motion_stage import Stage, context_text
 from contextdb.console import ExitCode, aligned, output, printable, progress
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural, some
-from contextdb.motion import Character, Pose, Trace
+from contextdb.motion import Character, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
 from contextdb.motion.characters.probing import Plan, Scene, plan_of
 from contextdb.motion.reading import as_number
@@ -88,7 +88,13 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         raise ContextDBError(Fault(found, "rows for moving clips; contextdb check says more"))
     folder = None if arguments.out is None else _folder(Path(arguments.out))
     rate = character.schema.rate if arguments.rate is None else arguments.rate
-    probes = [_probe(character, scene, drive, rate, folder) for scene, drive in progress(wanted, "driving")]
+    probes = []
+    for scene, drive in progress(wanted, "driving"):
+        probe, trace = _probe(character, scene, drive, rate, folder)
+        if probe.file:
+            say_where(trace, stage, arguments.controller, Path(probe.file))
+            trace.save(probe.file, timings=False)
+        probes.append(probe)
     over = list(_over(probes, arguments))
     with output():
         if arguments.json:
@@ -117,8 +123,8 @@ def _drives(scene: Scene, kinds: Sequence[str] | None) -> Iterator[Drive]:
         yield from (each for each in drives(speed) if kinds is None or any(kind in each.name for kind in kinds))
 
 
-def _probe(character: Character, scene: Scene, drive: Drive, rate: float, folder: Path | None) -> Probe:
-    """Drive a copy of the character, save its session if that is wanted, and measure it."""
+def _probe(character: Character, scene: Scene, drive: Drive, rate: float, folder: Path | None) -> tuple[Probe, Trace]:
+    """Drive a copy of the character and measure it; the file that its session is to be saved to, if any, and the session."""
     driven = character.copy()
     trace = driven.record(0)
     poses: list[Pose] = []
@@ -129,17 +135,13 @@ def _probe(character: Character, scene: Scene, drive: Drive, rate: float, folder
         sticks.append(stick)
     words = f"{scene.name} {drive.name} {drive.speed_mps:g}".replace("=", "-").split()
     file = "" if folder is None else str(folder / f"{'_'.join(words)}.parquet")
-    if file:
-        trace.save(file, timings=False)
-    return Probe(scene, drive, file, _measured(driven, trace, poses, sticks))
+    return Probe(scene, drive, file, _measured(driven, trace, poses, sticks)), trace
 
 
 def _measured(
     character: Character, trace: Trace, poses: Sequence[Pose], sticks: Sequence[tuple[float, float]]
 ) -> Mapping[str, Any]:
     """The measures of a drive, by the keys of `contextdb motion measure --json`."""
-    from contextdb.motion import measure  # type: ignore[attr-defined]
-
     assert character.stream is not None, "a character with poses has a stream"
     databases = character.controller.selector.databases
     found = measure(trace, character.stream.banks, poses=poses, databases=databases, wanted=sticks)

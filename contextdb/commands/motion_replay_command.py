@@ -3,40 +3,56 @@
 Without --at each change has a row, with the cost of playing on and how long the new animation played. --at accepts the tick of an
 update, shown in the first column, or a time such as 2.5s.
 
-A session keeps the best candidates of each search. With --at and --name the costs of all assets with that name are computed again
-from the databases: those of the project that the session was recorded with, or of --project.
+A session keeps what each search was asked. With --at, candidates and the costs of all assets with a --name are computed again from
+the databases: those of the project that the session was recorded with, or of --project. --why says what it would have taken for an
+asset to be chosen, --what-if what other weights, biases and thresholds would have made of the session: "LeftFoot velocity=2",
+"continuing=-0.1" (or base, looping), "threshold jog_tired=3".
 
   contextdb motion replay session.parquet
   contextdb motion replay session.parquet --at 2.5s --view pose
-  contextdb motion replay session.parquet --name jog
-  contextdb motion replay session.parquet --at 2.5s --name jog          why was mine not chosen?
+  contextdb motion replay session.parquet --at 2.5s --why jog           why was mine not chosen?
+  contextdb motion replay session.parquet --stats
+  contextdb motion replay session.parquet --what-if "LeftFoot velocity=2"
+  contextdb motion replay session.parquet --diff other.parquet
+  contextdb motion replay session.parquet --trace session.json          for Perfetto
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_stage import add_view
+from contextdb.commands.motion_what_if import changes_of
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width
-from contextdb.disk import path_in_quotes
-from contextdb.errors import ContextDBError, Fault, MotionError, Place, QueryError, in_quotes
+from contextdb.disk import path_in_quotes, write_atomic
+from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, QueryError, in_quotes
 from contextdb.motion import MotionDatabase, open_database, open_or_build, saved_path
 from contextdb.motion.reading import as_number
 from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.trace.asked_views import diff_lines, stats_lines, what_if_lines, why_lines
+from contextdb.motion.trace.chrome_trace import chrome_trace
 from contextdb.motion.trace.cost_views import Ranked, View
-from contextdb.motion.trace.filter_rows import fingerprint
+from contextdb.motion.trace.filter_rows import is_recorded
 from contextdb.motion.trace.json_form import decision_json, ranked_json
-from contextdb.motion.trace.reasked import reasked, require_known, why_not_asked
+from contextdb.motion.trace.reasked import Changes, Reasked, require_known, why_not_asked
 from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.views import decision_lines, session_lines, summary_line
+from contextdb.motion.trace.what_if import what_if
+from contextdb.motion.trace.why_not import WhyNot
 from contextdb.report.render_json import as_json
-from contextdb.tables.project import SCHEMA_FILE, folder_of
+from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
+
+Json = dict[str, object]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,22 +61,105 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--at", metavar="N|TIME", help="show one decision in full: its tick, or a time such as 2.5s")
     add_view(parser, "with --at: which costs are shown")
     parser.add_argument("--name", metavar="TEXT", default="", help="only assets whose name contains this")
-    parser.add_argument("--project", metavar="FOLDER", help="with --name: the project with the databases (default: as recorded)")
+    parser.add_argument("--why", metavar="ASSET", help="with --at: why this asset was not chosen, and what would have to change")
+    parser.add_argument("--stats", action="store_true", help="jumps, gains, causes, stay, and what never plays")
+    parser.add_argument(
+        "--what-if", metavar="NAME=VALUE", action="append", default=[], help="with this weight, bias or threshold; may be repeated"
+    )
+    parser.add_argument("--diff", metavar="OTHER", help="where this session and another one part")
+    parser.add_argument("--trace", metavar="OUT", help="write a Chrome trace, a .json file that Perfetto opens")
+    parser.add_argument("--project", metavar="FOLDER", help="the project with the databases (default: as recorded)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Print a session, or one decision of it."""
-    if arguments.view and arguments.at is None:
-        raise QueryError(Fault("--view shows the costs of one decision.", "--at N|TIME with it, such as --at 2.5s"))
-    trace = Trace.load(arguments.file)
-    place = None if arguments.at is None else place_of(arguments.at, trace, arguments.file)
+    if arguments.at is None:
+        for option, given, shows in (("--view", arguments.view, "the costs of"), ("--why", arguments.why, "an asset in")):
+            if given is not None:
+                raise QueryError(Fault(f"{option} shows {shows} one decision.", "--at N|TIME with it, such as --at 2.5s"))
+    replay = Replay(Trace.load(arguments.file), arguments)
+    other = None if arguments.diff is None else Trace.load(arguments.diff)
+    place = None if arguments.at is None else place_of(arguments.at, replay.trace, arguments.file)
+    parts = list(_parts(replay, other))
+    if arguments.trace is not None:
+        _write_trace(replay.trace, Path(arguments.trace))
+    if place is not None:
+        parts.insert(0, _Shown.of(replay, place).part())
+    if not parts:
+        parts.append(_session(replay))
     with output():
-        if place is None:
-            _print_session(trace, arguments)
+        if arguments.json:
+            told = {key: value for document, _ in parts for key, value in document.items()}
+            print(as_json({"format": 1, "file": arguments.file, **told}), end="")
         else:
-            _print_decision(trace, place, arguments)
+            print(*("\n".join(lines) for _, lines in parts), sep="\n\n")
     return ExitCode.OK
+
+
+Part = tuple[Json, list[str]]
+"""An answer, as JSON and as lines of text."""
+
+
+@dataclass(eq=False)
+class Replay:
+    """A session, what was asked about it, and, where that is needed, its databases."""
+
+    trace: Trace
+    asked: argparse.Namespace
+    missing: str = field(default="", init=False)
+
+    @cached_property
+    def databases(self) -> dict[str, MotionDatabase]:
+        """The databases of the session's project; `missing` says why some are not what was recorded."""
+        try:
+            found, why = databases_of(self.trace, self.asked.project, self.asked.file)
+        except ContextDBError as error:
+            if self.asked.project is not None:
+                raise
+            found, why = {}, error.faults[0].message
+        told = self.trace.use(found)
+        self.missing = why or told
+        return found
+
+    def reasked(self, changes: Changes | None = None, *, with_tables: bool = False) -> Reasked:
+        """The session asked again of its databases, and of the project's tables."""
+        stock = Stock(self.databases)
+        folder, why = project_of(self.trace, self.asked.project, self.asked.file)
+        if with_tables and not why:
+            stock = Stock.with_tables(self.databases, Project.load(folder))
+        return Reasked(self.trace, self.trace.about, stock, changes or {})
+
+    def require_databases(self) -> None:
+        """Raise MotionError where the session cannot be asked again, with the reason."""
+        if not self.databases or self.missing:
+            raise MotionError(Fault(f"the session cannot be asked again: {self.missing}", place=Place(self.asked.file)))
+
+
+def _parts(replay: Replay, other: Trace | None) -> Iterator[Part]:
+    """What was asked of the whole session."""
+    asked, trace, width = replay.asked, replay.trace, terminal_width()
+    if asked.stats:
+        stats = trace.stats()
+        yield {"stats": stats.to_json()}, [summary_line(trace.brief()), "", *stats_lines(stats, width)]
+    if asked.what_if:
+        replay.require_databases()
+        told = what_if(replay.reasked(), replay.reasked(changes_of(asked.what_if, replay.databases)))
+        yield {"what_if": told.to_json()}, list(what_if_lines(told, width))
+    if other is not None:
+        diff = trace.diff(other)
+        yield {"diff": {"file": asked.diff, **diff.to_json()}}, list(diff_lines(diff, width))
+
+
+def _write_trace(trace: Trace, path: Path) -> None:
+    """Write the Chrome trace."""
+    place = Place(str(path))
+    if path.suffix != ".json":
+        raise FileError(Fault("a Chrome trace cannot be written to such a file.", "a name that ends in .json", place=place))
+    if not os.path.isdir(path.parent):
+        found = f"there is no folder {path_in_quotes(path.parent)}."
+        raise FileError(Fault(found, "an existing folder", place=place, rule="no-such-path"))
+    write_atomic(path, (json.dumps(chrome_trace(trace.brief())) + "\n").encode())
 
 
 def place_of(text: str, trace: Trace, file: str) -> int:
@@ -94,62 +193,90 @@ def _number(text: str) -> float | None:
         return None
 
 
-def _print_session(trace: Trace, asked: argparse.Namespace) -> None:
+def _session(replay: Replay) -> Part:
+    """The whole session."""
+    trace, asked = replay.trace, replay.asked
     if asked.json:
         told = [decision for decision in trace.brief() if _is_named(decision.playing, asked.name)]
-        document = {"format": 1, "file": asked.file, "decisions": [_brief(decision_json(decision)) for decision in told]}
-        print(as_json(document), end="")
-        return
-    print(summary_line(trace.brief()))
+        return {"decisions": [_brief(decision_json(decision)) for decision in told]}, []
     lines = list(session_lines(trace.brief(), name=asked.name, width=terminal_width()))
-    print("", *(lines or [_never_played(trace, asked) if asked.name else "no decision"]), sep="\n")
+    return {}, [summary_line(trace.brief()), "", *(lines or [_never_played(replay) if asked.name else "no decision"])]
 
 
-def _never_played(trace: Trace, asked: argparse.Namespace) -> str:
+def _never_played(replay: Replay) -> str:
     """What to say of a name that no playing asset holds, and of one that no asset of the databases holds."""
-    databases, why = databases_of(trace, asked.project, asked.file)
-    if why:
-        return f"nothing whose name contains {in_quotes(asked.name)} plays; {why}"
+    name, databases = replay.asked.name, replay.databases
+    if not databases:
+        return f"nothing whose name contains {in_quotes(name)} plays; {replay.missing}"
     try:
-        require_known(asked.name, databases, asked.file)
+        require_known(name, databases, replay.asked.file)
     except MotionError as error:
         return error.faults[0].message
-    return f"nothing whose name contains {in_quotes(asked.name)} plays; --at N|TIME with --name shows what it would have cost"
+    return f"nothing whose name contains {in_quotes(name)} plays; --at N|TIME with --name shows what it would have cost"
 
 
 def _is_named(playing: Playing | None, name: str) -> bool:
     return not name or (playing is not None and name.casefold() in playing.asset.casefold())
 
 
-def _brief(decision: dict[str, object]) -> dict[str, object]:
+def _brief(decision: Json) -> Json:
     """A decision without what only --at tells."""
     return {key: value for key, value in decision.items() if key not in ("query", "candidates")}
 
 
-def _print_decision(trace: Trace, place: int, asked: argparse.Namespace) -> None:
-    decision, events = trace[place], trace.events(place)
-    ranked, why = _asked(trace, decision, asked) if asked.name else (None, "")
-    if asked.json:
-        again = (
-            {} if not asked.name else {"asked": None if ranked is None else ranked_json(ranked, events), "not_asked": why or None}
-        )
-        print(as_json({"format": 1, "file": asked.file, **decision_json(decision, events), **again}), end="")
-        return
-    view = View(asked.view or View.SUMMARY)
-    lines = decision_lines(decision, view, name=asked.name, events=events, width=terminal_width(), asked=ranked)
-    print(*lines, sep="\n")
-    if why:
-        print(f"\nof the candidates that the session keeps alone: {why}")
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """One decision, in full: with its candidates, what --name and --why ask of it, and why something cannot be computed again."""
 
+    replay: Replay
+    place: int
+    decision: Decision
+    ranked: list[Ranked] | None
+    why_not: WhyNot | None
+    not_asked: str
 
-def _asked(trace: Trace, decision: Decision, asked: argparse.Namespace) -> tuple[list[Ranked] | None, str]:
-    """The best frame of each range whose asset's name holds --name; None, and why, where they cannot be worked out."""
-    databases, why = databases_of(trace, asked.project, asked.file)
-    why = why or why_not_asked(decision, trace.about, databases)
-    if why:
-        return None, why
-    require_known(asked.name, databases, asked.file)
-    return reasked(decision, databases, asked.name), ""
+    @classmethod
+    def of(cls, replay: Replay, place: int) -> _Shown:
+        """The decision at a place of the session."""
+        asked, trace, databases = replay.asked, replay.trace, replay.databases
+        decision = trace[place]
+        needs = bool(asked.name) or (decision.searched and trace.n_candidates > 0 and not decision.candidates)
+        not_asked = (replay.missing or why_not_asked(decision, trace.about, databases)) if needs else ""
+        ranked, why_not = None, None
+        if asked.name and not not_asked:
+            require_known(asked.name, databases, asked.file)
+            ranked = replay.reasked()[place].best_of_assets(asked.name)
+        if asked.why is not None:
+            replay.require_databases()
+            why_not = replay.reasked(with_tables=True).why_not(place, asked.why)
+        return cls(replay, place, decision, ranked, why_not, not_asked)
+
+    def part(self) -> Part:
+        """The decision as JSON, or as lines of text."""
+        return (self._json(), []) if self.replay.asked.json else ({}, list(self._lines()))
+
+    def _json(self) -> Json:
+        asked, events = self.replay.asked, self.replay.trace.events(self.place)
+        again: Json = {}
+        if asked.name:
+            again["asked"] = None if self.ranked is None else ranked_json(self.ranked, events)
+        if asked.name or self.not_asked:
+            again["not_asked"] = self.not_asked or None
+        if self.why_not is not None:
+            again["why_not"] = self.why_not.to_json()
+        return {**decision_json(self.decision, events), **again}
+
+    def _lines(self) -> Iterator[str]:
+        asked, width = self.replay.asked, terminal_width()
+        if self.why_not is not None:
+            yield f"tick {self.decision.tick:,} at {self.decision.time_s:.2f} s: {self.decision.action}"
+            yield from why_lines(self.why_not, width)
+            return
+        view, events = View(asked.view or View.SUMMARY), self.replay.trace.events(self.place)
+        yield from decision_lines(self.decision, view, name=asked.name, events=events, width=width, asked=self.ranked)
+        if self.not_asked:
+            held = "of the candidates that the session keeps alone" if self.decision.candidates else "no candidates are shown"
+            yield from ("", f"{held}: {self.not_asked}")
 
 
 def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str, MotionDatabase], str]:
@@ -157,12 +284,9 @@ def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str
 
     A saved database that is the one which was recorded is opened without a look at the clips.
     """
-    said = {str(about["project"]) for about in trace.about.values() if "project" in about}
-    if project is None and not said:
-        return {}, "the session does not say which project it was recorded with; give it with --project FOLDER."
-    folder = os.path.normpath(os.path.join(os.path.dirname(file), said.pop())) if project is None else project
-    if project is None and not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
-        return {}, f"its project is no longer at {path_in_quotes(folder)}; give it with --project FOLDER."
+    folder, why = project_of(trace, project, file)
+    if why:
+        return {}, why
     opened = {name: _saved(saved_path(folder_of(Path(folder)), name), about) for name, about in trace.about.items()}
     if all(opened.values()):
         return {name: database for name, database in opened.items() if database is not None}, ""
@@ -172,10 +296,23 @@ def databases_of(trace: Trace, project: str | None, file: str) -> tuple[dict[str
         return open_or_build(motion.config, motion.folder, motion.assets, progress, names=names), ""
 
 
+def project_of(trace: Trace, project: str | None, file: str) -> tuple[str, str]:
+    """The folder of the project that a session was recorded with, or of the one that is given; or why there is none."""
+    if project is not None:
+        return project, ""
+    said = {str(about["project"]) for about in trace.about.values() if "project" in about}
+    if not said:
+        return "", "the session does not say which project it was recorded with; give it with --project FOLDER."
+    folder = os.path.normpath(os.path.join(os.path.dirname(file), said.pop()))
+    if not os.path.isfile(os.path.join(folder, SCHEMA_FILE)):
+        return "", f"its project is no longer at {path_in_quotes(folder)}; give it with --project FOLDER."
+    return folder, ""
+
+
 def _saved(path: Path, about: Mapping[str, object]) -> MotionDatabase | None:
     """A saved database, if it is the one that was recorded."""
     try:
         database = open_database(path)
     except ContextDBError:
         return None
-    return database if fingerprint(database) == about.get("digest") else None
+    return database if is_recorded(about, database) else None

@@ -35,6 +35,7 @@ from contextdb.motion import (
     Character,
     PoseStream,
     Steered,
+    Trace,
     Trajectory,
     Updated,
     steady_path,
@@ -71,7 +72,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
     character = character_of(stage, arguments.controller, arguments.seed, arguments.unknown)
     trace = character.record(arguments.k)
-    trace.about = {name: {**about, **_project(stage.folder, out)} for name, about in trace.about.items()}
+    say_where(trace, stage, arguments.controller, out)
     tables = stage.tables(character.controller.selector.names)
     path = Path(arguments.stick)
     stick = Stick.read(path, conditions_of(tables))
@@ -91,6 +92,12 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         else:
             print(summary_line(trace.brief()))
     return ExitCode.OK if any(decision.playing is not None for decision in trace.brief()) else ExitCode.FOUND
+
+
+def say_where(trace: Trace, stage: Stage, controller: str, out: Path) -> None:
+    """Keep in a session what it is of, for what reads it later."""
+    where = {**_project(stage.folder, out), "controller": controller}
+    trace.about = {name: {**about, **where} for name, about in trace.about.items()}
 
 
 def _project(folder: Path, out: Path) -> dict[str, str]:

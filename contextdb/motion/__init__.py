@@ -38,6 +38,8 @@ from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import Span
+from contextdb.motion.measuring.measure import measure
+from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
@@ -55,6 +57,7 @@ from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
+from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.selector import Entry, Selector
 from contextdb.motion.selection.variation import Variation
@@ -64,7 +67,14 @@ from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.pose_files import open_or_build_poses, open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
 from contextdb.motion.storage.written_poses import write_poses
+from contextdb.motion.trace.reasked import Reasked
+from contextdb.motion.trace.reasked_decision import ReaskedDecision
+from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.session_diff import Parting, SessionDiff
+from contextdb.motion.trace.stats import SessionStats
+from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
+from contextdb.motion.trace.why_not import Change, WhyNot
 
 __all__ = [
     "ANY_TAGS",
@@ -75,6 +85,8 @@ __all__ = [
     "Built",
     "Candidate",
     "Candidates",
+    "Change",
+    "ChangedChoice",
     "Channel",
     "Character",
     "CharacterState",
@@ -97,6 +109,7 @@ __all__ = [
     "Footfalls",
     "GateLook",
     "Hit",
+    "Inputs",
     "LeftOut",
     "LocalPoses",
     "MadeClip",
@@ -109,11 +122,13 @@ __all__ = [
     "MatchGate",
     "MatchNode",
     "MatchPlay",
+    "Measures",
     "Moment",
     "MotionConfig",
     "MotionDatabase",
     "MotionError",
     "Normalisation",
+    "Parting",
     "Playing",
     "Pose",
     "PoseBank",
@@ -122,6 +137,9 @@ __all__ = [
     "PoseStream",
     "Poses",
     "QueryError",
+    "Reasked",
+    "ReaskedDecision",
+    "ReaskedSearch",
     "Reason",
     "Recorder",
     "ReservedTag",
@@ -130,6 +148,8 @@ __all__ = [
     "Search",
     "Selector",
     "SelectorSettings",
+    "SessionDiff",
+    "SessionStats",
     "Skeleton",
     "Skip",
     "Span",
@@ -142,6 +162,8 @@ __all__ = [
     "Updated",
     "Variation",
     "WarpShare",
+    "WhatIf",
+    "WhyNot",
     "best_start",
     "build",
     "build_all",
@@ -159,6 +181,7 @@ __all__ = [
     "local_poses",
     "made_clips",
     "make_clip",
+    "measure",
     "mirrored",
     "mirrored_path",
     "open_database",

@@ -1,5 +1,5 @@
-"""What a check found and what coverage measured, as text for people and for machines: one module a format, imported when it is
-asked for."""
+"""What a check found, and what is measured of coverage and motion, as text for people and for machines: one module a format,
+imported when it is asked for."""
 
 from __future__ import annotations
 
@@ -24,6 +24,10 @@ RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
     ("coverage", "sarif"): ("render_sarif", ("shows_all",)),
     ("coverage", "markdown"): ("coverage_markdown", ("shows_all",)),
     ("coverage", "html"): ("coverage_html", ()),
+    ("measures", "text"): ("measure_text", ("colour", "width", "shows_all")),
+    ("measures", "json"): ("render_json", ()),
+    ("measures", "junit"): ("measure_junit", ()),
+    ("measures", "markdown"): ("measure_markdown", ()),
 }
 """For each subject and format the module that renders it and the options that it takes."""
 ERRORS: tuple[Level, ...] = ("error",)

@@ -13,8 +13,8 @@ from lines import DT, RATE, line
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.errors import MotionError, QueryError
-from contextdb.motion import Entry, Selector
+from contextdb.errors import ContextError, MotionError, QueryError
+from contextdb.motion import Entry, ManySteered, Selector, Steered
 from contextdb.motion.markup.marks import TagFilter
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_group import ControllerGroup
@@ -103,6 +103,11 @@ def given_to_all(data, selector_names, n):
     draw_each("among", st.sampled_from([None, ["b"], ("b",)]) if "b" in selector_names else st.none())
     draw_each("force", st.booleans())
     draw_each("interrupt", st.sampled_from([False, False, True]))
+    if data.draw(st.booleans()):
+        places = data.draw(st.lists(st.tuples(PLACES, PLACES, PLACES), min_size=n, max_size=n))
+        asked["body"] = np.array(places, float).reshape(-1, 3)
+        for one, place in zip(own, places, strict=True):
+            one["body"] = place
     if data.draw(st.booleans()):
         many = answers(data, n)
         how = data.draw(st.sampled_from(["many", "list", "one", "of databases"])) if n else "many"
@@ -203,6 +208,7 @@ def test_the_time_of_a_search_is_shared_by_those_who_searched():
         ({"valid": [None]}, "1 mask for 2 queries"),
         ({"valid": {"z": None}}, r'the selector has no database "z"'),
         ({"contexts": [{}]}, "1 context for 2 characters"),
+        ({"body": [None]}, "1 body for 2 characters"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_and_nobody_moves(given, message):
@@ -211,4 +217,18 @@ def test_what_cannot_be_meant_is_refused_and_nobody_moves(given, message):
     before = group.states
     with pytest.raises(QueryError, match=message):
         group.update(**{"dt_s": DT, "queries": [[0.0], [0.0]], **given})
+    assert group.states == before
+
+
+def test_the_bodies_of_a_crowd_are_recorded_each_with_its_own_character():
+    group = ControllerGroup([one_on(Selector([Entry("a", line(walk=range(10)))])) for _ in range(2)])
+    at_left, at_right = Steered(position=(1.0, 2.0), heading=0.5), Steered(position=(-1.0, 4.0))
+    places = [(1.0, 2.0, 0.5), (-1.0, 4.0, 0.0)]
+    for body in (ManySteered.of([at_left, at_right]), [at_left, at_right], places, np.array(places)):
+        assert [d.body for d in group.update(DT, [[0.0], [3.0]], body=body)] == places
+    assert [d.body for d in group.update(DT, [[0.0], [3.0]], body=[None, at_left])] == [None, places[0]]
+    assert [d.body for d in group.update(DT, [[0.0], [3.0]])] == [None, None]
+    before = group.states
+    with pytest.raises(ContextError, match=r"character 1: body is 7\. Accepted: a Steered"):
+        group.update(DT, [[0.0], [3.0]], body=[None, 7])
     assert group.states == before

@@ -32,6 +32,9 @@ PARTS = [motion.clip_features(CLIP, SCHEMA)]
 DATABASE = motion.MotionDatabase.from_features(np.eye(4, 2), [0, 2], [2, 4], ["a", "b"])
 SELECTOR = motion.Selector([motion.Entry("only", DATABASE)])
 QUERY = [0.0, 1.0]
+RECORDED = motion.Trace(2)
+motion.Controller(SELECTOR, recorder=RECORDED).update(0.1, QUERY)
+REASKED = RECORDED.reasked()
 STEERED = [motion.Steered()]
 MANY_STEERED = motion.ManySteered.of(STEERED)
 CONFIG = motion.MotionConfig()
@@ -185,6 +188,21 @@ CALLS: dict[str, Call] = {
     "Trace.save(path)": lambda x: isinstance(x, (str, Path)) or motion.Trace().save(x),
     "Trace.record(decision)": lambda x: motion.Trace().record(x),
     "Trace[]": lambda x: motion.Trace()[x],
+    "Trace.use(databases)": lambda x: motion.Trace().use(x),
+    "Trace.reasked(project)": lambda x: x is None or motion.Trace().reasked(x),
+    "Trace.reasked(weights)": lambda x: x is None or motion.Trace(1, {"a": DATABASE}).reasked(weights=x),
+    "Trace.reasked(thresholds)": lambda x: x is None or motion.Trace().reasked(thresholds=x),
+    "Trace.reasked(biases)": lambda x: x is None or motion.Trace().reasked(biases=x),
+    "Trace.reasked(tables)": lambda x: x is None or motion.Trace().reasked(tables=x),
+    "Reasked[]": lambda x: REASKED[x],
+    "Reasked.why_not(index)": lambda x: REASKED.why_not(x, "a"),
+    "Reasked.why_not(asset)": lambda x: REASKED.why_not(0, x),
+    "ReaskedDecision.best_of_assets(text)": lambda x: REASKED[0].best_of_assets(x),
+    "ReaskedDecision.rank(asset)": lambda x: REASKED[0].rank(x),
+    "ReaskedDecision.with_weights(weights)": lambda x: REASKED[0].with_weights(x),
+    "Trace.what_if(project)": lambda x: x is None or RECORDED.what_if(x),
+    "Trace.what_if(weights)": lambda x: x is None or RECORDED.what_if(weights=x),
+    "Trace.diff(other)": lambda x: motion.Trace().diff(x),
     "MatchNode(database)": lambda x: motion.MatchNode(x),
     "MatchNode(position_weight)": lambda x: motion.MatchNode(DATABASE, position_weight=x),
     "MatchGate(over)": lambda x: motion.MatchGate(x, 1.0),
@@ -264,7 +282,16 @@ CALLS: dict[str, Call] = {
     "Selector.with_database(name)": lambda x: SELECTOR.with_database(x, DATABASE),
     "Selector.with_database(database)": lambda x: SELECTOR.with_database("only", x),
     "Controller.upcoming(dt_s)": lambda x: motion.Controller(SELECTOR).upcoming(x),
+    "measure(session_or_poses)": lambda x: motion.measure(x, BANK),
+    "measure(banks)": lambda x: motion.measure(POSED, x, rate=30.0),
+    "measure(poses)": lambda x: motion.measure(motion.Trace(), BANK, poses=x),
+    "measure(databases)": lambda x: motion.measure(POSED, BANK, databases=x, rate=30.0),
+    "measure(settings)": lambda x: motion.measure(POSED, BANK, settings=x, rate=30.0),
+    "measure(rate)": lambda x: motion.measure(POSED, BANK, rate=x),
+    "measure(bodies)": lambda x: motion.measure(POSED, BANK, bodies=x, rate=30.0),
+    "measure(wanted)": lambda x: motion.measure(POSED, BANK, wanted=x, rate=30.0),
     "Controller.update(tags)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, tags=x),
+    "Controller.update(body)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, body=x),
     "Controller.update(context)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, context=x),
     "Controller.update(bias)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, bias=x),
     "Controller.update(among)": lambda x: motion.Controller(SELECTOR).update(0.1, QUERY, among=x),

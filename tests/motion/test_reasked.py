@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 from dataclasses import replace
 
@@ -9,12 +10,23 @@ import numpy as np
 import polars as pl
 import pytest
 
-from contextdb.errors import MotionError
-from contextdb.motion import Controller, ControllerSettings, Entry, FeatureSchema, LeftOut, Selector, TagFilter, Trace, make_clip
+from contextdb.errors import ContextDBError, MotionError
+from contextdb.motion import (
+    Biases,
+    Controller,
+    ControllerSettings,
+    Entry,
+    FeatureSchema,
+    LeftOut,
+    Selector,
+    TagFilter,
+    Trace,
+    make_clip,
+)
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search import candidates
 from contextdb.motion.search.database import MotionDatabase
-from contextdb.motion.trace.reasked import reasked, require_known, why_not_asked
+from contextdb.motion.trace.reasked import require_known, why_not_asked
 
 SCHEMA = FeatureSchema.from_dict(
     "loco",
@@ -48,15 +60,22 @@ def trace() -> Trace:
         penalties = {"walk": rng.random()} if i % 4 == 0 else None
         bias = {"loco": np.array([rng.choice([0.0, 0.1, np.inf]) for _ in range(LOCO.n_frames)])} if i % 5 == 0 else None
         controller.update(1 / 30, query, valid, tags, {"i": i}, penalties=penalties, bias=bias, force=i % 2 == 0)
-    return Trace.from_bytes(trace.to_bytes())
+    loaded = Trace.from_bytes(trace.to_bytes())
+    assert all(decision.candidates == () for decision in loaded)
+    assert loaded.use(DATABASES) == ""
+    for live, kept in zip(trace, loaded, strict=True):
+        assert [(name, found.rows, found.counts) for name, found in live.candidates] == [
+            (name, found.rows, found.counts) for name, found in kept.candidates
+        ]
+    return loaded
 
 
-def test_every_recorded_cost_comes_out_again_bit_for_bit(trace):
+def test_every_candidate_is_one_of_the_frames_that_the_search_compared(trace):
     n_rows = 0
     for decision in trace:
         assert bool(decision.filters) == decision.searched
-        for (name, kept), (other, chosen) in zip(decision.candidates, decision.filters, strict=True):
-            assert name == other
+        for name, kept in decision.candidates:
+            chosen = dict(decision.filters)[name]
             database = DATABASES[name]
             again = candidates.of(database, database.normalised(decision.query), chosen, database.n_frames, True)
             assert again.counts == kept.counts
@@ -67,27 +86,25 @@ def test_every_recorded_cost_comes_out_again_bit_for_bit(trace):
 
 
 def test_every_asset_has_its_best_frame_rank_cost_parts_and_reason(trace):
-    for decision in trace:
-        if not decision.searched:
-            continue
-        rows = reasked(decision, DATABASES, "")
-        searched = [name for name, _ in decision.filters]
+    for asked in trace.reasked(DATABASES):
+        decision = asked.decision
+        rows = asked.best_of_assets()
         assert sorted((each.database, each.row.range) for each in rows) == sorted(
-            (name, i) for name in searched for i in range(len(DATABASES[name].assets))
+            (name, i) for name in asked.searched for i in range(len(DATABASES[name].assets))
         )
         assert [each.row.cost for each in rows] == sorted(each.row.cost for each in rows)
         for each in rows:
             parts = sum(each.row.channels.values()) + sum(each.row.biases.values())
             assert each.row.cost == pytest.approx(parts, abs=1e-9) or each.row.left_out is LeftOut.FORBIDDEN
+            assert asked.rank(each.row.asset) == each.rank
         free = [each for each in rows if each.row.left_out is LeftOut.NO]
-        hits = [search.hit.cost for search in decision.choice.searches if search.hit]
-        assert [each.rank for each in free[:1]] == ([1] if free else [])
+        hits = [] if decision.choice is None else [search.hit.cost for search in decision.choice.searches if search.hit]
         assert min((each.row.cost for each in free), default=None) == min(hits, default=None)
 
 
 def test_a_name_gives_its_assets_alone_in_any_case(trace):
-    decision = next(decision for decision in trace if len(decision.filters) == 2)
-    assert {each.row.asset for each in reasked(decision, DATABASES, "WALK")} == {"walk", "walk_tired"}
+    asked = next(each for each in trace.reasked(DATABASES) if len(each.searched) == 2)
+    assert {each.row.asset for each in asked.best_of_assets("WALK")} == {"walk", "walk_tired"}
 
 
 def test_what_is_missing_to_ask_again_is_said(trace):
@@ -101,17 +118,65 @@ def test_what_is_missing_to_ask_again_is_said(trace):
     assert 'the database "tired" is another' in why_not_asked(searched, about, heavier)
 
 
+def test_candidates_are_worked_out_from_the_recorded_databases_alone(trace):
+    loaded = Trace.from_bytes(trace.to_bytes())
+    assert loaded.use({"loco": LOCO}) == 'there is no database "tired" in the project.'
+    assert not any(decision.candidates for decision in loaded)
+    other = replace(TIRED, marks=replace(TIRED.marks, kind_biases=TIRED.marks.kind_biases + 1.0))
+    assert loaded.use({"tired": other, "loco": LOCO}) == (
+        'the database "tired" is another than the one that the session was recorded with.'
+    )
+    assert list(loaded.databases) == ["loco"]
+
+
 def test_a_name_that_no_asset_holds_is_refused_with_the_nearest():
     with pytest.raises(MotionError, match=r'no asset\'s name contains "wlak".*Did you mean "walk"\?'):
         require_known("wlak", DATABASES, "session.parquet")
 
 
-def test_a_session_of_an_older_version_is_read_without_filters(trace, tmp_path):
-    path = tmp_path / "old.parquet"
-    raw = tmp_path / "new.parquet"
-    raw.write_bytes(trace.to_bytes())
-    metadata = pl.read_parquet_metadata(raw)
-    pl.read_parquet(raw).drop("filters").write_parquet(path, metadata={k: metadata[k] for k in ("contextdb.trace", "about")})
-    old = Trace.load(path)
-    assert len(old) == len(trace)
-    assert all(decision.filters == () for decision in old)
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"weights": {"LeftFoot positon": 2.0}}, 'no channel "LeftFoot positon".*Did you mean "LeftFoot position"'),
+        ({"weights": {"Hips velocity": -1.0}}, "a finite number, 0 or more"),
+        ({"weights": [1.0]}, "weights"),
+        ({"biases": {"loko": Biases()}}, 'no database "loko".*Did you mean "loco"'),
+        ({"biases": {"loco": 1.0}}, "Biases"),
+        ({"thresholds": {"tierd": 1.0}}, 'no database "tierd".*Did you mean "tired"'),
+        ({"tables": {"moves": None}}, "tables|table"),
+    ],
+)
+def test_a_change_of_what_there_is_not_is_refused(trace, changes, message):
+    with pytest.raises(ContextDBError, match=message):
+        trace.reasked(DATABASES, **changes)
+
+
+def test_an_asset_that_there_is_not_is_refused_with_the_nearest(trace):
+    place = next(i for i, decision in enumerate(trace) if decision.searched)
+    with pytest.raises(MotionError, match=r'no asset "jgo".*Did you mean "jog"'):
+        trace.reasked(DATABASES).why_not(place, "jgo")
+    unsearched = next(i for i, decision in enumerate(trace) if not decision.searched)
+    with pytest.raises(MotionError, match="nothing was searched"):
+        trace.reasked(DATABASES).why_not(unsearched, "jog")
+
+
+def test_a_session_of_format_1_is_read_with_the_candidates_that_it_kept(trace, tmp_path):
+    whole = pl.read_parquet(trace.to_bytes())
+    fields = [each.name for each in whole.schema["filters"].inner.fields if not each.name.endswith("_runs")]
+    old_filters = pl.col("filters").list.eval(pl.struct([pl.element().struct.field(name) for name in fields]))
+    about = {name: {key: said[key] for key in ("rate", "features", "channels", "digest")} for name, said in trace.about.items()}
+    metadata = {"contextdb.trace": "1", "about": json.dumps(about)}
+    dense = next(
+        i for i, decision in enumerate(trace) if decision.searched and not any(len(f.frame_biases) for _, f in decision.filters)
+    )
+    for name, old in (("filters.parquet", whole.with_columns(old_filters)), ("none.parquet", whole.drop("filters"))):
+        old.drop("inputs").write_parquet(tmp_path / name, metadata=metadata)
+        loaded = Trace.load(tmp_path / name)
+        assert len(loaded) == len(trace)
+        assert all(decision.inputs is None for decision in loaded)
+    assert all(decision.filters == () for decision in loaded)
+    kept = Trace.load(tmp_path / "filters.parquet")
+    assert kept.use(DATABASES) == ""
+    assert kept[dense].candidates[0][1].rows[:3] == trace[dense].candidates[0][1].rows[:3]
+    with pytest.raises(MotionError, match="does not say how its updates were made"):
+        kept.what_if(DATABASES)

@@ -27,7 +27,7 @@ from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.trace.filter_rows import filter_row
-from contextdb.motion.trace.rows import TIMINGS, context_json
+from contextdb.motion.trace.rows import BODY, TIMINGS, context_json
 from contextdb.motion.trace.session import CHUNK, Trace
 
 # ---- decisions to draw
@@ -82,6 +82,7 @@ DECISIONS = st.builds(
     search_us=MAYBE,
     root_motion=st.builds(RootMotion, NUMBERS, NUMBERS, NUMBERS),
     root_weight=NUMBERS,
+    body=st.none() | st.tuples(NUMBERS, NUMBERS, NUMBERS),
 )
 
 
@@ -120,6 +121,12 @@ def test_without_timings_all_but_the_timings_comes_back(decision):
     loaded = Trace.from_bytes(trace_of([decision]).to_bytes(timings=False))
     assert as_told(loaded[0]) == as_told(replace(decision, search_us=None))
     assert loaded.to_bytes(timings=False) == trace_of([decision]).to_bytes(timings=False)
+
+
+def test_a_session_of_a_version_that_kept_no_bodies_is_read_without_them(tmp_path: Path):
+    path = tmp_path / "session.parquet"
+    path.write_bytes(altered(lambda frame: frame.drop(BODY)))
+    assert [decision.body for decision in Trace.load(path)] == [None] * 7
 
 
 @given(DECISIONS)
@@ -233,7 +240,9 @@ def test_a_controller_s_decisions_are_recorded_as_they_were_with_the_markup_of_t
     events = trace.events(jump)
     assert events["runs", decisions[jump].playing.frame] == ("CostModifier 0.5",)
     assert all(tags == ("Move.Walk",) for (name, frame), tags in events.items() if name == "walks" and frame < 20)
-    assert events == Trace.from_bytes(trace.to_bytes()).events(jump)
+    loaded = Trace.from_bytes(trace.to_bytes())
+    assert loaded.use(trace.databases) == ""
+    assert events == loaded.events(jump)
 
 
 def test_without_databases_and_candidates_the_rest_is_recorded():
@@ -260,14 +269,14 @@ def test_the_file_tells_any_reader_of_parquet_what_it_holds(tmp_path: Path):
     trace.save(tmp_path / "session.parquet")
     frame = pl.read_parquet(tmp_path / "session.parquet")
     assert frame["tick"].to_list() == list(range(len(decisions)))
-    best = frame["candidates"].list.first().struct.field("rows").list.first().struct.field("cost")
-    assert best[0] == min(row.cost for row in decisions[0].candidates[0][1].rows)
+    assert frame["filters"].list.first().struct.field("ranges")[0].to_list() == [True, True]
+    assert json.loads(frame["inputs"][1])["dt_s"] == DT
     metadata = pl.read_parquet_metadata(tmp_path / "session.parquet")
-    assert metadata["contextdb.trace"] == "1"
-    assert json.loads(metadata["about"]) == {
-        name: {"rate": None, "features": ["feature 0"], "channels": ["features"], "digest": trace.about[name]["digest"]}
-        for name in ("walks", "runs")
-    }
+    assert (metadata["contextdb.trace"], metadata["candidates"]) == ("2", "4")
+    about = json.loads(metadata["about"])["runs"]
+    told = {"rate": None, "features": ["feature 0"], "channels": ["features"], "assets": ["run"], "starts": [0], "stops": [20]}
+    assert told.items() <= about.items()
+    assert about == trace.about["runs"]
     assert Trace.load(tmp_path / "session.parquet").about == trace.about
 
 
@@ -307,8 +316,8 @@ def altered(change, **metadata):
 
 
 def test_sessions_of_another_version_or_with_other_columns_are_refused(tmp_path: Path):
-    assert refused(altered(lambda frame: frame, **{"contextdb.trace": "2"}), tmp_path) == (
-        'the session has format "2"; this version reads format 1.'
+    assert refused(altered(lambda frame: frame, **{"contextdb.trace": "3"}), tmp_path) == (
+        'the session has format "3"; this version reads formats 1 and 2.'
     )
     assert refused(altered(lambda frame: frame, about="[1]"), tmp_path).startswith("the file is damaged")
     assert refused(altered(lambda frame: frame.drop("choice", "why")), tmp_path) == (

@@ -305,7 +305,7 @@ class Character:
         if "valid" not in options:
             options["valid"] = self.valid(step.facts)
         before = self.controller.state
-        decision = self.controller.update(step.dt_s, query, context=step.facts or None, **options)
+        decision = self.controller.update(step.dt_s, query, context=step.facts or None, body=step.body, **options)
         return self.answer(step, wished, decision, before)
 
     # ---- the parts of an update, for a crowd

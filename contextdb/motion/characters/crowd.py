@@ -131,7 +131,9 @@ class Crowd(Sequence[Character]):
         queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
         valid = self._valid(steps)
         before = self.states
-        decisions = group.update(dt, queries, valid, contexts=[step.facts or None for step in steps])
+        decisions = group.update(
+            dt, queries, valid, contexts=[step.facts or None for step in steps], body=[step.body for step in steps]
+        )
         try:
             together = zip(self, steps, paths, decisions, before, strict=True)
             return [each.answer(step, path, decision, state.controller) for each, step, path, decision, state in together]

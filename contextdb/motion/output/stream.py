@@ -15,6 +15,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_real
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
+from contextdb.motion.clips.ground_place import A_BODY, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample, loops
@@ -24,7 +25,6 @@ from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION
 
 DEFAULT_SETTINGS = PoseSettings()
-A_BODY = "a Steered, or x and z in metres and a heading in radians"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -217,18 +217,14 @@ class PoseStream:
             raise MotionError(Fault(found, some(self._banks), in_quotes(near) if near else ""))
         return bank, bank.range_of(playing.asset, playing.mirrored)
 
-    def _place_of(self, body: object) -> Place3 | None:
+    def _place_of(self, body: OfBody | None) -> Place3 | None:
         """Where the game's body is."""
         if body is None:
             if self.settings.root != "animation":
                 found = f'root = "{self.settings.root}" needs a body, and none was given.'
                 raise MotionError(Fault(found, A_BODY, 'root = "animation"'))
             return None
-        if isinstance(body, Steered):
-            return body.position[0], body.position[1], body.heading
-        if not isinstance(body, (tuple, list, np.ndarray)) or len(body) != 3:
-            raise ContextError(Fault(f"body is {body!r}.", A_BODY))
-        return require_real(body[0], "x"), require_real(body[1], "z"), require_real(body[2], "heading")
+        return place_of(body)
 
 
 def _checked(banks: object) -> dict[Any, PoseBank]:

@@ -9,7 +9,7 @@ Source: the window "Top Candidates" of EA's diagnostics; the debugger of Remedy'
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,23 +97,18 @@ def of(database: Searched, query: Floats, chosen: Filter, k: int, with_left_out:
     return Candidates(tuple(_candidates(database, query, chosen, frames[best], totals[best], why)), counts, why)
 
 
-def best_of_assets(database: Searched, wanted: Floats, chosen: Filter, name: str) -> tuple[list[Candidate], Floats]:
-    """Of each range whose asset's name holds a text the best frame, chosen or not; and the costs of all frames that may be chosen.
+def with_left_out(database: Searched, query: Floats, chosen: Filter, k: int) -> Candidates:
+    """The k best frames for a normalised query, and those of the k cheapest of all that are left out, cheapest first."""
+    best, every = of(database, query, chosen, k, False), of(database, query, chosen, k, True)
+    left_out = [row for row in every if row.left_out is not LeftOut.NO]
+    return replace(best, rows=tuple(sorted((*best, *left_out), key=lambda row: row.cost)))
 
-    A frame that may be chosen comes before one that may not. `wanted` is a normalised query.
-    """
-    lay, kinds = database.layout, database.marks.kinds
-    why = chosen.why(lay.frame_ranges, kinds)
-    frames = lay.frames
-    totals = scan.totals(lay, wanted, database.slices, database.weights, chosen, kinds, frames)
-    is_free, ranges = why[frames] == LeftOut.NO, lay.frame_ranges[frames]
-    best = []
-    for i in [i for i, asset in enumerate(database.assets) if name.casefold() in asset.casefold()]:
-        own = np.flatnonzero(ranges == i)
-        if len(own):
-            best.append(own[np.lexsort((frames[own], totals[own], ~is_free[own]))[0]])
-    at = np.array(best, np.int64)
-    return list(_candidates(database, wanted, chosen, frames[at], totals[at], why)), np.asarray(totals[is_free])
+
+def of_frames(
+    database: Searched, wanted: Floats, chosen: Filter, frames: Ints, totals: Floats, why: NDArray[np.uint8]
+) -> list[Candidate]:
+    """Some frames, their totals and the reason of every frame known; `wanted` is a normalised query."""
+    return list(_candidates(database, wanted, chosen, frames, totals, why))
 
 
 def _least_first(totals: Floats, is_other: NDArray[np.bool_], k: int) -> Ints:

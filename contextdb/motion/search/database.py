@@ -292,7 +292,10 @@ class MotionDatabase(Searched):
         A box is skipped when its lower bound plus its least bias is above the best total so far; see
         `contextdb.motion.search.kernels`.
         """
-        chosen = self._filters.make(valid, tags, current, bias, skip, in_match_range, penalties)
+        return self.search_filtered(query, self._filters.make(valid, tags, current, bias, skip, in_match_range, penalties))
+
+    def search_filtered(self, query: ArrayLike, chosen: Filter) -> Hit:
+        """The frame that a search chooses from what a filter lets pass; see `search` and `filter`."""
         found, totals, frames = self._searcher.least(query, chosen, math.inf, 1)
         return self._hit(found, int(frames[0]), float(totals[0]))
 

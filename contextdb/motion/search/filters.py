@@ -108,6 +108,15 @@ class Filter(NamedTuple):
         """The skips as spans: int64 [S, 2]."""
         return np.array([(skip.start, skip.stop) for skip in self.skips], np.int64) if self.skips else NO_SKIPS
 
+    def copied(self) -> Filter:
+        """The same, of arrays that no caller changes later."""
+        return self._replace(
+            ranges=self.ranges.copy(),
+            range_biases=self.range_biases.copy(),
+            frames=self.frames.copy(),
+            frame_biases=self.frame_biases.copy(),
+        )
+
     def playing(self, ranges: Ints, kinds: NDArray[np.integer]) -> int:
         """The frame that plays on if it may, else -1; from the range (-1: none) and the kind of every frame."""
         at = self.current

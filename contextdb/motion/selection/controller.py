@@ -14,7 +14,7 @@ DoNotChoose, NextNaturalOnly and root motion weight of EA's talk.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 
@@ -23,10 +23,12 @@ from numpy.typing import ArrayLike
 from contextdb.cells.arguments import require_kind
 from contextdb.errors import Fault, MotionError, QueryError
 from contextdb.motion import arguments
+from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.reading import as_number
 from contextdb.motion.search.candidates import Candidates
+from contextdb.motion.search.filtering import Tags
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection import variation
 from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags, OfValid
@@ -35,12 +37,14 @@ from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
 from contextdb.motion.selection.history import remembered
+from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.ongoing import Ongoing
 from contextdb.motion.selection.root_motion import NO_MOTION
 from contextdb.motion.selection.selector import Selector
 from contextdb.motion.selection.step import Step
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
+from contextdb.motion.selection.worked_out import WorkedOut
 
 Clock = Callable[[], float]
 
@@ -53,6 +57,9 @@ class Asking:
     cause: Trigger | None
     wanted: Asked | None
     context: Mapping[str, object] | None
+    force: bool = False
+    interrupt: bool = False
+    body: GroundPlace | None = None
 
     @property
     def query(self) -> Floats:
@@ -157,6 +164,7 @@ class Controller:
         among: Among | None = None,
         force: bool = False,
         interrupt: bool = False,
+        body: OfBody | None = None,
     ) -> Decision:
         """Move what plays on by some time, search if it is time to, and say what plays now.
 
@@ -175,14 +183,18 @@ class Controller:
             Search now, though no search is due. What plays may win.
         interrupt : bool
             Search now, and leave what plays if anything else may.
+        body : Steered or (x, z, heading), optional
+            Where the game has the body, for the recorder alone: `motion.measure` compares it with where the poses are.
 
         Raises
         ------
         QueryError
             A time, query, mask, tag or name that does not fit. The controller then stands where it stood.
+        ContextError
+            `body` is none.
         """
         asked = Asked(valid, tags, None, bias, among, None, penalties)
-        asking = self.ask(dt_s, self.checked(query), asked, context, force, interrupt)
+        asking = self.ask(dt_s, self.checked(query), asked, context, force, interrupt, place_of(body))
         if asking.wanted is None:
             return self.answer(asking)
         began_s = self.now_s()
@@ -190,13 +202,21 @@ class Controller:
         return self.answer(asking, choice, (self.now_s() - began_s) * 1e6)
 
     def ask(
-        self, dt_s: float, query: Floats, asked: Asked, context: Mapping[str, object] | None, force: bool, interrupt: bool
+        self,
+        dt_s: float,
+        query: Floats,
+        asked: Asked,
+        context: Mapping[str, object] | None,
+        force: bool,
+        interrupt: bool,
+        body: GroundPlace | None = None,
     ) -> Asking:
         """The first half of an update, of a `checked` query: move what plays on, say what is to be searched. Changes nothing."""
         dt_s = _seconds(dt_s)
         step = Step.of(self.selector, self.settings, self._state, dt_s, query, asked, self._ongoing(dt_s))
         cause = step.trigger(force, interrupt)
-        return Asking(step, cause, None if cause is None else step.wanted(cause), context)
+        wanted = None if cause is None else step.wanted(cause)
+        return Asking(step, cause, wanted, context, force, interrupt, body)
 
     def answer(self, asking: Asking, choice: Choice | None = None, search_us: float = 0.0) -> Decision:
         """The second half: decide by what the selector chose, None where nothing was to be searched."""
@@ -212,15 +232,16 @@ class Controller:
 
     def _decided(self, asking: Asking, choice: Choice | None, search_us: float | None) -> Decision:
         step, cause, wanted = asking.step, asking.cause, asking.wanted
-        candidates: tuple[tuple[str, Candidates], ...] = ()
+        candidates: Sequence[tuple[str, Candidates]] = ()
         filters: tuple[tuple[str, Filter], ...] = ()
         if cause is None or wanted is None or choice is None:
             assert step.ongoing is not None, "without anything playing there is a cause to search"
             outcome = step.unsearched(step.ongoing)
         else:
             outcome = step.searched(cause, wanted, choice, self._rng)
-            candidates = self._candidates(step.query, wanted)
-            filters = self._filters(wanted, candidates)
+            filters = self._filters(wanted)
+            if filters:
+                candidates = WorkedOut(self.selector.databases, step.query, filters, choice, self._n_candidates)
         return Decision(
             tick=self._state.tick,
             time_s=step.now_s,
@@ -238,7 +259,9 @@ class Controller:
             search_us=None if cause is None else search_us,
             root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
             root_weight=self._root_weight(outcome.playing),
+            body=asking.body,
             filters=filters,
+            inputs=self._inputs(asking),
         )
 
     def _state_after(self, step: Step, decision: Decision) -> ControllerState:
@@ -251,19 +274,27 @@ class Controller:
         since_s = 0.0 if decision.searched else state.since_search_s + step.dt_s
         return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent)
 
-    def _candidates(self, query: Floats, wanted: Asked) -> tuple[tuple[str, Candidates], ...]:
-        """For the recorder, of each database that was searched: the best frames, and those left out that cost as little."""
-        k = 0 if self.recorder is None else self.recorder.n_candidates
-        if k <= 0:
-            return ()
-        best = self.selector.candidates(query, k, **wanted.options())
-        all_of = dict(self.selector.candidates(query, k, left_out=True, **wanted.options()))
-        return tuple((name, _merged(found, all_of[name])) for name, found in best)
+    @property
+    def _n_candidates(self) -> int:
+        return 0 if self.recorder is None else self.recorder.n_candidates
 
-    def _filters(self, wanted: Asked, searched: tuple[tuple[str, Candidates], ...]) -> tuple[tuple[str, Filter], ...]:
-        """For the recorder, what could be chosen from in each database that was searched."""
-        databases = self.selector.databases
-        return tuple((name, databases[name].filter(**wanted.of(name))) for name, _ in searched)
+    def _filters(self, wanted: Asked) -> tuple[tuple[str, Filter], ...]:
+        """For the recorder, what could be chosen from in each database of the moment."""
+        if self._n_candidates <= 0:
+            return ()
+        among = self.selector.among(wanted.among)
+        databases = ((name, database) for name, database in self.selector.databases.items() if name in among)
+        return tuple((name, database.filter(**wanted.of(name)).copied()) for name, database in databases)
+
+    def _inputs(self, asking: Asking) -> Inputs | None:
+        """For the recorder, what else the update was given."""
+        if self._n_candidates <= 0:
+            return None
+        step, asked = asking.step, asking.step.asked
+        among = None if asked.among is None else tuple(sorted(self.selector.among(asked.among)))
+        tags = asked.tags
+        filters = tags if tags is None or isinstance(tags, TagFilter) else _filters_in(tags)
+        return Inputs(step.dt_s, asking.force, asking.interrupt, among, filters, self.settings)
 
     def _root_weight(self, playing: Playing | None) -> float:
         return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)
@@ -275,10 +306,9 @@ class Controller:
         return arguments.numbers_of(query, "the query")
 
 
-def _merged(best: Candidates, every: Candidates) -> Candidates:
-    """The candidates that may be chosen, and those left out, cheapest first."""
-    left_out = [row for row in every if row.left_out is not LeftOut.NO]
-    return replace(best, rows=tuple(sorted((*best, *left_out), key=lambda row: row.cost)))
+def _filters_in(tags: Mapping[str, Tags]) -> dict[str, TagFilter]:
+    """The tag filters of databases, without flags of frames."""
+    return {name: each for name, each in tags.items() if isinstance(each, TagFilter)}
 
 
 def _seconds(dt_s: float) -> float:

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contextdb.cells.arguments import require_many_of
-from contextdb.errors import Fault, MotionError, Place, QueryError, plural
+from contextdb.errors import ContextError, Fault, MotionError, Place, QueryError, plural
 from contextdb.motion import arguments
+from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
+from contextdb.motion.clips.many_steered import ManySteered
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.selection.asked import Among, Asked, OfPenalties, OfTags
 from contextdb.motion.selection.asked_of_many import OfValidForMany, each_of, valid_of_each
@@ -25,6 +27,7 @@ from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.selector import Selector
 
 Flag = bool | Sequence[bool] | NDArray[np.bool_]
+OfBodies = ManySteered | Sequence[OfBody | None] | NDArray[np.float64]
 
 
 class ControllerGroup(Sequence[Controller]):
@@ -129,6 +132,7 @@ class ControllerGroup(Sequence[Controller]):
         among: Among | Sequence[Among | None] | None = None,
         force: Flag = False,
         interrupt: Flag = False,
+        body: OfBodies | None = None,
     ) -> list[Decision]:
         """Update every character as `Controller.update` does; the decision of each, in order.
 
@@ -144,6 +148,8 @@ class ControllerGroup(Sequence[Controller]):
             As for `Controller.update`: one for all, or a list of one for each.
         contexts : sequence of Q mappings, optional
             The facts of the moment, for the recorders alone.
+        body : ManySteered, sequence of Q bodies, or float array of shape (Q, 3), optional
+            Where the game has each body, for the recorders alone.
 
         Raises
         ------
@@ -165,15 +171,16 @@ class ControllerGroup(Sequence[Controller]):
             _each(contexts, n, "context"),
             _each_flag(force, n, "flag to force"),
             _each_flag(interrupt, n, "flag to interrupt"),
+            _each_place(body, n),
             strict=True,
         )
         asking = []
         are_checked = self._have_width(wanted.shape[1]) and arguments.are_finite(wanted)
-        for i, (controller, query, own_tags, own_bias, own_among, own_penalties, context, forced, interrupted) in enumerate(each):
+        for i, (controller, query, own_tags, own_bias, own_among, own_penalties, *others) in enumerate(each):
             try:
                 asked = Asked(masks[controller.selector][i], own_tags, None, own_bias, own_among, None, own_penalties)
                 own_query = query if are_checked else controller.checked(query)
-                asking.append(controller.ask(dt_s, own_query, asked, context, forced, interrupted))
+                asking.append(controller.ask(dt_s, own_query, asked, *others))
             except QueryError as error:
                 raise QueryError(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
         answers = self._searched(asking)
@@ -214,6 +221,19 @@ def _each_among(among: object, n: int) -> Sequence[object]:
         isinstance(among, (list, tuple)) and not hasattr(among, "assets") and not all(isinstance(name, str) for name in among)
     )
     return each_of(among, n, "choice of databases", is_one=not is_for_each)
+
+
+def _each_place(body: OfBodies | None, n: int) -> Sequence[GroundPlace | None]:
+    """Where each body is; None for all, or for one of a list, where none is given."""
+    if isinstance(body, ManySteered):
+        body = np.column_stack((body.positions, body.headings))
+    places = []
+    for i, each in enumerate(each_of(body, n, "body", is_one=body is None)):
+        try:
+            places.append(place_of(each))
+        except ContextError as error:
+            raise ContextError(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
+    return places
 
 
 def _each_flag(given: Flag, n: int, what: str) -> Sequence[bool]:

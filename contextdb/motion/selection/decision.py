@@ -5,15 +5,17 @@ A `Decision` is data. A recorder is handed each one; a controller without a reco
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
+from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
 
 
@@ -80,16 +82,21 @@ class Decision:
         The facts of the moment, as they were given.
     query : float64 array, shape (F,), or None
         What was asked for.
-    candidates : tuple of (database name, Candidates)
-        Of the databases that were searched; empty unless the recorder asks for them.
+    candidates : sequence of (database name, Candidates)
+        Of the databases that were searched, worked out when they are first asked for; empty unless the recorder asks for them.
     search_us : float or None
         Microseconds that searching took; None without a search, or without a clock.
     root_motion : RootMotion
         How the playing animation moved the body since the last update.
     root_weight : float
         How much of its movement is to come from the animation, from 0 to 1; the rest is the game's.
+    body : (x, z, heading) or None
+        Where the game had the body, as it was given.
     filters : tuple of (database name, Filter)
-        What could be chosen from in each database that was searched; empty where no candidates are asked for.
+        What could be chosen from in each database that was, or could have been, searched; empty without a search, and where no
+        candidates are asked for.
+    inputs : Inputs or None
+        What else the update was given; None where no candidates are asked for.
     """
 
     tick: int
@@ -104,18 +111,21 @@ class Decision:
     choice: Choice | None = None
     context: Mapping[str, object] | None = None
     query: Floats | None = None
-    candidates: tuple[tuple[str, Candidates], ...] = ()
+    candidates: Sequence[tuple[str, Candidates]] = ()
     search_us: float | None = None
     root_motion: RootMotion = NO_MOTION
     root_weight: float = 1.0
+    body: GroundPlace | None = None
     filters: tuple[tuple[str, Filter], ...] = field(default=(), compare=False, repr=False)
+    inputs: Inputs | None = field(default=None, compare=False, repr=False)
 
 
 class Recorder(Protocol):
     """Something that keeps decisions."""
 
     n_candidates: int
-    """How many candidates of each searched database it wants; 0 for none."""
+    """How many candidates of each searched database its decisions show; 0 for none, and for nothing that they could be worked
+    out from."""
 
     def record(self, decision: Decision) -> None:
         """Take one decision."""

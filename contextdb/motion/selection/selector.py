@@ -138,8 +138,8 @@ class Selector:
         for entry, database, given in self._searched(asked):
             hits[entry.name] = hit = database.search(query, **given)
             if entry.threshold is not None and hit.cost < entry.threshold:
-                return _choice(self.entries, hits, among, entry.name)
-        return _choice(self.entries, hits, among, None)
+                return choice_of(self.entries, hits, among, entry.name)
+        return choice_of(self.entries, hits, among, None)
 
     def search_many(
         self,
@@ -196,7 +196,7 @@ class Selector:
                 hits[i][entry.name] = hit
                 if entry.threshold is not None and hit.cost < entry.threshold:
                     stopped[i] = entry.name
-        return [_choice(self.entries, *each) for each in zip(hits, among, stopped, strict=True)]
+        return [choice_of(self.entries, *each) for each in zip(hits, among, stopped, strict=True)]
 
     def candidates(
         self, query: ArrayLike, k: int = 10, *, left_out: bool = False, **options: Unpack[Options]
@@ -253,8 +253,8 @@ class Selector:
                 raise QueryError(Fault(found, some(self.names), in_quotes(near) if near else ""))
 
 
-def _choice(entries: Sequence[Entry], hits: Mapping[str, Hit], among: frozenset[str], stopped: str | None) -> Choice:
-    """The lowest cost of what was searched wins, on a tie the earlier database."""
+def choice_of(entries: Sequence[Entry], hits: Mapping[str, Hit], among: frozenset[str], stopped: str | None) -> Choice:
+    """The lowest cost of what was searched wins, on a tie the earlier database; `stopped` is the one under its threshold."""
     winner = min((name for name, hit in hits.items() if hit), key=lambda name: hits[name].cost, default=None)
     searches = tuple(Search(e.name, e.threshold, hits.get(e.name), _status(e, hits, among, winner)) for e in entries)
     if winner is None:

@@ -1,15 +1,17 @@
 """The filters of searches as rows of a recorded session, and back: with the query and the database they give every cost again.
 
-A filter is a few numbers for each range and each kind of frames, so that it is small; what a caller gives for each frame is kept
-too.
+A filter is a few numbers for each range and each kind of frames, so that it is small. What a caller gives for each frame is kept as
+runs: where the value changes, and the values between. Format 1 had a value for each frame and no runs.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.search.database import MotionDatabase
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from polars import DataType as PolarsType
 
 Row = dict[str, Any]
+RUNS = ("frame_runs", "bias_runs")
+"""The fields that format 1 lacks: the frame behind each run of flags, and of biases."""
 
 
 def filter_type() -> PolarsType:
@@ -38,23 +42,41 @@ def filter_type() -> PolarsType:
         "skips": pl.List(skip),
         "current": pl.Int64(),
         "continuing": pl.Float64(),
+        **{name: pl.List(pl.Int64()) for name in RUNS},
     }
     return pl.List(pl.Struct(fields))
 
 
 def filter_row(database: str, chosen: Filter) -> Row:
     """The filter of one database's search."""
+    (frame_runs, frames), (bias_runs, biases) = _runs(chosen.frames), _runs(np.asarray(chosen.frame_biases, np.float64))
     return {
         "database": database,
         "ranges": chosen.ranges.tolist(),
         "range_biases": np.asarray(chosen.range_biases, np.float64).tolist(),
         "kinds": {name: np.asarray(part).tolist() for name, part in chosen.kinds._asdict().items()},
-        "frames": chosen.frames.tolist(),
-        "frame_biases": np.asarray(chosen.frame_biases, np.float64).tolist(),
+        "frames": frames,
+        "frame_biases": biases,
         "skips": [{"start": int(skip.start), "stop": int(skip.stop), "why": skip.why.name} for skip in chosen.skips],
         "current": int(chosen.current),
         "continuing": float(chosen.continuing),
+        "frame_runs": frame_runs,
+        "bias_runs": bias_runs,
     }
+
+
+def _runs(values: NDArray[Any]) -> tuple[list[int], list[Any]]:
+    """Where each run of equal values ends, and its value."""
+    if not len(values):
+        return [], []
+    ends = np.append(np.flatnonzero(values[1:] != values[:-1]) + 1, len(values))
+    return ends.tolist(), values[ends - 1].tolist()
+
+
+def _unrolled(values: list[Any], runs: list[int] | None, dtype: type[np.generic]) -> NDArray[Any]:
+    """A value for each frame, from runs or, in format 1, from such values."""
+    found = np.array(values, dtype)
+    return found if not runs else np.repeat(found, np.diff(runs, prepend=0))
 
 
 def filter_of(row: Row) -> Filter:
@@ -78,8 +100,8 @@ def filter_of(row: Row) -> Filter:
             np.array(kinds["playable"], np.bool_),
             np.array(kinds["left_out"], np.uint8),
         ),
-        frames=np.array(row["frames"], np.bool_) if row["frames"] else NO_FLAGS,
-        frame_biases=np.array(row["frame_biases"], np.float64),
+        frames=_unrolled(row["frames"], row["frame_runs"], np.bool_) if row["frames"] else NO_FLAGS,
+        frame_biases=_unrolled(row["frame_biases"], row["bias_runs"], np.float64),
         skips=tuple(Skip(int(skip["start"]), int(skip["stop"]), LeftOut[skip["why"]]) for skip in row["skips"]),
         current=int(row["current"]),
         continuing=float(row["continuing"]),
@@ -94,3 +116,20 @@ def fingerprint(database: MotionDatabase) -> str:
         digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(repr((database.assets, database.channel_names, database.biases)).encode("utf-8", "surrogatepass"))
     return digest.hexdigest()
+
+
+def markup_digest(database: MotionDatabase) -> str:
+    """A digest of what the markup says, whatever tags it knows beside."""
+    marks, digest = database.marks, hashlib.blake2b(digest_size=16)
+    for array in (marks.kinds, marks.kind_marks, marks.kind_biases, marks.kind_root_weights, marks.looping, marks.warps):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    for tag, flags in sorted(
+        (tag, marks.kind_tags[:, i].tobytes()) for i, tag in enumerate(marks.tags) if marks.kind_tags[:, i].any()
+    ):
+        digest.update(repr((tag, flags)).encode("utf-8", "surrogatepass"))
+    return digest.hexdigest()
+
+
+def is_recorded(about: Mapping[str, Any], database: MotionDatabase) -> bool:
+    """Whether a database is the one that a session was recorded with; sessions of format 1 have no digest of the markup."""
+    return about.get("digest") == fingerprint(database) and about.get("markup") in (None, markup_digest(database))

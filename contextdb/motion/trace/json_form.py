@@ -14,7 +14,7 @@ from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.trace.cost_views import Ranked
 
-LEFT = ("candidates", "filters")
+LEFT = ("candidates", "filters", "inputs")
 Json = dict[str, object]
 Events = Mapping[tuple[str, int], Sequence[str]]
 

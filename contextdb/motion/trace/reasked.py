@@ -1,57 +1,157 @@
-"""A recorded decision asked again of its databases: what any asset would have cost, where it stood, and why it was left out.
+"""Recorded searches asked again: what every frame cost by channel and bias, where any asset stood, and what other settings choose.
 
-A session keeps of each search the best candidates, the query and the filter. With the databases that it was recorded with, query
-and filter give the cost of every frame again, bit for bit.
+A session keeps of each search the query and what could be chosen from. With the databases that it was recorded with, these give
+every cost again, bit for bit. Databases with other clips, markup or settings are asked with the same ranges, skips and biases,
+found by the names of assets.
+
+Source: Remedy's debugger shows the cost of every frame of every animation with live weights; what would have been chosen otherwise
+is exact because the search is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypedDict, overload
 
-import numpy as np
-
-from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, some
-from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.search import candidates
-from contextdb.motion.search.candidates import Candidate
+from contextdb.cells.arguments import require_kind, require_mapping, require_place
+from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural, some
 from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import Biases, Filter
 from contextdb.motion.selection.decision import Decision
-from contextdb.motion.trace.cost_views import Ranked
-from contextdb.motion.trace.filter_rows import fingerprint
-from contextdb.motion.trace.views import role_of
+from contextdb.motion.selection.selector import Entry
+from contextdb.motion.trace.filter_rows import is_recorded
+from contextdb.motion.trace.other_filters import asked_of_table, moved_to, with_biases
+from contextdb.motion.trace.reasked_decision import ReaskedDecision
+from contextdb.motion.trace.reasked_search import ReaskedSearch
+from contextdb.motion.trace.stock import Edited, Stock, require_name
+from contextdb.motion.trace.why_not import WhyNot, why_not
+
+About = Mapping[str, Mapping[str, Any]]
 
 
-def why_not_asked(decision: Decision, about: Mapping[str, Mapping[str, object]], databases: Mapping[str, MotionDatabase]) -> str:
-    """Why a decision cannot be asked again, in a sentence; "" when it can."""
+class Changes(TypedDict, total=False):
+    """What is asked otherwise; see `Trace.reasked`."""
+
+    weights: Mapping[str, float] | None
+    biases: Mapping[str, Biases] | None
+    thresholds: Mapping[str, float | None] | None
+    tables: Mapping[str, Edited] | None
+
+
+class Reasked(Sequence[ReaskedDecision]):
+    """A session asked again: one `ReaskedDecision` for each decision, worked out when it is asked for.
+
+    Parameters
+    ----------
+    decisions : sequence of Decision
+    about : mapping
+        What a `Trace` says of its databases.
+    stock : Stock
+        What is asked.
+    changes : Changes
+        What is asked otherwise.
+    """
+
+    def __init__(self, decisions: Sequence[Decision], about: About, stock: Stock, changes: Changes) -> None:
+        self.decisions, self.about, self.stock = decisions, about, stock
+        self.thresholds = _mapping(changes.get("thresholds"), "thresholds")
+        tables: Mapping[str, Edited] = _mapping(changes.get("tables"), "tables")
+        weights, biases = _mapping(changes.get("weights"), "weights"), _mapping(changes.get("biases"), "biases")
+        known = set(about) or set(stock.databases)
+        for name in (*self.thresholds, *biases):
+            require_name(name, "database", known)
+        for name, table in tables.items():
+            require_name(name, "table", set(stock.table_of.values()))
+            require_kind(table, Edited, "one of tables", "a Table")
+        self.tables = {name: table.compile() for name, table in tables.items()}
+        self.changed = frozenset(
+            name for name in stock.databases if name in about and not is_recorded(about[name], stock.databases[name])
+        )
+        self._of_biases: dict[str, Biases] = {}
+        for name, each in biases.items():
+            require_kind(each, Biases, "one of biases", "Biases")
+            self._of_biases[name] = each
+        self.databases = {name: _changed(each, weights, self._of_biases.get(name)) for name, each in stock.databases.items()}
+
+    @overload
+    def __getitem__(self, index: int) -> ReaskedDecision: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[ReaskedDecision]: ...
+    def __getitem__(self, index: int | slice) -> ReaskedDecision | list[ReaskedDecision]:
+        if isinstance(index, slice):
+            return [self.of(decision) for decision in self.decisions[index]]
+        return self.of(self.decisions[require_place(index, len(self), "decision")])
+
+    def __iter__(self) -> Iterator[ReaskedDecision]:
+        return (self.of(decision) for decision in self.decisions)
+
+    def __len__(self) -> int:
+        return len(self.decisions)
+
+    def __repr__(self) -> str:
+        return f"<Reasked: {plural(len(self), 'decision')}>"
+
+    def why_not(self, index: int, asset: str) -> WhyNot:
+        """Why an asset was not chosen by one decision, and what would have to change for it to be; see `WhyNot`.
+
+        Raises
+        ------
+        MotionError
+            No database has the asset, with the nearest; or nothing was searched.
+        """
+        return why_not(self[index], asset)
+
+    def of(self, decision: Decision) -> ReaskedDecision:
+        """A decision of the session, asked again."""
+        why = self._why_not_asked(decision)
+        if why:
+            raise MotionError(Fault(f"the search at tick {decision.tick:,} cannot be asked again: {why}"))
+        if decision.choice is None:
+            return ReaskedDecision(decision, (), {}, self.stock)
+        entries = tuple(
+            Entry(each.database, self.databases.get(each.database), self.thresholds.get(each.database, each.threshold))
+            for each in decision.choice.searches
+        )
+        searches = {name: self._search(name, decision, chosen) for name, chosen in decision.filters}
+        return ReaskedDecision(decision, entries, searches, self.stock)
+
+    def _why_not_asked(self, decision: Decision) -> str:
+        return "" if decision.choice is None else why_not_asked(decision, self.about, self.databases, self.changed)
+
+    def _search(self, name: str, decision: Decision, chosen: Filter) -> ReaskedSearch:
+        assert decision.query is not None, "a search has a query"
+        database = self.databases[name]
+        if name in self.changed:
+            tags = None if decision.inputs is None else decision.inputs.tags_of(name)
+            database, chosen = moved_to(database, chosen, self.about[name], tags)
+        table = self.tables.get(self.stock.table_of.get(name, ""))
+        if table is not None and decision.context is not None:
+            chosen = asked_of_table(database, chosen, table, decision.context)
+        if name in self._of_biases:
+            chosen = with_biases(database, chosen, self.stock.databases[name].biases)
+        return ReaskedSearch(name, database, decision.query, chosen)
+
+
+def why_not_asked(
+    decision: Decision, about: About, databases: Mapping[str, MotionDatabase], changed: frozenset[str] | None = None
+) -> str:
+    """Why a decision cannot be asked again, in a sentence; "" when it can.
+
+    `changed` are the databases that may differ from those of the session; None: none may.
+    """
     if not decision.searched:
         return "nothing was searched at this update: what played, played on."
     if decision.query is None or not decision.filters:
-        return "the session holds no filters, as an older version or code of your own recorded it: record it again."
+        return "the session holds no filters: an older version or code of your own recorded it, or it was to keep no candidates."
     for name, _ in decision.filters:
         if name not in databases:
             return f"there is no database {in_quotes(name)} in the project."
-        if about.get(name, {}).get("digest") != fingerprint(databases[name]):
+        if changed is None and not is_recorded(about.get(name, {}), databases[name]):
             return f"the database {in_quotes(name)} is another than the one that the session was recorded with."
+        if changed is not None and name in changed and "assets" not in about.get(name, {}):
+            return f"the database {in_quotes(name)} changed, and a session of an older version does not say what its ranges were."
     return ""
-
-
-def reasked(decision: Decision, databases: Mapping[str, MotionDatabase], name: str) -> list[Ranked]:
-    """Of each range whose asset's name holds a text the best frame, cheapest first, chosen or not.
-
-    The rank counts the frames of all databases that were searched which may be chosen and cost less. Ranges that are not valid come
-    with their cost all the same, and with the reason.
-    """
-    assert decision.query is not None, "without a query nothing was searched"
-    found: list[tuple[str, Candidate]] = []
-    free: list[Floats] = []
-    for database, chosen in decision.filters:
-        wanted = databases[database].normalised(decision.query)
-        rows, totals = candidates.best_of_assets(databases[database], wanted, chosen, name)
-        found += [(database, row) for row in rows]
-        free.append(totals)
-    ordered = np.sort(np.concatenate(free)) if free else np.empty(0)
-    found.sort(key=lambda each: each[1].cost)
-    return [Ranked(_rank(ordered, row), database, row, role_of(decision, database, row.frame)) for database, row in found]
 
 
 def require_known(name: str, databases: Mapping[str, MotionDatabase], file: str) -> None:
@@ -63,5 +163,10 @@ def require_known(name: str, databases: Mapping[str, MotionDatabase], file: str)
         raise MotionError(Fault(found, some(known), in_quotes(near) if near else "", Place(file)))
 
 
-def _rank(free: Floats, row: Candidate) -> int:
-    return int(np.searchsorted(free, row.cost, side="left")) + 1
+def _mapping(given: object, what: str) -> Mapping[str, Any]:
+    return {} if given is None else require_mapping(given, what, "a mapping")
+
+
+def _changed(database: MotionDatabase, weights: Mapping[str, float], biases: Biases | None) -> MotionDatabase:
+    weighed = database.with_weights(weights) if weights else database
+    return weighed if biases is None else replace(weighed, biases=biases)

@@ -3,8 +3,11 @@
 One row a decision. What a decision may lack is null. Times of searching are in a column of their own, `search_us`, which a file
 may leave out: all other columns are the same whenever the same session is recorded.
 
-A context becomes JSON: tags a sorted list, a NaN fact null, and what JSON has no word for its text. Of the frames of
-a search only the candidates stay: `Candidates.why` comes back empty, its sums are in `counts`.
+A context becomes JSON: tags a sorted list, a NaN fact null, and what JSON has no word for its text. What else an update was given
+is JSON too, see `contextdb.motion.trace.input_rows`.
+
+Candidates are not kept: they are worked out again from the query, the filters and the databases. The column `candidates` holds
+those that sessions of format 1 kept; of their frames `Candidates.why` comes back empty, its sums are in `counts`.
 """
 
 from __future__ import annotations
@@ -16,13 +19,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import NOTHING, Hit
 from contextdb.motion.selection.choice import Choice, Reason, Search, Status
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.selection.worked_out import WorkedOut
 from contextdb.motion.trace.filter_rows import filter_of, filter_row, filter_type
+from contextdb.motion.trace.input_rows import inputs_json, inputs_of
 
 if TYPE_CHECKING:
     from polars import DataType as PolarsType
@@ -32,8 +38,9 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 """What the markup says of a frame of a database."""
 Events = dict[tuple[str, int], tuple[str, ...]]
 
-TIMINGS, FILTERS = "search_us", "filters"
-"""The columns that a file may lack: another recording has other timings, and an older version kept no filters."""
+TIMINGS, FILTERS, INPUTS, BODY = "search_us", "filters", "inputs", ("body_x", "body_z", "body_heading")
+OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY)
+"""The columns that a file may lack: another recording has other timings, and older versions kept no filters, inputs and bodies."""
 
 
 def columns() -> dict[str, PolarsType]:
@@ -83,7 +90,9 @@ def columns() -> dict[str, PolarsType]:
         "candidates": pl.List(pl.Struct(found)),
         "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
         "root_weight": number,
+        **dict.fromkeys(BODY, number),
         FILTERS: filter_type(),
+        INPUTS: text,
         TIMINGS: number,
     }
 
@@ -107,12 +116,21 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         "choice": None if decision.choice is None else _choice_row(decision.choice),
         "context": None if decision.context is None else context_json(decision.context),
         "query": None if decision.query is None else np.asarray(decision.query, np.float64).tolist(),
-        "candidates": [_candidates_row(name, found, events_of) for name, found in decision.candidates],
+        "candidates": _kept(decision, events_of),
         "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
         "root_weight": float(decision.root_weight),
+        **dict(zip(BODY, (None, None, None) if decision.body is None else map(float, decision.body), strict=True)),
         FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
+        INPUTS: None if decision.inputs is None else inputs_json(decision.inputs),
         TIMINGS: _number(decision.search_us),
     }
+
+
+def _kept(decision: Decision, events_of: EventsOf) -> list[Row]:
+    """Candidates that cannot be worked out again, as a session of format 1 or code of your own has them."""
+    if isinstance(decision.candidates, WorkedOut):
+        return []
+    return [_candidates_row(name, found, events_of) for name, found in decision.candidates]
 
 
 def context_json(context: Mapping[str, object]) -> str:
@@ -230,7 +248,9 @@ def decision_of(row: Row) -> Decision:
         search_us=row.get(TIMINGS),
         root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
         root_weight=float(row["root_weight"]),
+        body=_body(row),
         filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
+        inputs=None if row.get(INPUTS) is None else inputs_of(row[INPUTS]),
     )
 
 
@@ -245,6 +265,11 @@ def _told(row: Row) -> Iterator[tuple[str, int, list[str]]]:
             yield each["database"], each["frame"], each["events"]
     for found in row["candidates"]:
         yield from ((found["database"], each["frame"], each["events"]) for each in found["rows"])
+
+
+def _body(row: Row) -> GroundPlace | None:
+    x, z, heading = (row.get(name) for name in BODY)
+    return None if x is None or z is None or heading is None else (float(x), float(z), float(heading))
 
 
 def _known(value: Any) -> Any:

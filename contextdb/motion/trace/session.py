@@ -5,12 +5,13 @@
     ...
     trace.save("session.parquet")
 
-Each decision is packed at once, so that no update waits for the work of others. With 12 candidates of two databases, an hour at 30
-updates and 10 searches a second takes about 100 MB, and to save it half a minute and 1 GB. Of a session that continues and on, the
-last `most` decisions stay.
+Each decision is packed at once, so that no update waits for the work of others. Candidates are not kept: of a search the query and
+what could be chosen from are, and the databases give the costs of every frame again, bit for bit, when they are asked for. Of a
+session that continues and on, the last `most` decisions stay.
 
 A file has one row a decision, its columns as `contextdb.motion.trace.rows` says, and in its metadata the format's number and what
-the databases' features and channels are. The same session gives the same bytes, if the timings are left out.
+the databases' ranges, features and channels are. The same session gives the same bytes, if the timings are left out. Format 2 keeps
+no candidates; sessions of format 1, which did, are read with theirs.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ import marshal
 import zlib
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from itertools import islice
 from os import PathLike
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, Unpack, overload
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_path, require_place, require_text
 from contextdb.disk import read_bytes, write_atomic
@@ -32,16 +34,23 @@ from contextdb.errors import ArtefactError, Fault, MotionError, Place, in_quotes
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Decision
-from contextdb.motion.trace.filter_rows import fingerprint
-from contextdb.motion.trace.rows import FILTERS, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
+from contextdb.motion.selection.worked_out import WorkedOut, of_searched
+from contextdb.motion.trace.filter_rows import RUNS, fingerprint, is_recorded, markup_digest
+from contextdb.motion.trace.reasked import Changes, Reasked
+from contextdb.motion.trace.rows import FILTERS, INPUTS, OPTIONAL, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
+from contextdb.motion.trace.session_diff import SessionDiff, diff_sessions
+from contextdb.motion.trace.stats import SessionStats, stats_of
+from contextdb.motion.trace.stock import Stock
+from contextdb.motion.trace.what_if import WhatIf, what_if
 
 if TYPE_CHECKING:
     import polars as pl
 
-FORMAT = 1
-FORMAT_KEY, ABOUT_KEY, DIGEST_KEY = "contextdb.trace", "about", "digest"
+FORMAT, READ = 2, ("1", "2")
+FORMAT_KEY, ABOUT_KEY, DIGEST_KEY, SHOWN_KEY = "contextdb.trace", "about", "digest", "candidates"
 CHUNK = 512
 """So many decisions become Parquet at a time."""
+N_CANDIDATES = 12
 MOST = 108_000
 """So many decisions stay unless another number is given: an hour at 30 a second."""
 
@@ -55,9 +64,10 @@ class Trace(Sequence[Decision]):
     Parameters
     ----------
     n_candidates : int
-        How many candidates of each searched database are kept with a decision; 0 for none, which is much faster.
+        How many candidates of each searched database a decision shows. With 0 it shows none, and nothing is recorded by which it
+        could be asked again.
     databases : mapping of name to MotionDatabase, optional
-        Those of the selector, so that the markup of candidates is recorded too, and what the features are.
+        Those of the selector. Default: those that the first decisions were made with.
     most : int
         How many recorded decisions stay; older ones are forgotten.
 
@@ -66,10 +76,13 @@ class Trace(Sequence[Decision]):
     n_forgotten : int
         How many decisions came before the first that is kept.
     about : mapping
-        For the name of each database `rate`, `features`, `channels`, and the `digest` of what costs come from.
+        For the name of each database `rate`, `features`, `channels`, its ranges (`assets`, `starts`, `stops`, `mirrored`), and
+        the `digest` of what costs come from.
     """
 
-    def __init__(self, n_candidates: int = 12, databases: Mapping[str, MotionDatabase] | None = None, *, most: int = MOST) -> None:
+    def __init__(
+        self, n_candidates: int = N_CANDIDATES, databases: Mapping[str, MotionDatabase] | None = None, *, most: int = MOST
+    ) -> None:
         for what, number, least in (("n_candidates", n_candidates, 0), ("most", most, 1)):
             if isinstance(number, bool) or not isinstance(number, int) or number < least:
                 raise MotionError(Fault(f"{what} is {number!r}.", f"a whole number, {least} or more"))
@@ -79,8 +92,9 @@ class Trace(Sequence[Decision]):
             require_text(name, "one of databases")
             require_kind(each, MotionDatabase, "one of databases", "a MotionDatabase")
         self.n_candidates, self.most, self.n_forgotten = n_candidates, most, 0
-        self.about: Mapping[str, Mapping[str, object]] = {name: _about(each) for name, each in (databases or {}).items()}
+        self.about: dict[str, dict[str, Any]] = {name: _about(each) for name, each in (databases or {}).items()}
         self._databases = dict(databases or {})
+        self._takes_databases = databases is None
         self._loaded: pl.DataFrame | None = None
         self._rows: deque[bytes] = deque(maxlen=most)
         self._events: Events = {}
@@ -89,6 +103,8 @@ class Trace(Sequence[Decision]):
     def record(self, decision: Decision) -> None:
         """Keep a decision; raises ContextError for what is none."""
         require_kind(decision, Decision, "decision", "a Decision")
+        if self._takes_databases and isinstance(decision.candidates, WorkedOut):
+            self._take(decision.candidates.databases)
         packed = _packed(row_of(decision, self._events_of))
         self.n_forgotten += len(self._rows) == self.most
         self._rows.append(packed)
@@ -109,13 +125,73 @@ class Trace(Sequence[Decision]):
         return (self._decision_of(row, place) for place, row in enumerate(self._every_row()))
 
     def brief(self) -> Iterator[Decision]:
-        """The decisions in order without their queries and candidates: much faster than with them."""
-        for place, row in enumerate(self._every_row("query", "candidates", FILTERS)):
-            yield self._decision_of({**row, "query": None, "candidates": [], FILTERS: []}, place)
+        """The decisions in order without their queries, candidates and inputs: much faster than with them."""
+        for place, row in enumerate(self._every_row("query", "candidates", FILTERS, INPUTS)):
+            yield self._decision_of({**row, "query": None, "candidates": [], FILTERS: [], INPUTS: None}, place)
 
     def events(self, index: int) -> Events:
         """What the markup says of the frames that a decision mentions, by (database, frame), as far as it says anything."""
-        return events_in(self._row(self._place(index)))
+        place = self._place(index)
+        told = events_in(self._row(place))
+        for name, found in self._decision(place).candidates:
+            told |= {(name, row.frame): said for row in found if (said := self._events_of(name, row.frame))}
+        return told
+
+    def use(self, databases: Mapping[str, MotionDatabase]) -> str:
+        """Work candidates out from these databases, and say in a sentence why some cannot be; "" when all can.
+
+        Those that are not what the session was recorded with are passed over. Raises ContextError for what are no databases.
+        """
+        given = require_mapping(databases, "databases", "a mapping of names to databases")
+        for each in given.values():
+            require_kind(each, MotionDatabase, "one of databases", "a MotionDatabase")
+        self._databases = {name: each for name, each in given.items() if self._is_recorded(name, each)}
+        self._events = {}
+        return missing(self.about, given, self._databases)
+
+    @property
+    def databases(self) -> Mapping[str, MotionDatabase]:
+        """Those of the session that there are, each what it was at its recording."""
+        return self._databases
+
+    def reasked(self, project: object = None, **changes: Unpack[Changes]) -> Reasked:
+        """Every search of the session asked again, of the same databases or of changed ones; see `Reasked`.
+
+        Parameters
+        ----------
+        project : Project, or mapping of name to MotionDatabase, optional
+            Where the databases and tables are. Default: the databases that `use` was given, or that recorded it.
+        weights : mapping of channel to float, optional
+            Other weights, for all databases.
+        biases : mapping of database name to Biases, optional
+        thresholds : mapping of database name to float or None, optional
+        tables : mapping of table name to Table, optional
+            Tables to ask again, with the recorded facts, instead of taking their recorded answers.
+
+        Raises
+        ------
+        MotionError
+            A channel, database or table that there is not, with the nearest; or a session that holds nothing to ask again.
+        """
+        stock = Stock(self._databases) if project is None else Stock.of(project, self.about)
+        return Reasked(self, self.about, stock, changes)
+
+    def what_if(self, project: object = None, **changes: Unpack[Changes]) -> WhatIf:
+        """How many recorded searches choose otherwise with changes, and the measures of the session run again in closed loop.
+
+        The parameters are those of `reasked`, and so is what it raises.
+        """
+        stock = Stock(self._databases) if project is None else Stock.of(project, self.about)
+        return what_if(Reasked(self, self.about, stock, {}), Reasked(self, self.about, stock, changes))
+
+    def stats(self) -> SessionStats:
+        """The session in figures."""
+        return stats_of(self.brief(), self.about)
+
+    def diff(self, other: Trace) -> SessionDiff:
+        """Where this session and another one part, and the measures of both. Raises ContextError for what is no Trace."""
+        require_kind(other, Trace, "other", "a Trace")
+        return diff_sessions(self.brief(), other.brief(), self.about, other.about)
 
     def save(self, path: str | PathLike[str], *, timings: bool = True) -> None:
         """Write the session to a Parquet file, in one step.
@@ -143,7 +219,8 @@ class Trace(Sequence[Decision]):
         whole = pl.concat(frames)
         frame, about = whole if timings else whole.drop(TIMINGS), json.dumps(self.about)
         out = io.BytesIO()
-        frame.write_parquet(out, metadata={FORMAT_KEY: str(FORMAT), ABOUT_KEY: about, **UNSEALED})
+        shown = str(self.n_candidates)
+        frame.write_parquet(out, metadata={FORMAT_KEY: str(FORMAT), ABOUT_KEY: about, SHOWN_KEY: shown, **UNSEALED})
         return sealed(out.getvalue())
 
     @classmethod
@@ -165,7 +242,7 @@ class Trace(Sequence[Decision]):
         """Read the bytes of a saved session; `file` is its name in messages."""
         require_kind(raw, bytes, "raw", "the bytes of a saved session")
         trace = cls()
-        trace._loaded, trace.about = _read(raw, file)
+        trace._loaded, trace.about, trace.n_candidates = _read(raw, file)
         trace._file = file
         return trace
 
@@ -197,9 +274,29 @@ class Trace(Sequence[Decision]):
 
     def _decision_of(self, row: Row, place: int) -> Decision:
         try:
-            return decision_of(row)
+            decision = decision_of(row)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise _refused(f"row {place} holds no decision ({type(error).__name__}).", self._file) from error
+        return self._with_candidates(decision)
+
+    def _with_candidates(self, decision: Decision) -> Decision:
+        """A decision with candidates that are worked out when they are asked for, where all that they need is there."""
+        if decision.candidates or decision.choice is None or decision.query is None or not self.n_candidates:
+            return decision
+        searched = of_searched(decision.filters, decision.choice)
+        if not searched or not all(name in self._databases for name, _ in searched):
+            return decision
+        found = WorkedOut(self._databases, decision.query, decision.filters, decision.choice, self.n_candidates)
+        return replace(decision, candidates=found)
+
+    def _is_recorded(self, name: str, database: MotionDatabase) -> bool:
+        return name in self.about and is_recorded(self.about[name], database)
+
+    def _take(self, databases: Mapping[str, MotionDatabase]) -> None:
+        for name, database in databases.items():
+            if name not in self._databases and (name not in self.about or self._is_recorded(name, database)):
+                self._databases[name] = database
+                self.about.setdefault(name, _about(database))
 
     def _row(self, place: int) -> Row:
         if self._loaded is not None and place < self._n_loaded:
@@ -207,10 +304,25 @@ class Trace(Sequence[Decision]):
         return _unpacked(self._rows[place - self._n_loaded])
 
 
-def _about(database: MotionDatabase) -> dict[str, object]:
+def _about(database: MotionDatabase) -> dict[str, Any]:
     rate = None if database.schema is None else database.schema.rate
     names = {"features": list(database.feature_names), "channels": list(database.channel_names)}
-    return {"rate": rate, **names, "digest": fingerprint(database)}
+    ranges = {name: getattr(database, name).tolist() for name in ("starts", "stops", "mirrored")}
+    biases = {"looping": database.marks.looping.tolist(), "biases": asdict(database.biases)}
+    digests = {"digest": fingerprint(database), "markup": markup_digest(database)}
+    return {"rate": rate, **names, "assets": list(database.assets), **ranges, **biases, **digests}
+
+
+def missing(
+    about: Mapping[str, Mapping[str, Any]], given: Mapping[str, MotionDatabase], usable: Mapping[str, MotionDatabase]
+) -> str:
+    """Why some databases of a session cannot be used, in a sentence; "" when all can."""
+    for name in about:
+        if name not in given:
+            return f"there is no database {in_quotes(name)} in the project."
+        if name not in usable:
+            return f"the database {in_quotes(name)} is another than the one that the session was recorded with."
+    return ""
 
 
 def _packed(row: Row) -> bytes:
@@ -237,8 +349,8 @@ def _old_digest(raw: bytes, frame: Frame) -> str:
     return hashlib.blake2b(raw[: frame.start] + frame.metadata[ABOUT_KEY].encode(), digest_size=16).hexdigest()
 
 
-def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, Mapping[str, Mapping[str, object]]]:
-    """The rows of a file and what it says of databases, checked."""
+def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, dict[str, dict[str, Any]], int]:
+    """The rows of a file, what it says of databases, and how many candidates its decisions show; checked."""
     import polars as pl
 
     why = _no_parquet(raw)
@@ -251,7 +363,8 @@ def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, Mapping[str, Mapping[str
         if metadata.get(DIGEST_KEY, expected := _old_digest(raw, parquet)) != expected:
             raise _refused("the file was altered after it was saved.", file)
         about = {name: dict(part) for name, part in json.loads(metadata[ABOUT_KEY]).items()}
-        frame = pl.read_parquet(io.BytesIO(raw))
+        n_candidates = int(metadata.get(SHOWN_KEY, N_CANDIDATES))
+        frame = _with_runs(pl.read_parquet(io.BytesIO(raw)))
     except ArtefactError:
         raise
     except DamagedFrame as error:
@@ -259,8 +372,20 @@ def _read(raw: bytes, file: str) -> tuple[pl.DataFrame, Mapping[str, Mapping[str
     except (Exception, pl.exceptions.PanicException) as error:  # some damage makes polars stumble instead of complain
         raise _refused(f"the file is damaged ({type(error).__name__}).", file) from None
     _check_columns(frame, file)
-    missing = [pl.lit(None, dtype).alias(name) for name, dtype in columns().items() if name not in frame.columns]
-    return frame.with_columns(missing).select(list(columns())), about
+    lacking = [pl.lit(None, dtype).alias(name) for name, dtype in columns().items() if name not in frame.columns]
+    return frame.with_columns(lacking).select(list(columns())), about, n_candidates
+
+
+def _with_runs(frame: pl.DataFrame) -> pl.DataFrame:
+    """Filters with the fields that format 1 lacks."""
+    import polars as pl
+
+    held = frame.schema.get(FILTERS)
+    inner = held.inner if isinstance(held, pl.List) else None
+    if not isinstance(inner, pl.Struct) or any(each.name in RUNS for each in inner.fields):
+        return frame
+    runs = [pl.lit(None, pl.List(pl.Int64())).alias(name) for name in RUNS]
+    return frame.with_columns(pl.col(FILTERS).list.eval(pl.element().struct.with_fields(runs)))
 
 
 def _no_parquet(raw: bytes) -> str:
@@ -275,14 +400,14 @@ def _no_parquet(raw: bytes) -> str:
 def _check_format(metadata: Mapping[str, str], file: str) -> None:
     if FORMAT_KEY not in metadata:
         raise _refused("this Parquet file is not a recorded session.", file)
-    if metadata[FORMAT_KEY] != str(FORMAT):
-        found = f"the session has format {in_quotes(metadata[FORMAT_KEY])}; this version reads format {FORMAT}."
+    if metadata[FORMAT_KEY] not in READ:
+        found = f"the session has format {in_quotes(metadata[FORMAT_KEY])}; this version reads formats {' and '.join(READ)}."
         raise _refused(found, file)
 
 
 def _check_columns(frame: pl.DataFrame, file: str) -> None:
     wanted = columns()
-    present = [name for name in wanted if name in frame.columns or name not in (TIMINGS, FILTERS)]
+    present = [name for name in wanted if name in frame.columns or name not in OPTIONAL]
     wrong = [name for name in present if frame.schema.get(name) != wanted[name]]
     if wrong:
         found = f"{plural(len(wrong), 'column')} of the session missing, or of another type: {', '.join(map(in_quotes, wrong))}."

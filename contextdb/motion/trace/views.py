@@ -100,7 +100,7 @@ def _session_columns(spells: Sequence[tuple[Decision, float]], assets: Column) -
     databases = [each.database if each else "" for each in playing]
     yield Column("tick", [f"{first.tick:,}" for first in firsts], is_number=True, is_key=True)
     yield Column("time s", [seconds(first.time_s) for first in firsts], is_number=True)
-    yield Column("search", [_cause(first) for first in firsts])
+    yield Column("search", [cause_of(first) for first in firsts])
     yield Column("", [str(first.action) for first in firsts])
     if len(set(filter(None, databases))) > 1:
         yield Column("database", [shortened(database, MOST_DATABASE) for database in databases])
@@ -115,7 +115,7 @@ def _asset(playing: Playing | None) -> str:
     return "" if playing is None else playing.asset + (" (mirrored)" if playing.mirrored else "")
 
 
-def _cause(decision: Decision) -> str:
+def cause_of(decision: Decision) -> str:
     """Why there was a search, in a word or two: what the decision's sentence begins with."""
     causes = (words for cause, words in CAUSES.items() if decision.why.startswith(cause.told(decision.before)))
     return next(causes, "") if decision.searched else ""

@@ -1,0 +1,183 @@
+"""Measure how good the motion of recorded sessions is: jumps, sliding feet, accelerations, path errors, and what is never played.
+
+The poses of a session are made again from the clips of its project, whose raw clips are measured too. A SESSION may also be a .npz
+file of poses, with --project for the clips.
+
+Exits with 1 if a bar is broken, or if a measure is more than 1 % worse than in the baseline; with 2 if a bar cannot be judged.
+
+  contextdb motion measure session.parquet
+  contextdb motion measure session.parquet --max-skate 8 --max-jumps 1.5
+  contextdb motion measure session.parquet --json > before.json
+  contextdb motion measure session.parquet --baseline before.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contextdb import report
+from contextdb.commands import add_format_arguments
+from contextdb.commands.motion_build_command import MotionProject, warn
+from contextdb.commands.motion_replay_command import project_of
+from contextdb.console import ExitCode, output, terminal_width, wants_colour
+from contextdb.disk import read_bytes
+from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quotes, plural
+from contextdb.motion import MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
+from contextdb.motion.storage.written_poses import NPZ
+from contextdb.motion.trace.filter_rows import fingerprint
+from contextdb.motion.trace.session import Trace
+
+if TYPE_CHECKING:
+    from contextdb.report.measure_results import MeasureResults, SessionMeasures
+
+BARS = {
+    "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),
+    "jumps": ("jumps_per_s", "PER_S", "the most jumps a second"),
+    "accel": ("accel_p99", "M_S2", "the most that 99 %% of joint accelerations may be, m/s²"),
+    "path": ("path_rms_m", "M", "the most that the path error may be, RMS, m"),
+    "heading": ("heading_rms_deg", "DEG", "the most that the heading error may be, RMS, degrees"),
+    "reach": ("reach_s", "S", "the most seconds until a new velocity is reached"),
+    "forced": ("forced_jumps", "N", "the most forced jumps"),
+    "forced-cost": ("forced_cost", "COST", "the most that a forced jump may cost"),
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("sessions", metavar="SESSION", nargs="+", help="a recorded session, .parquet; or its poses, .npz")
+    parser.add_argument("--poses", metavar="FILE", action="append", help="the poses of the session, .npz; once for each")
+    parser.add_argument("--project", metavar="FOLDER", help="the project with the clips (default: as recorded)")
+    parser.add_argument("--controller", metavar="NAME", help="whose [output.NAME] makes the poses (default: as recorded)")
+    for name, (_, unit, told) in BARS.items():
+        parser.add_argument(f"--max-{name}", metavar=unit, type=_number, help=told)
+    parser.add_argument("--baseline", metavar="FILE", help="an earlier report by --json; what got worse fails")
+    parser.add_argument("--all", action="store_true", help="every asset that is never played, and every comparison")
+    add_format_arguments(parser, report.formats("measures"))
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Measure sessions."""
+    poses = arguments.poses or []
+    if poses and len(poses) != len(arguments.sessions):
+        found = f"{plural(len(poses), 'file')} of poses for {plural(len(arguments.sessions), 'session')}."
+        raise ContextError(Fault(found, "--poses FILE once for each session, in their order"))
+    results = _results(arguments, poses)
+    colour = wants_colour(sys.stdout)
+    text = report.render(arguments.format, results, colour=colour, width=terminal_width(), shows_all=arguments.all)
+    with output():
+        print(text, end="")
+    return ExitCode.OK if results.passed else ExitCode.FOUND
+
+
+def _results(arguments: argparse.Namespace, poses: Sequence[str]) -> MeasureResults:
+    from contextdb.report.measure_results import MeasureResults, read_baseline
+
+    earlier: Mapping[str, Mapping[str, object]] = {}
+    if arguments.baseline:
+        try:
+            text = read_bytes(Path(arguments.baseline)).decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise ContextError(Fault("the baseline is not text.", place=Place(arguments.baseline))) from None
+        earlier = read_baseline(text, arguments.baseline)
+    clips: dict[str, Clips] = {}
+    every = [
+        _measured(arguments, file, poses[i] if poses else None, clips, _before(earlier, file, arguments))
+        for i, file in enumerate(arguments.sessions)
+    ]
+    return MeasureResults(tuple(every))
+
+
+def _before(earlier: Mapping[str, Mapping[str, object]], file: str, arguments: argparse.Namespace) -> Mapping[str, object]:
+    """The session of the baseline: of this name, or the only one where there is one only."""
+    if not arguments.baseline or file in earlier:
+        return earlier.get(file, {})
+    if len(earlier) == len(arguments.sessions) == 1:
+        return next(iter(earlier.values()))
+    found = f"the baseline has no session {in_quotes(file)}."
+    raise ContextError(Fault(found, "a report of the same sessions", place=Place(arguments.baseline)))
+
+
+@dataclass(frozen=True)
+class Clips:
+    """The clips of a project: its databases and pose banks, opened or built when they are first asked for."""
+
+    project: MotionProject
+
+    @cached_property
+    def banks(self) -> dict[str, PoseBank]:
+        """All pose banks."""
+        return open_or_build_poses(self.project.config, self.project.folder, self.project.assets)
+
+    @cached_property
+    def databases(self) -> dict[str, MotionDatabase]:
+        """All databases."""
+        return open_or_build(self.project.config, self.project.folder, self.project.assets)
+
+
+def _measured(
+    arguments: argparse.Namespace, file: str, poses: str | None, known: dict[str, Clips], before: Mapping[str, object]
+) -> SessionMeasures:
+    from contextdb.report.measure_results import Bar, SessionMeasures, compared, held_to
+
+    trace = None if Path(file).suffix == NPZ else Trace.load(file)
+    if trace is None and poses:
+        raise ContextError(Fault("--poses goes with a session, and these are poses.", "a .parquet session", place=Place(file)))
+    folder, why = (arguments.project, "") if trace is None else project_of(trace, arguments.project, file)
+    clips = known.setdefault(folder, Clips(MotionProject.load(folder))) if folder else None
+    try:
+        banks, databases = _of(clips, trace, file)
+        found = measure(
+            file if trace is None else trace,
+            banks or None,
+            poses=poses,
+            databases=databases or None,
+            settings=_settings(arguments, clips, trace),
+        )
+    except ContextDBError as error:
+        raise type(error)(*(fault if fault.place.file else fault.at(Place(file)) for fault in error.faults)) from None
+    if why:
+        warn([f"{file}: without clips to compare with: {why}"])
+    asked = {name: getattr(arguments, f"max_{name.replace('-', '_')}") for name in BARS}
+    bars = [Bar(f"max-{name}", BARS[name][0], most) for name, most in asked.items() if most is not None]
+    gates = (*(held_to(bar, found, file) for bar in bars), *compared(before, found))
+    return SessionMeasures(file, found, before, gates)
+
+
+def _of(clips: Clips | None, trace: Trace | None, file: str) -> tuple[Mapping[str, PoseBank], Mapping[str, MotionDatabase]]:
+    """The pose banks and databases of a session, with a word where a database is another than the recorded one."""
+    if clips is None:
+        return {}, {}
+    if trace is None:
+        return clips.banks, clips.databases
+    names = [name for name in trace.about if name in clips.databases]
+    others = [name for name in names if fingerprint(clips.databases[name]) != trace.about[name].get("digest")]
+    warn(f"{file}: the database {in_quotes(name)} is another than the one that the session was recorded with" for name in others)
+    return {name: clips.banks[name] for name in names}, {name: clips.databases[name] for name in names}
+
+
+def _settings(arguments: argparse.Namespace, clips: Clips | None, trace: Trace | None) -> PoseSettings | None:
+    """How the poses of a session are made."""
+    if clips is None:
+        return None
+    recorded = [] if trace is None else [str(about["controller"]) for about in trace.about.values() if "controller" in about]
+    name = arguments.controller or (recorded[0] if recorded else "")
+    if arguments.controller:
+        clips.project.config.selector_of(name)
+    return clips.project.config.output_of(name)
+
+
+def _number(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0.0 <= number < math.inf:
+        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a bar. Accepted: a number from 0 up.")
+    return number

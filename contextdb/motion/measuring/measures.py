@@ -1,0 +1,96 @@
+"""The measures of one session: data alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+
+
+@dataclass(frozen=True)
+class Measures:
+    """The measures of one session. None: `missing` says why, by the name of the measure.
+
+    Attributes
+    ----------
+    seconds, updates : float, int
+        How long it is, and how many moments.
+    jumps, jumps_per_s : int, float
+    forced_jumps, forced_cost : int, float
+        How many jumps had to be because nothing could play on, and what the dearest of them cost.
+    jump_cm, jump_worst_cm : float
+        How far joints are from where they would have been if what played had played on, against the body: the mean over joints and
+        jumps, and the 95 % quantile of the farthest joint.
+    jump_mps : float
+        The same of velocities: the mean step of a joint's velocity, m/s.
+    skate_cm_s, skate_raw_cm_s, skate_played_cm_s : float
+        The mean speed over the ground of feet that are down in the clip that plays; that of all clips as they are; and that of the
+        frames that played, as their clips have them.
+    skate_m_min, skate_raw_m_min : float
+        How far feet that are down in the clip slide in a minute, both together.
+    skate_weighted_cm_s, skate_weighted_raw_cm_s : float
+        The mean of speed x (2 - 2^(h / H)) over feet at a height h below H = 2.5 cm, contacts aside.
+    skate_ratio, skate_ratio_raw : float
+        The share of time in which a foot below 5 cm is faster than 0.5 m/s, at once and in the mean over 1/6 s.
+    accel_p99, accel_raw_p99 : float
+        99 % of the accelerations of joints are lower, m/s², over steps of 1/30 s; and those of all clips.
+    snap_share : float
+        The share of moments at which a joint's acceleration is above what 99.9 % of the clips' frames have; 0.001 is as the clips.
+    path_rms_m, path_p95_m, heading_rms_deg, heading_p95_deg : float
+        How far the character is from where the game has the body.
+    reach_s, reach_direction_s, reach_speed_s, reach_stop_s : float
+        How long it takes until a new velocity is reached that the stick, or else the body, has: in the mean, and of each kind.
+    n_changes, n_missed : int
+        How many such changes there are, and how many are not reached before the next; these count with the time until that.
+    stay_s : float
+        How long an animation plays until a jump, in the mean.
+    frames_used_share, assets_used_share : float
+        How much of the databases is ever played.
+    assets_never_used : tuple of str
+    frames_unusable_share : float
+        How much of the databases can never play, by their markup.
+    missing : mapping of str to str
+    """
+
+    seconds: float
+    updates: int
+    jumps: int
+    jumps_per_s: float | None = None
+    forced_jumps: int = 0
+    forced_cost: float | None = None
+    jump_cm: float | None = None
+    jump_worst_cm: float | None = None
+    jump_mps: float | None = None
+    skate_cm_s: float | None = None
+    skate_raw_cm_s: float | None = None
+    skate_played_cm_s: float | None = None
+    skate_m_min: float | None = None
+    skate_raw_m_min: float | None = None
+    skate_weighted_cm_s: float | None = None
+    skate_weighted_raw_cm_s: float | None = None
+    skate_ratio: float | None = None
+    skate_ratio_raw: float | None = None
+    accel_p99: float | None = None
+    accel_raw_p99: float | None = None
+    snap_share: float | None = None
+    path_rms_m: float | None = None
+    path_p95_m: float | None = None
+    heading_rms_deg: float | None = None
+    heading_p95_deg: float | None = None
+    reach_s: float | None = None
+    reach_direction_s: float | None = None
+    reach_speed_s: float | None = None
+    reach_stop_s: float | None = None
+    n_changes: int | None = None
+    n_missed: int | None = None
+    stay_s: float | None = None
+    frames_used_share: float | None = None
+    assets_used_share: float | None = None
+    assets_never_used: tuple[str, ...] | None = None
+    frames_unusable_share: float | None = None
+    missing: Mapping[str, str] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, object]:
+        """The measures as JSON has them."""
+        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        never = self.assets_never_used
+        return {**told, "assets_never_used": None if never is None else list(never), "missing": dict(self.missing)}

@@ -1,0 +1,131 @@
+"""Why not, figures of a session, what would have been and where two sessions part, for people: lines of text."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping
+
+from contextdb.console import printable
+from contextdb.errors import plural
+from contextdb.motion.trace.cost_views import cost_text, seconds
+from contextdb.motion.trace.session_diff import SessionDiff
+from contextdb.motion.trace.stats import GAINS, SessionStats
+from contextdb.motion.trace.text_table import WIDTH, Column, table_lines
+from contextdb.motion.trace.what_if import WhatIf
+from contextdb.motion.trace.why_not import Change, WhyNot
+
+MOST_NAMES = 12
+MOST_CHOICES = 20
+
+
+def why_lines(told: WhyNot, width: int = WIDTH) -> Iterator[str]:
+    """Why an asset was not chosen, and what would have to change."""
+    at = "" if told.time_s is None else f" at {told.time_s:.2f} s"
+    place = f"{told.asset}{at}, frame {told.frame:,} of {told.database}"
+    if told.winner == told.asset:
+        yield from _wrapped(f"{told.asset} was chosen: cost {cost_text(told.cost)}.", width)
+        return
+    beaten = "nothing was chosen" if told.winner is None else f"{told.winner} was chosen at cost {cost_text(told.winner_cost)}"
+    yield from _wrapped(f"{place}: cost {cost_text(told.cost)}, rank {told.rank:,}; {beaten}.", width)
+    yield from ("", "why not", "")
+    for reason in told.reasons:
+        yield from _wrapped(reason, width)
+    yield from ("", "what would have to change", "")
+    if not told.changes:
+        yield "no single change of a cell, a mark, a bias or a weight"
+        return
+    changes = told.changes
+    yield from table_lines(
+        [
+            Column("change", [each.kind for each in changes], is_key=True),
+            Column("of", [each.what for each in changes], is_key=True),
+            Column("to", [_to(each) for each in changes]),
+            Column("wins", ["yes" if each.wins else "not enough" for each in changes]),
+        ],
+        width,
+    )
+
+
+def _to(change: Change) -> str:
+    return change.to if isinstance(change.to, str) else f"{change.to:.6g}"
+
+
+def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
+    """The figures of a session."""
+    gain = "" if told.gain_median is None else f"median {told.gain_median:.0%}, {told.gain_small_share:.0%} under 20 %"
+    spread = ", ".join(f"{n} up to {high:.0%}" for n, high in zip(told.gains, GAINS, strict=True) if n) if told.gains else ""
+    used = "" if told.frames_used_share is None else f", {100.0 * told.frames_used_share:.2g} % of the frames"
+    rows = [
+        ("jumps", f"{told.jumps:,} in {told.seconds:.2f} s, {told.jumps_per_s:.2f} a second; {told.forced_jumps:,} forced"),
+        ("searches", ", ".join(f"{n:,} {cause}" for cause, n in told.causes.items())),
+        ("gain", f"{gain}; {spread}" if spread else gain),
+        ("stay", "" if told.stay_s is None else f"{told.stay_s:.2f} s in a clip"),
+        ("plays", f"{plural(told.assets_used, 'asset')}{used}"),
+    ]
+    never = told.assets_never_used
+    if never is not None:
+        more = f" and {len(never) - MOST_NAMES} more" if len(never) > MOST_NAMES else ""
+        names = ", ".join(never[:MOST_NAMES])
+        rows.append(("never used", f"{len(never):,}: {names}{more}" if never else "none"))
+    for label, text in rows:
+        if text:
+            lines = _wrapped(text, width - 12) or [""]
+            yield from (f"{label if i == 0 else '':<12}{line}" for i, line in enumerate(lines))
+
+
+def what_if_lines(told: WhatIf, width: int = WIDTH) -> Iterator[str]:
+    """What a change makes of a session."""
+    n = len(told.other_assets)
+    searches = f"{told.searches:,} recorded search{'' if told.searches == 1 else 'es'}"
+    yield f"of {searches}, {told.other_frames:,} choose another frame, {n:,} another asset"
+    if told.other_assets:
+        shown = told.other_assets[:MOST_CHOICES]
+        yield ""
+        yield from table_lines(
+            [
+                Column("tick", [f"{each.tick:,}" for each in shown], is_number=True, is_key=True),
+                Column("time s", [seconds(each.time_s) for each in shown], is_number=True),
+                Column("was", [each.was or "nothing" for each in shown]),
+                Column("becomes", [each.becomes or "nothing" for each in shown]),
+            ],
+            width,
+        )
+        if n > len(shown):
+            yield f"and {n - len(shown):,} more"
+    yield from ("", "the session run again in closed loop", "")
+    if not told.is_reproduced:
+        yield from _wrapped(
+            "(run again unchanged it does not play what was recorded: before is that run, not the recording)", width
+        )
+    yield from _measure_lines(("before", told.before), ("after", told.after), width)
+
+
+def diff_lines(told: SessionDiff, width: int = WIDTH) -> Iterator[str]:
+    """Where two sessions part."""
+    parting = told.parting
+    if parting is None:
+        yield f"both play the same in all {plural(told.updates, 'update')}"
+    else:
+        yield f"they part at tick {parting.tick:,}, {parting.time_s:.2f} s"
+        yield from _wrapped(f"first:  {parting.one or 'nothing'}. {parting.why_one}", width)
+        yield from _wrapped(f"second: {parting.other or 'nothing'}. {parting.why_other}", width)
+        yield f"of {plural(told.updates, 'update')}, {told.other_frames:,} play another frame, {told.other_assets:,} another asset"
+    if told.longer:
+        yield f"the {'first' if told.longer > 0 else 'second'} session is longer by {plural(abs(told.longer), 'update')}"
+    yield ""
+    yield from _measure_lines(("first", told.one), ("second", told.other), width)
+
+
+Measured = tuple[str, Mapping[str, float | None]]
+
+
+def _measure_lines(one: Measured, other: Measured, width: int) -> Iterator[str]:
+    names = list(one[1])
+    columns = [Column("measure", names, is_key=True)]
+    for heading, values in (one, other):
+        columns.append(Column(heading, ["" if (v := values[name]) is None else f"{v:.4g}" for name in names], is_number=True))
+    yield from table_lines(columns, width)
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    return textwrap.wrap(printable(text), width, break_long_words=False, break_on_hyphens=False)

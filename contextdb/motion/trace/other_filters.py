@@ -1,0 +1,115 @@
+"""What a recorded search could choose from, for another database, table or bias than the recorded one.
+
+R ranges, N frames. A range is known by its asset, whether it is mirrored, and how many ranges of the same come before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.motion.arguments import ValidRanges
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.markup.left_out import Skip
+from contextdb.motion.markup.tag_filter import TagFilter
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import Biases, Filter
+from contextdb.motion.selection.known_tags import with_tags
+from contextdb.motion.trace.stock import Asked
+
+UNKNOWN = "any"
+"""How a table is asked where the recorded facts leave one out: the condition is ignored."""
+Key = tuple[str, bool, int]
+
+
+def with_biases(database: MotionDatabase, chosen: Filter, old: Biases) -> Filter:
+    """A filter of a database that had other biases; what was added beside stays."""
+    looping = database.marks.looping
+    biases = _own(looping, database.biases) + (chosen.range_biases - _own(looping, old))
+    return chosen._replace(
+        range_biases=biases, least_of_ranges=float(biases.min(initial=np.inf)), continuing=database.biases.continuing
+    )
+
+
+def asked_of_table(database: MotionDatabase, chosen: Filter, table: Asked, context: Mapping[str, object]) -> Filter:
+    """A filter with the ranges that a table's answer lets play, and what its soft cells cost; costs given beside are gone."""
+    own = database.filter(table.query(dict(context), unknown=UNKNOWN))
+    return chosen._replace(
+        ranges=own.ranges, is_whole=own.is_whole, range_biases=own.range_biases, least_of_ranges=own.least_of_ranges
+    )
+
+
+def moved_to(
+    database: MotionDatabase, chosen: Filter, about: Mapping[str, Any], tags: TagFilter | None
+) -> tuple[MotionDatabase, Filter]:
+    """A filter of the database that `about` tells of, for another one; and that one, knowing the tags that are asked for.
+
+    Assets that the recorded database did not have may play only where all might.
+    """
+    starts, stops = np.array(about["starts"], np.int64), np.array(about["stops"], np.int64)
+    old = {key: i for i, key in enumerate(_keys(about["assets"], about["mirrored"]))}
+    at = np.array([old.get(key, -1) for key in _keys(database.assets, database.mirrored.tolist())], np.int64)
+    flags = np.where(at >= 0, chosen.ranges[at] if len(old) else False, chosen.is_whole)
+    added = chosen.range_biases - _own(np.array(about["looping"], np.bool_), Biases(**about["biases"]))
+    biases = _own(database.marks.looping, database.biases) + np.where(at >= 0, added[at] if len(old) else 0.0, 0.0)
+    here = _Moved(starts, stops, database, {int(i): new for new, i in enumerate(at.tolist()) if i >= 0})
+    if tags is not None:
+        names = [*tags.include, *tags.every, *tags.exclude, *(tag for tag, _ in (*tags.prefer, *tags.avoid))]
+        database = with_tags(database, names)
+    flagged = here.of_frames(chosen.frames, True) if len(chosen.frames) else None
+    own = database.filter(
+        ValidRanges(np.asarray(flags, np.bool_), biases),
+        tags=tags,
+        current=here.frame(chosen.current),
+        bias=here.of_frames(chosen.frame_biases, 0.0) if len(chosen.frame_biases) else None,
+        skip=tuple(here.skips(chosen.skips)),
+    )
+    return database, own if flagged is None else own._replace(frames=flagged)
+
+
+def _own(looping: NDArray[np.bool_], biases: Biases) -> Floats:
+    """What a database itself adds to its ranges."""
+    return np.where(looping, biases.base + biases.looping, biases.base)
+
+
+def _keys(assets: Sequence[str], mirrored: Sequence[bool]) -> Iterator[Key]:
+    seen: dict[tuple[str, bool], int] = {}
+    for asset, is_mirrored in zip(assets, mirrored, strict=True):
+        n = seen[asset, is_mirrored] = seen.get((asset, is_mirrored), -1) + 1
+        yield asset, is_mirrored, n
+
+
+class _Moved:
+    """From the frames of one database to those of another with the same assets."""
+
+    def __init__(self, starts: Any, stops: Any, database: MotionDatabase, ranges: Mapping[int, int]) -> None:
+        self.starts, self.stops, self.database, self.ranges = starts, stops, database, ranges
+
+    def frame(self, frame: int) -> int:
+        """A frame; -1 where its range is gone."""
+        old = next(iter(np.flatnonzero((self.starts <= frame) & (frame < self.stops)).tolist()), -1)
+        new = self.ranges.get(old)
+        if new is None:
+            return -1
+        first, stop = int(self.database.starts[new]), int(self.database.stops[new])
+        return min(first + frame - int(self.starts[old]), stop - 1)
+
+    def skips(self, skips: Sequence[Skip]) -> Iterator[Skip]:
+        """Spans of frames; those of ranges that are gone are left away."""
+        for skip in skips:
+            first, last = self.frame(skip.start), self.frame(skip.stop - 1)
+            if 0 <= first <= last:
+                yield replace(skip, start=first, stop=last + 1)
+
+    def of_frames(self, values: NDArray[Any], otherwise: object) -> NDArray[Any]:
+        """A value for each frame; frames that there were not have another."""
+        found = np.full(self.database.n_frames, otherwise, values.dtype)
+        for old, new in self.ranges.items():
+            first, start = int(self.database.starts[new]), int(self.starts[old])
+            n = min(int(self.database.stops[new]) - first, int(self.stops[old]) - start)
+            found[first : first + n] = values[start : start + n]
+        return found

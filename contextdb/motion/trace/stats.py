@@ -1,0 +1,141 @@
+"""A session in figures: how often it jumps and for how much, why it searched, how long a clip stays, what never plays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from statistics import fmean, median
+from typing import Any
+
+import numpy as np
+
+from contextdb.motion.selection.decision import Action, Decision
+from contextdb.motion.trace.views import cause_of
+
+SMALL_GAIN = 0.2
+"""A jump that spares less than this share of the cost of playing on gains little."""
+GAINS = (0.05, 0.1, 0.2, 0.5, 1.0)
+"""The histogram of gains has a bar up to each."""
+
+About = Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class SessionStats:
+    """The figures of a session.
+
+    Attributes
+    ----------
+    seconds : float
+    updates, searches, jumps, forced_jumps, loops : int
+        A forced jump is one for which nothing could play on.
+    jumps_per_s : float
+    causes : dict of str to int
+        How many searches there were for each cause.
+    gain_median : float or None
+        What a jump spares of the cost of playing on, as a share; None without a jump from what could play on.
+    gain_small_share : float or None
+        The share of such jumps that spare less than a fifth.
+    gains : tuple of int
+        How many spare up to 5, 10, 20, 50 and 100 %.
+    stay_s : float or None
+        Seconds from one change of asset to the next, in the mean.
+    assets_used : int
+    assets_never_used : tuple of str, or None
+        None where the session does not say what its databases hold.
+    frames_used_share : float or None
+    """
+
+    seconds: float
+    updates: int
+    searches: int
+    jumps: int
+    forced_jumps: int
+    loops: int
+    jumps_per_s: float
+    causes: dict[str, int] = field(default_factory=dict)
+    gain_median: float | None = None
+    gain_small_share: float | None = None
+    gains: tuple[int, ...] = ()
+    stay_s: float | None = None
+    assets_used: int = 0
+    assets_never_used: tuple[str, ...] | None = None
+    frames_used_share: float | None = None
+
+    def to_json(self) -> dict[str, object]:
+        """The figures by name."""
+        told = asdict(self)
+        told["gains"] = list(self.gains)
+        told["assets_never_used"] = None if self.assets_never_used is None else list(self.assets_never_used)
+        return told
+
+
+def stats_of(decisions: Iterable[Decision], about: About) -> SessionStats:
+    """The figures of a session; `about` is what a `Trace` says of its databases."""
+    found = list(decisions)
+    jumps = [each for each in found if each.action is Action.JUMP]
+    seconds = found[-1].time_s - found[0].time_s if found else 0.0
+    gains = [_gain(each) for each in jumps if each.cost is not None and each.continuing_cost]
+    causes: dict[str, int] = {}
+    for each in found:
+        if each.searched:
+            cause = cause_of(each) or "other"
+            causes[cause] = causes.get(cause, 0) + 1
+    stays = _stays(found)
+    used = {each.playing.asset for each in found if each.playing is not None}
+    known = [asset for each in about.values() for asset in each.get("assets", ())]
+    return SessionStats(
+        seconds=seconds,
+        updates=len(found),
+        searches=sum(each.searched for each in found),
+        jumps=len(jumps),
+        forced_jumps=sum(each.continuing_cost is None for each in jumps),
+        loops=sum(each.action is Action.LOOP for each in found),
+        jumps_per_s=len(jumps) / seconds if seconds > 0.0 else 0.0,
+        causes=dict(sorted(causes.items(), key=lambda item: (-item[1], item[0]))),
+        gain_median=median(gains) if gains else None,
+        gain_small_share=sum(gain < SMALL_GAIN for gain in gains) / len(gains) if gains else None,
+        gains=tuple(int(n) for n in np.bincount(np.searchsorted(GAINS, gains), minlength=len(GAINS))[: len(GAINS)]),
+        stay_s=fmean(stays) if stays else None,
+        assets_used=len(used),
+        assets_never_used=tuple(asset for asset in dict.fromkeys(known) if asset not in used) if known else None,
+        frames_used_share=_frames_used(found, about),
+    )
+
+
+def measures_of(decisions: Sequence[Decision], about: About) -> dict[str, float | None]:
+    """What is compared before and after a change, by the names that `motion measure` gives them."""
+    found = stats_of(decisions, about)
+    never = None if found.assets_never_used is None else float(len(found.assets_never_used))
+    return {
+        "jumps_per_s": found.jumps_per_s,
+        "forced_jumps": float(found.forced_jumps),
+        "stay_s": found.stay_s,
+        "frames_used_share": found.frames_used_share,
+        "assets_never_used": never,
+    }
+
+
+def _gain(jump: Decision) -> float:
+    assert jump.cost is not None, "a jump has a cost"
+    assert jump.continuing_cost, "playing on has a cost"
+    return (jump.continuing_cost - jump.cost) / abs(jump.continuing_cost)
+
+
+def _stays(decisions: Sequence[Decision]) -> list[float]:
+    """How long each asset played, the last one until the end."""
+    changes = [
+        each.time_s
+        for last, each in zip([None, *decisions], decisions, strict=False)
+        if each.playing is not None and (last is None or last.playing is None or last.playing.asset != each.playing.asset)
+    ]
+    ends = [*changes[1:], decisions[-1].time_s] if changes else []
+    return [end - start for start, end in zip(changes, ends, strict=True)]
+
+
+def _frames_used(decisions: Sequence[Decision], about: About) -> float | None:
+    if not about or not all("stops" in each for each in about.values()):
+        return None
+    every = sum(stop - start for each in about.values() for start, stop in zip(each["starts"], each["stops"], strict=True))
+    used = {(each.playing.database, each.playing.frame) for each in decisions if each.playing is not None}
+    return len(used) / every if every else None

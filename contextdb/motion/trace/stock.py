@@ -1,0 +1,119 @@
+"""What recorded searches are asked of again: the databases of a project, and its tables.
+
+A table is seen as something that can be asked and edited; nothing of it is known here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any, Protocol, runtime_checkable
+
+from contextdb.cells.arguments import require_kind, require_mapping
+from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.storage.building import open_or_build
+from contextdb.motion.storage.config import MotionConfig
+
+
+class Failing(Protocol):
+    """A cell that does not accept its fact, and the one that would."""
+
+    condition: str
+    cell: str
+    fact: str
+    mend: str
+
+
+class Row(Protocol):
+    """Why a row is valid or not."""
+
+    row: int
+    asset: str
+    is_enabled: bool
+    failures: Sequence[Failing]
+
+
+class Asked(Protocol):
+    """A compiled table."""
+
+    @property
+    def leaves(self) -> Sequence[str]: ...
+
+    def query(self, context: Any, *, unknown: Any) -> Any: ...
+
+    def explain(self, context: Any, *, unknown: Any) -> Iterable[Any]: ...
+
+
+@runtime_checkable
+class Edited(Protocol):
+    """A table."""
+
+    def compile(self) -> Asked: ...
+
+    def with_cell(self, row: int, column: str, text: str) -> Edited: ...
+
+
+@runtime_checkable
+class Described(Protocol):
+    """A project: what its contextdb.toml says, its folder, and its tables."""
+
+    @property
+    def schema(self) -> Any: ...
+
+    @property
+    def folder(self) -> str | PathLike[str]: ...
+
+    @property
+    def tables(self) -> Mapping[str, Any]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Stock:
+    """Databases, and the tables that say which of their assets are valid.
+
+    Attributes
+    ----------
+    databases : mapping of name to MotionDatabase
+    tables : mapping of name to Table
+    table_of : mapping of database name to table name
+    """
+
+    databases: Mapping[str, MotionDatabase]
+    tables: Mapping[str, Edited] = field(default_factory=dict)
+    table_of: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, project: object, names: Iterable[str]) -> Stock:
+        """The databases of some names and the tables of a project; or a mapping of databases, without tables."""
+        if isinstance(project, Described):
+            config = MotionConfig.from_dict(project.schema.motion, tables=project.tables)
+            wanted = [name for name in names if name in config.databases]
+            assets = {name: table.compile().leaves for name, table in project.tables.items()}
+            databases = open_or_build(config, project.folder, assets, names=wanted)
+            return cls.with_tables(databases, project)
+        given = require_mapping(project, "project", "a Project, or a mapping of names to databases")
+        for each in given.values():
+            require_kind(each, MotionDatabase, "one of project", "a MotionDatabase")
+        return cls(given)
+
+    @classmethod
+    def with_tables(cls, databases: Mapping[str, MotionDatabase], project: Described) -> Stock:
+        """Some databases, and the tables of a project."""
+        config = MotionConfig.from_dict(project.schema.motion, tables=project.tables)
+        table_of = {name: table for name in databases if name in config.databases and (table := config.databases[name].table)}
+        return cls(databases, project.tables, table_of)
+
+    def table(self, database: str) -> Edited | None:
+        """The table of a database."""
+        return self.tables.get(self.table_of.get(database, ""))
+
+
+def require_name(name: object, what: str, known: Iterable[str]) -> None:
+    """Raise MotionError for a name that is not among some, with the nearest."""
+    names = list(known)
+    if name not in names:
+        near = nearest(str(name), names)
+        found = f"there is no {what} {in_quotes(str(name))}."
+        raise MotionError(Fault(found, some(names) or "none", in_quotes(near) if near else ""))

@@ -1,0 +1,195 @@
+"""What `motion measure` hands to its renderers: the measures of each session, the bars that it is held to, and an earlier report.
+
+Data only; the same results give the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from contextdb.covering import format_percent
+from contextdb.errors import ContextError, Fault, Place, in_quotes, plural
+from contextdb.findings import Finding
+from contextdb.motion.measuring.measures import Measures
+from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP
+from contextdb.report.results import CheckReport, Subject
+
+NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE)
+"""A measure that is missing for such a reason keeps every bar."""
+SLACK = 0.01
+"""A measure is worse than before when it is larger by more than this share."""
+BASELINE = "a report of `contextdb motion measure --json`"
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A measure as people read it: its name, those of its keys, and how many decimals it has; percent where they are negative."""
+
+    label: str
+    key: str
+    raw: str = ""
+    decimals: int = 1
+    is_worse_when_larger: bool = False
+
+    def text(self, value: object) -> str:
+        """A value in words; "-" where there is none."""
+        if not isinstance(value, (int, float)):
+            return "-"
+        return format_percent(value, 1).removesuffix(" %") if self.decimals < 0 else f"{value:,.{self.decimals}f}"
+
+
+LINES = (
+    Line("jumps a second", "jumps_per_s", decimals=2, is_worse_when_larger=True),
+    Line("forced jumps", "forced_jumps", decimals=0, is_worse_when_larger=True),
+    Line("dearest forced jump", "forced_cost", decimals=3, is_worse_when_larger=True),
+    Line("jump, cm", "jump_cm", is_worse_when_larger=True),
+    Line("jump, worst joint, 95 %, cm", "jump_worst_cm", is_worse_when_larger=True),
+    Line("jump, velocity, m/s", "jump_mps", decimals=2, is_worse_when_larger=True),
+    Line("skate, cm/s", "skate_cm_s", "skate_raw_cm_s", is_worse_when_larger=True),
+    Line("of it in the clips' frames, cm/s", "skate_played_cm_s"),
+    Line("skate, m/min", "skate_m_min", "skate_raw_m_min", is_worse_when_larger=True),
+    Line("skate, weighted, cm/s", "skate_weighted_cm_s", "skate_weighted_raw_cm_s"),
+    Line("skate, ratio, %", "skate_ratio", "skate_ratio_raw", decimals=-1),
+    Line("acceleration, 99 %, m/s²", "accel_p99", "accel_raw_p99", is_worse_when_larger=True),
+    Line("snaps, %", "snap_share", decimals=-1, is_worse_when_larger=True),
+    Line("path error, RMS, m", "path_rms_m", decimals=3, is_worse_when_larger=True),
+    Line("path error, 95 %, m", "path_p95_m", decimals=3),
+    Line("heading error, RMS, degrees", "heading_rms_deg", is_worse_when_larger=True),
+    Line("heading error, 95 %, degrees", "heading_p95_deg"),
+    Line("new velocity reached, s", "reach_s", decimals=2, is_worse_when_larger=True),
+    Line("new direction, s", "reach_direction_s", decimals=2),
+    Line("new speed, s", "reach_speed_s", decimals=2),
+    Line("stop, s", "reach_stop_s", decimals=2),
+    Line("not reached", "n_missed", decimals=0),
+    Line("stay in a clip, s", "stay_s", decimals=2),
+    Line("frames used, %", "frames_used_share", decimals=-1),
+    Line("assets used, %", "assets_used_share", decimals=-1),
+    Line("frames that can never play, %", "frames_unusable_share", decimals=-1),
+)
+OF_KEY = {line.key: line for line in LINES}
+COMPARED = tuple(line for line in LINES if line.is_worse_when_larger)
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """The most that a measure may be, by an option of the command."""
+
+    option: str
+    key: str
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """A bar that a session is held to, or a comparison with the baseline."""
+
+    name: str
+    limit: float
+    value: float | None
+    passed: bool
+    message: str
+
+    def to_json(self) -> dict[str, object]:
+        """As plain data."""
+        return {"name": self.name, "limit": self.limit, "value": self.value, "passed": self.passed, "message": self.message}
+
+
+@dataclass(frozen=True)
+class SessionMeasures:
+    """One session: its file, its measures, those of the baseline by name, and its gates."""
+
+    file: str
+    measures: Measures
+    before: Mapping[str, object]
+    gates: tuple[Gate, ...]
+
+    @property
+    def headline(self) -> str:
+        """How long it is."""
+        return f"{self.measures.seconds:.2f} s, {plural(self.measures.updates, 'update')}, {plural(self.measures.jumps, 'jump')}"
+
+    def rows(self) -> Iterator[tuple[str, str, str, str]]:
+        """Of each measure that there is its name, its value, that of the raw clips, and that of the baseline."""
+        told = self.measures.to_json()
+        for line in LINES:
+            value, raw = told[line.key], told.get(line.raw)
+            if value is not None or raw is not None:
+                before = line.text(self.before[line.key]) if self.before.get(line.key) is not None else ""
+                yield line.label, line.text(value), "" if raw is None else line.text(raw), before
+
+    def not_measured(self) -> Iterator[str]:
+        """Why measures are missing, a sentence a reason; that there was nothing of a kind is none."""
+        of: dict[str, list[str]] = {}
+        for key, why in self.measures.missing.items():
+            if why not in NOTHING_TO_EXCEED and key in OF_KEY:
+                of.setdefault(why, []).append(OF_KEY[key].label)
+        return (f"not measured, as {why}: {'; '.join(labels)}" for why, labels in of.items())
+
+    def to_json(self) -> dict[str, object]:
+        """The session in the JSON document."""
+        return {"file": self.file, **self.measures.to_json(), "bars": [gate.to_json() for gate in self.gates]}
+
+
+@dataclass(frozen=True)
+class MeasureResults:
+    """All sessions."""
+
+    subject: ClassVar[Subject] = "measures"
+    sessions: tuple[SessionMeasures, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every bar is kept and nothing is worse than in the baseline."""
+        return all(gate.passed for session in self.sessions for gate in session.gates)
+
+    def to_json(self) -> dict[str, object]:
+        """The JSON document."""
+        return {"format": 1, "sessions": [session.to_json() for session in self.sessions]}
+
+    def as_check(self) -> CheckReport:
+        """The bars that are broken, as findings."""
+        broken = ((session.file, gate) for session in self.sessions for gate in session.gates if not gate.passed)
+        return CheckReport((), tuple(Finding(gate.name, "error", gate.message, file=file) for file, gate in broken))
+
+
+def held_to(bar: Bar, measures: Measures, file: str) -> Gate:
+    """The gate of a bar. Raises ContextError where the measure is missing, so that nobody knows."""
+    value, line = getattr(measures, bar.key), OF_KEY[bar.key]
+    limit = line.text(bar.most)
+    if value is None:
+        why = measures.missing.get(bar.key, "")
+        if why not in NOTHING_TO_EXCEED:
+            found = f"--{bar.option} cannot be judged: {why}."
+            raise ContextError(Fault(found, "a session of a project, or --poses and --project with it", place=Place(file)))
+        return Gate(bar.option, bar.most, None, True, f"{line.label}: {why}.")
+    passed = bool(value <= bar.most)
+    told = f"{line.label}: {line.text(value)}, {'within' if passed else 'more than'} {limit}."
+    return Gate(bar.option, bar.most, float(value), passed, told)
+
+
+def compared(before: Mapping[str, object], measures: Measures) -> Iterator[Gate]:
+    """A gate for each measure that an earlier report has too: it is worse when it is larger by more than 1 %."""
+    for line in COMPARED:
+        old, new = before.get(line.key), getattr(measures, line.key)
+        if isinstance(old, (int, float)) and not isinstance(old, bool) and new is not None:
+            passed = bool(new <= old + SLACK * abs(old) + 1e-9)
+            verdict = "no worse" if passed else "worse"
+            told = f"{line.label}: {line.text(new)}, {verdict} than {line.text(old)} before."
+            yield Gate(f"baseline {line.key}", float(old), float(new), passed, told)
+
+
+def read_baseline(text: str, file: str) -> dict[str, Mapping[str, object]]:
+    """The sessions of an earlier report, by file. Raises ContextError for what is none."""
+    try:
+        document = json.loads(text)
+        version = document["format"]
+        sessions: dict[str, Mapping[str, object]] = {str(session["file"]): dict(session) for session in document["sessions"]}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise ContextError(Fault("the baseline is no report of measures.", BASELINE, place=Place(file))) from None
+    if version != 1:
+        found = f"the baseline has format {in_quotes(str(version))}; this version reads format 1."
+        raise ContextError(Fault(found, BASELINE, place=Place(file)))
+    return sessions

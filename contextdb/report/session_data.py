@@ -1,0 +1,335 @@
+"""What the page of a session plays, as one JSON document: columns packed small, and the moments at which something was searched.
+
+Lengths are whole millimetres, times whole milliseconds, angles tenths of a milliradian. Columns are deflated, in base64; one with
+`delta` keeps of each row what it differs from the row before, which deflates better.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+
+SHOWN_HZ = 30.0
+"""So many poses a second are in the page at most."""
+SEARCHED, JUMPED, FORCED, MIRRORED = 1, 2, 4, 8
+MAY_NOT, MAY = 1, 128
+"""A bar of the landscape: 0 without a frame, from 1 one that may not play, from 128 one that may; the higher, the cheaper."""
+BAR_STEPS = 127
+
+
+@dataclass(frozen=True, slots=True)
+class Detail:
+    """How much a page holds.
+
+    Attributes
+    ----------
+    ghosts : int
+        How many poses that could have played are shown at each jump.
+    ghost_s : float
+        For how long.
+    bins : int
+        Into how many bars the frames of an asset are drawn together; 0 for no bars.
+    rows : int
+        Of how many assets.
+    candidates : int
+    searches : bool
+        Whether searches that changed nothing are told too.
+    """
+
+    ghosts: int
+    ghost_s: float
+    bins: int
+    rows: int
+    candidates: int
+    searches: bool
+
+    @staticmethod
+    def most_first() -> Iterator[Detail]:
+        """From all that is shown to what a page cannot do without."""
+        yield Detail(3, 0.7, 64, 64, 12, True)
+        yield Detail(3, 0.7, 64, 40, 12, False)
+        yield Detail(2, 0.5, 32, 24, 8, False)
+        yield Detail(1, 0.5, 16, 12, 5, False)
+        yield Detail(0, 0.0, 0, 0, 3, False)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Ghost:
+    """A pose that could have played, moving: joints [F, J, 3] in metres, relative to the root on the ground."""
+
+    asset: str
+    positions: Floats
+    plays_on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A frame that was compared; `parts` are its cost by channel."""
+
+    asset: str
+    at_s: float
+    mirrored: bool
+    cost: float
+    parts: tuple[float, ...]
+    left_out: str
+    chosen: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class AssetCosts:
+    """The costs of all frames of an asset: float64 [F], with which may play; and why the best of them may not, if so."""
+
+    asset: str
+    costs: Floats
+    may_play: NDArray[np.bool_]
+    left_out: str
+
+    @property
+    def best(self) -> float:
+        """The least cost of a frame that may play; of any frame where none may."""
+        among = self.costs[self.may_play] if self.may_play.any() else self.costs
+        return float(among.min())
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Moment:
+    """A search: when, why, and what there was to choose from."""
+
+    tick: int
+    why: str
+    is_change: bool
+    forced: bool
+    context: tuple[tuple[str, str], ...]
+    channels: tuple[str, ...]
+    candidates: Sequence[Candidate]
+    ghosts: Sequence[Ghost] = ()
+    assets: Sequence[AssetCosts] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeLine:
+    """A line of the table of what changed: what, asset, cost and why."""
+
+    time_s: float
+    texts: tuple[str, str, str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class SessionView:
+    """A session as the page shows it. T updates, J joints, K feet.
+
+    Attributes
+    ----------
+    rate : float
+        Updates a second.
+    bones, parents, feet
+        The rig: names [J], parents [J], the joints of the feet [K].
+    sides : tuple of str, length J
+        "left", "right" or "": which side of the body a joint is of.
+    positions : float array, shape (T, J, 3)
+        Joints in the world, in metres.
+    roots : float array, shape (T, 3)
+        x and z in metres, heading in radians.
+    bodies : float array, shape (T, 3), or None
+        Where the game had the body, likewise.
+    contacts : bool array, shape (T, K)
+    playing : list of (asset or None, seconds in it), length T
+    flags : uint8 array, shape (T,)
+        SEARCHED, JUMPED, FORCED and MIRRORED, added up.
+    strips : mapping of str to float array, shape (T,)
+        What is drawn below the timeline: "cost", "skate", "accel", "error", "valid", as far as known.
+    moments : sequence of Moment
+        In order of time.
+    measures : mapping of str to str
+    """
+
+    name: str
+    rate: float
+    bones: Sequence[str]
+    parents: Ints
+    feet: Sequence[int]
+    sides: Sequence[str]
+    positions: Floats
+    roots: Floats
+    bodies: Floats | None
+    contacts: NDArray[np.bool_]
+    playing: Sequence[tuple[str | None, float]]
+    flags: NDArray[np.uint8]
+    strips: Mapping[str, Floats]
+    moments: Sequence[Moment]
+    changes: Sequence[ChangeLine]
+    measures: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return max(0, len(self.positions) - 1) / self.rate
+
+
+def document_of(sessions: Sequence[SessionView], detail: Detail) -> dict[str, object]:
+    """What the page's script reads."""
+    return {"format": 1, "plays": len(sessions) > 0, "sessions": [_session(session, detail) for session in sessions]}
+
+
+def _session(session: SessionView, detail: Detail) -> dict[str, object]:
+    step = max(1, round(session.rate / SHOWN_HZ))
+    shown = np.arange(0, len(session.positions), step)
+    names = _Names()
+    asset = np.array([names.of(playing[0]) for playing in session.playing], np.int16)
+    local = session.positions[shown] - _on_ground(session.roots[shown])[:, None]
+    columns = {
+        "positions": _packed(_whole(local, 1000.0, np.int16).reshape(len(shown), -1), is_delta=True),
+        "root": _packed(_root(session.roots[shown]), is_delta=True),
+        "asset": _packed(asset[shown]),
+        "at": _packed(np.array([round(1000 * session.playing[i][1]) for i in shown.tolist()], np.int32)),
+        "flags": _packed(_gathered(session.flags, step)),
+        "contacts": _packed((session.contacts[shown] << np.arange(session.contacts.shape[1])).sum(axis=1).astype(np.uint8)),
+    }
+    if session.bodies is not None:
+        columns["body"] = _packed(_root(session.bodies[shown]), is_delta=True)
+    for name, values in session.strips.items():
+        columns[name] = _packed(_peaks(values, step).astype(np.float32))
+    moments = [_moment(each, names, step, session.rate, detail) for each in session.moments if each.is_change or detail.searches]
+    return {
+        "name": session.name,
+        "rate": session.rate / step,
+        "n": len(shown),
+        "bones": list(session.bones),
+        "parents": session.parents.tolist(),
+        "sides": list(session.sides),
+        "feet": list(session.feet),
+        "columns": columns,
+        "moments": moments,
+        "assets": names.known,
+    }
+
+
+class _Names:
+    """Assets by number."""
+
+    def __init__(self) -> None:
+        self.known: list[str] = []
+        self._numbers: dict[str, int] = {}
+
+    def of(self, name: str | None) -> int:
+        """The number of a name; -1 of none."""
+        if name is None:
+            return -1
+        if name not in self._numbers:
+            self._numbers[name] = len(self.known)
+            self.known.append(name)
+        return self._numbers[name]
+
+
+def _moment(moment: Moment, names: _Names, step: int, rate: float, detail: Detail) -> dict[str, object]:
+    rows = sorted(moment.assets, key=lambda each: (not each.may_play.any(), each.best))[: detail.rows if detail.bins else 0]
+    return {
+        "i": -(-moment.tick // step),
+        "why": moment.why,
+        "forced": moment.forced,
+        "context": [list(pair) for pair in moment.context],
+        "channels": list(moment.channels),
+        "candidates": [_candidate(each, names) for each in moment.candidates[: detail.candidates]],
+        "ghosts": [_ghost(each, step, rate, detail) for each in moment.ghosts[: detail.ghosts]],
+        "landscape": _landscape(rows, names, detail.bins) if rows else None,
+    }
+
+
+def _candidate(each: Candidate, names: _Names) -> dict[str, object]:
+    return {
+        "asset": names.of(each.asset),
+        "at": round(each.at_s, 3),
+        "mirrored": each.mirrored,
+        "cost": _short(each.cost),
+        "parts": [_short(part) for part in each.parts],
+        "left_out": each.left_out,
+        "chosen": each.chosen,
+    }
+
+
+def _ghost(ghost: Ghost, step: int, rate: float, detail: Detail) -> dict[str, object]:
+    shown = ghost.positions[: max(1, round(detail.ghost_s * rate)) : step]
+    packed = _packed(_whole(shown, 1000.0, np.int16).reshape(len(shown), -1), is_delta=True)
+    return {**packed, "asset": ghost.asset, "plays_on": ghost.plays_on, "frames": len(shown)}
+
+
+def _landscape(rows: Sequence[AssetCosts], names: _Names, bins: int) -> dict[str, object]:
+    """Bars: the cheapest frame of each part of an asset, the tallest the cheapest of all."""
+    least = min(each.best for each in rows)
+    most = max(float(np.median(each.costs)) for each in rows)
+    return {
+        "assets": [names.of(each.asset) for each in rows],
+        "best": [_short(each.best) for each in rows],
+        "reasons": [each.left_out for each in rows],
+        "bins": bins,
+        "bars": _packed(np.concatenate([_bars(each, bins, least, most) for each in rows])),
+    }
+
+
+def _bars(each: AssetCosts, bins: int, least: float, most: float) -> NDArray[np.uint8]:
+    found = np.zeros(bins, np.uint8)
+    parts = np.minimum(np.arange(len(each.costs)) * bins // max(1, len(each.costs)), bins - 1)
+    for kind, among in ((MAY_NOT, ~each.may_play), (MAY, each.may_play)):
+        lowest = np.full(bins, np.inf)
+        np.minimum.at(lowest, parts[among], each.costs[among])
+        share = 1.0 - np.clip((lowest - least) / max(most - least, 1e-12), 0.0, 1.0)
+        has = np.isfinite(lowest)
+        found[has] = kind + np.round(share[has] * (BAR_STEPS - 1)).astype(np.uint8)
+    return found
+
+
+def _on_ground(roots: Floats) -> Floats:
+    """The roots as points on the ground: float64 [T, 3]."""
+    return np.stack((roots[:, 0], np.zeros(len(roots)), roots[:, 1]), axis=1)
+
+
+def _root(roots: Floats) -> NDArray[np.int32]:
+    places = np.stack((roots[:, 0] * 1e3, roots[:, 1] * 1e3, np.unwrap(roots[:, 2]) * 1e4), axis=1)
+    return _whole(places, 1.0, np.int32)
+
+
+def _whole(values: Floats, scale: float, kind: type[np.signedinteger]) -> NDArray[np.signedinteger]:
+    """Values as whole numbers of some type; those beyond it at its ends."""
+    limits = np.iinfo(kind)
+    return np.clip(np.round(np.asarray(values, np.float64) * scale), limits.min, limits.max).astype(kind)
+
+
+def _gathered(flags: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:
+    """The flags of each shown update and of those before it that are not shown."""
+    found = flags[::step].copy()
+    for before in range(1, step):
+        found[1:] |= flags[step - before :: step][: len(found) - 1]
+    return found
+
+
+def _peaks(values: Floats, step: int) -> Floats:
+    """The largest of each shown update and of those before it that are not shown; what is not known is 0."""
+    known = np.nan_to_num(np.asarray(values, np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+    found = known[::step].copy()
+    for before in range(1, step):
+        found[1:] = np.maximum(found[1:], known[step - before :: step][: len(found) - 1])
+    return found
+
+
+def _packed(values: NDArray[np.generic], *, is_delta: bool = False) -> dict[str, object]:
+    """An array as the script reads it, little-endian."""
+    kept = values
+    width = values.shape[1] if values.ndim == 2 else 1
+    if is_delta and len(values) > 1:
+        kept = np.concatenate((values[:1], np.diff(values, axis=0)))  # wraps around as the script's own numbers do
+    raw = np.ascontiguousarray(kept.astype(kept.dtype.newbyteorder("<"))).tobytes()
+    data = base64.b64encode(zlib.compress(raw, 9)).decode()
+    return {"type": f"{kept.dtype.kind}{kept.dtype.itemsize}", "delta": width if is_delta else 0, "data": data}
+
+
+def _short(value: float) -> float | None:
+    """A number in six digits; None for one that JSON has not."""
+    return float(f"{value:.6g}") if np.isfinite(value) else None

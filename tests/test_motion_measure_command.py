@@ -1,0 +1,215 @@
+"""`contextdb motion measure` on a recorded session: its JSON, its bars, a baseline, and what it cannot measure."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from running import Result, run
+from test_motion_commands import MARKS, STICK, TABLE, TOML
+
+from contextdb.motion import Trace, make_clip, measure, write_bvh
+
+KEYS = [
+    "file",
+    "seconds",
+    "jumps_per_s",
+    "forced_jumps",
+    "jump_cm",
+    "skate_cm_s",
+    "skate_raw_cm_s",
+    "accel_p99",
+    "accel_raw_p99",
+    "path_rms_m",
+    "heading_rms_deg",
+    "reach_s",
+    "stay_s",
+    "frames_used_share",
+    "assets_never_used",
+]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project in game/, a session of it, its poses, and its measures."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "game" / "clips").mkdir(parents=True)
+    (folder / "game" / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    (folder / "game" / "moves.csv").write_text(TABLE, encoding="utf-8")
+    (folder / "game" / "clips" / "marks.csv").write_text(MARKS, encoding="utf-8")
+    for name in ("idle", "walk", "walk_tired", "jog"):
+        write_bvh(make_clip(name).clip, folder / "game" / "clips" / f"{name}.bvh", digits=3)
+    (folder / "stick.csv").write_text(STICK, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        result = run("motion", "run", "game", "player", "stick.csv", "--out", "session.parquet", "--poses", "poses.npz")
+        assert result.code == 0
+        (folder / "before.json").write_text(run("motion", "measure", "session.parquet", "--json").out, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with a copy of it all."""
+    folder = tmp_path / "here"
+    shutil.copytree(made, folder)
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("COLUMNS", "100")
+    return folder
+
+
+def measured(*arguments: str, code: int = 0) -> Result:
+    result = run("motion", "measure", *arguments)
+    assert result.code == code, result.err
+    return result
+
+
+def refused(*arguments: str) -> str:
+    result = measured(*arguments, code=2)
+    assert result.out == ""
+    assert len(result.err.splitlines()) == 1
+    return result.err
+
+
+def session_of(*arguments: str, code: int = 0) -> dict[str, object]:
+    document = measured(*arguments, "--json", code=code).json
+    assert document["format"] == 1
+    (session,) = document["sessions"]
+    return session
+
+
+def test_the_json_document_has_every_measure_with_the_raw_clips_beside():
+    session = session_of("session.parquet")
+    assert [key for key in KEYS if key not in session] == []
+    assert session["file"] == "session.parquet"
+    assert session["seconds"] == pytest.approx(5.0)
+    assert 0.0 < session["jumps_per_s"] < 5.0
+    assert session["assets_never_used"] == []
+    assert [key for key in KEYS if session[key] is None] == []
+
+
+def test_poses_that_were_written_measure_as_those_made_again():
+    again, written = session_of("session.parquet"), session_of("session.parquet", "--poses", "poses.npz")
+    for key, value in again.items():
+        if isinstance(value, float):
+            assert written[key] == pytest.approx(value, rel=1e-2, abs=1e-3), key
+
+
+def test_a_file_of_poses_is_measured_against_the_clips_of_a_project():
+    session, alone = session_of("poses.npz", "--project", "game"), session_of("session.parquet")
+    for key in ("seconds", "jumps_per_s", "forced_jumps", "skate_raw_cm_s", "accel_raw_p99", "stay_s"):
+        assert session[key] == pytest.approx(alone[key]), key
+    assert session["skate_cm_s"] == pytest.approx(alone["skate_cm_s"], rel=0.02, abs=0.02)
+    assert session["path_rms_m"] is None
+    assert session["missing"]["path_rms_m"] == "the session does not say where the game had the body"
+
+
+def test_the_command_and_the_function_say_the_same(here: Path):
+    found = measure(Trace.load("session.parquet"))
+    assert session_of("session.parquet")["jumps_per_s"] == found.jumps_per_s
+    assert found.missing["skate_cm_s"].startswith("there are no poses")
+
+
+def test_the_text_has_the_raw_clips_beside_and_says_what_is_never_played():
+    lines = measured("session.parquet").lines
+    assert lines[0].startswith("session.parquet: 5.00 s, 151 updates, ")
+    skate = next(line for line in lines if line.startswith("skate, cm/s"))
+    assert len(skate.split()) == 4
+    assert not any("not measured" in line for line in lines)
+    assert any(line.startswith("not measured, as the session does not say where") for line in measured("poses.npz").lines)
+
+
+@pytest.mark.parametrize("name", ["skate", "jumps", "accel", "path", "heading", "reach", "forced", "forced-cost"])
+def test_a_broken_bar_fails_and_is_told(name: str):
+    session = session_of("session.parquet", f"--max-{name}", "0.0001", code=1)
+    (gate,) = session["bars"]
+    assert (gate["name"], gate["passed"], gate["limit"]) == (f"max-{name}", False, 0.0001)
+    assert session_of("session.parquet", f"--max-{name}", "99999")["bars"][0]["passed"] is True
+    text = measured("session.parquet", f"--max-{name}", "0.0001", code=1)
+    assert text.lines[-1].startswith(f"BROKEN  max-{name}: ")
+    case = ET.fromstring(measured("session.parquet", f"--max-{name}", "0", "--format", "junit", code=1).out).find(".//failure")
+    assert case is not None
+    assert case.get("type") == f"max-{name}"
+    markdown = measured("session.parquet", f"--max-{name}", "0", "--format", "markdown", code=1).out
+    assert f"- **max-{name}**: " in markdown
+
+
+def test_a_session_without_bars_is_one_passed_case():
+    suites = ET.fromstring(measured("session.parquet", "poses.npz", "--format", "junit").out)
+    assert (suites.get("tests"), suites.get("failures")) == ("2", "0")
+
+
+def test_the_same_session_is_no_worse_than_its_baseline():
+    session = session_of("session.parquet", "--baseline", "before.json")
+    assert session["bars"]
+    assert all(gate["passed"] for gate in session["bars"])
+    assert measured("session.parquet", "--baseline", "before.json").lines[-1] == "kept  baseline: nothing is worse"
+
+
+def test_what_got_worse_than_the_baseline_fails_and_is_told(here: Path):
+    document = json.loads((here / "before.json").read_text(encoding="utf-8"))
+    document["sessions"][0]["jumps_per_s"] *= 0.9
+    document["sessions"][0]["skate_raw_cm_s"] *= 0.5  # what the clips do is no fault of the session
+    (here / "before.json").write_text(json.dumps(document), encoding="utf-8")
+    result = measured("session.parquet", "--baseline", "before.json", code=1)
+    (line,) = [line for line in result.lines if line.startswith("BROKEN")]
+    assert line == "BROKEN  baseline jumps_per_s: jumps a second: 1.60, worse than 1.44 before."
+
+
+def test_a_session_whose_project_is_gone_tells_its_jumps_and_why_no_more(here: Path):
+    shutil.move(here / "game", here / "moved")
+    result = measured("session.parquet")
+    assert "its project is no longer at" in result.err
+    assert any(line.startswith("not measured, as there are no poses") for line in result.lines)
+    assert session_of("session.parquet", "--project", "moved") == session_of("session.parquet", "--project", "moved")
+    assert "--max-skate cannot be judged: there are no poses" in measured("session.parquet", "--max-skate", "3", code=2).err
+
+
+def test_another_database_than_the_recorded_one_is_told(here: Path):
+    toml = here / "game" / "contextdb.toml"
+    toml.write_text(toml.read_text(encoding="utf-8").replace("at = [0.33, 1.0]", "at = [0.33, 0.9]"), encoding="utf-8")
+    assert 'the database "all" is another than the one that the session was recorded with' in measured("session.parquet").err
+
+
+def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
+    toml = here / "game" / "contextdb.toml"
+    toml.write_text(toml.read_text(encoding="utf-8") + '\n[output.player]\nroot = "code"\n', encoding="utf-8")
+    assert session_of("session.parquet")["path_rms_m"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none.parquet"], "none.parquet: "),
+        (["stick.csv"], "stick.csv: this is not a Parquet file."),
+        (["broken.npz"], "broken.npz: the file is damaged, or no .npz file"),
+        (["empty.parquet"], "empty.parquet: there is nothing to measure: no moment."),
+        (["session.parquet", "--poses", "short.npz"], "session.parquet: there are 9 poses for 151 decisions."),
+        (["session.parquet", "--poses", "poses.npz", "--poses", "poses.npz"], "2 files of poses for 1 session."),
+        (["poses.npz", "--poses", "poses.npz"], "poses.npz: --poses goes with a session, and these are poses."),
+        (["session.parquet", "--controller", "nobody"], "there is no [controllers.nobody]"),
+        (["session.parquet", "--project", "nowhere"], "nowhere"),
+        (["session.parquet", "--baseline", "stick.csv"], "stick.csv: the baseline is no report of measures."),
+        (["session.parquet", "--baseline", "other.json"], 'other.json: the baseline has no session "session.parquet".'),
+        (["session.parquet", "--baseline", "newer.json"], 'newer.json: the baseline has format "2"; this version reads format 1.'),
+        (["poses.npz", "--max-path", "1"], "--max-path cannot be judged: the session does not say where the game had the body."),
+    ],
+)
+def test_what_cannot_be_measured_is_refused_in_one_sentence(arguments: list[str], message: str, here: Path):
+    (here / "broken.npz").write_bytes(b"PK nothing")
+    Trace().save(here / "empty.parquet")
+    with np.load("poses.npz") as poses:
+        every = ("positions", "root", "asset", "time_s", "mirrored", "jumped", "forced")
+        np.savez("short.npz", **{name: poses[name][:9] if name in every else poses[name] for name in poses.files})
+    for name, document in (("other", {"format": 1, "sessions": []}), ("newer", {"format": 2, "sessions": []})):
+        (here / f"{name}.json").write_text(json.dumps(document), encoding="utf-8")
+    assert message in refused(*arguments)
+
+
+@pytest.mark.parametrize("text", ["-1", "many", "nan", "inf"])
+def test_a_bar_is_a_number_from_0_up(text: str):
+    assert "is not a bar. Accepted: a number from 0 up." in measured("session.parquet", f"--max-skate={text}", code=2).err

@@ -151,10 +151,10 @@ def _measured(
 
 def _over(probes: Sequence[Probe], arguments: argparse.Namespace) -> Iterator[str]:
     """Each bar that a drive is over."""
-    for option, (measure, unit) in BARS.items():
+    for option, (key, unit) in BARS.items():
         bar = getattr(arguments, option)
         for probe in probes:
-            value = probe.measures.get(measure)
+            value = probe.measures.get(key)
             if bar is not None and value is not None and value > bar:
                 where = f"{probe.scene.name} {probe.drive.name} at {probe.drive.speed_mps:g} m/s".strip()
                 yield f"{where}: {value:.2f} {unit}, over the bar of {bar:g}"

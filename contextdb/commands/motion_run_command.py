@@ -42,7 +42,7 @@ from contextdb.motion import (
     write_poses,
 )
 from contextdb.motion.characters.project import banks_of
-from contextdb.motion.characters.tables import Facts, own_facts_of
+from contextdb.motion.characters.tables import Facts
 from contextdb.motion.storage.written_poses import pose_file
 from contextdb.motion.trace.views import summary_line
 from contextdb.report.render_json import as_json
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     tables = stage.tables(character.controller.selector.names)
     path = Path(arguments.stick)
     stick = Stick.read(path, conditions_of(tables))
-    moments = Moments.read(path, tables, arguments.unknown, own_facts_of(character.tables, character.own_facts))
+    moments = Moments.read(path, tables, arguments.unknown, character.asked_facts)
     if moments is None:
         character.tables = None
     rate = character.schema.rate if arguments.rate is None else arguments.rate

@@ -168,7 +168,9 @@ class Character:
         if not isinstance(unknown, str) or unknown not in UNKNOWN:
             raise ContextError(Fault(f"unknown is {unknown!r}.", some(UNKNOWN)))
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
-        self.tables, self.own_facts, self.unknown = asking.checked(tables), own_facts, unknown
+        self.own_facts, self.unknown = own_facts, unknown
+        self.tables = tables
+        self._own: tuple[object, object, Mapping[str, FactOf]] = (None, None, {})
         self._body, self._apart = body, NO_MOTION
         self._trail: tuple[tuple[float, Place3], ...] = ()
 
@@ -228,6 +230,24 @@ class Character:
         trace = Trace(n_candidates, self.controller.selector.databases)
         self.controller.recorder = trace
         return trace
+
+    @property
+    def tables(self) -> Tables:
+        """The tables that say what is valid. Set them to exchange them, such as for reloaded ones."""
+        return self._tables
+
+    @tables.setter
+    def tables(self, tables: Tables) -> None:
+        self._tables = asking.checked(tables)
+
+    @property
+    def asked_facts(self) -> Mapping[str, FactOf]:
+        """The character's own facts that its tables ask for, as functions of the moment."""
+        tables, functions, found = self._own
+        if tables is not self._tables or functions is not self.own_facts:
+            found = asking.own_facts_of(self._tables, self.own_facts)
+            self._own = self._tables, self.own_facts, found
+        return found
 
     @property
     def body(self) -> Steered:
@@ -324,8 +344,7 @@ class Character:
     def step_of(self, dt: float, stick: Ground, given: Facts, facing: float | None, moved: Steered) -> Step:
         """The same with the body that has moved."""
         place = place_beside((*moved.position, moved.heading), self._apart)
-        own = asking.own_facts_of(self.tables, self.own_facts)
-        facts = given
+        own, facts = self.asked_facts, given
         if any(name not in given for name in own):
             moment = Moment(dt, stick, facing, moved, self.playing)
             facts = {**{name: of(moment) for name, of in own.items() if name not in given}, **given}
@@ -352,9 +371,9 @@ class Character:
     def valid(self, facts: Facts) -> OfValid | None:
         """What the tables allow with some facts."""
         answers: dict[int, HasAssets] = {
-            id(table): asking.answer(table, facts, self.unknown) for table in asking.each_of(self.tables)
+            id(table): asking.answer(table, facts, self.unknown) for table in asking.each_of(self._tables)
         }
-        return asking.valid_of(self.tables, answers)
+        return asking.valid_of(self._tables, answers)
 
     def answer(self, step: Step, wished: Trajectory, decision: Decision, before: ControllerState) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""

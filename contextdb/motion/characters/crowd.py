@@ -182,7 +182,7 @@ class Crowd(Sequence[Character]):
 
 def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[HasAssets]:
     """A table's answer to each of some contexts."""
-    if isinstance(table, asking.AnswersMany):
+    if asking.answers_many(table):
         columns = {name: [each.get(name) for each in facts] for name in table.asked}
         return table.query_many(columns, unknown=unknown)
     return [asking.answer(table, each, unknown) for each in facts]

@@ -49,8 +49,13 @@ def back_s(schema: FeatureSchema) -> float:
 
 def _points(schema: FeatureSchema) -> tuple[list[float], list[float]]:
     """The seconds and the metres at which the trajectory channels look at the path."""
-    channels = [channel for channel in schema.channels if channel.type == "trajectory"]
-    return [each for channel in channels for each in channel.at], [each for channel in channels for each in channel.along]
+    seconds: list[float] = []
+    metres: list[float] = []
+    for channel in schema.channels:
+        if channel.type == "trajectory":
+            seconds += channel.at
+            metres += channel.along
+    return seconds, metres
 
 
 def path_from(root: Sequence[float], path: Trajectory, *, halflife_s: float = RETURN_HALFLIFE_S) -> Trajectory:

@@ -113,7 +113,7 @@ class ClipSpeeds:
 def plan_of(character: Character, speeds_mps: Sequence[float] = ()) -> Plan:
     """Choose contexts, and speeds where none are given."""
     tables = asking.each_of(character.tables)
-    own = asking.own_facts_of(character.tables, character.own_facts)
+    own = character.asked_facts
     asked = {name: each for table in tables for name, each in table.asked.items() if name not in own}
     chosen, left_open = _single_values(tables, asked)
     values = {name: each.domain.everything for name, each in asked.items() if each.domain.everything}
@@ -229,7 +229,7 @@ def _assets(tables: Sequence[Table], facts: Facts) -> tuple[str, ...]:
     """The valid assets of all tables; the facts that are not given are open."""
     found: list[str] = []
     for table in tables:
-        if isinstance(table, asking.CanAnswer):
+        if asking.can_answer(table):
             found += table.query({name: fact for name, fact in facts.items() if name in table.asked}, unknown="any").assets
     return tuple(found)
 

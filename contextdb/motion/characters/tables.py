@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Literal, Protocol, TypeAlias, TypeGuard, cast
 
 from contextdb.cells.conditions import Condition
 from contextdb.errors import ContextError, Fault
@@ -16,7 +16,6 @@ Unknown = Literal["error", "any", "never"]
 A_TABLE = "a compiled table, a live context of one, or a mapping of databases to them"
 
 
-@runtime_checkable
 class CanAnswer(Protocol):
     """A compiled table."""
 
@@ -28,7 +27,6 @@ class CanAnswer(Protocol):
         """The valid rows of a context."""
 
 
-@runtime_checkable
 class KeepsFacts(Protocol):
     """A live context: facts that are kept."""
 
@@ -43,7 +41,6 @@ class KeepsFacts(Protocol):
         """The valid rows now."""
 
 
-@runtime_checkable
 class AnswersMany(CanAnswer, Protocol):
     """A compiled table that is asked with many contexts at once."""
 
@@ -55,14 +52,34 @@ Table: TypeAlias = CanAnswer | KeepsFacts
 Tables: TypeAlias = Table | Mapping[str, Table] | None
 
 
+def can_answer(table: object) -> TypeGuard[CanAnswer]:
+    """Whether it is a compiled table; by its names, as a check of the protocol takes long."""
+    return hasattr(table, "query") and hasattr(table, "asked")
+
+
+def keeps_facts(table: object) -> TypeGuard[KeepsFacts]:
+    """Whether it is a live context."""
+    return hasattr(table, "matches") and hasattr(table, "asked")
+
+
+def answers_many(table: object) -> TypeGuard[AnswersMany]:
+    """Whether it is a compiled table that is asked with many contexts at once."""
+    return hasattr(table, "query_many") and can_answer(table)
+
+
+def is_one(tables: object) -> TypeGuard[Table]:
+    """Whether it is one table, for all databases."""
+    return keeps_facts(tables) or can_answer(tables)
+
+
 def checked(tables: object) -> Tables:
     """The tables of a character; raises ContextError for what is no table."""
-    if tables is None or isinstance(tables, (KeepsFacts, CanAnswer)):
+    if tables is None or is_one(tables):
         return tables
     if not isinstance(tables, Mapping):
         raise ContextError(Fault(f"tables is a {type(tables).__name__}.", A_TABLE))
     for name, table in tables.items():
-        if not isinstance(name, str) or not isinstance(table, (KeepsFacts, CanAnswer)):
+        if not isinstance(name, str) or not is_one(table):
             raise ContextError(Fault(f"the table of {name!r} is a {type(table).__name__}.", A_TABLE))
     return dict(tables)
 
@@ -71,8 +88,13 @@ def each_of(tables: Tables) -> list[Table]:
     """Each table once."""
     if tables is None:
         return []
-    every = [tables] if isinstance(tables, (KeepsFacts, CanAnswer)) else list(tables.values())
-    return list({id(table): table for table in every}.values())
+    if is_one(tables):
+        return [tables]
+    return list({id(table): table for table in _by_database(tables).values()}.values())
+
+
+def _by_database(tables: Tables) -> Mapping[str, Table]:
+    return cast("Mapping[str, Table]", tables)
 
 
 def own_facts_of(tables: Tables, functions: Mapping[str, FactOf]) -> dict[str, FactOf]:
@@ -85,14 +107,14 @@ def valid_of(tables: Tables, answers: Mapping[int, HasAssets]) -> OfValid | None
     """What may play, for a controller: the answers of the tables, by their ids."""
     if tables is None:
         return None
-    if isinstance(tables, (KeepsFacts, CanAnswer)):
+    if is_one(tables):
         return answers[id(tables)]
-    return {database: answers[id(table)] for database, table in tables.items()}
+    return {database: answers[id(table)] for database, table in _by_database(tables).items()}
 
 
 def answer(table: Table, facts: Facts, unknown: Unknown) -> HasAssets:
     """The rows that are valid with some facts."""
-    if isinstance(table, KeepsFacts):
+    if keeps_facts(table):
         table.update(facts)
         return table.matches()
-    return table.query(facts, unknown=unknown)
+    return cast("CanAnswer", table).query(facts, unknown=unknown)

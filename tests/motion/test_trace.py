@@ -263,7 +263,7 @@ def test_the_file_tells_any_reader_of_parquet_what_it_holds(tmp_path: Path):
     best = frame["candidates"].list.first().struct.field("rows").list.first().struct.field("cost")
     assert best[0] == min(row.cost for row in decisions[0].candidates[0][1].rows)
     metadata = pl.read_parquet_metadata(tmp_path / "session.parquet")
-    assert metadata["contextdb.trace"] == "1"
+    assert metadata["contextdb.trace"] == "2"
     assert json.loads(metadata["about"]) == {
         name: {"rate": None, "features": ["feature 0"], "channels": ["features"], "digest": trace.about[name]["digest"]}
         for name in ("walks", "runs")
@@ -307,8 +307,8 @@ def altered(change, **metadata):
 
 
 def test_sessions_of_another_version_or_with_other_columns_are_refused(tmp_path: Path):
-    assert refused(altered(lambda frame: frame, **{"contextdb.trace": "2"}), tmp_path) == (
-        'the session has format "2"; this version reads format 1.'
+    assert refused(altered(lambda frame: frame, **{"contextdb.trace": "1"}), tmp_path) == (
+        'the session has format "1"; this version reads format 2. Since format 2 costs are on another scale.'
     )
     assert refused(altered(lambda frame: frame, about="[1]"), tmp_path).startswith("the file is damaged")
     assert refused(altered(lambda frame: frame.drop("choice", "why")), tmp_path) == (

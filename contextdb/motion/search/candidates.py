@@ -89,7 +89,7 @@ def of(database: Searched, query: Floats, chosen: Filter, k: int, with_left_out:
     why = chosen.why(lay.frame_ranges, kinds)
     in_ranges = lay.frames
     frames = in_ranges if with_left_out else in_ranges[why[in_ranges] == LeftOut.NO]
-    totals = scan.totals(lay, query, database.slices, database.weights, chosen, kinds, frames)
+    totals = scan.totals(lay, query, database.slices, database.cost_weights, chosen, kinds, frames)
     is_other = frames != chosen.playing(lay.frame_ranges, kinds)
     best = _least_first(totals, is_other, k)
     counted = np.bincount(why[in_ranges], minlength=len(LeftOut))
@@ -105,7 +105,7 @@ def best_of_assets(database: Searched, wanted: Floats, chosen: Filter, name: str
     lay, kinds = database.layout, database.marks.kinds
     why = chosen.why(lay.frame_ranges, kinds)
     frames = lay.frames
-    totals = scan.totals(lay, wanted, database.slices, database.weights, chosen, kinds, frames)
+    totals = scan.totals(lay, wanted, database.slices, database.cost_weights, chosen, kinds, frames)
     is_free, ranges = why[frames] == LeftOut.NO, lay.frame_ranges[frames]
     best = []
     for i in [i for i, asset in enumerate(database.assets) if name.casefold() in asset.casefold()]:
@@ -130,7 +130,9 @@ def _candidates(
     database: Searched, query: Floats, chosen: Filter, frames: Ints, totals: Floats, why: NDArray[np.uint8]
 ) -> Iterator[Candidate]:
     by_channel = (
-        cost.channel_costs(database.layout, frames, query, database.slices, database.weights) if len(frames) else np.empty((0, 0))
+        cost.channel_costs(database.layout, frames, query, database.slices, database.cost_weights)
+        if len(frames)
+        else np.empty((0, 0))
     )
     for i, (frame, total) in enumerate(zip(frames.tolist(), totals.tolist(), strict=True)):
         at = int(database.layout.frame_ranges[frame])

@@ -38,7 +38,8 @@ from contextdb.motion.trace.rows import FILTERS, TIMINGS, Events, Row, columns, 
 if TYPE_CHECKING:
     import polars as pl
 
-FORMAT = 1
+FORMAT = 2
+"""Since 2 the costs of databases built with a schema are divided by the sum of weight x features."""
 FORMAT_KEY, ABOUT_KEY, DIGEST_KEY = "contextdb.trace", "about", "digest"
 CHUNK = 512
 """So many decisions become Parquet at a time."""
@@ -277,7 +278,7 @@ def _check_format(metadata: Mapping[str, str], file: str) -> None:
         raise _refused("this Parquet file is not a recorded session.", file)
     if metadata[FORMAT_KEY] != str(FORMAT):
         found = f"the session has format {in_quotes(metadata[FORMAT_KEY])}; this version reads format {FORMAT}."
-        raise _refused(found, file)
+        raise _refused(f"{found} Since format 2 costs are on another scale.", file)
 
 
 def _check_columns(frame: pl.DataFrame, file: str) -> None:

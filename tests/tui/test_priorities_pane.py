@@ -70,10 +70,10 @@ def test_databases_stand_in_order_with_what_is_valid_and_the_rule(game: Path):
 
     before, after = drive(app, script)
     assert "every row counts as valid" in before
-    assert "1  loco_tired  wins under 0.1     ● 11 of 11 assets valid" in before
+    assert "1  loco_tired  wins under 0.1      ● 11 of 11 assets valid" in before
     assert "2  loco        searched last       ● 28 of 28 assets valid" in before
     assert "For the test row  gait Walk, style normal" in after
-    assert "1  loco_tired  wins under 0.1     ○ 0 of 11 assets valid" in after
+    assert "1  loco_tired  wins under 0.1      ○ 0 of 11 assets valid" in after
     assert "loco_tired has no valid asset for this context: loco decides." in after
 
 

@@ -4,7 +4,7 @@ From standing it goes straight, turns by 90 and by 180 degrees, runs circles and
 stops: at speeds and in contexts that are chosen from what the tables ask and allow, and reported. Each drive is measured as by
 `contextdb motion measure`.
 
-Exits with 1 when a drive is over a bar.
+Exits with 1 when a drive is over a bar; with 2 where a bar cannot be judged.
 
   contextdb motion probe game/ player
   contextdb motion probe game/ player --drive straight --drive circle --speed 1.3
@@ -16,24 +16,24 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from contextdb.commands.motion_measure_command import add_bars, gates_of
 from contextdb.commands.motion_run_command import character_of, rate_of, say_where
 from contextdb.commands.motion_stage import Stage, context_text
 from contextdb.console import ExitCode, aligned, output, printable, progress
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, plural, some
-from contextdb.motion import Character, Pose, Trace, measure
+from contextdb.motion import Character, Measures, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
 from contextdb.motion.characters.probing import Plan, Scene, plan_of
 from contextdb.motion.reading import as_number
 from contextdb.report.render_json import as_json
 
 KINDS = ("straight", "turns", "circle", "eight", "speeds", "stops")
-BARS = {"max_skate": ("skate_cm_s", "cm/s"), "max_jumps": ("jumps_per_s", "jumps a second")}
 COLUMNS = {
     "jumps_per_s": ("jumps/s", 2),
     "forced_jumps": ("forced", 0),
@@ -58,8 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--speed", metavar="M/S", type=_speed, action="append", help="drive at this speed; may be repeated")
     parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
     parser.add_argument("--out", metavar="FOLDER", help="save the session of each drive in this folder")
-    parser.add_argument("--max-skate", metavar="CM_S", type=_bar, help="the bar for the sliding of feet, cm/s")
-    parser.add_argument("--max-jumps", metavar="PER_S", type=_bar, help="the bar for jumps a second")
+    add_bars(parser)
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
 
@@ -70,7 +69,12 @@ class Probe:
     scene: Scene
     drive: Drive
     file: str
-    measures: Mapping[str, Any]
+    measures: Measures
+
+    @property
+    def name(self) -> str:
+        """The scene, the drive and the speed, in words."""
+        return f"{self.scene.name} {self.drive.name} at {self.drive.speed_mps:g} m/s".strip()
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -138,26 +142,19 @@ def _probe(character: Character, scene: Scene, drive: Drive, rate: float, folder
     return Probe(scene, drive, file, _measured(driven, trace, poses, sticks)), trace
 
 
-def _measured(
-    character: Character, trace: Trace, poses: Sequence[Pose], sticks: Sequence[tuple[float, float]]
-) -> Mapping[str, Any]:
-    """The measures of a drive, by the keys of `contextdb motion measure --json`."""
+def _measured(character: Character, trace: Trace, poses: Sequence[Pose], sticks: Sequence[tuple[float, float]]) -> Measures:
+    """The measures of a drive."""
     assert character.stream is not None, "a character with poses has a stream"
     databases = character.controller.selector.databases
-    found = measure(trace, character.stream.banks, poses=poses, databases=databases, wanted=sticks)
-    told: Mapping[str, Any] = found.to_json()
-    return told
+    return measure(trace, character.stream.banks, poses=poses, databases=databases, wanted=sticks)
 
 
 def _over(probes: Sequence[Probe], arguments: argparse.Namespace) -> Iterator[str]:
     """Each bar that a drive is over."""
-    for option, (key, unit) in BARS.items():
-        bar = getattr(arguments, option)
-        for probe in probes:
-            value = probe.measures.get(key)
-            if bar is not None and value is not None and value > bar:
-                where = f"{probe.scene.name} {probe.drive.name} at {probe.drive.speed_mps:g} m/s".strip()
-                yield f"{where}: {value:.2f} {unit}, over the bar of {bar:g}"
+    for probe in probes:
+        for gate in gates_of(arguments, probe.measures, probe.name):
+            if not gate.passed:
+                yield f"{probe.name}: {gate.message}"
 
 
 def _document(plan: Plan, probes: Sequence[Probe]) -> dict[str, Any]:
@@ -167,7 +164,7 @@ def _document(plan: Plan, probes: Sequence[Probe]) -> dict[str, Any]:
             "drive": probe.drive.name,
             "speed_mps": probe.drive.speed_mps,
             "facts": context_text(probe.scene.facts),
-            **probe.measures,
+            **probe.measures.to_json(),
         }
         for probe in probes
     ]
@@ -186,9 +183,9 @@ def _lines(probes: Sequence[Probe]) -> Iterator[str]:
     yield plural(len(probes), "drive")
 
 
-def _cells(measures: Mapping[str, Any]) -> Iterator[str]:
+def _cells(measures: Measures) -> Iterator[str]:
     for key, (_, digits) in COLUMNS.items():
-        value = measures.get(key)
+        value = getattr(measures, key)
         yield "" if value is None else f"{value:.{digits}f}"
 
 
@@ -204,13 +201,6 @@ def _speed(text: str) -> float:
     number = _number(text)
     if number is None or not 0.1 <= number <= 100.0:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a speed to drive at. Accepted: 0.1 to 100 m/s, such as 1.3.")
-    return number
-
-
-def _bar(text: str) -> float:
-    number = _number(text)
-    if number is None or number < 0.0:
-        raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a bar. Accepted: a number from 0, such as 1.5.")
     return number
 
 

@@ -412,9 +412,11 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> cdb.Project:
 
 def test_a_character_of_a_project_walks(project):
     player = motion.Character.of(project, "player")
-    playing = [player.update(DT, (0.0, 1.3), {"gait": "Walk", "style": "normal"}).decision.playing.asset for _ in range(60)]
-    assert playing[0] == "start_walk"
-    assert "walk" in playing
+    updated = [player.update(DT, (0.0, 1.3), {"gait": "Walk", "style": "normal"}) for _ in range(60)]
+    assert updated[0].decision.playing.asset == "start_walk"
+    assert all("walk" in each.decision.playing.asset for each in updated)
+    assert updated[-1].pose.root[1] == pytest.approx(updated[-1].body.position[1], abs=0.15)
+    assert updated[-1].body.position[1] > 1.5
     assert set(player.tables) == {"loco_tired", "loco"}
 
 

@@ -12,6 +12,7 @@ from hypothesis import given
 
 from contextdb.checks import run as check_module
 from contextdb.checks.run import check
+from contextdb.commands.check_command import check_path
 from contextdb.errors import Place
 from contextdb.findings import Finding, worst
 from contextdb.schema.settings import TableSettings
@@ -390,3 +391,63 @@ when = "When"
     found = {f.rule: f for f in check(Project.load(tmp_path).tables["outer"]) if "mirror" in f.rule}
     assert found["inferred-mirror"].message.startswith('"direction" is negated for mirrored clips of the database "loco"')
     assert found["undeclared-mirror"].column == "foot"
+
+
+OLD_COSTS = """
+[features.loco]
+rate = 30.0
+channels = [
+  { type = "position", bone = "Foot", weight = 2.0 },
+  { type = "trajectory", what = "direction", at = [0.5, 1.0], weight = 1.5 },
+]
+[databases.tired]
+clips = "tired/*.bvh"
+features = "loco"
+continuing_bias = {bias}
+base_bias = 30.0
+[databases.loco]
+clips = "*.bvh"
+features = "loco"
+weights = { "Foot position" = 0.0 }
+looping_bias = {bias}
+[selectors.locomotion]
+order = [ { database = "tired", threshold = {threshold} }, { database = "loco" } ]
+"""
+
+
+def old_costs(folder: Path, bias: str, threshold: str) -> list[Finding]:
+    toml = OLD_COSTS.replace("{bias}", bias).replace("{threshold}", threshold)
+    (folder / "contextdb.toml").write_text(toml, encoding="utf-8")
+    (folder / "a.csv").write_text("Asset,direction\na,10\nb,20\n", encoding="utf-8")
+    return [f for f in check_path(str(folder)).findings if f.rule == "old-cost-scale"]
+
+
+def test_thresholds_and_biases_of_the_old_cost_scale_are_told_with_what_they_are_today(tmp_path: Path):
+    found = old_costs(tmp_path, "-6", "24.0")
+    assert {(f.level, f.line) for f in found} == {("info", 8), ("info", 13), ("info", 18)}
+    far = "than 2 below 0, which is what two unrelated frames cost on average, so it outweighs nearly every difference."
+    earlier = "Earlier versions did not divide costs by the sum of weight x features, here"
+    assert [f.message for f in found] == [
+        "[selectors.locomotion] order 1: threshold = 24.0 is above 2, which is what two unrelated frames cost on average,"
+        f" so nearly every frame is under it. {earlier} 12: 24.0 of then is 2 today.",
+        f"[databases.tired] continuing_bias = -6.0 is more {far} {earlier} 12: -6.0 of then is -0.5 today.",
+        f"[databases.loco] looping_bias = -6.0 is more {far} {earlier} 6: -6.0 of then is -1 today.",
+    ]
+
+
+@pytest.mark.parametrize(("bias", "threshold"), [("-0.07", "0.1"), ("-1.0", "1.9"), ("-1e6", "1e6"), ("3.0", "-5.0"), ("0", "0")])
+def test_costs_that_may_be_meant_are_not_told(tmp_path: Path, bias: str, threshold: str):
+    assert old_costs(tmp_path, bias, threshold) == []
+
+
+@pytest.mark.parametrize("value", ["true", '"30"', "[]", "{ x = 1 }"])
+def test_costs_that_cannot_be_read_are_no_matter_of_their_scale(tmp_path: Path, value: str):
+    assert old_costs(tmp_path, value, value) == []
+
+
+def test_an_old_threshold_is_told_where_the_features_cannot_be_read(tmp_path: Path):
+    old_costs(tmp_path, "0", "24.0")
+    toml = (tmp_path / "contextdb.toml").read_text(encoding="utf-8").replace("rate = 30.0", "rate = -1.0")
+    (tmp_path / "contextdb.toml").write_text(toml, encoding="utf-8")
+    (finding,) = [f for f in check_path(str(tmp_path)).findings if f.rule == "old-cost-scale"]
+    assert finding.message.endswith("Earlier versions did not divide costs by the sum of weight x features.")

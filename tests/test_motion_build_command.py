@@ -6,6 +6,7 @@ import contextlib
 import errno
 import io
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 from unittest import mock
@@ -381,3 +382,33 @@ def test_with_poses_a_bank_is_saved_beside_each_database_and_opened_where_it_is_
 
 def test_poses_of_all_clips_cannot_be_had_where_faulty_ones_are_left_out():
     assert "one of the two" in refused("game", "--poses", "--keep-going")
+
+
+STRAIGHT = """
+[features.loco]
+rate = 30.0
+channels = [
+  { type = "position", bone = "LeftFoot" },
+  { type = "trajectory", what = "direction", at = [0.5, 1.0] },
+]
+[databases.all]
+clips = "*.bvh"
+features = "loco"
+[databases.walk]
+clips = "walk.bvh"
+features = "loco"
+"""
+
+
+def test_a_channel_that_hardly_varies_is_told_once_with_its_spread_and_the_floor_that_is_its_scale(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text(STRAIGHT, encoding="utf-8")
+    for name in ("walk", "jog"):
+        write_bvh(make_clip(name).clip, tmp_path / f"{name}.bvh", digits=3)
+    result = run("motion", "build", str(tmp_path))
+    assert result.code == 0
+    (told,) = [line for line in result.err.splitlines() if "[features.loco]" in line]
+    assert open_database(tmp_path / "all.motion.safetensors").normalisation.scale[-1] == 0.2
+    assert re.search(
+        r'"trajectory direction at 0\.5 1 s" varies by 0\.0\d+ of a unit vector in all clips: the scale is 0\.2, as', told
+    )
+    assert told.endswith("a smaller scale would make it most of every cost. Clips that vary more, or weight = 0, change that.")

@@ -56,7 +56,7 @@ features = "loco"
 clips = "clips/jog.bvh"
 features = "loco"
 [selectors.moves]
-order = [{ database = "tired", threshold = 0.5 }, { database = "all" }]
+order = [{ database = "tired", threshold = 0.05 }, { database = "all" }]
 [selectors.free]
 order = [{ database = "free" }]
 [controllers.player]
@@ -336,7 +336,7 @@ def test_clips_that_are_not_there_are_told(here: Path):
 def test_a_priority_database_under_its_threshold_wins_and_the_next_is_not_searched():
     result = motion("select", "game", "moves", *WALK, "--query", "walk_tired@1")
     assert result.lines[0] == "tick 0 at 0.00 s: starts"
-    assert any(line.endswith("0.5  winner, under its threshold") for line in result.lines)
+    assert any(line.endswith("0.05  winner, under its threshold") for line in result.lines)
     assert any(line.split() == ["2", "all", "not", "searched"] for line in result.lines)
     assert "context     gait = Walk, speed = 1.2, style = tired" in result.lines
 

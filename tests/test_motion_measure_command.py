@@ -152,12 +152,13 @@ def test_the_same_session_is_no_worse_than_its_baseline():
 
 def test_what_got_worse_than_the_baseline_fails_and_is_told(here: Path):
     document = json.loads((here / "before.json").read_text(encoding="utf-8"))
-    document["sessions"][0]["jumps_per_s"] *= 0.9
+    now = document["sessions"][0]["jumps_per_s"]
+    document["sessions"][0]["jumps_per_s"] = 0.9 * now
     document["sessions"][0]["skate_raw_cm_s"] *= 0.5  # what the clips do is no fault of the session
     (here / "before.json").write_text(json.dumps(document), encoding="utf-8")
     result = measured("session.parquet", "--baseline", "before.json", code=1)
     (line,) = [line for line in result.lines if line.startswith("BROKEN")]
-    assert line == "BROKEN  baseline jumps_per_s: jumps a second: 1.60, worse than 1.44 before."
+    assert line == f"BROKEN  baseline jumps_per_s: jumps a second: {now:.2f}, worse than {0.9 * now:.2f} before."
 
 
 def test_a_session_whose_project_is_gone_tells_its_jumps_and_why_no_more(here: Path):

@@ -1,7 +1,8 @@
-"""Files that the version before the packages wrote: each still opens, and says what it said then.
+"""Files that the version before the packages wrote: each still opens, and says what it said then; or says why it does not.
 
 `tests/written_before` holds a project, its compiled table, a table in Parquet, a report of coverage, the journal of an editor
-that was killed, a motion database and a recorded session; `said.json` holds what that version itself read in them.
+that was killed, a motion database and a recorded session; `said.json` holds what that version itself read in them. The costs of
+databases are on another scale today, so these are refused; a session says what it cost then.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import pytest
 from running import ROOT, run
 
 import contextdb as cdb
+from contextdb.errors import ArtefactError
 from contextdb.motion.storage.stored import open_database
 from tui.model.session import Session
 
@@ -60,20 +62,12 @@ def journal(folder: Path) -> Any:
     return [session.sheet.history.names, [list(column) for column in session.sheet.table.columns]]
 
 
-def database(folder: Path) -> Any:
-    frames = open_database(folder / "walk.database.safetensors")
-    hits = [frames.search(frames.raw(frame)) for frame in (40, 100)]
-    return [[hit.asset, hit.frame, round(hit.cost, 9)] for hit in hits]
-
-
 def trace(folder: Path) -> Any:
     decisions = run("motion", "replay", str(folder / "session.parquet"), "--json").json["decisions"]
     return [[d[key] for key in ("time_s", "action", "playing", "cost", "context", "root_motion")] for d in decisions[::6]]
 
 
-READERS: dict[str, Callable[[Path], Any]] = {
-    read.__name__: read for read in (compiled, parquet, baseline, journal, database, trace)
-}
+READERS: dict[str, Callable[[Path], Any]] = {read.__name__: read for read in (compiled, parquet, baseline, journal, trace)}
 
 
 def what_is_said(name: str, folder: Path) -> Any:
@@ -87,3 +81,11 @@ def test_a_file_written_before_the_packages_says_what_it_said(name: str, tmp_pat
     monkeypatch.chdir(tmp_path)
     said = json.loads((WRITTEN / "said.json").read_text(encoding="utf-8"))
     assert what_is_said(name, Path("game")) == said[name]
+
+
+def test_a_database_with_costs_on_the_old_scale_is_refused_with_the_reason():
+    message = (
+        "layout 1; this version reads layout 2. Since layout 2 costs are divided .* build it again with `contextdb motion build`"
+    )
+    with pytest.raises(ArtefactError, match=message):
+        open_database(WRITTEN / "walk.database.safetensors")

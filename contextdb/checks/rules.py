@@ -294,6 +294,12 @@ RULES: dict[str, Rule] = {
         'Correct `min` or `max`; if the number has no side, as a speed, remove `mirror = "negate"`.',
         ("checks.mirrored",),
     ),
+    "old-cost-scale": Rule(
+        "info",
+        "A threshold or a bias of contextdb.toml looks as if it was chosen for the costs of an older version.",
+        "Divide it by the number that the message names. From 1,000 on, a number means that its database or frame always wins.",
+        ("checks.costs",),
+    ),
     "undecided-rows": Rule(
         "info",
         "Some rows were not compared with all others, because that would exceed the work limit of a check.",

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from contextdb import report
 from contextdb.checks.cases import check_cases, read_cases
+from contextdb.checks.costs import check_costs
 from contextdb.checks.rows import check_rows, unused_conditions
 from contextdb.checks.run import check
 from contextdb.commands import add_format_arguments
@@ -127,7 +128,8 @@ def _check_files(files: Sequence[tuple[str | None, Path]], schema: Schema | None
         findings += check_rows(table, progress=None if log is None else partial(_tell, log))
         findings += _check_cases(table, cases_path(path))
     if schema is not None and len(read) == len(files):
-        findings += unused_conditions(schema, read, _lines_of(schema))
+        lines = _lines_of(schema)
+        findings += [*unused_conditions(schema, read, lines), *check_costs(schema, lines)]
     return CheckReport(tuple(tables), tuple(findings))
 
 

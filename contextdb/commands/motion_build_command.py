@@ -169,7 +169,9 @@ class MotionProject:
             yield f"[tables.{table}] no database has a clip of {plural(len(assets), 'asset')}: {some(assets)}"
         if unlisted:
             yield f"no table has a row for {plural(len(unlisted), 'clip')}: {some(unlisted)}"
-        yield from dict.fromkeys(str(fault) for each in built.values() for fault in (*each.markup_faults, *each.mirror_faults))
+        yield from dict.fromkeys(
+            str(fault) for each in built.values() for fault in (*each.markup_faults, *each.mirror_faults, *each.scale_faults)
+        )
         for name, each in built.items():
             n_clips = len(each.computed) + len(each.cached)
             yield from (f"[databases.{name}] {sentence}" for sentence in grouped(each.doubts, n_clips))

@@ -52,6 +52,8 @@ class FileKind:
         For messages about a file that cannot be used.
     also : tuple of int
         Other versions that are read.
+    since : str
+        What has changed since the version before, for messages about an older file.
     """
 
     key: str
@@ -60,6 +62,7 @@ class FileKind:
     accepted: str
     mend: str
     also: tuple[int, ...] = ()
+    since: str = ""
 
     def metadata(self, others: Mapping[str, str]) -> dict[str, str]:
         """The metadata of a file of this kind, and others."""
@@ -134,7 +137,8 @@ def read_tensors(path: Path, kind: FileKind, *, writeable: bool = False) -> tupl
         metadata = header.pop(_METADATA)
         known = [str(layout) for layout in sorted((kind.layout, *kind.also))]
         if metadata[kind.key] not in known:
-            raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {' or '.join(known)}.")
+            since = f" {kind.since}" if kind.since else ""
+            raise kind.refused(path, f"layout {metadata[kind.key]}; this version reads layout {' or '.join(known)}.{since}")
         return {name: _view(mapped, start, entry) for name, entry in header.items()}, metadata
 
 

@@ -27,7 +27,7 @@ SECTIONS = {
         "jog": {"table": "locomotion", "clips": "clips/*.bvh", "features": "loco"},
         "jog_tired": {"clips": "clips/*_tired.bvh", "features": "loco"},
     },
-    "selectors": {"locomotion": {"order": [{"database": "jog_tired", "threshold": 2.75}, {"database": "jog"}]}},
+    "selectors": {"locomotion": {"order": [{"database": "jog_tired", "threshold": 0.1}, {"database": "jog"}]}},
     "conditions": {"other sections": "are passed over"},
 }
 
@@ -93,7 +93,7 @@ def test_every_key_of_a_database_is_read():
 def test_a_database_is_not_mirrored_and_cannot_be_entered_near_the_ends_of_clips_unless_it_says_so():
     settings = MotionConfig.from_dict(SECTIONS).database("jog")
     assert (settings.mirror, settings.markup, settings.end_s, settings.weights) == (False, None, 0.3, {})
-    assert (settings.base_bias, settings.looping_bias, settings.continuing_bias) == (0.0, -0.005, -0.01)
+    assert (settings.base_bias, settings.looping_bias, settings.continuing_bias) == (0.0, -0.01, -0.1)
 
 
 def test_nothing_is_a_config_too():
@@ -213,14 +213,14 @@ REFUSED = {
     "no threshold before the last": (
         ("selectors", "locomotion", "order", 0, "threshold"),
         None,
-        '[selectors.locomotion] order 1 has no "threshold". Accepted: a cost, such as 2.75: under it this database wins outright',
+        '[selectors.locomotion] order 1 has no "threshold". Accepted: a cost, such as 0.1: under it this database wins outright',
     ),
     "a threshold on the last": (
         ("selectors", "locomotion", "order", 1, "threshold"),
         1.0,
         "nothing follows that it could spare a search.",
     ),
-    "a threshold in quotes": (("selectors", "locomotion", "order", 0, "threshold"), "2.75", "Did you mean threshold = 2.75?"),
+    "a threshold in quotes": (("selectors", "locomotion", "order", 0, "threshold"), "0.1", "Did you mean threshold = 0.1?"),
 }
 
 

@@ -23,6 +23,7 @@ from contextdb.motion import (
     make_clip,
     query_from,
 )
+from contextdb.motion.features.normalisation import floor_of
 
 SCHEMA = FeatureSchema.from_dict(
     "loco",
@@ -175,7 +176,7 @@ def test_a_built_search_equals_a_scan_of_normalised_frames():
     for _ in range(20):
         query = offset + rng.normal(size=LOCO.n_features) * scale
         valid = rng.random(len(LOCO.assets)) < 0.2
-        costs = (((LOCO.features - (query - offset) / scale) ** 2) * weights).sum(axis=1)
+        costs = (((LOCO.features - (query - offset) / scale) ** 2) * weights).sum(axis=1) / weights.sum()
         allowed = np.concatenate(
             [np.full(stop - start, flag) for start, stop, flag in zip(LOCO.starts, LOCO.stops, valid, strict=True)]
         )
@@ -209,13 +210,16 @@ def test_channels_of_one_group_share_a_scale():
     assert len(set(scale.tolist())) == 1
 
 
-def test_features_without_variation_are_compared_in_their_own_units():
+def test_features_without_variation_are_compared_by_the_floors_of_their_channels():
     still = Clip("still", CLIPS[0].skeleton, 1 / 30, np.repeat(CLIPS[0].values[:1], 10, axis=0))
     database = MotionDatabase.build([still], SCHEMA)
-    assert database.normalisation.scale.tolist() == [1.0] * SCHEMA.n_features
+    floors = {name: floor_of(channel)[0] for name, channel in zip(SCHEMA.slices, SCHEMA.channels, strict=True)}
+    expected = [floors[name] for name, part in SCHEMA.slices.items() for _ in range(part.stop - part.start)]
+    assert database.normalisation.scale.tolist() == expected
     query = database.raw(0)
-    query[0] += 2.0
-    assert database.search(query).cost == pytest.approx(0.75 * 4.0)
+    query[0] += 2.0 * expected[0]
+    total = sum(channel.weight * channel.n_features for channel in SCHEMA.channels)
+    assert database.search(query).cost == pytest.approx(0.75 * 4.0 / total)
 
 
 def test_turning_a_weight_shares_the_features_and_changes_the_cost():
@@ -223,8 +227,11 @@ def test_turning_a_weight_shares_the_features_and_changes_the_cost():
     turned = LOCO.with_weights({"Hips velocity": 5.0})
     assert turned.layout is LOCO.layout
     before, after = LOCO.channel_costs(7, query), turned.channel_costs(7, query)
-    assert after.pop("Hips velocity") == pytest.approx(5.0 * before.pop("Hips velocity"))
-    assert after == before
+    weight = dict(zip(LOCO.channel_names, LOCO.weights, strict=True))["Hips velocity"]
+    total = sum(channel.weight * channel.n_features for channel in SCHEMA.channels)
+    share = total / (total + 3 * (5.0 - weight))  # the hips' velocity has three features
+    assert after.pop("Hips velocity") == pytest.approx(share * 5.0 / weight * before.pop("Hips velocity"))
+    assert after == pytest.approx({name: share * cost for name, cost in before.items()})
 
 
 @pytest.mark.parametrize(
@@ -233,6 +240,7 @@ def test_turning_a_weight_shares_the_features_and_changes_the_cost():
         ({"hips velocity": 1.0}, 'Did you mean "Hips velocity"'),
         ({"Hips velocity": -1.0}, "is -1.0"),
         ({"Hips velocity": math.nan}, "is nan"),
+        (dict.fromkeys(SCHEMA.slices, 0.0), "the weight of every channel is 0"),
     ],
 )
 def test_a_weight_that_cannot_be_is_refused(weights, message):

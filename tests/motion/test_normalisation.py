@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contextdb.motion import FeatureSchema, Normalisation, features_of, make_clip
+from contextdb.motion import FeatureSchema, MotionDatabase, Normalisation, features_of, make_clip, query_from
+from contextdb.motion.features.normalisation import floor_of
 from contextdb.motion.features.schema import Channel
 
 CHANNELS = (
@@ -42,12 +43,61 @@ def test_channels_of_a_group_share_a_scale_and_others_do_not():
     assert scale[6] != scale[0]
 
 
-def test_features_that_do_not_vary_keep_their_own_unit():
-    schema = FeatureSchema("test", 30.0, (Channel("phase"), Channel("trajectory", what="speed", at=(0.0,))))
-    still = np.tile(np.array([[0.0, 0.0, 0.0, 0.0, 1.5]], np.float32), (9, 1))
+def test_a_custom_channel_that_does_not_vary_keeps_its_own_unit():
+    schema = FeatureSchema("test", 30.0, (Channel("custom", function="reach", size=2),))
+    still = np.tile(np.array([[0.5, 1.5]], np.float32), (9, 1))
     found = Normalisation.of([still], schema)
-    assert found.scale.tolist() == [1.0] * 5
-    assert found.apply(still[0] + 1.0).tolist() == [1.0] * 5
+    assert (found.scale.tolist(), found.raised) == ([1.0, 1.0], ())
+    assert found.apply(still[0] + 1.0).tolist() == [1.0, 1.0]
+
+
+EVERY_KIND = (
+    *(Channel(kind, bone="Hips") for kind in ("position", "velocity", "direction", "orientation", "angular_velocity")),
+    Channel("phase"),
+    *(
+        Channel("trajectory", what=what, at=(0.5,))
+        for what in ("position", "velocity", "speed", "direction", "direction_to_velocity")
+    ),
+)
+
+
+@pytest.mark.parametrize("channel", EVERY_KIND, ids=lambda channel: channel.name)
+@pytest.mark.parametrize("times_the_floor", [0.0, 0.5, 0.999, 1.001, 3.0])
+def test_a_scale_is_what_the_features_vary_by_and_at_least_the_floor_of_their_kind(channel, times_the_floor):
+    schema = FeatureSchema("test", 30.0, (channel,))
+    floor, unit = floor_of(channel)
+    signs = np.where(np.arange(40) % 2, 1.0, -1.0)[:, None]  # vary by exactly 1
+    block = np.repeat(signs * floor * times_the_floor, channel.n_features, axis=1).astype(np.float32)
+    found = Normalisation.of([block], schema)
+    assert found.scale == pytest.approx(np.full(channel.n_features, floor * max(1.0, times_the_floor)))
+    assert [(each.channels, each.floor, each.unit) for each in found.raised] == (
+        [((channel.name,), floor, unit)] if times_the_floor < 1.0 else []
+    )
+    assert [each.spread for each in found.raised] == pytest.approx([floor * times_the_floor] if times_the_floor < 1.0 else [])
+
+
+def test_a_group_has_the_least_floor_of_its_channels():
+    group = [Channel("velocity", bone="Hips", group="g"), Channel("position", bone="Hips", group="g")]
+    still = np.ones((9, 6), np.float32)
+    found = Normalisation.of([still], FeatureSchema("test", 30.0, tuple(group)))
+    assert found.scale == pytest.approx(np.full(6, 0.01))
+    assert found.raised[0].channels == ("Hips velocity", "Hips position")
+    free = (*group, Channel("custom", function="reach", group="g"))
+    assert Normalisation.of([np.ones((9, 7), np.float32)], FeatureSchema("test", 30.0, free)).raised == ()
+
+
+def test_clips_that_go_straight_leave_a_cost_of_which_a_turn_is_a_part():
+    channels = [
+        {"type": "position", "bone": "LeftFoot"},
+        {"type": "trajectory", "what": "direction", "at": [0.33, 0.67, 1.0]},
+    ]
+    schema = FeatureSchema.from_dict("test", {"rate": 30.0, "channels": channels})
+    clips = [make_clip(name).clip for name in ("walk", "walk_fast", "jog")]
+    database = MotionDatabase.build(clips, schema)
+    assert [each.channels for each in database.normalisation.raised] == [("trajectory direction at 0.33 0.67 1 s",)]
+    query = query_from(schema, clips[0], 40)
+    query[3:] = [1.0, 0.0] * 3  # to the left at once; each of the six features of 9 is 1 away from straight ahead
+    assert database.search(query).cost == pytest.approx(6 / 9 / 0.2**2, rel=0.1)  # by the spread of 0.05 it would be 250
 
 
 def test_a_normalisation_can_be_undone():

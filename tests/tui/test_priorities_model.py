@@ -53,7 +53,7 @@ def test_assets_are_counted_from_rows_where_there_are_no_clips(game: Path):
     assert fresh.valid == tuple(valid)
     assert len(tired.assets) == sum(asset.endswith("_tired") for asset in load(game / "locomotion.csv").assets)
     assert "no clips yet" in tired.note
-    assert selector.rule == "loco_tired wins outright when its best cost is under 2.75, otherwise the cheaper of both plays."
+    assert selector.rule == "loco_tired wins outright when its best cost is under 0.1, otherwise the cheaper of both plays."
 
 
 def test_assets_are_those_with_clips_that_stand_in_the_table(game: Path):
@@ -109,7 +109,7 @@ def test_a_pattern_that_no_file_can_fit_finds_no_clips(game: Path):
 
 def test_faults_of_the_file_are_told_and_no_selector_is_shown(game: Path):
     toml = game / "contextdb.toml"
-    toml.write_text(toml.read_text(encoding="utf-8").replace("threshold = 2.75", 'threshold = "low"'), encoding="utf-8")
+    toml.write_text(toml.read_text(encoding="utf-8").replace("threshold = 0.1", 'threshold = "low"'), encoding="utf-8")
     priorities = Priorities(sheet_of(game / "locomotion.csv"))
     assert priorities.selectors() == []
     assert "not a number" in priorities.faults()[0].message
@@ -127,7 +127,7 @@ def test_the_example_reads_with_its_features(tmp_path: Path):
     (tmp_path / "contextdb.toml").write_text(EXAMPLE + "\n" + features, encoding="utf-8")
     (tmp_path / "locomotion.csv").write_text("Asset,x\na,True\n", encoding="utf-8")
     [selector] = Priorities(sheet_of(tmp_path / "locomotion.csv")).selectors()
-    assert selector.order == (("jog_tired", 2.75), ("jog", None))
+    assert selector.order == (("jog_tired", 0.1), ("jog", None))
 
 
 # ---- the rule

@@ -70,10 +70,10 @@ def test_databases_stand_in_order_with_what_is_valid_and_the_rule(game: Path):
 
     before, after = drive(app, script)
     assert "every row counts as valid" in before
-    assert "1  loco_tired  wins under 2.75     ● 11 of 11 assets valid" in before
+    assert "1  loco_tired  wins under 0.1      ● 11 of 11 assets valid" in before
     assert "2  loco        searched last       ● 28 of 28 assets valid" in before
     assert "For the test row  gait Walk, style normal" in after
-    assert "1  loco_tired  wins under 2.75     ○ 0 of 11 assets valid" in after
+    assert "1  loco_tired  wins under 0.1      ○ 0 of 11 assets valid" in after
     assert "loco_tired has no valid asset for this context: loco decides." in after
 
 
@@ -100,10 +100,10 @@ def test_a_threshold_is_typed_and_a_bad_one_stays_with_its_reason(game: Path):
         await pilot.press("t")
         field = app.query_one("#priorities-threshold", Input)
         assert field.has_focus
-        assert field.value == "2.75"
+        assert field.value == "0.1"
         await pilot.press(*"low", "enter")
         await pilot.pause()
-        assert "A cost is a number, such as 2.75." in screen_text(app)
+        assert "A cost is a number, such as 0.1." in screen_text(app)
         assert field.value == "low"
         field.value = "1e40"
         await pilot.press("enter")
@@ -137,12 +137,12 @@ def test_a_database_is_moved_and_the_cursor_goes_with_it(game: Path):
     async def script(pilot):
         await pilot.press("d")
         await pilot.pause()
-        assert app.order() == [("loco", 2.75), ("loco_tired", None)]
+        assert app.order() == [("loco", 0.1), ("loco_tired", None)]
         await pilot.press("d", "u")
         await pilot.pause()
 
     drive(app, script)
-    assert app.order() == [("loco_tired", 2.75), ("loco", None)]
+    assert app.order() == [("loco_tired", 0.1), ("loco", None)]
     assert app.told == ["Move loco_tired down", "Move loco_tired up"]
 
 
@@ -155,7 +155,7 @@ def test_a_database_is_added_with_a_threshold_asked_for_and_removed(game: Path):
         await pilot.press("down", "enter")
         await pilot.pause()
         await pilot.pause()
-        assert app.order() == [("loco_hurt", 0.0), ("loco_tired", 2.75), ("loco", None)]
+        assert app.order() == [("loco_hurt", 0.0), ("loco_tired", 0.1), ("loco", None)]
         assert app.query_one("#priorities-threshold", Input).has_focus
         await pilot.press(*"1.5", "enter")
         await pilot.pause()
@@ -167,7 +167,7 @@ def test_a_database_is_added_with_a_threshold_asked_for_and_removed(game: Path):
         return screen_text(app)
 
     drive(app, script)
-    assert app.order() == [("loco_tired", 2.75), ("loco", None)]
+    assert app.order() == [("loco_tired", 0.1), ("loco", None)]
     assert "Every database of the same features is in the selector already" in app.told[2]
 
 
@@ -189,7 +189,7 @@ def test_every_tool_works_by_mouse(game: Path):
     async def script(pilot):
         await pilot.click("#priorities-do-down")
         await pilot.pause()
-        assert app.order() == [("loco", 2.75), ("loco_tired", None)]
+        assert app.order() == [("loco", 0.1), ("loco_tired", None)]
         await pilot.click("#priorities-do-up")
         await pilot.click("#priorities-do-threshold")
         await pilot.pause()
@@ -212,7 +212,7 @@ def test_a_project_without_databases_says_what_they_are(tmp_path: Path):
 
     text = drive(app, script, (80, 18))
     assert "A database is a set of clips" in text
-    assert 'order = [ { database = "jog_tired", threshold = 2.75 }, { database = "jog" } ]' in text
+    assert 'order = [ { database = "jog_tired", threshold = 0.1 }, { database = "jog" } ]' in text
 
 
 def test_databases_without_a_selector_are_put_into_the_example(tmp_path: Path):
@@ -226,12 +226,12 @@ def test_databases_without_a_selector_are_put_into_the_example(tmp_path: Path):
     async def script(pilot):
         return screen_text(app)
 
-    assert '{ database = "loco_tired", threshold = 2.75 }, { database = "loco" }' in drive(app, script, (120, 24))
+    assert '{ database = "loco_tired", threshold = 0.1 }, { database = "loco" }' in drive(app, script, (120, 24))
 
 
 def test_faults_of_the_file_are_shown(game: Path):
     toml = game / "contextdb.toml"
-    toml.write_text(toml.read_text(encoding="utf-8").replace("threshold = 2.75", 'threshold = "[low]"'), encoding="utf-8")
+    toml.write_text(toml.read_text(encoding="utf-8").replace("threshold = 0.1", 'threshold = "[low]"'), encoding="utf-8")
     app = PrioritiesApp(game / "locomotion.csv")
 
     async def script(pilot):

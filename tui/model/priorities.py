@@ -38,7 +38,7 @@ clips = "clips/jog_tired/*.bvh"
 features = "loco"
 
 [selectors.locomotion]
-order = [ { database = "jog_tired", threshold = 2.75 }, { database = "jog" } ]"""
+order = [ { database = "jog_tired", threshold = 0.1 }, { database = "jog" } ]"""
 
 
 @dataclass(frozen=True)

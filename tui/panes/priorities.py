@@ -207,7 +207,7 @@ class PrioritiesPane(Pane):
         if found is None:
             return
         if value is None:
-            self._wrong("A cost is a number, such as 2.75.")
+            self._wrong("A cost is a number, such as 0.1.")
             return
         selector, at = found
         name = selector.databases[at].name
@@ -346,7 +346,7 @@ def _nothing_yet(databases: list[str]) -> Content:
     if not databases:
         return Content.assemble(NO_DATABASES, "\n\n", (EXAMPLE, "bold"))
     first, *rest = databases
-    steps = [f'{{ database = "{name}", threshold = 2.75 }}' for name in rest] + [f'{{ database = "{first}" }}']
+    steps = [f'{{ database = "{name}", threshold = 0.1 }}' for name in rest] + [f'{{ database = "{first}" }}']
     return Content.assemble(NO_SELECTORS, "\n\n", (f"[selectors.main]\norder = [ {', '.join(steps)} ]", "bold"))
 
 

@@ -158,5 +158,5 @@ class MatchGate:
 def _bar(value: object, what: str) -> float:
     number = as_number(value)
     if number is None:
-        raise MotionError(Fault(f"the gate's {what} is {value!r}.", "a finite cost, such as 2.75"))
+        raise MotionError(Fault(f"the gate's {what} is {value!r}.", "a finite cost, such as 0.1"))
     return number

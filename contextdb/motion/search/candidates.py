@@ -89,7 +89,7 @@ def of(database: Searched, query: Floats, chosen: Filter, k: int, with_left_out:
     why = chosen.why(lay.frame_ranges, kinds)
     in_ranges = lay.frames
     frames = in_ranges if with_left_out else in_ranges[why[in_ranges] == LeftOut.NO]
-    totals = scan.totals(lay, query, database.slices, database.weights, chosen, kinds, frames)
+    totals = scan.totals(lay, query, database.slices, database.cost_weights, chosen, kinds, frames)
     is_other = frames != chosen.playing(lay.frame_ranges, kinds)
     best = _least_first(totals, is_other, k)
     counted = np.bincount(why[in_ranges], minlength=len(LeftOut))
@@ -125,7 +125,9 @@ def _candidates(
     database: Searched, query: Floats, chosen: Filter, frames: Ints, totals: Floats, why: NDArray[np.uint8]
 ) -> Iterator[Candidate]:
     by_channel = (
-        cost.channel_costs(database.layout, frames, query, database.slices, database.weights) if len(frames) else np.empty((0, 0))
+        cost.channel_costs(database.layout, frames, query, database.slices, database.cost_weights)
+        if len(frames)
+        else np.empty((0, 0))
     )
     for i, (frame, total) in enumerate(zip(frames.tolist(), totals.tolist(), strict=True)):
         at = int(database.layout.frame_ranges[frame])

@@ -43,6 +43,12 @@ def _sum(rows: Floats) -> Floats:
     return total
 
 
+def shares_of(slices: Sequence[slice], weights: Floats) -> Floats:
+    """The weights [C] divided by the sum of weight x features over all channels: with them a cost is a weighted mean."""
+    relative = weights / weights.max()
+    return np.asarray(relative / weights_of_features(slices, relative).sum())
+
+
 def weights_of_features(slices: Sequence[slice], weights: Floats) -> Floats:
     """The weight of each feature, from that of its channel: float64 [F]."""
     return np.repeat(weights, [columns.stop - columns.start for columns in slices])

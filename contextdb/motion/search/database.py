@@ -1,6 +1,10 @@
 """A motion database: the features of all frames of some assets, and the exact search for the best frame that may play now.
 
-    cost of a frame = Σ over channels of channel_weight × squared difference of normalised features + its biases
+    cost of a frame = Σ over channels of channel_weight × squared difference of normalised features
+                      ÷ Σ over channels of channel_weight × number of features, and its biases
+
+So a cost is a weighted mean of squared differences and means the same for every schema: 0 is the same pose and path, and two frames
+that have nothing to do with each other cost 2 on average. Of a database made from features it is the plain sum.
 
 N frames, F features, R ranges. A range is the frames [start, stop) of one asset; frames between ranges belong to none and are never
 chosen. Which assets may play now comes as a mask next to the cost, so that it can change with every search and rebuilds nothing.
@@ -60,7 +64,7 @@ class Hit:
     frame : int
         Counted over the whole database, 0…N-1.
     cost : float
-        Without a unit; the biases are in it.
+        A weighted mean of squared differences, without a unit; the biases are in it.
     """
 
     asset: str | None
@@ -93,6 +97,7 @@ class MotionDatabase(Searched):
     slices : tuple of slice, length C
         Each channel's features.
     weights : float64 array, shape (C,)
+        As given; a cost is made with `cost_weights`.
     normalisation : Normalisation
         How a query in the schema's units becomes comparable with `features`.
     marks : Marks
@@ -391,7 +396,7 @@ class MotionDatabase(Searched):
     def channel_costs(self, frame: Hit | int, query: ArrayLike) -> dict[str, float]:
         """What each channel adds to the cost of one frame. Their sum, in order, is the frame's cost without its biases."""
         frames = np.array([self._number(frame)])
-        found = cost.channel_costs(self.layout, frames, self._searcher.normalised(query), self.slices, self.weights)
+        found = cost.channel_costs(self.layout, frames, self._searcher.normalised(query), self.slices, self.cost_weights)
         return dict(zip(self.channel_names, found[:, 0].tolist(), strict=True))
 
     def raw(self, frame: Hit | int) -> Floats:
@@ -428,7 +433,10 @@ class MotionDatabase(Searched):
         return self.layout.range_of(require_whole(frame, "frame"))
 
     def with_weights(self, weights: Mapping[str, float]) -> MotionDatabase:
-        """The same database with some channels weighed otherwise; nothing is rebuilt, the features are shared."""
+        """The same database with some channels weighed otherwise; nothing is rebuilt, the features are shared.
+
+        Costs stay on their scale: see `cost_weights`.
+        """
         changed = self.weights.copy()
         for name, weight in require_mapping(weights, "weights", "a mapping of channels to weights").items():
             require_kind(weight, Real, "one of weights", "a number, 0 or more")
@@ -439,6 +447,8 @@ class MotionDatabase(Searched):
             if not math.isfinite(weight) or weight < 0.0:
                 raise MotionError(Fault(f"the weight of channel {in_quotes(name)} is {weight!r}.", "a finite number, 0 or more"))
             changed[self.channel_names.index(name)] = weight
+        if not changed.any():
+            raise MotionError(Fault("the weight of every channel is 0.", "at least one above 0, else all frames are alike"))
         return replace(self, weights=changed)
 
     def __getstate__(self) -> dict[str, object]:
@@ -463,7 +473,7 @@ class MotionDatabase(Searched):
 
     @cached_property
     def _searcher(self) -> Searcher:
-        return Searcher(self.layout, self.marks.kinds, self.normalisation, self.slices, self.weights, self.feature_names)
+        return Searcher(self.layout, self.marks.kinds, self.normalisation, self.slices, self.cost_weights, self.feature_names)
 
     def _hit(self, found: int, frame: int, total: float) -> Hit:
         """The answer for a range, or for -1, none."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
@@ -10,6 +11,7 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.marks import Marks
+from contextdb.motion.search import cost
 from contextdb.motion.search.filters import NO_BIAS, Biases
 from contextdb.motion.search.layout import Features, Layout
 
@@ -31,3 +33,12 @@ class Searched:
     biases: Biases = NO_BIAS
     root: Features | None = None
     schema: FeatureSchema | None = None
+
+    @cached_property
+    def cost_weights(self) -> Floats:
+        """What each channel's squared differences are multiplied by in a cost: float64 [C].
+
+        The weights divided by the sum of weight x features over all channels, so that a cost is a weighted mean and means the same
+        for every schema. Of a database made from features the weights themselves.
+        """
+        return self.weights if self.schema is None else cost.shares_of(self.slices, self.weights)

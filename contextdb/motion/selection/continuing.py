@@ -42,7 +42,9 @@ def _cost(database: MotionDatabase, frame: int, query: Floats) -> float:
     """The cost of one frame for a normalised query: the sums of `search.cost`, in their order, without their arrays."""
     values, wanted = database.layout.take(np.array([frame]))[0].tolist(), query.tolist()
     squares = [(value - want) * (value - want) for value, want in zip(values, wanted, strict=True)]
-    return _sum(weight * _sum(squares[columns]) for columns, weight in zip(database.slices, database.weights.tolist(), strict=True))
+    return _sum(
+        weight * _sum(squares[columns]) for columns, weight in zip(database.slices, database.cost_weights.tolist(), strict=True)
+    )
 
 
 def _sum(values: Iterable[float]) -> float:

@@ -5,7 +5,7 @@
     search_every_s = 0.1       # between two searches, unless one is forced
     jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are not candidates
     history_s = 0.5            # frames played within so many seconds are not entered again
-    variation_within = 0.05    # frames that cost at most so much more than the best are as good as it; without the key, none are
+    variation_within = 0.005   # frames that cost at most so much more than the best are as good as it; without the key, none are
     variation_memory = 2       # and none of the last so many assets is chosen while another is as good
 
 Source: SearchThrottleTime, PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch. The default history is the
@@ -29,7 +29,7 @@ SECONDS = {
     "history_s": ("seconds from 0 to 60, such as 0.5; 0 is no memory", 60.0),
 }
 VARIATION = ("variation_within", "variation_memory")
-WITHIN = "a cost from 0 to 1e30, such as 0.05"
+WITHIN = "a cost from 0 to 1e30, such as 0.005"
 MEMORY = "a whole number from 0 to 1000, such as 2"
 MOST_COST, MOST_ASSETS = 1e30, 1000
 KEYS = ("selector", *SECONDS, *VARIATION)

@@ -286,7 +286,7 @@ def _check_entries(entries: Sequence[Entry]) -> None:
         if names.count(entry.name) > 1:
             raise MotionError(Fault(f"the database {in_quotes(entry.name)} appears twice in the selector.", "each once"))
         if entry.threshold is not None and math.isnan(entry.threshold):
-            raise MotionError(Fault(f"the threshold of {in_quotes(entry.name)} is not a number.", "a cost, such as 2.75, or None"))
+            raise MotionError(Fault(f"the threshold of {in_quotes(entry.name)} is not a number.", "a cost, such as 0.1, or None"))
     loaded = [(entry.name, entry.database) for entry in entries if entry.database is not None]
     for name, database in loaded[1:]:
         first, other = loaded[0]

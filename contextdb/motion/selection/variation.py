@@ -45,7 +45,7 @@ class Variation:
 
     def __post_init__(self) -> None:
         if not isinstance(self.within, Real) or not (math.isfinite(self.within) and self.within >= 0.0):
-            raise MotionError(Fault(f"variation within {self.within!r} of the best cost.", "a cost, 0 or more, such as 0.05"))
+            raise MotionError(Fault(f"variation within {self.within!r} of the best cost.", "a cost, 0 or more, such as 0.005"))
         if not isinstance(self.memory, int) or self.memory < 0:
             raise MotionError(Fault(f"variation with a memory of {self.memory!r}.", "a whole number of assets, 0 or more"))
 

@@ -14,7 +14,7 @@ from os import PathLike
 from pathlib import Path
 
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
-from contextdb.errors import ArtefactError, Fault, FileError, in_quotes, plural
+from contextdb.errors import ArtefactError, Fault, FileError, in_quotes, plural, some
 from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.markup.markup import Markup
@@ -51,6 +51,8 @@ class Built:
         What of its markup does nothing; see `Markup.faults_for`.
     mirror_faults : tuple of Fault
         That its mirrored poses do not fit the rig, whose two sides differ.
+    scale_faults : tuple of Fault
+        Which channels of its features vary so little that their scale is a floor; see `Normalisation.raised`.
     doubts : tuple of ClipFinding
         What is doubtful about its clips, such as their unit; see `contextdb.motion.clips.doubts`. None stops a build.
     """
@@ -61,6 +63,7 @@ class Built:
     cached: tuple[str, ...]
     markup_faults: tuple[Fault, ...] = ()
     mirror_faults: tuple[Fault, ...] = ()
+    scale_faults: tuple[Fault, ...] = ()
     doubts: tuple[ClipFinding, ...] = ()
 
 
@@ -249,6 +252,7 @@ def _built(inputs: Inputs, name: str, found: list[Extracted], shared: Mapping[st
         tuple(each.file.asset for each in found if not each.is_computed),
         () if markup is None else tuple(_markup_faults(inputs, markup, settings, database)),
         tuple(_mirror_faults(name, found)),
+        tuple(_scale_faults(settings.features, shared[settings.features])),
         tuple(doubts((each.file.asset, str(each.file.path), each.measures) for each in found)),
     )
 
@@ -263,6 +267,16 @@ def _mirror_faults(name: str, found: Sequence[Extracted]) -> Iterator[Fault]:
         differ = f"the two sides of the rig differ in {plural(len(uneven), 'clip')}, most in {in_quotes(worst.file.asset)}"
         so = "So far off are mirrored rotations that are played on the rig; searches are not concerned."
         yield Fault(f"[databases.{name}] mirror: {differ}: {told}{more}. {so}")
+
+
+def _scale_faults(schema: str, normalisation: Normalisation) -> Iterator[Fault]:
+    """One fault for each group of channels whose scale is a floor."""
+    for each in normalisation.raised:
+        vary = (
+            f"{some(each.channels)} {'varies' if len(each.channels) == 1 else 'vary'} by {each.spread:.2g} {each.unit} in all clips"
+        )
+        so = "as a smaller scale would make it most of every cost. Clips that vary more, or weight = 0, change that"
+        yield Fault(f"[features.{schema}] {vary}: the scale is {each.floor:g}, {so}.")
 
 
 def _markup_faults(inputs: Inputs, markup: Markup, settings: DatabaseSettings, database: MotionDatabase) -> list[Fault]:

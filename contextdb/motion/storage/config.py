@@ -205,7 +205,7 @@ def _read_output(parts: Mapping[str, Mapped], faults: list[Fault], file: str | N
 def _read_selectors(
     parts: Mapping[str, Mapping[str, Mapped]], faults: list[Fault], file: str | None
 ) -> Iterator[tuple[str, SelectorSettings]]:
-    accepted = 'databases in order, such as [{ database = "jog_tired", threshold = 2.75 }, { database = "jog" }]'
+    accepted = 'databases in order, such as [{ database = "jog_tired", threshold = 0.1 }, { database = "jog" }]'
     for name, part in parts["selectors"].items():
         section = Section(f"[selectors.{name}]", part, ("order",), faults, file)
         steps = part.get("order") if section.has("order", accepted) else ()
@@ -230,7 +230,7 @@ def _read_step(section: Section, i: int, step: object, n_steps: int, known: list
         return None, None
     part = Section(where, step, STEP_KEYS, section.faults, section.file)
     database = part.one_of("database", known, "database") if part.has("database", some(known) or "the name of a database") else None
-    accepted = "a cost, such as 2.75"
+    accepted = "a cost, such as 0.1"
     if "threshold" in step:
         if i == n_steps - 1:
             part.wrong("threshold", "nothing follows that it could spare a search", "no threshold on the last database")

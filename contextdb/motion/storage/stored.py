@@ -42,10 +42,11 @@ from contextdb.motion.search.layout import Layout
 
 STORED = FileKind(
     "contextdb.motion",
-    1,
+    2,
     "a motion database of contextdb",
     "a motion database that this version of contextdb built",
     "to build it again with `contextdb motion build`",
+    since="Since layout 2 costs are divided by the sum of weight x features, and scales have a floor.",
 )
 LARGE = ("layout.blocks", "layout.lows", "layout.highs", "root")
 """What grows with frames times features, and holds no index."""

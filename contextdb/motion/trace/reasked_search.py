@@ -60,7 +60,7 @@ class ReaskedSearch:
     @property
     def channels(self) -> Floats:
         """What each channel adds to the cost of each frame: float64 [N, C]."""
-        return np.asarray((self.database.weights[:, None] * self.sums).T)
+        return np.asarray((self.database.cost_weights[:, None] * self.sums).T)
 
     @cached_property
     def biases(self) -> Floats:
@@ -71,7 +71,7 @@ class ReaskedSearch:
     def costs(self) -> Floats:
         """The cost of each frame, its biases in it, to the last bit the search's: float64 [N]; infinite between ranges."""
         total = np.zeros(self.database.n_frames)
-        for weight, added in zip(self.database.weights, self.sums, strict=True):
+        for weight, added in zip(self.database.cost_weights, self.sums, strict=True):
             total += weight * added
         return np.asarray(np.where(self.database.layout.frame_ranges >= 0, total + self.biases, np.inf))
 

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 FORMAT, READ = 2, ("1", "2")
+"""Since 2 the costs of databases built with a schema are divided by the sum of weight x features, and the inputs are kept."""
 FORMAT_KEY, ABOUT_KEY, DIGEST_KEY, SHOWN_KEY = "contextdb.trace", "about", "digest", "candidates"
 CHUNK = 512
 """So many decisions become Parquet at a time."""

@@ -420,9 +420,9 @@ def _weight_of_tie(channel: str, now: float, at: Place, winner: ReaskedSearch, f
     """
 
     def behind(weight: float) -> float:
-        changed = at.search.database.with_weights({channel: weight}).weights
+        changed = at.search.database.with_weights({channel: weight}).cost_weights
         own = float((changed * at.search.sums[:, at.frame]).sum() + at.search.biases[at.frame])
-        others = winner.database.with_weights({channel: weight}).weights
+        others = winner.database.with_weights({channel: weight}).cost_weights
         return own - float((others * winner.sums[:, frame]).sum() + winner.biases[frame])
 
     old, value = now, behind(now)

@@ -38,5 +38,5 @@ def _skate(feet: Floats, it: Shown) -> Floats:
     assert it.contacts is not None, "was looked at before"
     slides = formulas.Slides.of(feet, it.times_s, it.contacts, formulas.floor_of(feet))
     found = np.full(len(it.times_s), np.nan)
-    found[1:] = np.where(slides.planted, 100.0 * slides.speeds, 0.0).max(axis=1)
+    found[len(found) - len(slides.seconds) :] = np.where(slides.planted, 100.0 * slides.speeds, 0.0).max(axis=1)
     return found

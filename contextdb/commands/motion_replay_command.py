@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if place is not None:
         parts.insert(0, _Shown.of(replay, place).part())
     if not parts:
-        parts.append(_session(replay))
+        parts.append(_session(replay) if page is None else ({}, [summary_line(replay.trace.brief())]))
     with output():
         if arguments.json:
             told = {key: value for document, _ in parts for key, value in document.items()}

@@ -131,8 +131,8 @@ def _shown(given: object, banks: Banks | None, poses: OfPoses | None, settings: 
         return shown.with_poses(session, _of_poses(poses, session.rate if rate is None else rate))
     if not banks or not decisions:
         return session
-    made = _made(decisions, banks, PoseSettings() if settings is None else settings)
-    return session if made is None else shown.with_poses(session, shown.of_poses(made, 1.0))
+    made = poses_of(decisions, banks, PoseSettings() if settings is None else settings)
+    return shown.with_poses(session, shown.of_poses(made, 1.0))
 
 
 def _of_poses(given: object, rate: float | None) -> Shown:
@@ -148,8 +148,11 @@ def _of_poses(given: object, rate: float | None) -> Shown:
     return shown.of_poses(listed, require_real(rate, "rate", LEAST_RATE, MOST_RATE))
 
 
-def _made(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings) -> list[Pose] | None:
-    """The poses of a session, made again; None where its root mode needs a body that it does not say."""
+def poses_of(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings) -> list[Pose]:
+    """The poses of a session, made again; by the animation's own root where the session does not say where the body was.
+
+    Raises MotionError where the banks have no poses of what plays.
+    """
     if settings.root != "animation" and any(decision.body is None for decision in decisions):
         settings = replace(settings, root="animation")
     stream = PoseStream(banks, settings)

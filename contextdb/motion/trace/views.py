@@ -185,7 +185,7 @@ def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]
     if decision.search_us is not None:
         yield "search", f"{decision.search_us:,.0f} µs"
     if decision.context:
-        yield "context", ", ".join(f"{key} = {_fact_text(value)}" for key, value in decision.context.items())
+        yield "context", ", ".join(f"{key} = {fact_text(value)}" for key, value in decision.context.items())
 
 
 def _playing_text(playing: Playing | None) -> str:
@@ -203,7 +203,8 @@ def _parts_text(decision: Decision, playing: Playing | None) -> str:
     return ""
 
 
-def _fact_text(value: object) -> str:
+def fact_text(value: object) -> str:
+    """A fact as people write it."""
     if isinstance(value, (list, tuple, set, frozenset)):
         return " ".join(f"+{tag}" for tag in sorted(map(str, value))) or "no tags"
     return "missing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -32,6 +32,9 @@ SETTINGS = st.builds(
     history_s=SECONDS,
     variation=st.sampled_from([None, None, Variation(1.0), Variation(4.0, 2)]),
     rate=st.just(RATE),
+    cost_bar=st.sampled_from([None, 0.0, 1.0, 4.0]),
+    grace_s=SECONDS,
+    until_natural=st.booleans(),
 )
 
 

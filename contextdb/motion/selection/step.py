@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.search.database import Hit
-from contextdb.motion.selection import trigger
+from contextdb.motion.selection import guards, trigger
 from contextdb.motion.selection.asked import Asked
 from contextdb.motion.selection.choice import Choice, Reason
 from contextdb.motion.selection.continuing import continuing_cost
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Playing
+from contextdb.motion.selection.guards import Held
 from contextdb.motion.selection.history import Played, ended_skip, history_skips, playing_skips, remembered
 from contextdb.motion.selection.ongoing import Ongoing, playing_at
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
@@ -34,6 +35,7 @@ class Outcome:
     cost: float | None = None
     continuing_cost: float | None = None
     choice: Choice | None = None
+    held: Held = Held.NOTHING
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,26 +83,40 @@ class Step:
         """Seconds until the next search is due."""
         return self.settings.search_every_s - self.state.since_search_s - self.dt_s
 
+    @property
+    def waited_s(self) -> float:
+        """For how long a forced jump over the cost bar has waited."""
+        since_s = self.state.waiting_since_s
+        return 0.0 if since_s is None else self.now_s - since_s
+
     # ---- whether to search
 
     def trigger(self, force: bool, interrupt: bool) -> Trigger | None:
         """Why to search now; None not to."""
         if self.ongoing is None:
             return Trigger.NOTHING_PLAYS if self.state.playing is None else Trigger.LOST
-        is_valid = self._is_valid(self.ongoing)
+        is_valid = self._is_valid(self.ongoing)  # it refuses a wrong mask also where nothing hangs on it
         if self.ongoing.move.is_ended:
             return Trigger.ENDED
         if self.ongoing.database not in self.selector.among(self.asked.among):
             return Trigger.NOT_AMONG
+        if interrupt:
+            return Trigger.INTERRUPTED
         if not is_valid:
             return Trigger.NOT_VALID
-        if interrupt or force:
-            return Trigger.INTERRUPTED if interrupt else Trigger.FORCED
+        if force:
+            return Trigger.FORCED
         return Trigger.DUE if self.due_s <= TOLERANCE_S else None
 
     def _is_valid(self, ongoing: Ongoing) -> bool:
         """Whether the playing asset is still valid."""
         return bool(ongoing.head.database.filter(**self.asked.of(ongoing.database)).ranges[ongoing.head.range])
+
+    def held(self, cause: Trigger | None) -> Held:
+        """Which guard lets play on what is no longer valid, without a search."""
+        if cause is not Trigger.NOT_VALID or self.ongoing is None:
+            return Held.NOTHING
+        return guards.held_without_search(self.ongoing, self.settings)
 
     # ---- what to leave out
 
@@ -121,9 +137,10 @@ class Step:
 
     # ---- what comes of it
 
-    def unsearched(self, ongoing: Ongoing) -> Outcome:
+    def unsearched(self, ongoing: Ongoing, held: Held) -> Outcome:
         """What plays, plays on."""
-        return Outcome(_onward(ongoing), trigger.not_due(self.due_s), ongoing.playing)
+        why = trigger.held(ongoing.playing, held.told) if held else trigger.not_due(self.due_s)
+        return Outcome(_onward(ongoing), why, ongoing.playing, held=held)
 
     def searched(self, cause: Trigger, asked: Asked, choice: Choice, rng: Rng | None) -> Outcome:
         """What is made of the selector's choice: to play on, to jump, or, when nothing is found, to make do with what there is."""
@@ -138,6 +155,13 @@ class Step:
             return Outcome(_onward(self.ongoing), why, self.ongoing.playing, continuing, continuing, choice)
         playing = self._playing(choice, hit)
         why = trigger.jumped(cause, self.before, playing, hit.cost, choice, continuing)
+        bar = self.settings.cost_bar
+        if cause is Trigger.NOT_VALID and self.ongoing is not None and bar is not None and hit.cost > bar:
+            left_s = self.settings.grace_s - self.waited_s
+            if left_s > TOLERANCE_S:
+                why = trigger.waiting(self.ongoing.playing, playing, hit.cost, bar, left_s)
+                return Outcome(_onward(self.ongoing), why, self.ongoing.playing, choice=choice, held=Held.COST_BAR)
+            why = trigger.last_resort(why, bar, self.waited_s)
         action = Action.START if self.state.playing is None else Action.JUMP
         return Outcome(action, why, playing, hit.cost, continuing, choice)
 

@@ -32,8 +32,8 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 """What the markup says of a frame of a database."""
 Events = dict[tuple[str, int], tuple[str, ...]]
 
-TIMINGS, FILTERS = "search_us", "filters"
-"""The columns that a file may lack: another recording has other timings, and an older version kept no filters."""
+TIMINGS, FILTERS, HELD = "search_us", "filters", "held"
+"""The columns that a file may lack: another recording has other timings, and an older version kept no filters and had no guards."""
 
 
 def columns() -> dict[str, PolarsType]:
@@ -83,6 +83,7 @@ def columns() -> dict[str, PolarsType]:
         "candidates": pl.List(pl.Struct(found)),
         "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
         "root_weight": number,
+        HELD: text,
         FILTERS: filter_type(),
         TIMINGS: number,
     }
@@ -110,6 +111,7 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         "candidates": [_candidates_row(name, found, events_of) for name, found in decision.candidates],
         "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
         "root_weight": float(decision.root_weight),
+        HELD: str(decision.held),
         FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
         TIMINGS: _number(decision.search_us),
     }
@@ -230,6 +232,7 @@ def decision_of(row: Row) -> Decision:
         search_us=row.get(TIMINGS),
         root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
         root_weight=float(row["root_weight"]),
+        held=row.get(HELD) or "",
         filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
     )
 

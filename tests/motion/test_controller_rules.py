@@ -73,9 +73,9 @@ class Oracle:
         before, here = self.frame, (passed or [self.frame])[-1]
         self.played.update(dict.fromkeys(passed, self.tick))
         chosen = self._best(place, mask, here, may_continue, following is None) if searched else following
-        if is_forced and searched and chosen is not None and self._cost(chosen, place) > self.bar:
-            if self.tick - (self.waiting_from or self.tick) < self.n["grace_s"]:
-                self.held, chosen = "cost bar", None
+        is_over = is_forced and searched and chosen is not None and self._cost(chosen, place) > self.bar
+        if is_over and self.tick - (self.waiting_from or self.tick) < self.n["grace_s"]:
+            self.held, chosen = "cost bar", None
         self.waiting_from = (self.waiting_from or (self.tick if self.held == "cost bar" else None)) if self.held else None
         if searched:
             self.searched_at = self.tick

@@ -67,7 +67,6 @@ class LiveContext(MutableMapping[str, object]):
         "_enabled",
         "_facts",
         "_is_bound",
-        "_keep",
         "_known",
         "_lookups",
         "_masks",
@@ -115,10 +114,8 @@ class LiveContext(MutableMapping[str, object]):
         """Other names that `update` was given and that are like none of these."""
         self._alike: dict[str, tuple[str, ...]] = {}
         """For each other name the facts that it is like."""
-        self._keep = compiled.keeping(unknown) if compiled.mirroring and not compiled.is_soft else None
-        """What keeps the facts of an answer, where it must know them for a mirror alone."""
         self._is_bound = compiled.is_bound
-        """Whether an answer must know the facts, for the costs of soft cells or for a mirror."""
+        """Whether an answer must know the facts, for the costs of soft cells, for a mirror or for widened cells."""
         self._answer = Matches(0, self._answering)
         """The last answer: while the rows stay the same, so does the object."""
         for condition in compiled.conditions:
@@ -267,7 +264,7 @@ class LiveContext(MutableMapping[str, object]):
 
     def matches(self) -> Matches:
         """The valid rows now; the same object as before while they stay the same, in a table without soft cells and without
-        conditions whose facts change in a mirror.
+        conditions whose facts change in a mirror or that have a hysteresis.
 
         Raises
         ------
@@ -300,8 +297,6 @@ class LiveContext(MutableMapping[str, object]):
             return self._set_matches(bits)
         if self._is_bound:
             answer = Matches(bits, self._answering)
-            if self._keep is not None:
-                return answer.with_mirrored(self._keep(self._told))
             return self._compiled.bound(answer, self._told, self._unknown)
         if bits != self._answer.bits:
             self._answer = Matches(bits, self._answering)
@@ -480,8 +475,6 @@ class AskingLiveContext(LiveContext):
                 left &= ~when.rules[number].rows
         if left == answer.bits:
             return answer
-        if self._keep is not None:
-            return Matches(left, self._answering).with_mirrored(self._keep(self._told))
         if self._is_bound:
             return self._compiled.bound(Matches(left, self._answering), self._told, self._unknown)
         if left != self._left.bits:

@@ -10,7 +10,9 @@ import polars as pl
 import pytest
 from lines import DT, RATE, line
 
+import contextdb as cdb
 from contextdb.motion import Action, Controller, ControllerSettings, Entry, Selector, Trace
+from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.trace.views import decision_lines, session_lines
 
 
@@ -123,6 +125,60 @@ def test_until_natural_lets_a_clip_play_to_its_end_and_a_loop_does_not_wait():
     one = controller(line("walk,Looping,,,\n", walk=range(4), run=range(50, 60)), until_natural=True)
     one.update(DT, [0.0])
     assert updates(one, [1.0], valid("run"))[0].action is Action.JUMP
+
+
+# ---- hysteresis
+
+
+def table(cells, hysteresis=0.5, **more):
+    told = {"speed": {"type": "number", "hysteresis": hysteresis}, "heat": {"type": "number"}}
+    return cdb.Table.from_columns({"Asset": ["walk", "run"], "speed": cells, **more}, told).compile()
+
+
+def test_what_plays_stays_valid_a_little_beyond_its_edge_and_nothing_else_does():
+    moves = table(["0..2", "1..9"])
+    one = controller(line(walk=range(10), run=range(50, 60)))
+    one.update(DT, [0.0], moves.query({"speed": 1.5}))
+    stays, leaves = one.update(DT, [1.0], moves.query({"speed": 2.5})), one.update(DT, [1.0], moves.query({"speed": 2.75}))
+    assert (stays.action, stays.held, stays.searched) == (Action.CONTINUE, "hysteresis", False)
+    assert stays.why == "The next search is due in 59.9 s; walk is valid by hysteresis alone."
+    assert (leaves.action, at(leaves), leaves.held) == (Action.JUMP, ("run", 0.0), "")
+    returning = one.update(DT, [1.0], moves.query({"speed": 0.75}))
+    assert (at(returning), returning.held) == (("run", 0.1), "hysteresis")
+    other = controller(line(walk=range(10), run=range(50, 60)))
+    assert at(other.update(DT, [0.0], moves.query({"speed": 2.25}))) == ("run", 0.0)
+
+
+def test_in_a_search_it_competes_as_what_plays_but_no_other_frame_of_it_does():
+    moves = table(["0..2", "1..9"])
+    trace = Trace(n_candidates=30)
+    one = controller(line(walk=range(10), run=range(3, 13)), trace, search_every_s=0.0)
+    one.update(DT, [0.0], moves.query({"speed": 1.0}))
+    stays = one.update(DT, [1.0], moves.query({"speed": 2.25}))
+    assert (stays.action, at(stays), stays.held, stays.continuing_cost) == (Action.CONTINUE, ("walk", 0.1), "hysteresis", 0.0)
+    assert stays.why == "A search was due: playing on costs 0, the least; walk is valid by hysteresis alone."
+    ((_, found),) = stays.candidates
+    reasons = {row.frame: row.left_out for row in found if row.asset == "walk"}
+    assert reasons.pop(1) is LeftOut.NO
+    assert set(reasons.values()) == {LeftOut.NOT_VALID}
+    jumped = one.update(DT, [4.0], moves.query({"speed": 2.25}))
+    assert (jumped.action, at(jumped), jumped.continuing_cost) == (Action.JUMP, ("run", 0.1), 4.0)
+
+
+def test_soft_cells_cost_what_plays_by_hysteresis_what_they_cost_widened():
+    moves = table(["0..2", "1..9"], heat=["0..1 ~3", "Any"])
+    one = controller(line(walk=range(10), run=range(9, 19)), search_every_s=0.0)
+    one.update(DT, [0.0], moves.query({"speed": 1.0, "heat": 0.0}))
+    stays = one.update(DT, [1.0], moves.query({"speed": 2.25, "heat": 2.0}))
+    assert (at(stays), stays.continuing_cost) == (("walk", 0.1), 3.0)
+
+
+def test_beyond_the_hysteresis_the_grace_time_begins():
+    moves = table(["0..2", "1..9"])
+    one = controller(line(walk=range(20), run=range(50, 60)), cost_bar=2.0, grace_s=0.2)
+    speeds = (1.0, 2.25, 2.25, 3.0, 3.0, 3.0)
+    held = [one.update(DT, [1.0], moves.query({"speed": speed})).held for speed in speeds]
+    assert held == ["", "hysteresis", "hysteresis", "cost bar", "cost bar", ""]
 
 
 # ---- what is kept

@@ -192,7 +192,8 @@ class Controller:
         dt_s = _seconds(dt_s)
         step = Step.of(self.selector, self.settings, self._state, dt_s, query, asked, self._ongoing(dt_s))
         cause = step.trigger(force, interrupt)
-        if held := step.held(cause):
+        held = step.held(cause)
+        if held:
             cause = None
         return Asking(step, cause, None if cause is None else step.wanted(cause), context, held)
 
@@ -248,7 +249,7 @@ class Controller:
             if self.settings.variation is not None:
                 recent = self.settings.variation.remember(recent, playing.asset)
         since_s = 0.0 if decision.searched else state.since_search_s + step.dt_s
-        waiting_since_s = state.waiting_since_s if decision.held else None
+        waiting_since_s = state.waiting_since_s if decision.held not in ("", Held.HYSTERESIS) else None
         if decision.held == Held.COST_BAR and waiting_since_s is None:
             waiting_since_s = step.now_s
         return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent, waiting_since_s)

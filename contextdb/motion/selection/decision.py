@@ -89,7 +89,8 @@ class Decision:
     root_weight : float
         How much of its movement is to come from the animation, from 0 to 1; the rest is the game's.
     held : str
-        What let an asset that is no longer valid play on: "next natural", "until natural" or "cost bar"; empty when nothing had to.
+        What let an asset that is no longer valid play on: "next natural", "until natural", "cost bar" or "hysteresis"; empty when
+        nothing had to.
     filters : tuple of (database name, Filter)
         What could be chosen from in each database that was searched; empty where no candidates are asked for.
     """

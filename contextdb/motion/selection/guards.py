@@ -8,6 +8,9 @@ The jump out of such an asset is forced: playing on does not compete with it, wh
   After the grace time the bar counts no longer: the best jump is taken, as the last resort, and its reason says so.
 
 An interruption passes all guards, and so does the end of a clip: then nothing can play on.
+
+Before that, an asset may be valid by hysteresis alone: its row's cells accept the facts when they are widened by what the
+conditions declare. It then competes in searches as any that plays, but no other frame of it may be entered.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ class Held(StrEnum):
     NEXT_NATURAL = "next natural"
     UNTIL_NATURAL = "until natural"
     COST_BAR = "cost bar"
+    HYSTERESIS = "hysteresis"
 
     @property
     def told(self) -> str:

@@ -58,6 +58,11 @@ def held(before: Playing, told: str) -> str:
     return f"{Trigger.NOT_VALID.told(before)}, but plays on {told}."
 
 
+def by_hysteresis(why: str, before: Playing) -> str:
+    """The same of an asset that hysteresis alone keeps valid."""
+    return f"{why.removesuffix('.')}; {before.asset} is valid by hysteresis alone."
+
+
 def waiting(before: Playing, playing: Playing, cost: float, bar: float, left_s: float) -> str:
     """What is said when a forced jump over the bar waits."""
     told = f"{Trigger.NOT_VALID.told(before)}: {playing.asset} at {playing.time_s:.2f} s costs {cost:.4g}, over the bar {bar:g}"

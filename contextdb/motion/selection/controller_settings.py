@@ -6,7 +6,7 @@
     jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are not candidates
     history_s = 0.5            # frames played within so many seconds are not entered again
     cost_bar = 1.0             # a jump out of an asset that is no longer valid waits if it costs more; without the key, none does
-    grace_s = 0.2              # for at most so long
+    grace_s = 0.3              # for at most so long
     until_natural = true       # and an asset without a loop then plays on to its end
     variation_within = 0.05    # frames that cost at most so much more than the best are as good as it; without the key, none are
     variation_memory = 2       # and none of the last so many assets is chosen while another is as good
@@ -31,7 +31,7 @@ SECONDS = {
     "search_every_s": ("seconds from 0 to 60, such as 0.1; 0 is every update", 60.0),
     "jump_threshold_s": ("seconds from 0 to 60, such as 0.2", 60.0),
     "history_s": ("seconds from 0 to 60, such as 0.5; 0 is no memory", 60.0),
-    "grace_s": ("seconds from 0 to 60, such as 0.2; 0 is no grace", 60.0),
+    "grace_s": ("seconds from 0 to 60, such as 0.3; 0 is no grace", 60.0),
 }
 VARIATION = ("variation_within", "variation_memory")
 BAR = "a cost from 0 to 1e30, such as 1.0"
@@ -76,7 +76,7 @@ class ControllerSettings:
     variation: Variation | None = None
     rate: float = 30.0
     cost_bar: float | None = None
-    grace_s: float = 0.2
+    grace_s: float = 0.3
     until_natural: bool = False
 
     def __post_init__(self) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import math
 import pickle
+from dataclasses import replace
 from types import SimpleNamespace
 
 import polars as pl
@@ -11,7 +13,7 @@ import pytest
 from lines import DT, RATE, line
 
 import contextdb as cdb
-from contextdb.motion import Action, Controller, ControllerSettings, Entry, Selector, Trace
+from contextdb.motion import Action, Controller, ControllerSettings, Entry, FeatureSchema, Selector, Trace
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.trace.views import decision_lines, session_lines
 
@@ -71,6 +73,18 @@ def test_an_asset_that_is_valid_again_begins_a_new_grace_time():
     one.update(DT, [0.0])
     masks = [valid("run"), valid("run"), None, valid("run"), valid("run"), valid("run")]
     assert [one.update(DT, [1.0], mask).action for mask in masks] == [*[Action.CONTINUE] * 5, Action.JUMP]
+
+
+def test_databases_with_a_schema_have_a_bar_and_others_none_unless_it_is_given():
+    channels = [{"type": "trajectory", "what": "speed", "at": 0.0}]
+    schema = FeatureSchema.from_dict("speed", {"rate": RATE, "channels": channels})
+    plain = line(walk=range(10), run=range(50, 60))
+    assert ControllerSettings().bar_of(plain) == math.inf
+    assert ControllerSettings().bar_of(replace(plain, schema=schema)) == 1.0
+    assert ControllerSettings(cost_bar=3).bar_of(plain) == 3
+    one = controller(replace(plain, schema=schema))
+    one.update(DT, [0.0])
+    assert updates(one, [1.0], valid("run"))[0].held == "cost bar"
 
 
 def test_without_a_bar_a_grace_time_changes_nothing():

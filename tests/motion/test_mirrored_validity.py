@@ -75,7 +75,7 @@ def test_searches_starts_and_reasons_all_go_by_the_mirror(database):
 
 
 def test_what_plays_mirrored_plays_on_while_the_mirrored_facts_allow_it(database):
-    settings = ControllerSettings(search_every_s=60.0, jump_threshold_s=0.0, history_s=0.0, rate=30.0)
+    settings = ControllerSettings(search_every_s=60.0, jump_threshold_s=0.0, history_s=0.0, rate=30.0, grace_s=0.0)
     one, compiled = Controller(Selector([Entry("a", database)]), settings), table()
     at = next(i for i, a in enumerate(database.assets) if a == TURNS[1] and database.mirrored[i])
     query = database.raw(int(database.starts[at]))
@@ -154,6 +154,7 @@ order = [{ database = "turns" }]
 
 [controllers.player]
 selector = "turns"
+grace_s = 0
 """
 
 

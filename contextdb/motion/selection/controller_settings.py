@@ -5,14 +5,15 @@
     search_every_s = 0.1       # between two searches, unless one is forced
     jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are not candidates
     history_s = 0.5            # frames played within so many seconds are not entered again
-    cost_bar = 1.0             # a jump out of an asset that is no longer valid waits if it costs more; without the key, none does
+    cost_bar = 1.0             # a jump out of an asset that is no longer valid waits if it costs more
     grace_s = 0.3              # for at most so long
     until_natural = true       # and an asset without a loop then plays on to its end
     variation_within = 0.05    # frames that cost at most so much more than the best are as good as it; without the key, none are
     variation_memory = 2       # and none of the last so many assets is chosen while another is as good
 
 Source: SearchThrottleTime, PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch. The default history is the
-shortest one with which a steered character without fitting clips still showed new frames half of the time.
+shortest one with which a steered character without fitting clips still showed new frames half of the time. Bar and grace time are
+those with which, on captured clips, no forced jump is taken over the bar and turns and changes of speed come no later.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import Any
 from contextdb.errors import Fault, MotionError, in_quotes, some
 from contextdb.files.toml_text import what
 from contextdb.motion.reading import Mapped, Section, as_number
+from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.variation import Variation
 
 SECONDS = {
@@ -38,6 +40,8 @@ BAR = "a cost from 0 to 1e30, such as 1.0"
 WITHIN = "a cost from 0 to 1e30, such as 0.05"
 MEMORY = "a whole number from 0 to 1000, such as 2"
 MOST_COST, MOST_ASSETS = 1e30, 1000
+USUAL_BAR = 1.0
+"""Half of what two frames cost on average that have nothing to do with each other."""
 KEYS = ("selector", *SECONDS, "cost_bar", "until_natural", *VARIATION)
 
 
@@ -54,7 +58,8 @@ class ControllerSettings:
     history_s : float
         Frames that were played within the last so many seconds are not entered again.
     cost_bar : float, optional
-        A jump out of an asset that is no longer valid waits while it costs more. Default: none waits.
+        A jump out of an asset that is no longer valid waits while it costs more. Default: `USUAL_BAR` where a database was built
+        with a schema; into one made from features, whose costs have a scale of their own, none waits.
     grace_s : float
         For how long it waits at most; then it is taken, as the last resort.
     until_natural : bool
@@ -78,6 +83,12 @@ class ControllerSettings:
     cost_bar: float | None = None
     grace_s: float = 0.3
     until_natural: bool = False
+
+    def bar_of(self, database: MotionDatabase) -> float:
+        """What a forced jump into a database may cost at once."""
+        if self.cost_bar is not None:
+            return self.cost_bar
+        return math.inf if database.schema is None else USUAL_BAR
 
     def __post_init__(self) -> None:
         faults = [

@@ -4,8 +4,8 @@ The jump out of such an asset is forced: playing on does not compete with it, wh
 
 - NextNaturalOnly: while such a frame plays, nothing is searched; the jump waits for the end of the span or of a round of a loop.
 - Until natural, a setting: an asset that does not loop plays on to its end.
-- Cost bar, a setting: a jump that costs more waits. The search goes on at each update, and the first jump under the bar is taken.
-  After the grace time the bar counts no longer: the best jump is taken, as the last resort, and its reason says so.
+- Cost bar, on unless it is set otherwise: a jump that costs more waits. The search goes on at each update, and the first jump under
+  the bar is taken. After the grace time the bar counts no longer: the best jump is taken, as the last resort, and `why` says so.
 
 An interruption passes all guards, and so does the end of a clip: then nothing can play on.
 

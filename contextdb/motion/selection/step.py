@@ -184,8 +184,8 @@ class Step:
             return Outcome(_onward(self.ongoing), why, self.ongoing.playing, continuing, continuing, choice, held)
         playing = self._playing(choice, hit)
         why = trigger.jumped(cause, self.before, playing, hit.cost, choice, continuing)
-        bar = self.settings.cost_bar
-        if cause is Trigger.NOT_VALID and self.ongoing is not None and bar is not None and hit.cost > bar:
+        bar = self.settings.bar_of(self.selector.databases[playing.database])
+        if cause is Trigger.NOT_VALID and self.ongoing is not None and hit.cost > bar:
             left_s = self.settings.grace_s - self.waited_s
             if left_s > TOLERANCE_S:
                 why = trigger.waiting(self.ongoing.playing, playing, hit.cost, bar, left_s)

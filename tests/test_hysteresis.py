@@ -11,6 +11,7 @@ import oracles
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from nested_tables import Nest, is_valid, nests
 from strategies import contexts, examples
 from test_mirroring import mirroring_tables, plain_in_mirror
 
@@ -93,6 +94,23 @@ def test_many_answers_are_widened_as_each_is_and_joined_and_lessened_ones_too(da
     assert (first & last).widened.indices.tolist() == sorted({*wide[0]} & {*wide[-1]})
     assert (first | last).widened.indices.tolist() == sorted({*wide[0]} | {*wide[-1]})
     assert first.only([]).widened.indices.tolist() == []
+
+
+@given(nests(("int", "number", "angle")), st.sampled_from(["any", "never"]), st.data())
+def test_in_tables_inside_tables_all_cells_of_a_condition_accept_one_value_near_the_fact(nest, unknown, data):
+    conditions = {name: replace(c, hysteresis=_reach(data.draw, c.domain)) for name, c in nest.outer.schema.conditions.items()}
+    outer, *inner = (_with_conditions(table, conditions) for table in (nest.outer, *nest.tables.values()))
+    nest = Nest(outer, {table.name: table for table in inner})
+    facts, plain = data.draw(contexts(nest.all_cells(), has_missing=True))
+    near = widened(nest.all_cells(), plain)
+    expected = [row for row, way in enumerate(nest.ways()) if is_valid(nest, way, near, unknown)]
+    answer = nest.outer.compile(nest.tables).query(facts, unknown=unknown)
+    assert answer.widened.indices.tolist() == expected
+
+
+def _with_conditions(table, conditions):
+    columns = {c.name: c.to_list() for c in table.columns}
+    return Table.from_columns(columns, replace(EMPTY, conditions=conditions), table.settings, table.name)
 
 
 @pytest.mark.parametrize(

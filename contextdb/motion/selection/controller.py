@@ -168,7 +168,7 @@ class Controller:
         context : mapping of str to object, optional
             The facts of the moment, for the recorder alone.
         force : bool
-            Search now, though no search is due. What plays may win.
+            Search now, though no search is due. What plays may win, and guards hold.
         interrupt : bool
             Search now, and leave what plays if anything else may; no guard holds it.
 

@@ -256,10 +256,13 @@ class CompiledData(Unchanging):
 
     def with_others(self, matches: Matches, context: Context, unknown: Unknown) -> Matches:
         """An answer that knows what its context answers in a mirror, and with widened facts."""
-        kept = self.keep(context)
         if self.mirroring:
-            matches.with_mirrored(kept if unknown == "error" else partial(self.query_mirrored, kept, unknown))
-        return matches.with_widened(partial(self.query_widened, kept, unknown)) if self.widening else matches
+            matches.with_mirrored(self.keeping(unknown)(context))
+        return matches.with_widened(partial(self.query_widened, self.keep(context), unknown)) if self.widening else matches
+
+    def keeping(self, unknown: Unknown) -> Callable[[Context], dict[str, object] | Callable[[], Matches]]:
+        """What makes of a context that an answer was asked with what `Matches.with_mirrored` takes."""
+        return self.keep if unknown == "error" else lambda context: partial(self.query_mirrored, self.keep(context), unknown)
 
     @cached_property
     def keep(self) -> Callable[[Context], dict[str, object]]:

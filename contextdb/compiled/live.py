@@ -67,6 +67,7 @@ class LiveContext(MutableMapping[str, object]):
         "_enabled",
         "_facts",
         "_is_bound",
+        "_keep",
         "_known",
         "_lookups",
         "_masks",
@@ -114,6 +115,8 @@ class LiveContext(MutableMapping[str, object]):
         """Other names that `update` was given and that are like none of these."""
         self._alike: dict[str, tuple[str, ...]] = {}
         """For each other name the facts that it is like."""
+        self._keep = compiled.keeping(unknown) if compiled.mirroring and not (compiled.is_soft or compiled.widening) else None
+        """What keeps the facts of an answer, where it must know them for a mirror alone."""
         self._is_bound = compiled.is_bound
         """Whether an answer must know the facts, for the costs of soft cells, for a mirror or for widened cells."""
         self._answer = Matches(0, self._answering)
@@ -297,6 +300,8 @@ class LiveContext(MutableMapping[str, object]):
             return self._set_matches(bits)
         if self._is_bound:
             answer = Matches(bits, self._answering)
+            if self._keep is not None:
+                return answer.with_mirrored(self._keep(self._told))
             return self._compiled.bound(answer, self._told, self._unknown)
         if bits != self._answer.bits:
             self._answer = Matches(bits, self._answering)
@@ -475,6 +480,8 @@ class AskingLiveContext(LiveContext):
                 left &= ~when.rules[number].rows
         if left == answer.bits:
             return answer
+        if self._keep is not None:
+            return Matches(left, self._answering).with_mirrored(self._keep(self._told))
         if self._is_bound:
             return self._compiled.bound(Matches(left, self._answering), self._told, self._unknown)
         if left != self._left.bits:

@@ -65,7 +65,6 @@ CALLS: dict[str, Call] = {
     "footfalls(clip)": lambda x: motion.footfalls(x),
     "footfalls(feet)": lambda x: motion.footfalls(CLIP, x),
     "footfalls(slowest_mps)": lambda x: motion.footfalls(CLIP, slowest_mps=x),
-    "footfalls(highest_m)": lambda x: motion.footfalls(CLIP, highest_m=x),
     "mirrored(moved)": lambda x: motion.mirrored(x, [("LeftFoot", "RightFoot")]),
     "mirrored(pairs)": lambda x: motion.mirrored(POSES, x),
     "mirrored_path(path)": lambda x: motion.mirrored_path(x),

@@ -190,6 +190,18 @@ def _channel_features(
     return found if not channel.at else np.concatenate([_moved(found, seconds * poses.rate) for seconds in channel.at], axis=1)
 
 
+def block_of(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema) -> Floats:
+    """A channel's features of every frame of some poses and their path: [F, features of the channel]."""
+    return _channel_features(channel, poses, path, schema, schema.name, NO_MARKS)
+
+
+def require_features(skeleton: Skeleton, schema: FeatureSchema) -> None:
+    """Raise MotionError where the features of a skeleton's poses cannot be computed."""
+    faults = list(_faults(skeleton, schema, False))
+    if faults:
+        raise MotionError(*faults)
+
+
 def _moved(values: Floats, frames: float) -> Floats:
     """Values [F, ...] as they are some frames later, at the nearest frame within the clip."""
     every = np.arange(len(values))

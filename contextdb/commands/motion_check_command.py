@@ -56,7 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
     add_format_arguments(parser, FORMATS)
     parser.add_argument(
-        "--fail-on", choices=("error", "warning", "none"), default="warning", help="the lowest level that fails (default: warning)"
+        "--fail-on",
+        metavar="LEVEL",
+        choices=("error", "warning", "none"),
+        default="warning",
+        help="the lowest level that fails: error, warning or none (default: warning)",
     )
     parser.add_argument("--all", action="store_true", help="print every finding, not the first few of each kind")
     parser.add_argument("--no-cache", action="store_true", help="compute every clip, and cache nothing")

@@ -125,6 +125,15 @@ def test_a_bone_that_all_clips_lack_is_told_once_with_that_of_the_rig(game: Path
     assert 'Did you mean "Foot_R"?' in found[1]["message"]
 
 
+def test_a_clip_without_a_bone_of_the_features_is_still_looked_at(game: Path):
+    toml = TOML.replace('bone = "LeftFoot"', 'bone = "Tail"').replace(
+        'clips = "clips/*.bvh"', 'clips = "clips/*.bvh"\nmetres_per_unit = 1.0'
+    )
+    (game / "contextdb.toml").write_text(toml, encoding="utf-8")
+    found = findings()
+    assert Counter(f["rule"] for f in found) == {"unknown-bone": 1, "odd-size": 3}
+
+
 def test_feet_that_never_rest_are_doubted_unless_the_clip_is_short(game: Path):
     walk = make_clip("walk").clip
     values = walk.values.copy()

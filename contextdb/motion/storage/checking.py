@@ -6,16 +6,19 @@ would warn of a warning, and one broken thing hides no other.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from contextdb.errors import ContextDBError, Fault, Place, nearest, plural, some
 from contextdb.findings import Finding
+from contextdb.motion.clips.doubts import ClipFinding, Measures, doubts, measure
 from contextdb.motion.storage import building
-from contextdb.motion.storage.build_inputs import Assets, told_once
+from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, told_once
 from contextdb.motion.storage.building import Built, Progress
-from contextdb.motion.storage.clip_files import unmatched
+from contextdb.motion.storage.clip_files import ClipFile, read_clip, unmatched
 from contextdb.motion.storage.config import MotionConfig
 
 
@@ -44,16 +47,32 @@ def check_motion(
 
     built = building.build_all(config, folder, assets, progress, cache=cache, tolerates=takes)
     found = [Finding.of(fault) for fault in told_once(refused)]
-    found += _of_clips(built)
+    found += _of_clips(built, _left_out(config, folder, assets, built))
     found += _of_settings(config)
     found += _of_assets(config, folder, assets)
     return MotionFindings(tuple(found), {name: len(each.computed) + len(each.cached) for name, each in built.items()})
 
 
-def _of_clips(built: dict[str, Built]) -> Iterator[Finding]:
-    """What is doubtful of clips that can be used; a clip in several databases is told once."""
-    doubts = dict.fromkeys(doubt for each in built.values() for doubt in each.doubts)
-    for doubt in doubts:
+def _left_out(config: MotionConfig, folder: Path, assets: Assets, built: dict[str, Built]) -> Iterator[ClipFinding]:
+    """What is doubtful of clips that can be read, but whose features cannot be computed."""
+    files = Inputs.of(config, folder, assets, None, Faults(lambda name, error: True)).files
+    for name, listed in files.items():
+        used = {*built[name].computed, *built[name].cached} if name in built else set()
+        yield from doubts(_measured(file for file in listed if file.asset not in used))
+
+
+def _measured(files: Iterable[ClipFile]) -> Iterator[tuple[str, str, Measures]]:
+    for file in files:
+        with suppress(ContextDBError):
+            clip = read_clip(file)
+            if clip.n_frames:
+                yield file.asset, str(file.path), measure(clip)
+
+
+def _of_clips(built: dict[str, Built], left_out: Iterable[ClipFinding]) -> Iterator[Finding]:
+    """What is doubtful of clips; a clip in several databases is told once."""
+    used = (doubt for each in built.values() for doubt in each.doubts)
+    for doubt in dict.fromkeys(chain(used, left_out)):
         yield Finding(doubt.rule, "warning", doubt.message, file=doubt.file, asset=doubt.asset)
     for fault in dict.fromkeys(fault for each in built.values() for fault in each.markup_faults):
         yield Finding.of(fault, "warning")

@@ -132,6 +132,11 @@ def test_a_clip_without_a_bone_of_the_features_is_still_looked_at(game: Path):
     (game / "contextdb.toml").write_text(toml, encoding="utf-8")
     found = findings()
     assert Counter(f["rule"] for f in found) == {"unknown-bone": 1, "odd-size": 3}
+    assert {Path(f["file"]).parent for f in found} == {Path("game/clips")}
+    text = run("motion", "check", "game")
+    assert text.out.count("odd-size") == 1
+    assert "(2 other clips likewise.)" in " ".join(text.out.split())
+    assert run("motion", "check", "game", "--all").out.count("odd-size") == 3
 
 
 def test_feet_that_never_rest_are_doubted_unless_the_clip_is_short(game: Path):

@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from contextdb import report
@@ -45,6 +45,14 @@ class MotionReport(CheckReport):
         databases, clips = plural(len(self.n_clips), "database"), plural(sum(self.n_clips.values()), "clip")
         return f"{databases} and {clips} checked: {said}"
 
+    def condensed(self) -> MotionReport:
+        """The report for people: what many clips have in common is told of the first, with how many others have it."""
+        alike: dict[tuple[str, ...], list[Finding]] = {}
+        for i, finding in enumerate(self.findings):
+            mend = finding.message.partition(" Expected: ")[2]
+            alike.setdefault((finding.rule, mend) if mend else (finding.rule, mend, str(i)), []).append(finding)
+        return replace(self, findings=tuple(_of_all(findings) for findings in alike.values()))
+
     def to_json(self) -> dict[str, object]:
         """The JSON document."""
         databases = [{"database": name, "clips": n_clips} for name, n_clips in self.n_clips.items()]
@@ -70,9 +78,10 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Check the motion of a folder."""
     found = check_path(arguments.path, cache=not arguments.no_cache)
     failing = LEVELS[: LEVELS.index(arguments.fail_on) + 1] if arguments.fail_on != "none" else ()
+    is_for_people = arguments.format in ("text", "markdown") and not arguments.all
     text = report.render(
         arguments.format,
-        found,
+        found.condensed() if is_for_people else found,
         colour=wants_colour(sys.stdout),
         width=terminal_width(),
         shows_all=arguments.all,
@@ -105,6 +114,11 @@ def check_path(path: str, *, cache: bool = True) -> MotionReport:
     with building_bar() as progress:
         checked = check_motion(config, folder, assets, progress, cache=CACHE_FOLDER if cache else None)
     return MotionReport((), checked.findings, checked.n_clips)
+
+
+def _of_all(findings: list[Finding]) -> Finding:
+    first, *others = findings
+    return replace(first, message=f"{first.message} ({plural(len(others), 'other clip')} likewise.)") if others else first
 
 
 def _as_findings(faults: Iterable[object]) -> list[Finding]:

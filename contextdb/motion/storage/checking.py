@@ -6,9 +6,9 @@ would warn of a warning, and one broken thing hides no other.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
@@ -46,16 +46,24 @@ def check_motion(
         return True
 
     built = building.build_all(config, folder, assets, progress, cache=cache, tolerates=takes)
-    found = [Finding.of(fault) for fault in told_once(refused)]
-    found += _of_clips(built, _left_out(config, folder, assets, built))
+    files = Inputs.of(config, folder, assets, None, Faults(lambda name, error: True)).files
+    found = [Finding.of(fault) for fault in _in_files(told_once(refused), files)]
+    found += _of_clips(built, _left_out(files, built))
     found += _of_settings(config)
     found += _of_assets(config, folder, assets)
     return MotionFindings(tuple(found), {name: len(each.computed) + len(each.cached) for name, each in built.items()})
 
 
-def _left_out(config: MotionConfig, folder: Path, assets: Assets, built: dict[str, Built]) -> Iterator[ClipFinding]:
+def _in_files(faults: Iterable[Fault], files: Mapping[str, list[ClipFile]]) -> Iterator[Fault]:
+    """The faults; those at the name of a clip at its file."""
+    paths = {file.asset: str(file.path) for listed in files.values() for file in listed}
+    for fault in faults:
+        path = paths.get(fault.place.file or "")
+        yield fault if path is None else replace(fault, place=replace(fault.place, file=path))
+
+
+def _left_out(files: Mapping[str, list[ClipFile]], built: Mapping[str, Built]) -> Iterator[ClipFinding]:
     """What is doubtful of clips that can be read, but whose features cannot be computed."""
-    files = Inputs.of(config, folder, assets, None, Faults(lambda name, error: True)).files
     for name, listed in files.items():
         used = {*built[name].computed, *built[name].cached} if name in built else set()
         yield from doubts(_measured(file for file in listed if file.asset not in used))
@@ -69,7 +77,7 @@ def _measured(files: Iterable[ClipFile]) -> Iterator[tuple[str, str, Measures]]:
                 yield file.asset, str(file.path), measure(clip)
 
 
-def _of_clips(built: dict[str, Built], left_out: Iterable[ClipFinding]) -> Iterator[Finding]:
+def _of_clips(built: Mapping[str, Built], left_out: Iterable[ClipFinding]) -> Iterator[Finding]:
     """What is doubtful of clips; a clip in several databases is told once."""
     used = (doubt for each in built.values() for doubt in each.doubts)
     for doubt in dict.fromkeys(chain(used, left_out)):

@@ -24,7 +24,7 @@ from contextdb.motion import (
     load_bvh,
     make_clip,
 )
-from contextdb.motion.clips.contacts import stances
+from contextdb.motion.clips.contacts import _most_nearby, stances
 from contextdb.motion.clips.feet import footfalls_of, marked
 from contextdb.motion.clips.foot_bones import FootBones, feet_of
 from contextdb.motion.clips.poses import forward_kinematics, local_poses, resampled
@@ -122,6 +122,13 @@ def test_declared_heels_and_toes_count_and_must_be_bones_of_the_rig():
 
 
 # ---- how points move
+
+
+@pytest.mark.parametrize("reach", [1, 2, 3, 7, 8, 40])
+def test_the_largest_value_nearby_is_that_of_a_plain_window(reach):
+    values = np.random.default_rng(reach).normal(size=30)
+    plain = [values[max(0, i - reach) : i + reach + 1].max() for i in range(30)]
+    assert _most_nearby(values, reach).tolist() == plain
 
 
 def points(heights, ahead, rate=30.0):

@@ -148,8 +148,11 @@ def _speeds(points: Floats, rate: float) -> Floats:
 
 def _most_nearby(values: Floats, reach: int) -> Floats:
     """The largest of the values [n] that are at most `reach` away."""
-    padded = np.pad(values, reach, mode="edge")
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1))
+    most, width, span = np.pad(values, reach, mode="edge"), 2 * reach + 1, 1
+    while 2 * span <= width:  # the largest of twice as many, from two halves side by side
+        most, span = np.maximum(most[:-span], most[span:]), 2 * span
+    rest = width - span
+    return np.asarray(np.maximum(most[:-rest], most[rest:]) if rest else most)
 
 
 def _on_ground(found: Spans, own: Floats, other: Floats) -> Spans:

@@ -29,6 +29,7 @@ from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, steady_path
 from contextdb.motion.features.channels import Channel
 from contextdb.motion.features.extraction import ClipFeatures, clip_features, features_of, query_from, with_path
+from contextdb.motion.features.live_query import LivePose, PoseHistory, query_from_pose
 from contextdb.motion.features.many_queries import with_paths
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
@@ -111,6 +112,7 @@ __all__ = [
     "Hit",
     "Inputs",
     "LeftOut",
+    "LivePose",
     "LocalPoses",
     "MadeClip",
     "ManySteered",
@@ -132,6 +134,7 @@ __all__ = [
     "Playing",
     "Pose",
     "PoseBank",
+    "PoseHistory",
     "PoseSettings",
     "PoseState",
     "PoseStream",
@@ -196,6 +199,7 @@ __all__ = [
     "poses_of",
     "poses_path",
     "query_from",
+    "query_from_pose",
     "resampled",
     "root_trajectory",
     "save_database",

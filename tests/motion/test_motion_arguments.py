@@ -39,6 +39,8 @@ STEERED = [motion.Steered()]
 MANY_STEERED = motion.ManySteered.of(STEERED)
 CONFIG = motion.MotionConfig()
 FALLS = motion.footfalls(CLIP)
+LIVE = motion.LivePose(motion.poses_of(CLIP).positions[0], motion.local_poses(CLIP).rotations[0])
+HISTORY = motion.PoseHistory(CLIP.skeleton)
 NODE = motion.MatchNode(motion.MotionDatabase.build([CLIP], SCHEMA))
 BANK = motion.PoseBank.build([CLIP], SCHEMA)
 BUILT = motion.MotionDatabase.build([CLIP], SCHEMA)
@@ -69,7 +71,6 @@ CALLS: dict[str, Call] = {
     "footfalls(clip)": lambda x: motion.footfalls(x),
     "footfalls(feet)": lambda x: motion.footfalls(CLIP, x),
     "footfalls(slowest_mps)": lambda x: motion.footfalls(CLIP, slowest_mps=x),
-    "footfalls(highest_m)": lambda x: motion.footfalls(CLIP, highest_m=x),
     "mirrored(moved)": lambda x: motion.mirrored(x, [("LeftFoot", "RightFoot")]),
     "mirrored(pairs)": lambda x: motion.mirrored(POSES, x),
     "mirrored_path(path)": lambda x: motion.mirrored_path(x),
@@ -88,6 +89,13 @@ CALLS: dict[str, Call] = {
     "query_from(schema)": lambda x: motion.query_from(x, CLIP),
     "query_from(clip)": lambda x: motion.query_from(SCHEMA, x),
     "query_from(frame)": lambda x: motion.query_from(SCHEMA, CLIP, x),
+    "query_from_pose(schema)": lambda x: motion.query_from_pose(x, LIVE, HISTORY),
+    "query_from_pose(pose)": lambda x: motion.query_from_pose(SCHEMA, x, HISTORY),
+    "query_from_pose(history)": lambda x: motion.query_from_pose(SCHEMA, LIVE, x),
+    "PoseHistory(skeleton)": lambda x: motion.PoseHistory(x),
+    "PoseHistory(rate)": lambda x: motion.PoseHistory(CLIP.skeleton, x),
+    "PoseHistory(seconds)": lambda x: motion.PoseHistory(CLIP.skeleton, 30.0, x),
+    "PoseHistory.add(pose)": lambda x: HISTORY.add(x),
     "query_from(wanted)": lambda x: motion.query_from(SCHEMA, CLIP, 0, x),
     "with_path(schema)": lambda x: motion.with_path(x, PARTS[0].features[0], PATH),
     "with_path(query)": lambda x: motion.with_path(SCHEMA, x, PATH),

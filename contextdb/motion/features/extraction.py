@@ -15,7 +15,8 @@ from contextdb.cells.arguments import require_kind, require_whole
 from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, nearest, plural, some
 from contextdb.motion.clips import mirror, own_axes, quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.feet import feet_of, footfalls_of, phases
+from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, footfalls_of, phases, rounds_of
+from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.looping import three_rounds
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import Poses, poses_of
@@ -53,7 +54,9 @@ class ClipFeatures:
     root: Features
 
 
-def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, looping: bool = False) -> ClipFeatures:
+def clip_features(
+    clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, looping: bool = False, contacts: ContactMarks = NO_MARKS
+) -> ClipFeatures:
     """The features of every frame of a clip, resampled to the schema's rate, and the body's path.
 
     Parameters
@@ -64,6 +67,8 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, 
         Take the clip in a mirror, left and right bones exchanged by the schema's `mirror`.
     looping : bool
         The clip continues at its start when it ends: its path continues too, and does not run out straight.
+    contacts : (left, right)
+        When each foot of the clip is down, as marks say it: see `Markup.contacts_of`. Default: this is found.
 
     Raises
     ------
@@ -87,11 +92,12 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, 
         poses = mirror.mirrored(poses, schema.mirror)
     path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
     root = np.column_stack((path.positions, path.headings)).astype(np.float32)
-    own = slice(None)
+    own, marks = slice(None), (contacts[1], contacts[0]) if mirrored else contacts
     if looping:
+        marks = rounds_of(marks, 3, (poses.n_frames - 1) / poses.rate)
         poses, own = three_rounds(poses, path)
         path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
-    blocks = [_channel_features(channel, poses, path, schema, clip)[own] for channel in schema.channels]
+    blocks = [_channel_features(channel, poses, path, schema, clip.name, marks)[own] for channel in schema.channels]
     features = np.concatenate(blocks, axis=1).astype(np.float32)
     return ClipFeatures(clip.name, mirrored, features, root)
 
@@ -157,17 +163,31 @@ def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajector
     return changed
 
 
-def _channel_features(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: Clip) -> Floats:
+def _channel_features(
+    channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: str, marks: ContactMarks
+) -> Floats:
     match channel.type:
         case "trajectory":
             return trajectory_features(channel, path, np.arange(poses.n_frames))
         case "phase":
-            found = phases(footfalls_of(poses, channel.feet), np.arange(poses.n_frames) / poses.rate)
+            found = phases(footfalls_of(poses, schema.foot_bones(channel.feet), marks), np.arange(poses.n_frames) / poses.rate)
         case "custom":
-            found = _custom_features(channel, poses, path, schema.functions, clip.name)
+            found = _custom_features(channel, poses, path, schema.functions, clip)
         case _:
             found = _bone_features(channel, poses, path)
     return found if not channel.at else np.concatenate([_moved(found, seconds * poses.rate) for seconds in channel.at], axis=1)
+
+
+def block_of(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema) -> Floats:
+    """A channel's features of every frame of some poses and their path: [F, features of the channel]."""
+    return _channel_features(channel, poses, path, schema, schema.name, NO_MARKS)
+
+
+def require_features(skeleton: Skeleton, schema: FeatureSchema) -> None:
+    """Raise MotionError where the features of a skeleton's poses cannot be computed."""
+    faults = list(_faults(skeleton, schema, False))
+    if faults:
+        raise MotionError(*faults)
 
 
 def _moved(values: Floats, frames: float) -> Floats:
@@ -280,7 +300,7 @@ def _faults(skeleton: Skeleton, schema: FeatureSchema, mirrored: bool) -> Iterat
     """Why a skeleton's features cannot be computed."""
     yield from schema.bone_faults(skeleton)
     for channel in schema.channels:
-        if channel.type == "phase" and channel.feet is None:
+        if channel.type == "phase" and channel.feet is None and schema.feet is None:
             yield from _feet_faults(skeleton)
         if channel.type == "custom" and channel.function not in schema.functions:
             yield _no_function(channel, schema)

@@ -15,6 +15,7 @@ import numpy as np
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
 from contextdb.files.toml_text import as_toml, what
+from contextdb.motion.clips.foot_bones import FootBones, Pair
 from contextdb.motion.clips.mirror import Pairs, pattern_fault
 from contextdb.motion.clips.poses import Poses
 from contextdb.motion.clips.quaternions import Floats
@@ -30,10 +31,11 @@ CustomFunction = Callable[[Poses, Trajectory], Floats]
 
 PathChannels = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[What | None, slice], ...]]
 
-SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror")
+SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror", "feet", "heels", "toes")
 MOST_RATE = 1000.0
 MOST_SMOOTH_S = 2.0
 A_FACING = 'the left and the right bone, such as ["LeftUpLeg", "RightUpLeg"]'
+A_FOOT = 'the left and the right bone, such as ["LeftFoot", "RightFoot"]'
 A_MIRROR = 'pairs of a left and a right bone, such as [["Left*", "Right*"]]'
 
 
@@ -56,6 +58,8 @@ class FeatureSchema:
         nothing in time. Default: 0, the facing as it is.
     mirror : tuple of (left, right)
         Pairs of bones that change places when a clip is mirrored; a `*` on both sides matches the same rest of the name.
+    feet, heels, toes : (left bone, right bone), optional
+        What touches the ground. Default: feet by their names, the toes below them, and heels worked out from both.
     functions : mapping of name to function
         What custom channels are computed by. Not compared, and not part of contextdb.toml: see `with_functions`.
     """
@@ -67,6 +71,9 @@ class FeatureSchema:
     facing: tuple[str, str] | None = None
     facing_smooth_s: float = 0.0
     mirror: Pairs = ()
+    feet: Pair | None = None
+    heels: Pair | None = None
+    toes: Pair | None = None
     functions: Mapping[str, CustomFunction] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
@@ -102,8 +109,13 @@ class FeatureSchema:
     @property
     def bones(self) -> tuple[str, ...]:
         """Every bone that the channels, `root` and `facing` name, once."""
-        named = [bone for channel in self.channels for bone in channel.bones] + [self.root, *(self.facing or ())]
+        named = [bone for channel in self.channels for bone in channel.bones] + [self.root]
+        named += [bone for pair in (self.facing, self.feet, self.heels, self.toes) for bone in pair or ()]
         return tuple(dict.fromkeys(bone for bone in named if bone is not None))
+
+    def foot_bones(self, feet: Pair | None = None) -> FootBones:
+        """The declared bones of the feet; with `feet` of these, which then are what touches the ground."""
+        return FootBones(self.feet, self.heels, self.toes) if feet in (None, self.feet) else FootBones(feet)
 
     def bone_faults(self, skeleton: Skeleton) -> list[Fault]:
         """What is wrong with using the schema on a skeleton: a fault for each bone that it lacks, with the nearest one."""
@@ -163,9 +175,10 @@ def _read_schema(
     facing = read_pair(section, "facing", A_FACING) if "facing" in mapping else None
     smooth_s = _read_smooth(section) if "facing_smooth_s" in mapping else 0.0
     mirror = _read_mirror(section) if "mirror" in mapping else ()
+    feet, heels, toes = (read_pair(section, key, A_FOOT) if key in mapping else None for key in ("feet", "heels", "toes"))
     if faults or rate is None or smooth_s is None:
         return None
-    return cls(name, rate, tuple(channels), root, facing, smooth_s, mirror)
+    return cls(name, rate, tuple(channels), root, facing, smooth_s, mirror, feet, heels, toes)
 
 
 def _read_rate(section: Section) -> float | None:

@@ -26,7 +26,7 @@ from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plur
 from contextdb.motion.clips import mirror as mirrors
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.feet import feet_of, footfalls_of
+from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, flat_feet_of
 from contextdb.motion.clips.poses import Poses, forward_kinematics, local_poses, resampled
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
@@ -90,7 +90,7 @@ class PoseBank:
     feet : tuple of str
         Left and right; empty where no bones are named like feet.
     contacts : bool array, shape (N, len(feet))
-        Whether each foot is down in the clip.
+        Whether each foot is down in the clip: stands flat, so that it can be held where it is, or is marked.
     """
 
     skeleton: Skeleton
@@ -127,7 +127,7 @@ class PoseBank:
         mirror : bool or collection of str
             Whether all clips, or those of these names, are there a second time with left and right exchanged.
         markup : Markup, optional
-            Says which clips loop.
+            Says which clips loop, and when feet are down where that is not to be found.
 
         Raises
         ------
@@ -156,7 +156,8 @@ class PoseBank:
             both = mirror if isinstance(mirror, bool) else clip.name in mirror
             try:
                 loops = markup is not None and markup.is_looping(clip.name)
-                parts += [_Part.of(clip, schema, side, loops) for side in ((False, True) if both else (False,))]
+                marks = NO_MARKS if markup is None else markup.contacts_of(clip.name)
+                parts += [_Part.of(clip, schema, side, loops, marks) for side in ((False, True) if both else (False,))]
             except MotionError as error:
                 faults += [fault.at(Place(clip.name)) for fault in error.faults]
         if not parts and not faults:
@@ -270,7 +271,7 @@ class _Part:
     contacts: Flags
 
     @classmethod
-    def of(cls, clip: Clip, schema: FeatureSchema, is_mirrored: bool, is_looping: bool) -> _Part:
+    def of(cls, clip: Clip, schema: FeatureSchema, is_mirrored: bool, is_looping: bool, marks: ContactMarks) -> _Part:
         with np.errstate(all="ignore"):  # numbers too large become infinite or NaN, and are refused below
             local = resampled(local_poses(clip), schema.rate)
             if is_mirrored:
@@ -290,7 +291,7 @@ class _Part:
         ground = np.stack((root[:, 0], np.zeros(len(root)), root[:, 1]), axis=-1)[:, None]
         positions[:, tops] = quaternions.rotate(back, poses.positions[:, tops] - ground)
         rotations[:, tops] = quaternions.multiply(back, poses.rotations[:, tops])
-        feet, contacts = _contacts(poses)
+        feet, contacts = _contacts(poses, schema, (marks[1], marks[0]) if is_mirrored else marks)
         return cls(clip.name, is_mirrored, is_looping, _rig(clip), rotations, positions, root, feet, contacts)
 
 
@@ -311,13 +312,13 @@ def _rig(clip: Clip) -> Skeleton:
     return replace(clip.skeleton, offsets=offsets, end_sites=ends)
 
 
-def _contacts(poses: Poses) -> tuple[tuple[str, ...], Flags]:
+def _contacts(poses: Poses, schema: FeatureSchema, marks: ContactMarks) -> tuple[tuple[str, ...], Flags]:
     """The feet, and in which frames each is down."""
     try:
-        feet = feet_of(poses.skeleton)
+        falls = flat_feet_of(poses, schema.foot_bones(), marks)
     except MotionError:
         return (), np.zeros((poses.n_frames, 0), np.bool_)
-    falls = footfalls_of(poses, feet)
+    feet = falls.feet
     frames = np.arange(poses.n_frames) / poses.rate
     down = [[(a - 1e-9 <= frames) & (frames <= b + 1e-9) for a, b in falls.down[foot].tolist()] for foot in feet]
     none = np.zeros(poses.n_frames, np.bool_)

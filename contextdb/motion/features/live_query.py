@@ -286,9 +286,10 @@ def _put_trajectories(query: Features, plan: _Plan, path: Trajectory) -> None:
             own = slice(start, start + len(channel.at))
             frames = np.full(len(channel.at), now)
             part = PathPoints(points.positions[own], points.headings[own], points.velocities[own])
-            blocks.append(point_features(channel, path, frames, part).ravel())
+            blocks.append(point_features(channel.what, path.positions[frames], path.headings[frames], part).ravel())
         for metres in channel.along:
-            blocks.append(point_features(channel, path, np.array([now]), along_path(path, np.array([float(now)]), metres)).ravel())
+            point = along_path(path, np.array([float(now)]), metres)
+            blocks.append(point_features(channel.what, path.positions[now:], path.headings[now:], point).ravel())
         query[where] = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
 
 

@@ -30,7 +30,8 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.clips.trajectory import PathPoints, Trajectory, after_seconds, along_path, root_trajectory
 from contextdb.motion.features.channels import Channel
-from contextdb.motion.features.extraction import Features, block_of, point_features, require_features
+from contextdb.motion.features.extraction import Features, block_of, require_features
+from contextdb.motion.features.path_features import point_features
 from contextdb.motion.features.schema import FeatureSchema
 
 LONGEST_S = 60.0

@@ -5,8 +5,9 @@
     python benchmarks/motion_quality.py --probes              the last stage probe by probe too; --json FILE for programs
 
 A body follows a stick as `Steered` does, in six probes of a minute: straight on, turns of 90 and of 180 degrees, changes of speed,
-a circle and a figure eight. The controller is asked with its path; its decisions become poses with more and more stages. All assets
-are valid, settings are the defaults. A stage whose settings this version does not have is left out.
+a circle and a figure eight. The controller is asked with its path; its decisions become poses with more and more stages. In the
+last one the path begins with the heading that is shown, in the others with that of the body. All assets are valid, settings are the
+defaults. A stage whose settings this version does not have is left out.
 
 The captured clips are not part of this project: the environment variable CONTEXTDB_MOCAP names their folder.
 """
@@ -18,7 +19,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +124,8 @@ class Stage:
     is_plain: bool
     has_rate: bool
     settings: PoseSettings
+    is_closed: bool = False
+    """Whether the path that is asked for begins with the heading that is shown, not with that of the game's body."""
 
 
 def stages() -> list[Stage]:
@@ -143,7 +146,12 @@ def stages() -> list[Stage]:
     has_rate = any(field.name == "min_play_rate" for field in fields(ControllerSettings))
     if aligned or has_rate:
         found.append(Stage("+ alignment and rate", False, has_rate, PoseSettings(**{**off, **aligned})))
-    return [*found, Stage("+ foot lock", False, has_rate, PoseSettings())]
+    everything = PoseSettings()
+    return [
+        *found,
+        Stage("+ foot lock", False, has_rate, everything),
+        Stage("+ closed loop", False, has_rate, everything, is_closed=True),
+    ]
 
 
 def controller_of(clips: Clips, has_rate: bool) -> Any:
@@ -156,17 +164,20 @@ def controller_of(clips: Clips, has_rate: bool) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What was decided along a probe, and the stick."""
+    """What was decided along a probe, the poses where they were made on the way, and the stick."""
 
     trace: motion.Trace
+    poses: list[motion.Pose] | None
     wanted: list[tuple[float, float]]
 
 
-def run(clips: Clips, stick: Stick, seconds: float, chooser: Any) -> Run:
-    """Let a chooser follow a stick."""
+def run(clips: Clips, stick: Stick, seconds: float, chooser: Any, closed: PoseSettings | None = None) -> Run:
+    """Let a chooser follow a stick; with settings, the path begins with the heading of the pose that they show."""
     chooser.recorder = trace = motion.Trace(0)
-    body = motion.Steered()
+    stream = None if closed is None else motion.PoseStream(clips.bank, closed)
+    body = seen = motion.Steered()
     past, wanted = [body], []
+    poses: list[motion.Pose] = []
     pose = clips.database.normalisation.undo(np.zeros(clips.schema.n_features))
     for tick in range(round(seconds * RATE) + 1):
         asked = stick(tick / RATE)
@@ -174,12 +185,15 @@ def run(clips: Clips, stick: Stick, seconds: float, chooser: Any) -> Run:
         dt_s = 1.0 / RATE if tick else 0.0
         if tick:
             body = body.moved(dt_s, asked)
+            seen = body if stream is None else replace(body, heading=poses[-1].root[2])
             past = [*past, body][-31:]
         ahead = chooser.upcoming(dt_s)
         pose = pose if ahead is None else clips.database.raw(ahead.frame)
-        query = motion.with_path(clips.schema, pose, motion.steered_path(past, asked))
-        chooser.update(dt_s, query, body=body)
-    return Run(trace, wanted)
+        query = motion.with_path(clips.schema, pose, motion.steered_path([*past[:-1], seen], asked))
+        decision = chooser.update(dt_s, query, body=body)
+        if stream is not None:
+            poses.append(stream.update(decision, dt_s, body))
+    return Run(trace, None if stream is None else poses, wanted)
 
 
 # ---- the tables
@@ -222,18 +236,20 @@ def raw_row(found: Measures) -> tuple[str, ...]:
 
 def measured(clips: Clips, seconds: float) -> Iterator[tuple[Stage, dict[str, Measures]]]:
     """The measures of each stage, probe by probe. What was decided is the same for all stages that choose alike."""
-    runs: dict[tuple[bool, bool], dict[str, Run]] = {}
+    runs: dict[tuple[bool, bool, bool], dict[str, Run]] = {}
     for stage in stages():
-        key = stage.is_plain, stage.has_rate
+        key = stage.is_plain, stage.has_rate, stage.is_closed
         if key not in runs:
+            choosers = (PlainMatching(clips.database) if stage.is_plain else controller_of(clips, stage.has_rate) for _ in PROBES)
+            closed = stage.settings if stage.is_closed else None
             runs[key] = {
-                name: run(clips, stick, seconds, PlainMatching(clips.database) if stage.is_plain else controller_of(clips, key[1]))
-                for name, stick in PROBES.items()
+                name: run(clips, stick, seconds, chooser, closed)
+                for (name, stick), chooser in zip(PROBES.items(), choosers, strict=True)
             }
         yield (
             stage,
             {
-                name: motion.measure(each.trace, clips.bank, settings=stage.settings, wanted=each.wanted)
+                name: motion.measure(each.trace, clips.bank, poses=each.poses, settings=stage.settings, wanted=each.wanted)
                 for name, each in runs[key].items()
             },
         )

@@ -62,7 +62,8 @@ def measure(
     databases : mapping of str to MotionDatabase, optional
         Says how much of them is used, and what their markup keeps from playing. Default: of the banks how much is used.
     settings : PoseSettings, optional
-        How the poses of the session are made.
+        How the poses of the session are made. Where the session does not say where the game had the body, the root follows the
+        animation.
     rate : float, optional
         Poses a second; needed for a sequence of `Pose` without a session.
     bodies : float array, shape (T, 3), optional
@@ -132,7 +133,7 @@ def _shown(given: object, banks: Banks | None, poses: OfPoses | None, settings: 
     if not banks or not decisions:
         return session
     made = _made(decisions, banks, PoseSettings() if settings is None else settings)
-    return session if made is None else shown.with_poses(session, shown.of_poses(made, 1.0))
+    return shown.with_poses(session, shown.of_poses(made, session.rate))
 
 
 def _of_poses(given: object, rate: float | None) -> Shown:
@@ -148,8 +149,8 @@ def _of_poses(given: object, rate: float | None) -> Shown:
     return shown.of_poses(listed, require_real(rate, "rate", LEAST_RATE, MOST_RATE))
 
 
-def _made(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings) -> list[Pose] | None:
-    """The poses of a session, made again; None where its root mode needs a body that it does not say."""
+def _made(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings) -> list[Pose]:
+    """The poses of a session, made again; where it does not say where the body was, the root follows the animation."""
     if settings.root != "animation" and any(decision.body is None for decision in decisions):
         settings = replace(settings, root="animation")
     stream = PoseStream(banks, settings)

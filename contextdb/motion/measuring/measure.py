@@ -62,9 +62,10 @@ def measure(
     databases : mapping of str to MotionDatabase, optional
         Says how much of them is used, and what their markup keeps from playing. Default: of the banks how much is used.
     settings : PoseSettings, optional
-        How the poses of the session are made.
+        How the poses of the session are made. Where the session does not say where the game had the body, the root follows the
+        animation.
     rate : float, optional
-        Poses a second; needed for a sequence of `Pose` without a session.
+        Of a sequence of `Pose` without a session: how many a second has. Default: the rate of the banks.
     bodies : float array, shape (T, 3), optional
         Where the game had the body: x, z and heading. Default: what the session says.
     wanted : float array, shape (T, 2), optional
@@ -124,7 +125,7 @@ def _shown(given: object, banks: Banks | None, poses: OfPoses | None, settings: 
     if not isinstance(given, Trace):
         if poses is not None:
             raise ContextError(Fault("poses go with a session, and none is given.", "a Trace, or the path of one"))
-        return _of_poses(given, rate)
+        return _of_poses(given, _rate_of(banks) if rate is None else rate)
     decisions = list(given.brief())
     session = shown.of_decisions(decisions)
     if poses is not None:
@@ -132,7 +133,14 @@ def _shown(given: object, banks: Banks | None, poses: OfPoses | None, settings: 
     if not banks or not decisions:
         return session
     made = poses_of(decisions, banks, PoseSettings() if settings is None else settings)
-    return shown.with_poses(session, shown.of_poses(made, 1.0))
+    return shown.with_poses(session, shown.of_poses(made, session.rate))
+
+
+def _rate_of(banks: Banks | None) -> float | None:
+    """The frames that a second of the clips has."""
+    if not banks:
+        return None
+    return banks.rate if isinstance(banks, PoseBank) else next(iter(banks.values())).rate
 
 
 def _of_poses(given: object, rate: float | None) -> Shown:

@@ -52,8 +52,12 @@ def _to(change: Change) -> str:
 
 def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
     """The figures of a session."""
-    gain = "" if told.gain_median is None else f"median {told.gain_median:.0%}, {told.gain_small_share:.0%} under 20 %"
-    spread = ", ".join(f"{n} up to {high:.0%}" for n, high in zip(told.gains, GAINS, strict=True) if n) if told.gains else ""
+    gain = (
+        ""
+        if told.gain_median is None
+        else f"median {_percent(told.gain_median)}, {_percent(told.gain_small_share or 0.0)} under 20 %"
+    )
+    spread = ", ".join(f"{n} up to {_percent(high)}" for n, high in zip(told.gains, GAINS, strict=True) if n) if told.gains else ""
     used = "" if told.frames_used_share is None else f", {100.0 * told.frames_used_share:.2g} % of the frames"
     rows = [
         ("jumps", f"{told.jumps:,} in {told.seconds:.2f} s, {told.jumps_per_s:.2f} a second; {told.forced_jumps:,} forced"),
@@ -71,6 +75,10 @@ def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
         if text:
             lines = _wrapped(text, width - 12) or [""]
             yield from (f"{label if i == 0 else '':<12}{line}" for i, line in enumerate(lines))
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def what_if_lines(told: WhatIf, width: int = WIDTH) -> Iterator[str]:

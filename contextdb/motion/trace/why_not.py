@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contextdb.cells.arguments import require_text
-from contextdb.errors import ContextDBError, Fault, MotionError
+from contextdb.errors import ContextDBError, Fault, MotionError, in_quotes, row_name
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice, Reason
@@ -176,7 +176,7 @@ def _place(asked: ReaskedDecision, asset: str) -> Place:
         if each == asset and (frame := search.best_of_range(i)) >= 0
     ]
     if not found:
-        raise MotionError(Fault(f'the asset "{asset}" has no frames.', "an asset with frames"))
+        raise MotionError(Fault(f"the asset {in_quotes(asset)} has no frames.", "an asset with frames"))
     return min(found, key=lambda at: (at.left_out is not LeftOut.NO, at.cost))
 
 
@@ -207,9 +207,9 @@ def _invalid(asked: ReaskedDecision, at: Place) -> Iterator[str]:
         yield "valid: the asset was not among the valid ones"
     for row in rows[:1]:
         for failing in row.failures:
-            yield f"table: row {row.row + 1} of {asked.stock.table_of[at.name]}: {failing}"
+            yield f"table: {row_name(row.row)} of {asked.stock.table_of[at.name]}: {failing}"
         if not row.is_enabled:
-            yield f"table: row {row.row + 1} of {asked.stock.table_of[at.name]} is disabled"
+            yield f"table: {row_name(row.row)} of {asked.stock.table_of[at.name]} is disabled"
 
 
 def _reason_within(at: Place) -> LeftOut:
@@ -227,7 +227,7 @@ def _rows(asked: ReaskedDecision, at: Place) -> list[Row]:
         return []
     try:
         explained = table.compile().explain(_facts(asked), unknown=UNKNOWN)
-        return [row for row in explained if row.asset == at.asset and not row.is_valid]
+        return [row for row in explained.asset(at.asset) if not row.is_valid]
     except ContextDBError:
         return []
 
@@ -289,8 +289,8 @@ def _valid(asked: ReaskedDecision, at: Place) -> Step | None:
             chosen = asked_of_table(search.database, search.chosen, edited.compile(), _facts(asked))
             if chosen.ranges[at.range]:
                 failures = rows[0].failures
-                name, row = asked.stock.table_of[at.name], rows[0].row + 1
-                what = f"row {row} of {name}: {', '.join(failing.condition for failing in failures)}"
+                name, row = asked.stock.table_of[at.name], row_name(rows[0].row)
+                what = f"{row} of {name}: {', '.join(failing.condition for failing in failures)}"
                 kind = "cell" if len(failures) == 1 else "cells"
                 return kind, what, ", ".join(failing.mend for failing in failures), _with(asked, at, chosen)
     return "mask", at.asset, "valid", _with(asked, at, _let_in(at.search.chosen, at.range))

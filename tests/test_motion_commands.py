@@ -24,6 +24,7 @@ from contextdb.motion import (
     write_bvh,
 )
 from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.what_if import run_again
 from contextdb.tables.project import Project
 
 TOML = """
@@ -682,6 +683,16 @@ def test_what_if_counts_the_searches_that_choose_otherwise():
     assert (same["other_frames"], same["before"]) == (0, same["after"])
     lines = motion("replay", "session.parquet", "--what-if", "threshold tired=0").lines
     assert lines[0].startswith(f"of {heavy['searches']} recorded searches, ")
+
+
+def test_what_if_of_another_table_runs_the_session_again_with_its_answers():
+    project, trace = Project.load("game"), Trace.load("session.parquet")
+    slower = project["moves"].with_cell(3, "speed", "9")
+    told = trace.what_if(project, tables={"moves": slower})
+    assert {each.was for each in told.other_assets} == {"jog"}
+    again = run_again(trace.reasked(project, tables={"moves": slower}))
+    assert "jog" not in {decision.playing.asset for decision in again}
+    assert "jog" in {decision.playing.asset for decision in run_again(trace.reasked(project))}
 
 
 def test_a_diff_says_where_two_sessions_part(here: Path):

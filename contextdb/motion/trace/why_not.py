@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contextdb.cells.arguments import require_text
+from contextdb.cells.mirroring import changed_in_mirror, mirrored_facts
 from contextdb.errors import ContextDBError, Fault, MotionError, in_quotes, row_name
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.filters import Filter
@@ -207,7 +208,8 @@ def _invalid(asked: ReaskedDecision, at: Place) -> Iterator[str]:
         yield "valid: the asset was not among the valid ones"
     for row in rows[:1]:
         for failing in row.failures:
-            yield f"table: {row_name(row.row)} of {asked.stock.table_of[at.name]}: {failing}"
+            mirrored = ", with mirrored facts" if _is_mirrored(at) else ""
+            yield f"table: {row_name(row.row)} of {asked.stock.table_of[at.name]}{mirrored}: {failing}"
         if not row.is_enabled:
             yield f"table: {row_name(row.row)} of {asked.stock.table_of[at.name]} is disabled"
 
@@ -226,14 +228,16 @@ def _rows(asked: ReaskedDecision, at: Place) -> list[Row]:
     if table is None or context is None:
         return []
     try:
-        explained = table.compile().explain(_facts(asked), unknown=UNKNOWN)
+        compiled = table.compile()
+        facts = mirrored_facts(context, changed_in_mirror(compiled.asked.values())) if _is_mirrored(at) else dict(context)
+        explained = compiled.explain(facts, unknown=UNKNOWN)
         return [row for row in explained.asset(at.asset) if not row.is_valid]
     except ContextDBError:
         return []
 
 
-def _facts(asked: ReaskedDecision) -> dict[str, object]:
-    return dict(asked.decision.context or {})
+def _is_mirrored(at: Place) -> bool:
+    return bool(at.search.database.mirrored[at.range])
 
 
 # ---- changes
@@ -286,7 +290,7 @@ def _valid(asked: ReaskedDecision, at: Place) -> Step | None:
         edited = _edited(table, rows[0])
         if edited is not None:
             search = asked.searches[at.name]
-            chosen = asked_of_table(search.database, search.chosen, edited.compile(), _facts(asked))
+            chosen = asked_of_table(search.database, search.chosen, edited.compile(), asked.decision.context or {})
             if chosen.ranges[at.range]:
                 failures = rows[0].failures
                 name, row = asked.stock.table_of[at.name], row_name(rows[0].row)

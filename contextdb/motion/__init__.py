@@ -67,7 +67,7 @@ from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.session_diff import Parting, SessionDiff
 from contextdb.motion.trace.stats import SessionStats
 from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
-from contextdb.motion.trace.why_not import Change, WhyNot
+from contextdb.motion.trace.why_not import Change, ChangePart, WhyNot
 
 __all__ = [
     "ANY_TAGS",
@@ -78,6 +78,7 @@ __all__ = [
     "Candidate",
     "Candidates",
     "Change",
+    "ChangePart",
     "ChangedChoice",
     "Channel",
     "Choice",

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,27 +41,46 @@ MOST_STEPS = 30
 AND = " + "
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
-    """One change, and whether the asset wins with it.
+class ChangePart(NamedTuple):
+    """One thing that is changed.
 
     Attributes
     ----------
     kind : str
-        "cell", "mask" (its range is let in, where no table says why it was not), "mark", "tags", "setting", "bias", "weight",
-        "threshold"; or several, as "cell + bias".
+        "cell", "cells", "mask" (its range is let in, where no table says why it was not), "mark", "tags", "setting", "bias",
+        "weight" or "threshold".
     what : str
         What is changed: the cell, the mark, the channel.
     to : str or float
         To what.
-    wins : bool
-        Whether a search with it chooses the asset.
     """
 
     kind: str
     what: str
     to: str | float
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What is changed together, and whether a search with it chooses the asset."""
+
+    parts: tuple[ChangePart, ...]
     wins: bool
+
+    @property
+    def kind(self) -> str:
+        """The kinds of its parts, as "cell + bias"."""
+        return AND.join(part.kind for part in self.parts)
+
+    @property
+    def what(self) -> str:
+        """What its parts change."""
+        return AND.join(part.what for part in self.parts)
+
+    @property
+    def to(self) -> str | float:
+        """To what: as it is for one part, else as text."""
+        return self.parts[0].to if len(self.parts) == 1 else AND.join(str(part.to) for part in self.parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,8 +158,8 @@ class Place:
         return LeftOut(int(self.search.left_out[self.frame]))
 
 
-Step = tuple[str, str, "str | float", ReaskedDecision]
-"""A change: its kind, what, to what, and the decision with it."""
+Step = tuple[ChangePart, ReaskedDecision]
+"""A change, and the decision with it."""
 
 
 def why_not(asked: ReaskedDecision, asset: str) -> WhyNot:
@@ -244,21 +264,15 @@ def _is_mirrored(at: Place) -> bool:
 
 
 def _changes(asked: ReaskedDecision, at: Place) -> Iterator[Change]:
-    """The changes of each kind that make the asset win, or come nearest to it."""
-    ways = list(_free(asked, at))
-    for kind, what, to, free in ways:
-        yield Change(kind, what, to, _wins(free, at.asset))
-    if at.left_out is LeftOut.NO and at.name in asked.searched:
-        ways = [("", "", "", asked)]
-    for kind, what, to, free in ways[:1]:
-        if _wins(free, at.asset):
-            continue
-        for more in _cheaper(free, _place(free, at.asset)):
-            wins = _wins(more[3], at.asset)
-            if kind:
-                yield Change(kind + AND + more[0], what + AND + more[1], f"{to}{AND}{more[2]}", wins)
-            else:
-                yield Change(more[0], more[1], more[2], wins)
+    """What lets the asset be chosen, and, where that is not enough, what makes it cheaper beside."""
+    parts: tuple[ChangePart, ...] = ()
+    now = asked
+    for part, freed in _free(asked, at):
+        parts, now = (*parts, part), freed
+        yield Change(parts, _wins(now, at.asset))
+    if not _wins(now, at.asset):
+        for part, cheaper in _cheaper(now, _place(now, at.asset)):
+            yield Change((*parts, part), _wins(cheaper, at.asset))
 
 
 def _wins(asked: ReaskedDecision, asset: str) -> bool:
@@ -266,19 +280,12 @@ def _wins(asked: ReaskedDecision, asset: str) -> bool:
 
 
 def _free(asked: ReaskedDecision, at: Place) -> Iterator[Step]:
-    """What lets the asset be chosen: each step goes on from the one before, and the last, which does it all, is first."""
-    kinds: list[str] = []
-    whats: list[str] = []
-    tos: list[str] = []
-    now, found = asked, []
+    """What lets the asset be chosen: each step goes on from the one before."""
     for step in (_valid, _unmarked, *[_in_time] * len(OF_TIME), _in_turn):
-        done = step(now, at)
-        if done is None:
-            continue
-        kind, what, to, now = done
-        kinds, whats, tos = [*kinds, kind], [*whats, what], [*tos, str(to)]
-        found.append((AND.join(kinds), AND.join(whats), to if len(tos) == 1 else AND.join(tos), now))
-    yield from reversed(found)
+        done = step(asked, at)
+        if done is not None:
+            asked = done[1]
+            yield done
 
 
 def _valid(asked: ReaskedDecision, at: Place) -> Step | None:
@@ -296,8 +303,8 @@ def _valid(asked: ReaskedDecision, at: Place) -> Step | None:
                 name, row = asked.stock.table_of[at.name], row_name(rows[0].row)
                 what = f"{row} of {name}: {', '.join(failing.condition for failing in failures)}"
                 kind = "cell" if len(failures) == 1 else "cells"
-                return kind, what, ", ".join(failing.mend for failing in failures), _with(asked, at, chosen)
-    return "mask", at.asset, "valid", _with(asked, at, _let_in(at.search.chosen, at.range))
+                return ChangePart(kind, what, "; ".join(failing.mend for failing in failures)), _with(asked, at, chosen)
+    return ChangePart("mask", at.asset, "valid"), _with(asked, at, _let_in(at.search.chosen, at.range))
 
 
 def _edited(table: Edited, row: Row) -> Edited | None:
@@ -328,7 +335,7 @@ def _unmarked(asked: ReaskedDecision, at: Place) -> Step | None:
         return None
     kind = "tags" if reason is LeftOut.TAGS else "mark"
     what = f"{reason.text} on {at.asset}"
-    return kind, what, "without", _with_search(asked, _unmarked_search(asked.searches[at.name], at.range))
+    return ChangePart(kind, what, "without"), _with_search(asked, _unmarked_search(asked.searches[at.name], at.range))
 
 
 def _unmarked_search(search: ReaskedSearch, at: int) -> ReaskedSearch:
@@ -369,7 +376,7 @@ def _in_time(asked: ReaskedDecision, at: Place) -> Step | None:
         return None
     chosen = asked.searches[at.name].chosen
     skips = tuple(skip for skip in chosen.skips if skip.why is not at.left_out)
-    return "setting", setting, "0", _with(asked, at, chosen._replace(skips=skips))
+    return ChangePart("setting", setting, 0.0), _with(asked, at, chosen._replace(skips=skips))
 
 
 def _in_turn(asked: ReaskedDecision, at: Place) -> Step | None:
@@ -378,7 +385,7 @@ def _in_turn(asked: ReaskedDecision, at: Place) -> Step | None:
     if choice is None or at.name in asked.searched or choice.database is None:
         return None
     lower = _rounded(choice.hit.cost, downwards=True)
-    return "threshold", choice.database, lower, asked.with_threshold(choice.database, lower)
+    return ChangePart("threshold", choice.database, lower), asked.with_threshold(choice.database, lower)
 
 
 def _cheaper(asked: ReaskedDecision, at: Place) -> Iterator[Step]:
@@ -392,10 +399,10 @@ def _cheaper(asked: ReaskedDecision, at: Place) -> Iterator[Step]:
     biases = chosen.range_biases.copy()
     biases[at.range] += added
     least = float(biases.min(initial=np.inf))
-    yield "bias", at.asset, added, _with(asked, at, chosen._replace(range_biases=biases, least_of_ranges=least))
+    yield ChangePart("bias", at.asset, added), _with(asked, at, chosen._replace(range_biases=biases, least_of_ranges=least))
     if at.name != choice.database and _comes_before(asked, at.name, choice.database):
         to = _rounded(at.cost + MARGIN * abs(at.cost), downwards=False)
-        yield "threshold", at.name, to, asked.with_threshold(at.name, to)
+        yield ChangePart("threshold", at.name, to), asked.with_threshold(at.name, to)
     yield from _weighed(asked, at, choice)
 
 
@@ -410,9 +417,9 @@ def _weighed(asked: ReaskedDecision, at: Place, choice: Choice) -> Iterator[Step
             continue
         to = _rounded(weight, downwards=weight < now)
         size = abs(math.log((to + 1e-12) / (now + 1e-12)))
-        found.append((size, ("weight", channel, to, asked.with_weights({channel: to}))))
+        found.append((size, (ChangePart("weight", channel, to), asked.with_weights({channel: to}))))
     found.sort(key=lambda each: each[0])
-    winning = [step for _, step in found if _wins(step[3], at.asset)]
+    winning = [step for _, step in found if _wins(step[1], at.asset)]
     yield from (winning or [step for _, step in found])[:1]
 
 

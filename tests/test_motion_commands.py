@@ -695,6 +695,26 @@ def test_what_if_of_another_table_runs_the_session_again_with_its_answers():
     assert "jog" in {decision.playing.asset for decision in run_again(trace.reasked(project))}
 
 
+def test_a_project_with_other_markup_or_clips_is_asked_by_the_names_of_assets(here: Path):
+    tick = int(at_jump())
+    trace = Trace.load("session.parquet")
+    assert not any(each.is_changed for each in trace.reasked(Project.load("game")))
+    marks = here / "game" / "clips" / "marks.csv"
+    marks.write_text(f"{MARKS}jog,DoNotChoose,,,\n", encoding="utf-8")
+    marked = trace.reasked(Project.load("game"))
+    assert marked.changed == {"all"}
+    assert marked[tick].choice.hit.asset != "jog"
+    assert marked.why_not(tick, "jog").reasons[0] == "markup: DoNotChoose"
+    assert not marked[0].is_changed
+    marks.write_text(MARKS, encoding="utf-8")
+    (here / "game" / "clips" / "idle.bvh").unlink()
+    fewer = trace.reasked(Project.load("game"))
+    assert "all" in fewer.changed
+    assert fewer[0].decision.choice.hit.asset == "idle"
+    assert fewer[0].choice.hit.asset != "idle"
+    assert len(run_again(fewer)) == 151
+
+
 def test_a_diff_says_where_two_sessions_part(here: Path):
     assert motion("replay", "session.parquet", "--diff", "session.parquet").lines[0] == "both play the same in all 151 updates"
     (here / "other.csv").write_text(STICK.replace("12.5,2.5,20,Run,2,normal", "12.5,1.2,0,Walk,1.2,normal"), encoding="utf-8")

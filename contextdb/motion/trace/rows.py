@@ -38,6 +38,7 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 Events = dict[tuple[str, int], tuple[str, ...]]
 
 TIMINGS, FILTERS, INPUTS = "search_us", "filters", "inputs"
+OPTIONAL = (TIMINGS, FILTERS, INPUTS)
 """The columns that a file may lack: another recording has other timings, and older versions kept no filters and no inputs."""
 
 

@@ -37,7 +37,7 @@ from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.worked_out import WorkedOut, of_searched
 from contextdb.motion.trace.filter_rows import RUNS, fingerprint, is_recorded, markup_digest
 from contextdb.motion.trace.reasked import Changes, Reasked
-from contextdb.motion.trace.rows import FILTERS, INPUTS, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
+from contextdb.motion.trace.rows import FILTERS, INPUTS, OPTIONAL, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
 from contextdb.motion.trace.session_diff import SessionDiff, diff_sessions
 from contextdb.motion.trace.stats import SessionStats, stats_of
 from contextdb.motion.trace.stock import Stock
@@ -409,7 +409,7 @@ def _check_format(metadata: Mapping[str, str], file: str) -> None:
 
 def _check_columns(frame: pl.DataFrame, file: str) -> None:
     wanted = columns()
-    present = [name for name in wanted if name in frame.columns or name not in (TIMINGS, FILTERS, INPUTS)]
+    present = [name for name in wanted if name in frame.columns or name not in OPTIONAL]
     wrong = [name for name in present if frame.schema.get(name) != wanted[name]]
     if wrong:
         found = f"{plural(len(wrong), 'column')} of the session missing, or of another type: {', '.join(map(in_quotes, wrong))}."

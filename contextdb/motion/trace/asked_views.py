@@ -12,7 +12,8 @@ from contextdb.motion.trace.session_diff import SessionDiff
 from contextdb.motion.trace.stats import GAINS, SessionStats
 from contextdb.motion.trace.text_table import WIDTH, Column, table_lines
 from contextdb.motion.trace.what_if import WhatIf
-from contextdb.motion.trace.why_not import Change, ChangePart, WhyNot
+from contextdb.motion.trace.why_not import WhyNot
+from contextdb.motion.trace.winning_changes import Change, ChangePart
 
 MOST_NAMES = 12
 MOST_CHOICES = 20

@@ -49,6 +49,7 @@ from contextdb.report.render_json import as_json
 from contextdb.tables.table import leaf_assets
 
 SUFFIX = ".parquet"
+K_HELP = "candidates of each search that replay shows; with 0, none, and no search can be asked again (default: 12)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
     parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh or .npz")
     parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
-    parser.add_argument("--k", metavar="N", type=_count, default=12, help="candidates of each search to keep (default: 12)")
+    parser.add_argument("--k", metavar="N", type=_count, default=12, help=K_HELP)
     parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="seed of the controller's variation (default: 0)")
     parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")

@@ -75,7 +75,8 @@ from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.session_diff import Parting, SessionDiff
 from contextdb.motion.trace.stats import SessionStats
 from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
-from contextdb.motion.trace.why_not import Change, WhyNot
+from contextdb.motion.trace.why_not import WhyNot
+from contextdb.motion.trace.winning_changes import Change, ChangePart
 
 __all__ = [
     "ANY_TAGS",
@@ -87,6 +88,7 @@ __all__ = [
     "Candidate",
     "Candidates",
     "Change",
+    "ChangePart",
     "ChangedChoice",
     "Channel",
     "Character",

@@ -189,7 +189,7 @@ CHANGES = {
     ),
     "a group": ({"features": {"channels": [{**c, "group": "g"} for c in SECTIONS["features"]["loco"]["channels"]]}}, False),
     "a weight of the database": ({"weights": {"Hips velocity": 3.0}}, False),
-    "a bias": ({"continuing_bias": -0.1}, False),
+    "a bias": ({"continuing_bias": -0.2}, False),
     "the end": ({"end_s": 1.0}, False),
     "markup": ({"markup": "marks.csv"}, False),
 }

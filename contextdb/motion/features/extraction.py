@@ -1,4 +1,4 @@
-"""Compute features: from clips for a database, and from a pose and a wished path for a query. One code path for both.
+"""Compute features: from clips for a database, and from a pose and a wished path for a query.
 
 F frames at the schema's rate, N features, in the schema's units (m, m/s, rad/s, unit vectors) and not yet normalised.
 """
@@ -17,28 +17,19 @@ from contextdb.motion.clips import mirror, own_axes, quaternions
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.feet import feet_of, footfalls_of, phases
 from contextdb.motion.clips.looping import three_rounds
+from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.clips.trajectory import (
-    PathPoints,
-    Trajectory,
-    after_seconds,
-    along_path,
-    heading_vectors,
-    rates_of_change,
-    root_trajectory,
-    to_own_frame,
-)
+from contextdb.motion.clips.trajectory import Trajectory, after_seconds, along_path, rates_of_change, root_trajectory, to_own_frame
 from contextdb.motion.features.channels import DEFAULT_AXIS, Channel
+from contextdb.motion.features.path_features import point_features, write_paths
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 
 Features = NDArray[np.float32]
 
 FARTHEST_M = 1e6
 LARGEST_CUSTOM = 1e12
-SLOW_MPS = 0.3
-"""A body that is slower moves in no clear direction: its direction to velocity shrinks evenly to 0, 0 at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,17 +153,14 @@ def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajector
         found = f"the query has shape {np.shape(query)}, and the path {plural(n_frames, 'frame')} and its present at {wanted.now}."
         raise QueryError(Fault(found, f"a query of {schema.n_features} features, and a path that holds its present"))
     changed = np.array(query, np.float32)
-    frames = np.array([wanted.now])
-    for channel in schema.channels:
-        if channel.type == "trajectory":
-            changed[schema.slices[channel.name]] = _trajectory_features(channel, wanted, frames)[0]
+    write_paths(schema, changed[None], ManyTrajectories(wanted.rate, wanted.positions[None], wanted.headings[None], wanted.now))
     return changed
 
 
 def _channel_features(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: Clip) -> Floats:
     match channel.type:
         case "trajectory":
-            return _trajectory_features(channel, path, np.arange(poses.n_frames))
+            return trajectory_features(channel, path, np.arange(poses.n_frames))
         case "phase":
             found = phases(footfalls_of(poses, channel.feet), np.arange(poses.n_frames) / poses.rate)
         case "custom":
@@ -249,36 +237,13 @@ def _in_body(vectors: Floats, headings: Floats) -> Floats:
 # ---- the path
 
 
-def _trajectory_features(channel: Channel, path: Trajectory, frames: Ints) -> Floats:
+def trajectory_features(channel: Channel, path: Trajectory, frames: Ints) -> Floats:
     """A trajectory channel's features at some frames of a path: [frames, features of the channel]."""
-    at = frames.astype(np.float64)
+    at, origins, headings = frames.astype(np.float64), path.positions[frames], path.headings[frames]
     points = [after_seconds(path, at, seconds) for seconds in channel.at] + [
         along_path(path, at, metres) for metres in channel.along
     ]
-    return np.concatenate([point_features(channel, path, frames, point) for point in points], axis=1)
-
-
-def point_features(channel: Channel, path: Trajectory, frames: Ints, points: PathPoints) -> Floats:
-    """What a channel says of one point for each of some frames of a path."""
-    headings = path.headings[frames]
-    match channel.what:
-        case "position":
-            return to_own_frame(points.positions - path.positions[frames], headings)
-        case "direction":
-            return heading_vectors(points.headings - headings)
-        case "velocity":
-            return to_own_frame(points.velocities, headings)
-        case "direction_to_velocity":
-            return _direction_to_velocity(points)
-        case _:
-            return np.asarray(np.linalg.norm(points.velocities, axis=-1, keepdims=True))
-
-
-def _direction_to_velocity(points: PathPoints) -> Floats:
-    """The facing as seen by one who looks where the body moves: [N, 2], of length 1 from `SLOW_MPS` on and shorter below."""
-    speeds = np.linalg.norm(points.velocities, axis=-1, keepdims=True)
-    moving = to_own_frame(points.velocities / np.maximum(speeds, SLOW_MPS), points.headings)
-    return np.asarray(moving * np.array([-1.0, 1.0]))
+    return np.concatenate([point_features(channel.what, origins, headings, point) for point in points], axis=1)
 
 
 # ---- functions of others

@@ -20,13 +20,15 @@ from contextdb.motion.clips.poses import Poses
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.trajectory import Trajectory
-from contextdb.motion.features.channels import Channel, check_together, is_pair, read_channel, read_pair
+from contextdb.motion.features.channels import Channel, What, check_together, is_pair, read_channel, read_pair
 from contextdb.motion.reading import Mapped, Section
 
 __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
 
 CustomFunction = Callable[[Poses, Trajectory], Floats]
 """Makes the features of a custom channel, [F, size], of a body's poses and its path, both F frames at the schema's rate."""
+
+PathChannels = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[What | None, slice], ...]]
 
 SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror")
 MOST_RATE = 1000.0
@@ -82,6 +84,15 @@ class FeatureSchema:
         """Where each channel's features stand."""
         stops = np.cumsum([channel.n_features for channel in self.channels]).tolist()
         return {channel.name: slice(stop - channel.n_features, stop) for channel, stop in zip(self.channels, stops, strict=True)}
+
+    @cached_property
+    def path_points(self) -> tuple[PathChannels, ...]:
+        """Where the trajectory channels look: seconds or metres, and what each channel that looks there says, with its slice."""
+        found: dict[tuple[tuple[float, ...], tuple[float, ...]], list[tuple[What | None, slice]]] = {}
+        for channel in self.channels:
+            if channel.type == "trajectory":
+                found.setdefault((channel.at, channel.along), []).append((channel.what, self.slices[channel.name]))
+        return tuple((at, along, tuple(channels)) for (at, along), channels in found.items())
 
     @property
     def weights(self) -> Floats:

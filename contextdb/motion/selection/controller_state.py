@@ -26,6 +26,8 @@ class ControllerState:
         What was played within the last seconds.
     recent : tuple of str
         The assets of the last changes, as far as variation remembers them.
+    waiting_since_s : float, optional
+        Since when a forced jump over the cost bar waits, in seconds of play; None when none does.
     rng : object
         Where the random generator is; None without one.
     """
@@ -36,4 +38,5 @@ class ControllerState:
     since_search_s: float = 0.0
     history: tuple[Played, ...] = ()
     recent: tuple[str, ...] = ()
+    waiting_since_s: float | None = None
     rng: object = None

@@ -38,9 +38,9 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 """What the markup says of a frame of a database."""
 Events = dict[tuple[str, int], tuple[str, ...]]
 
-TIMINGS, FILTERS, INPUTS, BODY = "search_us", "filters", "inputs", ("body_x", "body_z", "body_heading")
-OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY)
-"""The columns that a file may lack: another recording has other timings, and older versions kept no filters, inputs and bodies."""
+TIMINGS, FILTERS, INPUTS, BODY, HELD = "search_us", "filters", "inputs", ("body_x", "body_z", "body_heading"), "held"
+OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY, HELD)
+"""The columns that a file may lack: another recording has other timings, and older versions kept none of the others."""
 
 
 def columns() -> dict[str, PolarsType]:
@@ -91,6 +91,7 @@ def columns() -> dict[str, PolarsType]:
         "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
         "root_weight": number,
         **dict.fromkeys(BODY, number),
+        HELD: text,
         FILTERS: filter_type(),
         INPUTS: text,
         TIMINGS: number,
@@ -120,6 +121,7 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
         "root_weight": float(decision.root_weight),
         **dict(zip(BODY, (None, None, None) if decision.body is None else map(float, decision.body), strict=True)),
+        HELD: str(decision.held),
         FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
         INPUTS: None if decision.inputs is None else inputs_json(decision.inputs),
         TIMINGS: _number(decision.search_us),
@@ -249,6 +251,7 @@ def decision_of(row: Row) -> Decision:
         root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
         root_weight=float(row["root_weight"]),
         body=_body(row),
+        held=row.get(HELD) or "",
         filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
         inputs=None if row.get(INPUTS) is None else inputs_of(row[INPUTS]),
     )

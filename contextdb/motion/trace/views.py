@@ -84,6 +84,8 @@ def _spells(decisions: Iterable[Decision]) -> list[tuple[Decision, float]]:
 
 
 def _changes(decision: Decision, last: Decision) -> bool:
+    if decision.held != last.held:
+        return True
     if decision.action is Action.CONTINUE:
         return last.action in STEADY
     return decision.action not in STEADY or decision.action is not last.action
@@ -101,7 +103,7 @@ def _session_columns(spells: Sequence[tuple[Decision, float]], assets: Column) -
     yield Column("tick", [f"{first.tick:,}" for first in firsts], is_number=True, is_key=True)
     yield Column("time s", [seconds(first.time_s) for first in firsts], is_number=True)
     yield Column("search", [cause_of(first) for first in firsts])
-    yield Column("", [str(first.action) for first in firsts])
+    yield Column("", [_action(first) for first in firsts])
     if len(set(filter(None, databases))) > 1:
         yield Column("database", [shortened(database, MOST_DATABASE) for database in databases])
     yield assets
@@ -113,6 +115,11 @@ def _session_columns(spells: Sequence[tuple[Decision, float]], assets: Column) -
 
 def _asset(playing: Playing | None) -> str:
     return "" if playing is None else playing.asset + (" (mirrored)" if playing.mirrored else "")
+
+
+def _action(decision: Decision) -> str:
+    """What the update did, and the guard that saw to it."""
+    return f"{decision.action} ({decision.held})" if decision.held else str(decision.action)
 
 
 def cause_of(decision: Decision) -> str:
@@ -177,6 +184,8 @@ def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]
     for what, cost, of in (("cost", decision.cost, playing), ("playing on", decision.continuing_cost, before)):
         if cost is not None:
             yield what, cost_text(cost) + _parts_text(decision, of)
+    if decision.held:
+        yield "held by", decision.held
     if playing is not None and events.get((playing.database, playing.frame)):
         yield "events", ", ".join(events[playing.database, playing.frame])
     if move != NO_MOTION or decision.root_weight != 1.0:

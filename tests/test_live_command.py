@@ -253,10 +253,23 @@ def test_decisions_are_printed_where_they_change_what_plays():
 
 
 def test_nothing_that_a_game_sends_moves_the_cursor_or_stops_the_listener():
-    hostile = ask(who="\x1b[2J", table="x\n", facts={"\x07": "\x1b]0;x\x07", "z": {"odd": 1}}, actors=3)
+    hostile = ask(who="\x1b[2J", table="x\n", facts={"\x07": "\x1b]0;x\x07", "z": {"odd": 1}})
     lines = said(hostile, {"line": "weather"})
     assert len(lines) == 1
     assert all(character.isprintable() for character in lines[0])
     own = cdb.Table.from_columns({"Asset": ["a"]}, name="x").compile()
-    assert Changes({"x": own}, True).of(ask(actors={"A": [3]})).notes
+    assert Changes({"x": own}, True).of(ask(facts={"z": {"odd": 1}})).notes == ['your "x" cannot be asked that: this is no fact.']
+    assert "cannot be asked" in Changes({"x": own}, True).of(ask(actors={"A": [{"hp": 3}]})).notes[0]
     assert Changes({"x": own}, True).of(ask(rows="0")).notes == ['your "x" answers otherwise than the game\'s.']
+
+
+@pytest.mark.parametrize("fault", [TypeError, ValueError, AttributeError])
+def test_a_fault_of_our_own_is_not_taken_for_a_line_that_cannot_be_asked(monkeypatch: pytest.MonkeyPatch, fault: type[Exception]):
+    own = cdb.Table.from_columns({"Asset": ["a"]}, name="x").compile()
+
+    def broken(*arguments: object, **named: object) -> object:
+        raise fault("of our own")
+
+    monkeypatch.setattr(cdb.CompiledTable, "explain", broken)
+    with pytest.raises(fault, match="of our own"):
+        Changes({"x": own}, True).of(ask())

@@ -14,6 +14,8 @@ from contextdb.telemetry.link.lines import ASK, DECISION, HEADER, LOST, PICK, TA
 
 N_NEAREST = 3
 NO_PICK = "-"
+Facts = dict[str, object]
+
 UNCHANGED = ("plays on", "loops")
 """The actions of a decision that are no change."""
 
@@ -101,11 +103,13 @@ class Changes:
         if own is None or line["line"] != ASK:
             return [], []
         try:
-            actors = line.get("actors")
-            given = None if actors is None else {role: [given_facts(each) for each in listed] for role, listed in actors.items()}
-            explanation = own.explain(given_facts(line["facts"]), unknown="any", actors=given)
-        except (ContextDBError, ValueError, AttributeError, TypeError) as error:
-            return [], self._note(f"your {in_quotes(own.name)} cannot be asked that: {error}")
+            facts, actors = _given(line)
+        except ValueError as error:
+            return [], self._note(_not_asked(own, error))
+        try:
+            explanation = own.explain(facts, unknown="any", actors=actors)
+        except ContextDBError as error:
+            return [], self._note(_not_asked(own, error))
         notes: list[str] = []
         if explanation.matches.bits != int(line["rows"], 16) and not any(None is v for v in line["facts"].values()):
             notes = self._note(f"your {in_quotes(own.name)} answers otherwise than the game's.")
@@ -132,6 +136,17 @@ class Changes:
             return []
         self._noted.add(text)
         return [text]
+
+
+def _given(line: Line) -> tuple[Facts, Mapping[str, list[Facts]] | None]:
+    """The facts and the actors of a question, as a query takes them; ValueError where one is no fact."""
+    actors = line.get("actors")
+    given = None if actors is None else {role: [given_facts(each) for each in listed] for role, listed in actors.items()}
+    return given_facts(line["facts"]), given
+
+
+def _not_asked(own: CompiledTable, error: Exception) -> str:
+    return f"your {in_quotes(own.name)} cannot be asked that: {error}"
 
 
 def _pick_of(picked: object) -> tuple[object, object] | None:

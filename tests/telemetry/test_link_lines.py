@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import FactSet, read_fact, read_fact_text
+from contextdb.telemetry.link import lines
 from contextdb.telemetry.link.lines import dumped, fact_text, given_fact, read_line, sent_fact, sent_facts
 
 HOSTILE = [
@@ -110,11 +111,30 @@ ASK = {"line": "ask", "t": 1, "who": None, "table": "x", "facts": {}, "rows": "0
         (json.dumps(ASK | {"valid": True}).encode(), '"valid" is of another type'),
         (json.dumps(ASK | {"pick": {"asset": 3}}).encode(), "asset"),
         (b'{"line":"tables","tables":{"a":3}}', "no object"),
+        (b'{"line":"tables","tables":{"a":{"conditions":5}}}', '"conditions" of a table is no object'),
+        (json.dumps(ASK | {"t": 10**400}).encode(), '"t" is too large'),
+        (json.dumps(ASK | {"actors": 3}).encode(), '"actors" is no object of lists of objects'),
+        (json.dumps(ASK | {"actors": {"A": 3}}).encode(), '"actors" is no object of lists of objects'),
+        (json.dumps(ASK | {"actors": {"A": [3]}}).encode(), '"actors" is no object of lists of objects'),
     ],
 )
 def test_what_is_no_line_is_refused_with_why(raw: bytes, why: str):
     with pytest.raises(ValueError, match=why):
         read_line(raw)
+
+
+def test_a_question_with_actors_or_null_for_them_is_read():
+    for actors in ({"A": [{"hp": 3}, {}], "B": []}, {}, None):
+        assert read_line(json.dumps(ASK | {"actors": actors}).encode())["actors"] == actors
+
+
+def test_a_fault_of_our_own_in_a_fact_is_not_taken_for_a_fact_that_cannot_be_sent(monkeypatch: pytest.MonkeyPatch):
+    def broken(value: object, condition: Condition) -> object:
+        raise TypeError("a fault of our own")
+
+    monkeypatch.setattr(lines, "read_fact", broken)
+    with pytest.raises(TypeError, match="of our own"):
+        sent_fact(frozenset(("A",)), CONDITIONS["tags"])
 
 
 def test_a_line_of_a_kind_that_is_not_known_is_read():

@@ -336,6 +336,17 @@ def test_a_file_with_a_port_that_others_may_read_is_passed_over(by_port: Path):
         by_port.chmod(0o600)
 
 
+@pytest.mark.parametrize(
+    "said", [b"", b"[1]", b'{"port":null,"token":"a"}', b'{"port":70000,"token":"a"}', b'{"port":"x","token":"a"}']
+)
+def test_a_file_with_a_port_that_says_none_is_passed_over(by_port: Path, said: bytes):
+    with cdb.link("game"):
+        whole = by_port.read_bytes()
+        by_port.write_bytes(said)
+        assert hearing.games() == []
+        by_port.write_bytes(whole)
+
+
 def test_the_port_of_a_game_that_was_killed_is_swept(by_port: Path):
     with cdb.link("game") as link:
         said = by_port.read_bytes()

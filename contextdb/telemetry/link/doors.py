@@ -24,6 +24,7 @@ IS_UNIX = hasattr(socket, "AF_UNIX")
 SOCKET, PORT = ".sock", ".port"
 MOST_OF_A_NAME = 99
 """So many games of one name may run at once."""
+MOST_PORT = 65535
 WAITING = 16
 """So many connections may wait to be taken."""
 PATIENCE_S = 2.0
@@ -155,9 +156,12 @@ def _port(path: Path) -> tuple[int, str]:
         raise PermissionError(f"{path} is not this user's alone")
     try:
         read = json.loads(path.read_bytes())
-        return int(read["port"]), str(read["token"])
-    except (ValueError, TypeError, KeyError):
-        raise OSError(f"{path} is no file of a game that listens") from None
+    except (ValueError, RecursionError):
+        read = None
+    port, token = (read.get("port"), read.get("token")) if isinstance(read, dict) else (None, None)
+    if not isinstance(port, int) or not 0 < port <= MOST_PORT or not isinstance(token, str):
+        raise OSError(f"{path} is no file of a game that listens")
+    return port, token
 
 
 def is_same_user(connection: socket.socket) -> bool:

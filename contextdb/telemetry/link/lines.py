@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -78,11 +79,24 @@ def _require(line: Line) -> None:
             int(line["rows"], 16)
         except ValueError:
             raise ValueError('the value of "rows" is no number in hexadecimal.') from None
+        if line.get("actors") is not None and not _is_actors(line["actors"]):
+            raise ValueError('the value of "actors" is no object of lists of objects.')
+    if isinstance(line.get("t"), int) and abs(line["t"]) > sys.float_info.max:
+        raise ValueError('the value of "t" is too large.')
     for table in line["tables"].values() if line["line"] in (HEADER, TABLES) else ():
         if not isinstance(table, dict):
             raise ValueError('a table of "tables" is no object of JSON.')
+        if not isinstance(table.get("conditions", {}), dict):
+            raise ValueError('the value of "conditions" of a table is no object of JSON.')
     if isinstance(line.get("pick"), dict) and not isinstance(line["pick"].get("asset"), (str, type(None))):
         raise ValueError('the asset of "pick" is no text.')
+
+
+def _is_actors(value: object) -> bool:
+    """Whether a value has the shape of actors: for each role a list of facts."""
+    if not isinstance(value, dict):
+        return False
+    return all(isinstance(listed, list) and all(isinstance(facts, dict) for facts in listed) for listed in value.values())
 
 
 # ---- facts
@@ -113,7 +127,7 @@ def sent_fact(value: object, condition: Condition) -> object:
         return sent_fact(value.item(), condition) if type(value.item()) in (bool, int, float, str) else None
     try:
         fact = read_fact(value, condition)
-    except (ContextError, TypeError, ValueError):
+    except ContextError:
         return None
     if isinstance(fact, Cell):
         return {"cell": format_cell(fact, condition.domain)}

@@ -101,8 +101,8 @@ class Recorded:
         first = self.starts[start]
         try:
             pairs = zip(self.starts[start:stop], self.stops[start:stop], strict=True)
-            return [_plain_texts(read_line(raw[i - first : j - first])) for i, j in pairs]
-        except (ValueError, KeyError):
+            return [_plain_texts(_question(raw[i - first : j - first])) for i, j in pairs]
+        except ValueError:
             found = "the file has been changed since it was opened."
             raise TableError(Fault(found, "a recording that only grows", place=Place(str(self.path)))) from None
 
@@ -199,6 +199,14 @@ class _Reader:
 
     def _at(self, line: int) -> Place:
         return Place(str(self.path), line)
+
+
+def _question(raw: bytes) -> Line:
+    """A line that is a question; ValueError for any other."""
+    line = read_line(raw)
+    if line["line"] != ASK:
+        raise ValueError("this is no question.")
+    return line
 
 
 def _texts(line: Line) -> Texts:

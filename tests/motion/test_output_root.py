@@ -54,6 +54,7 @@ def test_a_steered_body_may_be_given_as_it_is():
 @pytest.mark.parametrize("weight", [0.0, 0.3, 1.0])
 def test_weights_share_the_movement_between_animation_and_game(weight):
     free = {"position_pull_s": 0.0, "rotation_pull_s": 0.0, "position_clamp_m": 1000.0, "rotation_clamp_deg": 180.0}
+    free |= {"path_alignment": False, "min_stride": 1.0, "max_stride": 1.0}
     settings = PoseSettings(position_weight=weight, rotation_weight=0.0, blend="none", **free)
     found = roots([("walk", 0.0, 61)], settings, lambda t: (3.0 * t, 0.0, 0.0))
     clip = bank().root[bank().starts[range_of("walk")] :][[0, 60]].astype(float)

@@ -33,6 +33,7 @@ from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.clips.trajectory import root_trajectory
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
+from contextdb.motion.output.travel import travels
 
 Flags = NDArray[np.bool_]
 Singles = NDArray[np.float32]
@@ -215,6 +216,13 @@ class PoseBank:
         (x, z, heading), (to_x, to_z, to_heading) = self.root[low].tolist(), self.root[high].tolist()
         return x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)
 
+    def travel_at(self, range_number: int, time_s: float) -> Place3:
+        """How fast the clip goes about a moment: metres a second to the left and ahead of its mean facing, and how far it is
+        turned from that then."""
+        low, high, share = self._between(range_number, time_s)
+        (left, ahead, sway), (to_left, to_ahead, to_sway) = self._travels[low].tolist(), self._travels[high].tolist()
+        return left + share * (to_left - left), ahead + share * (to_ahead - ahead), sway + share * (to_sway - sway)
+
     def contacts_at(self, range_number: int, time_s: float) -> Flags:
         """Which feet are down at a moment of a range: in the nearest frame."""
         low, high, share = self._between(range_number, time_s)
@@ -225,6 +233,10 @@ class PoseBank:
         found = self.skeleton.offsets.copy()
         found[self.moving] = positions
         return found
+
+    @cached_property
+    def _travels(self) -> Floats:
+        return travels(self.root, self.starts, self.stops, self.looping, self.rate)
 
     @cached_property
     def _ranges(self) -> dict[tuple[str, bool], int]:
@@ -285,7 +297,7 @@ class _Part:
         rotations, positions = local.rotations, local.positions.copy()
         above = poses.skeleton.ancestors(poses.skeleton.hips)
         rotations[:, above], positions[:, above] = [1.0, 0.0, 0.0, 0.0], 0.0
-        tops = _tops(poses.skeleton)
+        tops = tops_of(poses.skeleton)
         back = quaternions.about_axis("y", -root[:, 2])[:, None]
         ground = np.stack((root[:, 0], np.zeros(len(root)), root[:, 1]), axis=-1)[:, None]
         positions[:, tops] = quaternions.rotate(back, poses.positions[:, tops] - ground)
@@ -294,7 +306,7 @@ class _Part:
         return cls(clip.name, is_mirrored, is_looping, _rig(clip), rotations, positions, root, feet, contacts)
 
 
-def _tops(skeleton: Skeleton) -> list[int]:
+def tops_of(skeleton: Skeleton) -> list[int]:
     """The joints that hang on the root: the first, or those below the joints above the hips."""
     above = {-1, *skeleton.ancestors(skeleton.hips)}
     return [joint for joint, parent in enumerate(skeleton.parents.tolist()) if parent in above and joint not in above]
@@ -342,7 +354,7 @@ def _faults(clip: Clip, rig: Skeleton, seen: set[str]) -> Iterator[Fault]:
 def _joined(parts: list[_Part], rate: float) -> PoseBank:
     rig = parts[0].rig
     away = [np.abs(part.positions - rig.offsets).max(axis=(0, 2)) for part in parts if not part.is_mirrored]
-    moving = sorted({*_tops(rig), *np.flatnonzero(np.max(away, axis=0) > SAME_M).tolist()})
+    moving = sorted({*tops_of(rig), *np.flatnonzero(np.max(away, axis=0) > SAME_M).tolist()})
     stops = np.cumsum([len(part.root) for part in parts])
     return PoseBank(
         rig,

@@ -222,6 +222,43 @@ def fade_turns(left, spins, reach, share, slope, braking, playing, playing_spins
             to_spins[j, i] = spin[i] + under[i]
 
 
+# ---- alignment
+
+
+@compiled
+def align(parents, tops, places, spine, left, turn, rotations, positions):
+    """Turn the joints that hang on the root, `tops`, about the vertical, and joint by joint of the spine a part of it back.
+
+    `places` says where the tops are in `positions` [M, 3]; of the turn `left` is left after each joint of the spine, which hang on
+    each other. Rotations and positions are changed.
+    """
+    first = parents[spine[0]]
+    above = (1.0, 0.0, 0.0, 0.0)
+    while first >= 0:
+        q = rotations[first]
+        above = _product((q[0], q[1], q[2], q[3]), above)
+        first = parents[first]
+    whole = (math.cos(0.5 * turn), 0.0, math.sin(0.5 * turn), 0.0)
+    for k in range(tops.shape[0]):
+        q, p = rotations[tops[k]], positions[places[k]]
+        turned = _product(whole, (q[0], q[1], q[2], q[3]))
+        moved = _turned(whole, (p[0], p[1], p[2]))
+        for i in range(4):
+            rotations[tops[k], i] = turned[i]
+        for i in range(3):
+            positions[places[k], i] = moved[i]
+    under = _product(whole, above)
+    for k in range(spine.shape[0]):
+        q = rotations[spine[k]]
+        above = _product(above, (q[0], q[1], q[2], q[3]))
+        angle = 0.5 * turn * left[k]
+        turned = _product((math.cos(angle), 0.0, math.sin(angle), 0.0), above)
+        own = _product(_inverse(under), turned)
+        under = turned
+        for i in range(4):
+            rotations[spine[k], i] = own[i]
+
+
 # ---- placing
 
 

@@ -1,6 +1,6 @@
 """The stages between what plays and the pose that is shown. Each is a small function of a posture and a state of its own.
 
-    clip ─► joints (spring or dead blending) ─► root (animation, code or both; its spring) ─► feet (lock) ─► Posture
+    clip ─► joints (spring or dead blending) ─► root (animation, code or both; its spring) ─► alignment ─► feet ─► Posture
 
 A stage takes the posture so far, what happened in this tick and its state, and gives the posture and its next state. It changes
 nothing in place, so that old states stay good for a rollback. J joints, M of them with positions of their own.
@@ -17,13 +17,28 @@ from contextdb.motion.output.bank import Flags, Place3, Sample
 from contextdb.motion.selection.root_motion import RootMotion
 
 
+@dataclass(frozen=True, slots=True)
+class Warp:
+    """How a body is bent to the way it is to go: its hips and legs turned against its root, its steps so many times as long, and
+    how both change a second."""
+
+    turn: float = 0.0
+    turn_speed: float = 0.0
+    stride: float = 1.0
+    stride_speed: float = 0.0
+
+
+UNWARPED = Warp()
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Posture:
-    """A pose in the making: rotations [J, 4] and positions [M, 3], and where the root is: x, z and heading."""
+    """A pose in the making: rotations [J, 4] and positions [M, 3], where the root is: x, z and heading, and how it is warped."""
 
     rotations: Floats
     positions: Floats
     root: Place3
+    warp: Warp = UNWARPED
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,6 +56,12 @@ class Tick:
         How much of its movement is to come from the clip.
     body : (x, z, heading) or None
         Where the game has the body.
+    velocity : (x, z) or None
+        How fast the game moves it over the ground.
+    travel : (left, ahead, sway)
+        How fast what plays goes, to the left and ahead of its mean facing; and by how much the root is turned from that.
+    warp : Warp
+        That of the pose before.
     clip : Posture
         What plays, as the clip has it.
     contacts : bool array, shape (n feet,)
@@ -53,6 +74,9 @@ class Tick:
     root_motion: RootMotion
     root_weight: float
     body: Place3 | None
+    velocity: tuple[float, float] | None
+    travel: Place3
+    warp: Warp
     clip: Posture
     contacts: Flags
 

@@ -18,8 +18,9 @@ from contextdb.errors import ContextError, Fault, MotionError, in_quotes, neares
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample, loops
+from contextdb.motion.output.root import rotation_share
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import Posture, Tick
+from contextdb.motion.output.stages import UNWARPED, Posture, Tick, Warp
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION
 
@@ -71,6 +72,9 @@ class PoseState:
     clip: Posture | None = None
     stages: tuple[object, ...] = ()
     play_rate: float = 1.0
+    warp: Warp = UNWARPED
+    body: Place3 | None = None
+    velocity: tuple[float, float] | None = None
 
 
 class PoseStream:
@@ -139,6 +143,7 @@ class PoseStream:
         require_kind(decision, Decision, "decision", "a Decision")
         dt = require_real(dt, "dt", 0.0)
         place = self._place_of(body)
+        velocity = _velocity(body, place, dt, self._state)
         state, playing = self._state, decision.playing
         if playing is None:
             clip, sample = state.clip or self._rest(), None
@@ -146,7 +151,8 @@ class PoseStream:
             clip, sample = self._posture(playing)
         left, entered = self._seam(decision, sample)
         contacts = self._contacts(playing)
-        tick = Tick(dt, left, entered, decision.root_motion, decision.root_weight, place, clip, contacts)
+        motion, weight, travel = decision.root_motion, decision.root_weight, self._travel(decision)
+        tick = Tick(dt, left, entered, motion, weight, place, velocity, travel, state.warp, clip, contacts)
         posture = clip
         begun = state.stages or tuple(stage.begin(clip, place) for stage in self._stages)
         after = []
@@ -154,7 +160,8 @@ class PoseStream:
             posture, own = stage.apply(posture, tick if state.stages else _first(tick), own)
             after.append(own)
         rate = _play_rate(decision, state, dt)
-        self._state = PoseState(self.settings, playing or state.playing, clip, tuple(after), rate)
+        warp, place = posture.warp, place or state.body
+        self._state = PoseState(self.settings, playing or state.playing, clip, tuple(after), rate, warp, place, velocity)
         return self._placed(posture, decision, rate, contacts)
 
     def _posture(self, playing: Playing) -> tuple[Posture, Sample]:
@@ -198,6 +205,14 @@ class PoseStream:
         bank, number = self._find(playing)
         return bank.contacts_at(number, playing.time_s)
 
+    def _travel(self, decision: Decision) -> Place3:
+        """How fast what plays goes, and how far the root sways with it."""
+        if decision.playing is None:
+            return 0.0, 0.0, 0.0
+        bank, number = self._find(decision.playing)
+        left, ahead, sway = bank.travel_at(number, decision.playing.time_s)
+        return left, ahead, sway * rotation_share(self.settings, decision.root_weight)
+
     def _find(self, playing: Playing) -> tuple[PoseBank, int]:
         """The bank of what plays, and its range there."""
         bank = self._only or self._banks.get(playing.database)
@@ -239,6 +254,15 @@ def _checked(banks: object) -> dict[Any, PoseBank]:
 def _first(tick: Tick) -> Tick:
     """The first tick of a character: it appears where it is, and has not moved."""
     return replace(tick, dt_s=0.0, left=None, entered=None, root_motion=NO_MOTION)
+
+
+def _velocity(body: object, place: Place3 | None, dt_s: float, state: PoseState) -> tuple[float, float] | None:
+    """How fast the game moves the body: as it says itself, else by how far it came since the last update."""
+    if isinstance(body, Steered):
+        return body.velocity
+    if place is None or state.body is None or dt_s <= 0.0:
+        return state.velocity
+    return (place[0] - state.body[0]) / dt_s, (place[1] - state.body[1]) / dt_s
 
 
 def _play_rate(decision: Decision, state: PoseState, dt_s: float) -> float:

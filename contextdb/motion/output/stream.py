@@ -72,6 +72,7 @@ class PoseState:
     clip: Posture | None = None
     stages: tuple[object, ...] = ()
     play_rate: float = 1.0
+    clip_rate: float = 1.0
     warp: Warp = UNWARPED
     body: Place3 | None = None
     velocity: tuple[float, float] | None = None
@@ -150,6 +151,7 @@ class PoseStream:
         else:
             clip, sample = self._posture(playing)
         left, entered = self._seam(decision, sample)
+        left, entered = _at_rate(left, state.clip_rate), _at_rate(entered, decision.play_rate)
         contacts = self._contacts(playing)
         motion, weight, travel = decision.root_motion, decision.root_weight, self._travel(decision)
         tick = Tick(dt, left, entered, motion, weight, place, velocity, travel, state.warp, clip, contacts)
@@ -161,7 +163,8 @@ class PoseStream:
             after.append(own)
         rate = _play_rate(decision, state, dt)
         warp, place = posture.warp, place or state.body
-        self._state = PoseState(self.settings, playing or state.playing, clip, tuple(after), rate, warp, place, velocity)
+        stages, clip_rate = tuple(after), decision.play_rate
+        self._state = PoseState(self.settings, playing or state.playing, clip, stages, rate, clip_rate, warp, place, velocity)
         return self._placed(posture, decision, rate, contacts)
 
     def _posture(self, playing: Playing) -> tuple[Posture, Sample]:
@@ -211,7 +214,7 @@ class PoseStream:
             return 0.0, 0.0, 0.0
         bank, number = self._find(decision.playing)
         left, ahead, sway = bank.travel_at(number, decision.playing.time_s)
-        return left, ahead, sway * rotation_share(self.settings, decision.root_weight)
+        return decision.play_rate * left, decision.play_rate * ahead, sway * rotation_share(self.settings, decision.root_weight)
 
     def _find(self, playing: Playing) -> tuple[PoseBank, int]:
         """The bank of what plays, and its range there."""
@@ -249,6 +252,15 @@ def _checked(banks: object) -> dict[Any, PoseBank]:
         if not same or not np.array_equal(rig.moving, other.moving):
             raise MotionError(Fault("the banks are of different rigs.", "banks of one rig"))
     return named
+
+
+def _at_rate(sample: Sample | None, rate: float) -> Sample | None:
+    """A moment of a clip that plays at a rate: all in it changes so many times as fast."""
+    if sample is None or rate == 1.0:
+        return sample
+    left, ahead, turn = sample.root_velocity
+    velocity = (rate * left, rate * ahead, rate * turn)
+    return replace(sample, spins=rate * sample.spins, velocities=rate * sample.velocities, root_velocity=velocity)
 
 
 def _first(tick: Tick) -> Tick:

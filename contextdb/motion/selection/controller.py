@@ -35,9 +35,10 @@ from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
 from contextdb.motion.selection.history import remembered
 from contextdb.motion.selection.ongoing import Ongoing
+from contextdb.motion.selection.play_rate import eased, play_rate
 from contextdb.motion.selection.root_motion import NO_MOTION
 from contextdb.motion.selection.selector import Selector
-from contextdb.motion.selection.step import Step
+from contextdb.motion.selection.step import Outcome, Step
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
 
@@ -118,7 +119,7 @@ class Controller:
 
     def _ongoing(self, dt_s: float) -> Ongoing | None:
         """What plays, moved on; the last is kept, for an update mostly follows what was asked of `upcoming`."""
-        asked = (self._state.playing, self.selector, self.settings.rate, dt_s)
+        asked = (self._state.playing, self.selector, self.settings.rate, dt_s * self._state.play_rate)
         if self._moved is None or self._moved[0] != asked:
             self._moved = asked, Ongoing.of(*asked)
         return self._moved[1]
@@ -231,6 +232,7 @@ class Controller:
             search_us=None if cause is None else search_us,
             root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
             root_weight=self._root_weight(outcome.playing),
+            play_rate=self._play_rate(step, outcome),
             filters=filters,
         )
 
@@ -242,7 +244,7 @@ class Controller:
             if self.settings.variation is not None:
                 recent = self.settings.variation.remember(recent, playing.asset)
         since_s = 0.0 if decision.searched else state.since_search_s + step.dt_s
-        return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent)
+        return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent, decision.play_rate)
 
     def _candidates(self, query: Floats, wanted: Asked) -> tuple[tuple[str, Candidates], ...]:
         """For the recorder, of each database that was searched: the best frames, and those left out that cost as little."""
@@ -260,6 +262,16 @@ class Controller:
 
     def _root_weight(self, playing: Playing | None) -> float:
         return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)
+
+    def _play_rate(self, step: Step, outcome: Outcome) -> float:
+        """How fast what plays goes on."""
+        playing = outcome.playing
+        if playing is None or outcome.action is Action.HOLD:
+            return 1.0
+        limits = self.settings.min_play_rate, self.settings.max_play_rate
+        wanted = play_rate(self.selector.databases[playing.database], playing.frame, step.query, limits)
+        is_new = outcome.action in (Action.START, Action.JUMP)
+        return wanted if is_new else eased(self._state.play_rate, wanted, step.dt_s)
 
     def checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""

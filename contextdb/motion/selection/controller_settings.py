@@ -5,6 +5,8 @@
     search_every_s = 0.1       # between two searches, unless one is forced
     jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are not candidates
     history_s = 0.5            # frames played within so many seconds are not entered again
+    min_play_rate = 0.8        # clips are played as fast as the character is asked to go, within these limits; 1 and 1 is never
+    max_play_rate = 1.25
     variation_within = 0.05    # frames that cost at most so much more than the best are as good as it; without the key, none are
     variation_memory = 2       # and none of the last so many assets is chosen while another is as good
 
@@ -28,11 +30,15 @@ SECONDS = {
     "jump_threshold_s": ("seconds from 0 to 60, such as 0.2", 60.0),
     "history_s": ("seconds from 0 to 60, such as 0.5; 0 is no memory", 60.0),
 }
+RATES = {
+    "min_play_rate": ("a number from 0.1 to 1, such as 0.8; 1 plays nothing slower", 0.1, 1.0),
+    "max_play_rate": ("a number from 1 to 10, such as 1.25; 1 plays nothing faster", 1.0, 10.0),
+}
 VARIATION = ("variation_within", "variation_memory")
 WITHIN = "a cost from 0 to 1e30, such as 0.05"
 MEMORY = "a whole number from 0 to 1000, such as 2"
 MOST_COST, MOST_ASSETS = 1e30, 1000
-KEYS = ("selector", *SECONDS, *VARIATION)
+KEYS = ("selector", *SECONDS, *RATES, *VARIATION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +57,13 @@ class ControllerSettings:
         Random choice among near ties. Default: always the best.
     rate : float
         Frames a second of databases made from features; those built from clips know theirs.
+    min_play_rate, max_play_rate : float
+        Between which limits a clip is played slower or faster, so that it goes about as fast as the query asks for.
 
     Raises
     ------
     MotionError
-        Seconds that are no finite numbers of 0 or more, or a rate that is not above 0.
+        Seconds that are no finite numbers of 0 or more, a rate that is not above 0, or a play rate out of its limits.
     """
 
     search_every_s: float = 0.1
@@ -63,10 +71,12 @@ class ControllerSettings:
     history_s: float = 0.5
     variation: Variation | None = None
     rate: float = 30.0
+    min_play_rate: float = 0.8
+    max_play_rate: float = 1.25
 
     def __post_init__(self) -> None:
         faults = [
-            Fault(f"{field.name} is {value!r}.", f"a number, {'above 0' if field.name == 'rate' else '0 or more'}")
+            Fault(f"{field.name} is {value!r}.", _accepted(field.name))
             for field in fields(self)
             if field.name != "variation" and not _is_accepted(field.name, value := getattr(self, field.name))
         ]
@@ -74,8 +84,14 @@ class ControllerSettings:
             raise MotionError(*faults)
 
 
+def _accepted(name: str) -> str:
+    return RATES[name][0] if name in RATES else f"a number, {'above 0' if name == 'rate' else '0 or more'}"
+
+
 def _is_accepted(name: str, value: object) -> bool:
     number = as_number(value)
+    if name in RATES:
+        return number is not None and RATES[name][1] <= number <= RATES[name][2]
     return number is not None and (number > 0.0 or (number == 0.0 and name != "rate"))
 
 
@@ -90,6 +106,7 @@ def read_controllers(
         values: dict[str, Any] = {
             key: section.number(key, accepted, 0.0, most) for key, (accepted, most) in SECONDS.items() if key in part
         }
+        values |= {key: section.number(key, *RATES[key]) for key in RATES if key in part}
         variation = _read_variation(section)
         if len(faults) == n_faults and selector is not None:
             yield name, selector, ControllerSettings(**values, variation=variation)

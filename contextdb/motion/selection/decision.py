@@ -88,6 +88,8 @@ class Decision:
         How the playing animation moved the body since the last update.
     root_weight : float
         How much of its movement is to come from the animation, from 0 to 1; the rest is the game's.
+    play_rate : float
+        Seconds of the clip that pass in a second, from here to the next update.
     filters : tuple of (database name, Filter)
         What could be chosen from in each database that was searched; empty where no candidates are asked for.
     """
@@ -108,6 +110,7 @@ class Decision:
     search_us: float | None = None
     root_motion: RootMotion = NO_MOTION
     root_weight: float = 1.0
+    play_rate: float = 1.0
     filters: tuple[tuple[str, Filter], ...] = field(default=(), compare=False, repr=False)
 
 

@@ -32,8 +32,9 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 """What the markup says of a frame of a database."""
 Events = dict[tuple[str, int], tuple[str, ...]]
 
-TIMINGS, FILTERS = "search_us", "filters"
-"""The columns that a file may lack: another recording has other timings, and an older version kept no filters."""
+TIMINGS, FILTERS, PLAY_RATE = "search_us", "filters", "play_rate"
+OPTIONAL = (TIMINGS, FILTERS, PLAY_RATE)
+"""The columns that a file may lack: another recording has other timings, and an older version kept no filters and no play rates."""
 
 
 def columns() -> dict[str, PolarsType]:
@@ -83,6 +84,7 @@ def columns() -> dict[str, PolarsType]:
         "candidates": pl.List(pl.Struct(found)),
         "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
         "root_weight": number,
+        PLAY_RATE: number,
         FILTERS: filter_type(),
         TIMINGS: number,
     }
@@ -110,6 +112,7 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         "candidates": [_candidates_row(name, found, events_of) for name, found in decision.candidates],
         "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
         "root_weight": float(decision.root_weight),
+        PLAY_RATE: float(decision.play_rate),
         FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
         TIMINGS: _number(decision.search_us),
     }
@@ -230,6 +233,7 @@ def decision_of(row: Row) -> Decision:
         search_us=row.get(TIMINGS),
         root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
         root_weight=float(row["root_weight"]),
+        play_rate=1.0 if row.get(PLAY_RATE) is None else float(row[PLAY_RATE]),
         filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
     )
 

@@ -33,7 +33,7 @@ from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, 
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.trace.filter_rows import fingerprint
-from contextdb.motion.trace.rows import FILTERS, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
+from contextdb.motion.trace.rows import FILTERS, OPTIONAL, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -282,7 +282,7 @@ def _check_format(metadata: Mapping[str, str], file: str) -> None:
 
 def _check_columns(frame: pl.DataFrame, file: str) -> None:
     wanted = columns()
-    present = [name for name in wanted if name in frame.columns or name not in (TIMINGS, FILTERS)]
+    present = [name for name in wanted if name in frame.columns or name not in OPTIONAL]
     wrong = [name for name in present if frame.schema.get(name) != wanted[name]]
     if wrong:
         found = f"{plural(len(wrong), 'column')} of the session missing, or of another type: {', '.join(map(in_quotes, wrong))}."

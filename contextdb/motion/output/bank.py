@@ -223,6 +223,12 @@ class PoseBank:
         (left, ahead, sway), (to_left, to_ahead, to_sway) = self._travels[low].tolist(), self._travels[high].tolist()
         return left + share * (to_left - left), ahead + share * (to_ahead - ahead), sway + share * (to_sway - sway)
 
+    def steps_at(self, range_number: int, time_s: float) -> list[list[float]]:
+        """How far each foot is through its swing at a moment, 0 to 1, and where it comes down, left and ahead of the body."""
+        low, high, share = self._between(range_number, time_s)
+        step: list[list[float]] = self._steps[high if share >= 0.5 else low].tolist()
+        return step
+
     def contacts_at(self, range_number: int, time_s: float) -> Flags:
         """Which feet are down at a moment of a range: in the nearest frame."""
         low, high, share = self._between(range_number, time_s)
@@ -233,6 +239,12 @@ class PoseBank:
         found = self.skeleton.offsets.copy()
         found[self.moving] = positions
         return found
+
+    @cached_property
+    def _steps(self) -> Floats:
+        from contextdb.motion.output.legs import steps_of
+
+        return steps_of(self)
 
     @cached_property
     def _travels(self) -> Floats:

@@ -354,5 +354,38 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
         rotations[hip, i], rotations[knee, i], rotations[ankle, i] = first[i], second[i], third[i]
 
 
+@compiled
+def too_high(positions, leg, toe, place, along_x, along_z, straight):
+    """By how much a hip is too high for its leg to bring its toe to a place: below 0 where it reaches farther.
+
+    A leg reaches as far as it does now, or as with a knee that is `straight`.
+    """
+    a, b, c, t = positions[leg[0]], positions[leg[1]], positions[leg[2]], positions[toe]
+    tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
+    way = _turned(tilt, (t[0] - c[0], t[1] - c[1], t[2] - c[2]))
+    upper, lower = _length((b[0] - a[0], b[1] - a[1], b[2] - a[2])), _length((c[0] - b[0], c[1] - b[1], c[2] - b[2]))
+    now = _length((c[0] - a[0], c[1] - a[1], c[2] - a[2]))
+    reach = max(now, math.sqrt(upper * upper + lower * lower - 2.0 * upper * lower * math.cos(straight)))
+    x, y, z = place[0] - way[0] - a[0], a[1] - place[1] + way[1], place[2] - way[2] - a[2]
+    return y - math.sqrt(max(reach * reach - x * x - z * z, 0.0))
+
+
+@compiled
+def stand(parents, positions, world, leg, toe, place, along_x, along_z, straight, rotations):
+    """Bend a leg so that its toe comes to a place, its foot turned by the slope of the ground, which rises along x and z."""
+    ankle = leg[2]
+    tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
+    foot = world[ankle]
+    turned = _product(tilt, (foot[0], foot[1], foot[2], foot[3]))
+    for i in range(4):
+        world[ankle, i] = turned[i]
+    a, t = positions[ankle], positions[toe]
+    way = _turned(tilt, (t[0] - a[0], t[1] - a[1], t[2] - a[2]))
+    shin = world[leg[1]]
+    ahead = (shin[1], shin[2], shin[3]) if toe == ankle else way
+    target = (place[0] - way[0], place[1] - way[1], place[2] - way[2])
+    bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
+
+
 IS_COMPILED = hasattr(sample, "stats")
 """Whether the loops are numba's."""

@@ -20,5 +20,4 @@ def stages_of(settings: PoseSettings, bank: PoseBank) -> tuple[Stage, ...]:
         "dead": (DeadBlending(settings.fade_s, settings.fade_halflife_s),),
     }
     ways = (Alignment.of(settings, bank),) if settings.is_warping else ()
-    feet = (Feet.of(settings, bank),) if settings.foot_lock else ()
-    return (*joints[settings.blend], Root(settings), *ways, *feet)
+    return (*joints[settings.blend], Root(settings), *ways, Feet.of(settings, bank))

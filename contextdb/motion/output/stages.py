@@ -9,12 +9,15 @@ nothing in place, so that old states stay good for a rollback. J joints, M of th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import Flags, Place3, Sample
 from contextdb.motion.selection.root_motion import RootMotion
+
+Ground = Callable[[float, float], tuple[float, tuple[float, float, float]] | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,10 @@ class Tick:
         How fast what plays goes, to the left and ahead of its mean facing; and by how much the root is turned from that.
     warp : Warp
         That of the pose before.
+    ground : function or None
+        Of a place, x and z: the height of the ground and its normal; None where it is flat.
+    steps : sequence of (share, left, ahead)
+        How far each foot is through its swing in the clip, and where it comes down; empty without a ground.
     clip : Posture
         What plays, as the clip has it.
     contacts : bool array, shape (n feet,)
@@ -77,6 +84,8 @@ class Tick:
     velocity: tuple[float, float] | None
     travel: Place3
     warp: Warp
+    ground: Ground | None
+    steps: Sequence[Sequence[float]]
     clip: Posture
     contacts: Flags
 

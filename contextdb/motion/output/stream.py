@@ -7,7 +7,7 @@ decisions give the same poses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,9 +18,10 @@ from contextdb.errors import ContextError, Fault, MotionError, in_quotes, neares
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample, loops
+from contextdb.motion.output.ground import A_GROUND
 from contextdb.motion.output.root import rotation_share
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import UNWARPED, Posture, Tick, Warp
+from contextdb.motion.output.stages import UNWARPED, Ground, Posture, Tick, Warp
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION
 
@@ -122,7 +123,13 @@ class PoseStream:
             raise ContextError(Fault("the state is of a stream of other settings or of another rig.", "a state of this stream"))
         self._state = state
 
-    def update(self, decision: Decision, dt: float, body: Steered | tuple[float, float, float] | None = None) -> Pose:
+    def update(
+        self,
+        decision: Decision,
+        dt: float,
+        body: Steered | tuple[float, float, float] | None = None,
+        ground: Ground | None = None,
+    ) -> Pose:
         """The pose after a decision.
 
         Parameters
@@ -132,7 +139,9 @@ class PoseStream:
         dt : float
             Seconds since the last update, as the controller had them.
         body : Steered or (x, z, heading), optional
-            Where the game has the body now; the root modes "code" and "mixed" need it.
+            Where the game has the body now; every root mode but "animation" needs it.
+        ground : function, optional
+            Of x and z: the height of the ground in metres and its normal, (nx, ny, nz), or None where it is flat.
 
         Raises
         ------
@@ -143,6 +152,8 @@ class PoseStream:
         """
         require_kind(decision, Decision, "decision", "a Decision")
         dt = require_real(dt, "dt", 0.0)
+        if ground is not None and not callable(ground):
+            raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
         place = self._place_of(body)
         velocity = _velocity(body, place, dt, self._state)
         state, playing = self._state, decision.playing
@@ -154,7 +165,8 @@ class PoseStream:
         left, entered = _at_rate(left, state.clip_rate), _at_rate(entered, decision.play_rate)
         contacts = self._contacts(playing)
         motion, weight, travel = decision.root_motion, decision.root_weight, self._travel(decision)
-        tick = Tick(dt, left, entered, motion, weight, place, velocity, travel, state.warp, clip, contacts)
+        steps = self._steps(playing) if ground is not None else ()
+        tick = Tick(dt, left, entered, motion, weight, place, velocity, travel, state.warp, ground, steps, clip, contacts)
         posture = clip
         begun = state.stages or tuple(stage.begin(clip, place) for stage in self._stages)
         after = []
@@ -215,6 +227,13 @@ class PoseStream:
         bank, number = self._find(decision.playing)
         left, ahead, sway = bank.travel_at(number, decision.playing.time_s)
         return decision.play_rate * left, decision.play_rate * ahead, sway * rotation_share(self.settings, decision.root_weight)
+
+    def _steps(self, playing: Playing | None) -> Sequence[Sequence[float]]:
+        """Where the feet come down next."""
+        if playing is None:
+            return ((0.0, 0.0, 0.0),) * len(self._rig.feet)
+        bank, number = self._find(playing)
+        return bank.steps_at(number, playing.time_s)
 
     def _find(self, playing: Playing) -> tuple[PoseBank, int]:
         """The bank of what plays, and its range there."""

@@ -63,7 +63,10 @@ class Root:
         offset, speed = state.offset, state.offset_speed
         if self.settings.blend != "none":
             offset, speed = decayed(offset, speed, damping(self.settings.halflife_s), tick.dt_s)
-            speed = _sum(speed, _step(tick, base[2], position_share, rotations))
+            step = _step(tick, base[2], position_share, rotations)
+            speed = _sum(speed, step)
+            if tick.is_ahead:
+                offset = _sum(offset, (step[0] * tick.dt_s, step[1] * tick.dt_s, step[2] * tick.dt_s))
         if self.settings.root in ("mixed", "path") and tick.body is not None:
             base = self._clamped(base, offset, tick.body, _way(tick) if self.settings.root == "path" else None)
         return replace(posture, root=_sum(base, offset)), RootState(base, offset, speed, tick.body or state.body)
@@ -167,7 +170,11 @@ def _step(tick: Tick, heading: float, position_share: float, rotation_share: flo
     """By how much the velocity of what plays drops at a seam, over the ground of the world."""
     if tick.left is None or tick.entered is None:
         return NOTHING
-    left, ahead, turn = (a - b for a, b in zip(tick.left.root_velocity, tick.entered.root_velocity, strict=True))
+    entered = tick.entered.root_velocity
+    if tick.is_ahead and tick.dt_s > 0.0:
+        own = tick.root_motion
+        entered = own.left_m / tick.dt_s, own.ahead_m / tick.dt_s, own.turn_rad / tick.dt_s
+    left, ahead, turn = (a - b for a, b in zip(tick.left.root_velocity, entered, strict=True))
     x, z, _ = _after((0.0, 0.0, heading), _bent(RootMotion(left, ahead), tick.warp), position_share, 0.0)
     return x, z, rotation_share * turn
 

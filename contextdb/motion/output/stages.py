@@ -55,6 +55,8 @@ class Tick:
         Where what plays has a seam: the moment that would have been shown, and the one that is shown instead. None without a seam.
     root_motion : RootMotion
         How the clip moved the body since the last update.
+    is_ahead : bool
+        Whether it is already the movement of what is entered at the seam, as where something else has decided meanwhile.
     root_weight : float
         How much of its movement is to come from the clip.
     body : (x, z, heading) or None
@@ -79,6 +81,7 @@ class Tick:
     left: Sample | None
     entered: Sample | None
     root_motion: RootMotion
+    is_ahead: bool
     root_weight: float
     body: Place3 | None
     velocity: tuple[float, float] | None

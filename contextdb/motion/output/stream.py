@@ -26,6 +26,8 @@ from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION
 
 DEFAULT_SETTINGS = PoseSettings()
+NEAR_S = 0.1
+"""What is shown goes on where it is not farther from where it should be than this."""
 A_BODY = "a Steered, or x and z in metres and a heading in radians"
 
 
@@ -135,7 +137,7 @@ class PoseStream:
         Parameters
         ----------
         decision : Decision
-            What `Controller.update` gave for this tick.
+            What `Controller.update` gave for this tick, or `MatchPlay.decision`: what one shows after the other is blended too.
         dt : float
             Seconds since the last update, as the controller had them.
         body : Steered or (x, z, heading), optional
@@ -156,6 +158,7 @@ class PoseStream:
             raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
         place = self._place_of(body)
         velocity = _velocity(body, place, dt, self._state)
+        decision, is_ahead = self._joined(decision, dt)
         state, playing = self._state, decision.playing
         if playing is None:
             clip, sample = state.clip or self._rest(), None
@@ -166,7 +169,7 @@ class PoseStream:
         contacts = self._contacts(playing)
         motion, weight, travel = decision.root_motion, decision.root_weight, self._travel(decision)
         steps = self._steps(playing) if ground is not None else ()
-        tick = Tick(dt, left, entered, motion, weight, place, velocity, travel, state.warp, ground, steps, clip, contacts)
+        tick = Tick(dt, left, entered, motion, is_ahead, weight, place, velocity, travel, state.warp, ground, steps, clip, contacts)
         posture = clip
         begun = state.stages or tuple(stage.begin(clip, place) for stage in self._stages)
         after = []
@@ -178,6 +181,22 @@ class PoseStream:
         stages, clip_rate = tuple(after), decision.play_rate
         self._state = PoseState(self.settings, playing or state.playing, clip, stages, rate, clip_rate, warp, place, velocity)
         return self._placed(posture, decision, rate, contacts)
+
+    def _joined(self, decision: Decision, dt_s: float) -> tuple[Decision, bool]:
+        """The decision, as a jump from what was shown where it goes on from something else: another one has decided meanwhile; and
+        whether its movement is then that of what it plays."""
+        shown, playing = self._state.playing, decision.playing
+        if shown is None or playing is None:
+            return decision, False
+        is_seam = decision.action in (Action.JUMP, Action.START)
+        on = decision.before if is_seam else playing
+        if on is not None and (on.database, on.asset, on.mirrored) == (shown.database, shown.asset, shown.mirrored):
+            ahead_s = on.time_s - shown.time_s
+            if decision.action is Action.LOOP or -NEAR_S <= ahead_s <= dt_s * self._state.clip_rate + NEAR_S:
+                return decision, False
+        moved = replace(shown, time_s=shown.time_s + dt_s * self._state.clip_rate)
+        is_ahead = not is_seam or decision.before is None
+        return replace(decision, action=decision.action if is_seam else Action.JUMP, before=moved), is_ahead
 
     def _posture(self, playing: Playing) -> tuple[Posture, Sample]:
         """The clip's own pose and place."""

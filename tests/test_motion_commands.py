@@ -481,7 +481,7 @@ def test_a_stick_that_cannot_be_followed_is_refused_with_its_place(here: Path, t
         (["game", "player", "stick.csv", "--out", "new.parquet", "--seed", "x"], '"x" is not a seed.'),
         (
             ["game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.fbx"],
-            "new.fbx: poses cannot be written to such a file. Accepted: a name that ends in .bvh or .npz",
+            "new.fbx: poses cannot be written to such a file. Accepted: a name that ends in .bvh, .npz or .glb",
         ),
         (["game", "player", "stick.csv", "--out", "new.parquet", "--poses", "none/new.npz"], 'there is no folder "none".'),
     ],

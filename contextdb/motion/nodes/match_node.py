@@ -135,7 +135,7 @@ class MatchPlay:
         """What plays now, for `PoseStream.update`; after each `advance`. `database` is its name, where a stream has several banks.
 
         Its root weight is 0, for the game has the body on the warped path; its root motion is that path's, for the root mode
-        "animation".
+        "animation". Raises ContextError where `database` is no text.
         """
         head, time_s = self.playhead, self.entry_s + self.time_s
         playing = playing_at(require_text(database, "database"), head, head.frame_at(time_s), time_s)

@@ -24,7 +24,7 @@ A_POSE_FILE = f"a name that ends in {BVH}, {NPZ} or {GLB}"
 
 
 def write_poses(poses: Sequence[Pose], bank: PoseBank, path: str | PathLike[str], rate: float) -> None:
-    """Write poses by the ending of the name: as BVH, as the arrays of `pose_arrays`, or as glTF. The same poses give the same bytes.
+    """Write poses by the ending of the name: BVH, the arrays of `pose_arrays`, or glTF. The same poses give the same bytes.
 
     A `.bvh` has the rig in centimetres and angles in degrees; a `.glb` has a node for each joint and one animation of them, in
     metres, and needs pygltflib.

@@ -9,7 +9,7 @@ all comes there as critically damped springs do, so that a step of the ground is
 Lock: when a foot comes down in the clip its place over the ground is kept, and its height comes to that of the clip, rolls and all.
 It is let go when it goes up in the clip, or when it would be farther from the clip's place than the radius; then what lies between
 the two decays as a spring. It goes up with the clip's own velocity; only where it had to be let go does its velocity change
-by and by.
+by and by. One that was let go while it was down is locked again when it has nearly come to its clip's place.
 
 The hips go down by the least that lets legs reach, stretched no more than in the clip or than a knee of 170°. The place of a foot
 is that of the toe where it has one, else of the ankle. The hip and knee turn so that the foot gets there, and the foot keeps its
@@ -44,6 +44,9 @@ STRAIGHT = math.radians(170.0)
 """A knee that is straighter is damped."""
 FAR_M = 1.0
 """A foot that is farther from its clip's place belongs to a character that was put elsewhere: it goes there at once."""
+BACK_SHARE, SLOW_MPS = 1.0 / 3.0, 0.5
+"""A foot that had to be let go is locked again when it has come back to its clip as far as to this share of the radius, and
+moves no faster than this."""
 HIPS_HALFLIFE_S = 0.1
 """How fast hips and feet come to the height of the ground."""
 HIPS_DAMPING = damping(HIPS_HALFLIFE_S)
@@ -231,11 +234,16 @@ class Feet:
                 return _locked(state.point, offset, speed, height, toe)
             velocity = _over_time(_apart(toe, state.free), dt_s)
             return _free(True, _apart(place, toe), _apart(speed, velocity), toe)
-        if is_down and not state.is_down:
+        if is_down and (not state.is_down or self._is_back(offset, _apart(toe, state.free), dt_s)):
             shown = _sum(toe, offset)
             point = (shown[0], shown[2])
             return _locked(point, _apart(shown, _over(point, height)), STILL, height, toe)
         return _free(is_down, offset, speed, toe)
+
+    def _is_back(self, offset: Triple, moved: Triple, dt_s: float) -> bool:
+        """Whether a foot is nearly at its clip's place again, and that hardly moves."""
+        is_near = math.hypot(offset[0], offset[2]) < BACK_SHARE * self.settings.foot_radius_m
+        return is_near and math.hypot(moved[0], moved[2]) <= SLOW_MPS * dt_s
 
     def _placed(self, posture: Posture) -> tuple[Floats, Floats]:
         """Positions and rotations of all joints in the world."""

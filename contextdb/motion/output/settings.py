@@ -19,7 +19,7 @@
     max_stride = 1.25
     foot_lock = true           # feet that are down in the clip stay where they came down
     foot_halflife_s = 0.1      # how fast a foot that was let go comes to the clip
-    foot_radius_m = 0.2        # a foot is let go where the clip has it so far away
+    foot_radius_m = 0.3        # a foot is let go where the clip has it so far away
 
 Reading touches no file.
 Source of the defaults: orangeduck/Motion-Matching, `controller.cpp`, and its dead blending demo.
@@ -55,7 +55,7 @@ NUMBERS = {
     "min_stride": ("a share from 0.1 to 1, such as 0.8; 1 shortens no step", 0.1, 1.0),
     "max_stride": ("a number from 1 to 3, such as 1.25; 1 lengthens no step", 1.0, 3.0),
     "foot_halflife_s": ("seconds from 0.001 to 60, such as 0.1", LEAST_HALFLIFE_S, 60.0),
-    "foot_radius_m": ("metres from 0 to 10, such as 0.2", 0.0, 10.0),
+    "foot_radius_m": ("metres from 0 to 10, such as 0.3", 0.0, 10.0),
 }
 FLAGS, TRUTH = ("path_alignment", "foot_lock"), "true or false"
 KEYS = (*WORDS, *NUMBERS, *FLAGS)
@@ -118,7 +118,7 @@ class PoseSettings:
     max_stride: float = 1.25
     foot_lock: bool = True
     foot_halflife_s: float = 0.1
-    foot_radius_m: float = 0.2
+    foot_radius_m: float = 0.3
 
     def __post_init__(self) -> None:
         if faults := list(_faults({field.name: getattr(self, field.name) for field in fields(self)})):

@@ -16,7 +16,7 @@ Source: orientation and stride warping of Unreal's Animation Warping; the alignm
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -72,10 +72,10 @@ class Alignment:
             *_followed(state.stride, state.stride_speed, stride, y, tick.dt_s),
         )
         if warp.turn == 0.0:
-            return replace(posture, warp=warp), warp
+            return Posture(posture.rotations, posture.positions, posture.root, warp), warp
         rotations, positions, spine = posture.rotations.copy(), posture.positions.copy(), self.spine
         kernels.align(self.parents, spine.tops, spine.places, spine.joints, spine.left, warp.turn, rotations, positions)
-        return replace(posture, rotations=rotations, positions=positions, warp=warp), warp
+        return Posture(rotations, positions, posture.root, warp), warp
 
     def _wanted(self, heading: float, tick: Tick) -> tuple[float, float]:
         """The turn and the stride that the game's velocity asks for; 0 and 1 where either body stands."""

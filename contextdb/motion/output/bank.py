@@ -69,6 +69,22 @@ class Sample:
     root_velocity: Place3
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Moment:
+    """A moment of a clip to be shown.
+
+    Rotations [J, 4] and positions [M, 3]; where the clip has the body; how fast it goes to the left and ahead of its mean facing,
+    and how far it is turned from that; which feet are down; the nearest frame.
+    """
+
+    rotations: Floats
+    positions: Floats
+    root: Place3
+    travel: Place3
+    contacts: Flags
+    frame: int
+
+
 @dataclass(frozen=True, eq=False)
 class PoseBank:
     """Poses of clips. Made by `build`, or opened by `open_poses`.
@@ -202,37 +218,39 @@ class PoseBank:
 
     def sample_of(self, range_number: int, time_s: float) -> Sample:
         """As `sample`, of a range's number, without a look at the arguments."""
-        kernels = loops()
         low, high, share = self._between(range_number, time_s)
-        rotations, positions = np.empty((self.n_joints, 4)), np.empty((len(self.moving), 3))
+        rotations, positions = self._pose(low, high, share)
         spins, velocities = np.empty((self.n_joints, 3)), np.empty((len(self.moving), 3))
-        kernels.sample(self.rotations, self.positions, low, high, share, rotations, positions)
-        kernels.slopes(self.rotations, self.positions, low, high, self.rate, spins, velocities)
+        loops().slopes(self.rotations, self.positions, low, high, self.rate, spins, velocities)
         return Sample(rotations, positions, spins, velocities, self._root_velocity(low, high, share))
+
+    def moment_of(self, range_number: int, time_s: float) -> Moment:
+        """What a range is at a moment."""
+        low, high, share = self._between(range_number, time_s)
+        rotations, positions = self._pose(low, high, share)
+        (x, z, heading, left, ahead, sway), (to_x, to_z, to_heading, to_left, to_ahead, to_sway) = self._ways[[low, high]].tolist()
+        root = x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)
+        travel = left + share * (to_left - left), ahead + share * (to_ahead - ahead), sway + share * (to_sway - sway)
+        near = high if share >= 0.5 else low
+        return Moment(rotations, positions, root, travel, np.asarray(self.contacts[near]), near)
 
     def root_at(self, range_number: int, time_s: float) -> Place3:
         """Where the clip itself has the body at a moment of a range."""
-        low, high, share = self._between(range_number, time_s)
-        (x, z, heading), (to_x, to_z, to_heading) = self.root[low].tolist(), self.root[high].tolist()
-        return x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)
+        return self.moment_of(range_number, time_s).root
+
+    def contacts_at(self, range_number: int, time_s: float) -> Flags:
+        """Which feet are down at a moment of a range: in the nearest frame."""
+        return self.moment_of(range_number, time_s).contacts
 
     def travel_at(self, range_number: int, time_s: float) -> Place3:
         """How fast the clip goes about a moment: metres a second to the left and ahead of its mean facing, and how far it is
         turned from that then."""
-        low, high, share = self._between(range_number, time_s)
-        (left, ahead, sway), (to_left, to_ahead, to_sway) = self._travels[low].tolist(), self._travels[high].tolist()
-        return left + share * (to_left - left), ahead + share * (to_ahead - ahead), sway + share * (to_sway - sway)
+        return self.moment_of(range_number, time_s).travel
 
-    def steps_at(self, range_number: int, time_s: float) -> list[list[float]]:
-        """How far each foot is through its swing at a moment, 0 to 1, and where it comes down, left and ahead of the body."""
-        low, high, share = self._between(range_number, time_s)
-        step: list[list[float]] = self._steps[high if share >= 0.5 else low].tolist()
+    def steps_at(self, frame: int) -> list[list[float]]:
+        """How far each foot is through its swing in a frame, 0 to 1, and where it comes down, left and ahead of the body."""
+        step: list[list[float]] = self._steps[frame].tolist()
         return step
-
-    def contacts_at(self, range_number: int, time_s: float) -> Flags:
-        """Which feet are down at a moment of a range: in the nearest frame."""
-        low, high, share = self._between(range_number, time_s)
-        return np.asarray(self.contacts[high if share >= 0.5 else low])
 
     def translations(self, positions: Floats) -> Floats:
         """Each joint against its parent [J, 3], of the positions [M, 3] of those that have some of their own."""
@@ -247,8 +265,22 @@ class PoseBank:
         return steps_of(self)
 
     @cached_property
-    def _travels(self) -> Floats:
-        return travels(self.root, self.starts, self.stops, self.looping, self.rate)
+    def places(self) -> Ints:
+        """Which row of positions [M, 3] is each joint's, -1 where it keeps its offset: int64 [J]."""
+        found = np.full(self.n_joints, -1)
+        found[self.moving] = np.arange(len(self.moving))
+        return found
+
+    @cached_property
+    def _ways(self) -> Floats:
+        """Root and travel of each frame: [N, 6]."""
+        return np.column_stack((self.root, travels(self.root, self.starts, self.stops, self.looping, self.rate)))
+
+    @cached_property
+    def _spans(self) -> list[tuple[int, int, bool]]:
+        """First frame, steps to the last and whether it loops, of each range."""
+        steps = (self.stops - self.starts - 1).tolist()
+        return list(zip(self.starts.tolist(), steps, self.looping.tolist(), strict=True))
 
     @cached_property
     def _ranges(self) -> dict[tuple[str, bool], int]:
@@ -256,13 +288,19 @@ class PoseBank:
 
     def _between(self, range_number: int, time_s: float) -> tuple[int, int, float]:
         """The two frames about a moment, and the share of the second."""
-        start, n_steps = int(self.starts[range_number]), int(self.stops[range_number] - self.starts[range_number]) - 1
+        start, n_steps, is_looping = self._spans[range_number]
         frame = time_s * self.rate
-        if self.looping[range_number] and n_steps > 0 and not 0.0 <= frame <= n_steps:
+        if is_looping and n_steps > 0 and not 0.0 <= frame <= n_steps:
             frame %= n_steps
         frame = min(max(frame, 0.0), float(n_steps))
         low = min(int(frame), max(n_steps - 1, 0))
         return start + low, start + min(low + 1, n_steps), frame - low
+
+    def _pose(self, low: int, high: int, share: float) -> tuple[Floats, Floats]:
+        """Rotations [J, 4] and positions [M, 3] between two frames."""
+        rotations, positions = np.empty((self.n_joints, 4)), np.empty((len(self.moving), 3))
+        loops().sample(self.rotations, self.positions, low, high, share, rotations, positions)
+        return rotations, positions
 
     def _root_velocity(self, low: int, high: int, share: float) -> Place3:
         x, z, heading = self.root[low].tolist()

@@ -113,13 +113,15 @@ class Feet:
     settings: PoseSettings
     bank: PoseBank
     legs: tuple[Leg | None, ...]
+    toes: Ints
     tops: Ints
 
     @classmethod
     def of(cls, settings: PoseSettings, bank: PoseBank) -> Feet:
         """For the feet that a bank has contacts of."""
         legs = tuple(leg_of(bank.skeleton, foot) for foot in bank.feet)
-        return cls(settings, bank, legs, np.searchsorted(bank.moving, tops_of(bank.skeleton)))
+        toes = np.array([0 if leg is None else leg.toe for leg in legs], np.int64)
+        return cls(settings, bank, legs, toes, np.searchsorted(bank.moving, tops_of(bank.skeleton)))
 
     def begin(self, posture: Posture, body: Place3 | None) -> LegsState:
         """No foot has been seen."""
@@ -139,7 +141,7 @@ class Feet:
             state = self._on_ground(posture, tick, state, free)
         feet = self._stood(tick, state, free)
         lower = state.lower.gone_down(self._too_high(state, feet, positions), tick.dt_s)
-        state = replace(state, feet=feet, lower=lower)
+        state = LegsState(feet, state.footings, state.hips, lower)
         height, places = state.hips.now - state.lower.now, posture.positions
         if height != 0.0:
             places = places.copy()
@@ -150,7 +152,7 @@ class Feet:
             if leg is not None and foot is not None and (foot.shown, footing.now) != (_triple(positions[leg.toe]), FLAT.now):
                 _, x, z = footing.now
                 kernels.stand(parents, positions, world, leg.joints, leg.toe, np.array(foot.shown), x, z, STRAIGHT, rotations)
-        return replace(posture, rotations=rotations, positions=places), state
+        return Posture(rotations, places, posture.root, posture.warp), state
 
     def _lengthened(self, posture: Posture, tick: Tick, positions: Floats) -> list[Triple]:
         """How far each foot is moved along the way, for steps of the stride's length."""
@@ -193,7 +195,7 @@ class Feet:
 
     def _stood(self, tick: Tick, state: LegsState, free: list[Triple | None]) -> tuple[FootState | None, ...]:
         """The feet after this tick, on their ground."""
-        heights = self._placed(tick.clip)[0][:, 1] if self.settings.foot_lock else None
+        heights = self._heights(tick.clip) if self.settings.foot_lock else None
         found: list[FootState | None] = []
         for i, (leg, toe, own, footing) in enumerate(zip(self.legs, free, state.feet, state.footings, strict=True)):
             if leg is None or toe is None:
@@ -203,7 +205,7 @@ class Feet:
             if heights is None:
                 found.append(_free(False, STILL, STILL, over))
             else:
-                height = float(heights[leg.toe]) + footing.now[0]
+                height = heights[i] + footing.now[0]
                 found.append(self._moved(own, over, height, bool(tick.contacts[i]), tick.dt_s))
         return tuple(found)
 
@@ -244,6 +246,13 @@ class Feet:
         """Whether a foot is nearly at its clip's place again, and that hardly moves."""
         is_near = math.hypot(offset[0], offset[2]) < BACK_SHARE * self.settings.foot_radius_m
         return is_near and math.hypot(moved[0], moved[2]) <= SLOW_MPS * dt_s
+
+    def _heights(self, clip: Posture) -> list[float]:
+        """How high each toe is in the clip."""
+        rig, found = self.bank.skeleton, np.empty(len(self.toes))
+        kernels.heights(rig.parents, rig.offsets, self.bank.places, clip.rotations, clip.positions, self.toes, found)
+        heights: list[float] = found.tolist()
+        return heights
 
     def _placed(self, posture: Posture) -> tuple[Floats, Floats]:
         """Positions and rotations of all joints in the world."""

@@ -286,6 +286,30 @@ def place(parents, translations, rotations, x, z, heading, to_positions, to_worl
 
 
 @compiled
+def heights(parents, offsets, places, rotations, positions, joints, to_heights):
+    """How high some joints are over the root.
+
+    `places` says which row of `positions` [M, 3] is each joint's; below 0 it keeps its offset.
+    """
+    for k in range(joints.shape[0]):
+        j = joints[k]
+        x = (0.0, 0.0, 0.0)
+        while j >= 0:
+            if places[j] >= 0:
+                p = positions[places[j]]
+                t = (p[0], p[1], p[2])
+            else:
+                p = offsets[j]
+                t = (p[0], p[1], p[2])
+            x = (x[0] + t[0], x[1] + t[1], x[2] + t[2])
+            j = parents[j]
+            if j >= 0:
+                q = rotations[j]
+                x = _turned((q[0], q[1], q[2], q[3]), x)
+        to_heights[k] = x[1]
+
+
+@compiled
 def _about(axis, angle):
     """The rotation about a unit axis."""
     sine = math.sin(0.5 * angle)

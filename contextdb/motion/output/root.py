@@ -19,7 +19,7 @@ adjustment and the clamp of orangeduck/Motion-Matching, `controller.cpp`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from contextdb.motion.clips.steering import STANDING_MPS
 from contextdb.motion.output.bank import Place3
@@ -69,7 +69,9 @@ class Root:
                 offset = _sum(offset, (step[0] * tick.dt_s, step[1] * tick.dt_s, step[2] * tick.dt_s))
         if self.settings.root in ("mixed", "path") and tick.body is not None:
             base = self._clamped(base, offset, tick.body, _way(tick) if self.settings.root == "path" else None)
-        return replace(posture, root=_sum(base, offset)), RootState(base, offset, speed, tick.body or state.body)
+        return Posture(posture.rotations, posture.positions, _sum(base, offset)), RootState(
+            base, offset, speed, tick.body or state.body
+        )
 
     def _moved(self, state: RootState, tick: Tick, position_share: float, rotation_share: float) -> Place3:
         """The base after this tick's movement and the pull to the game's body."""

@@ -110,8 +110,7 @@ def damping(halflife_s: float) -> float:
 
 def decayed(offset: Place3, speed: Place3, y: float, dt_s: float) -> tuple[Place3, Place3]:
     """An offset of three numbers and its change a second some time later: x = e^{-yt} (x0 + (v0 + x0 y) t)."""
-    fade = math.exp(-y * dt_s)
-    pushed = [v + x * y for x, v in zip(offset, speed, strict=True)]
-    a, b, c = (fade * (x + p * dt_s) for x, p in zip(offset, pushed, strict=True))
-    d, e, f = (fade * (v - p * y * dt_s) for v, p in zip(speed, pushed, strict=True))
-    return (a, b, c), (d, e, f)
+    (a, b, c), (d, e, f) = offset, speed
+    fade, p, q, r = math.exp(-y * dt_s), d + a * y, e + b * y, f + c * y
+    faded = fade * (a + p * dt_s), fade * (b + q * dt_s), fade * (c + r * dt_s)
+    return faded, (fade * (d - p * y * dt_s), fade * (e - q * y * dt_s), fade * (f - r * y * dt_s))

@@ -17,7 +17,7 @@ from contextdb.cells.arguments import require_kind, require_mapping, require_rea
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
-from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample, loops
+from contextdb.motion.output.bank import Flags, Moment, Place3, PoseBank, Sample, loops
 from contextdb.motion.output.ground import A_GROUND
 from contextdb.motion.output.root import rotation_share
 from contextdb.motion.output.settings import PoseSettings
@@ -26,6 +26,8 @@ from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION
 
 DEFAULT_SETTINGS = PoseSettings()
+NOWHERE: Place3 = (0.0, 0.0, 0.0)
+NO_STEPS: Sequence[Sequence[float]] = ()
 NEAR_S = 0.1
 """What is shown goes on where it is not farther from where it should be than this."""
 A_BODY = "a Steered, or x and z in metres and a heading in radians"
@@ -160,15 +162,20 @@ class PoseStream:
         velocity = _velocity(body, place, dt, self._state)
         decision, is_ahead = self._joined(decision, dt)
         state, playing = self._state, decision.playing
-        if playing is None:
-            clip, sample = state.clip or self._rest(), None
+        moment, bank = None, self._rig
+        if playing is not None:
+            bank, number = self._find(playing)
+            moment = bank.moment_of(number, playing.time_s)
+        if moment is None:
+            clip, contacts, travel = state.clip or self._rest(), np.zeros(len(bank.feet), np.bool_), NOWHERE
         else:
-            clip, sample = self._posture(playing)
-        left, entered = self._seam(decision, sample)
+            clip, contacts = Posture(moment.rotations, moment.positions, moment.root), moment.contacts
+            travel = _travel(moment, decision, self.settings)
+        left, entered = self._seam(decision)
         left, entered = _at_rate(left, state.clip_rate), _at_rate(entered, decision.play_rate)
-        contacts = self._contacts(playing)
-        motion, weight, travel = decision.root_motion, decision.root_weight, self._travel(decision)
-        steps = self._steps(playing) if ground is not None else ()
+        motion, weight, steps = decision.root_motion, decision.root_weight, NO_STEPS
+        if ground is not None:
+            steps = bank.steps_at(moment.frame) if moment is not None else [(0.0, 0.0, 0.0)] * len(bank.feet)
         tick = Tick(dt, left, entered, motion, is_ahead, weight, place, velocity, travel, state.warp, ground, steps, clip, contacts)
         posture = clip
         begun = state.stages or tuple(stage.begin(clip, place) for stage in self._stages)
@@ -198,26 +205,20 @@ class PoseStream:
         is_ahead = not is_seam or decision.before is None
         return replace(decision, action=decision.action if is_seam else Action.JUMP, before=moved), is_ahead
 
-    def _posture(self, playing: Playing) -> tuple[Posture, Sample]:
-        """The clip's own pose and place."""
-        bank, number = self._find(playing)
-        sample = bank.sample_of(number, playing.time_s)
-        return Posture(sample.rotations, sample.positions, bank.root_at(number, playing.time_s)), sample
-
     def _rest(self) -> Posture:
         """The rig at rest, for a character that has not played anything yet."""
         rotations = np.zeros((self._rig.n_joints, 4))
         rotations[:, 0] = 1.0
         return Posture(rotations, self._rig.skeleton.offsets[self._rig.moving], (0.0, 0.0, 0.0))
 
-    def _seam(self, decision: Decision, sample: Sample | None) -> tuple[Sample | None, Sample | None]:
+    def _seam(self, decision: Decision) -> tuple[Sample | None, Sample | None]:
         """Where what plays jumps, or goes over the end of a loop: what would have been shown, and what is shown instead."""
         before, playing = decision.before or self._state.playing, decision.playing
         if playing is None or before is None or self._state.playing is None:
             return None, None
         if decision.action in (Action.JUMP, Action.START):
-            bank, number = self._find(before)
-            return bank.sample_of(number, before.time_s), sample
+            (bank, number), (to_bank, to_number) = self._find(before), self._find(playing)
+            return bank.sample_of(number, before.time_s), to_bank.sample_of(to_number, playing.time_s)
         if decision.action is Action.LOOP:
             bank, number = self._find(playing)
             end_s = bank.last_s(number)
@@ -231,28 +232,6 @@ class PoseStream:
         loops().place(rig.skeleton.parents, translations, posture.rotations, *posture.root, positions, world)
         is_forced = is_jump and decision.continuing_cost is None
         return Pose(playing, is_jump, is_forced, posture.root, posture.rotations, translations, positions, contacts, rate)
-
-    def _contacts(self, playing: Playing | None) -> Flags:
-        """Which feet are down in the clip; none where nothing plays."""
-        if playing is None:
-            return np.zeros(len(self._rig.feet), np.bool_)
-        bank, number = self._find(playing)
-        return bank.contacts_at(number, playing.time_s)
-
-    def _travel(self, decision: Decision) -> Place3:
-        """How fast what plays goes, and how far the root sways with it."""
-        if decision.playing is None:
-            return 0.0, 0.0, 0.0
-        bank, number = self._find(decision.playing)
-        left, ahead, sway = bank.travel_at(number, decision.playing.time_s)
-        return decision.play_rate * left, decision.play_rate * ahead, sway * rotation_share(self.settings, decision.root_weight)
-
-    def _steps(self, playing: Playing | None) -> Sequence[Sequence[float]]:
-        """Where the feet come down next."""
-        if playing is None:
-            return ((0.0, 0.0, 0.0),) * len(self._rig.feet)
-        bank, number = self._find(playing)
-        return bank.steps_at(number, playing.time_s)
 
     def _find(self, playing: Playing) -> tuple[PoseBank, int]:
         """The bank of what plays, and its range there."""
@@ -290,6 +269,12 @@ def _checked(banks: object) -> dict[Any, PoseBank]:
         if not same or not np.array_equal(rig.moving, other.moving):
             raise MotionError(Fault("the banks are of different rigs.", "banks of one rig"))
     return named
+
+
+def _travel(moment: Moment, decision: Decision, settings: PoseSettings) -> Place3:
+    """How fast what plays goes at its rate, and how far the root sways with it."""
+    left, ahead, sway = moment.travel
+    return decision.play_rate * left, decision.play_rate * ahead, sway * rotation_share(settings, decision.root_weight)
 
 
 def _at_rate(sample: Sample | None, rate: float) -> Sample | None:

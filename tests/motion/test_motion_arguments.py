@@ -230,7 +230,9 @@ CALLS: dict[str, Call] = {
     "PoseStream.update(decision)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(x, 0.1),
     "PoseStream.update(dt)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(DECISION, x),
     "PoseStream.update(body)": lambda x: x is None or motion.PoseStream(BANK).update(DECISION, 0.1, x),
-    "PoseStream.update(ground)": lambda x: x is None or motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1, None, x),
+    "PoseStream.update(ground)": lambda x: (
+        x is None or callable(x) or motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1, None, x)
+    ),
     "PoseStream.restore(state)": lambda x: motion.PoseStream(BANK).restore(x),
     "clip_of_poses(poses)": lambda x: motion.clip_of_poses(x, BANK, 30.0),
     "clip_of_poses(poses), one": lambda x: motion.clip_of_poses([x], BANK, 30.0),

@@ -103,7 +103,7 @@ class LegsState:
     @property
     def is_flat(self) -> bool:
         """Whether no ground is felt any more."""
-        return self.hips == LEVEL_HIPS and all(footing == FLAT for footing in self.footings)
+        return (self.hips is LEVEL_HIPS or self.hips == LEVEL_HIPS) and self.footings == (FLAT,) * len(self.footings)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,14 +114,14 @@ class Feet:
     bank: PoseBank
     legs: tuple[Leg | None, ...]
     toes: Ints
-    tops: Ints
+    tops: list[int]
 
     @classmethod
     def of(cls, settings: PoseSettings, bank: PoseBank) -> Feet:
         """For the feet that a bank has contacts of."""
         legs = tuple(leg_of(bank.skeleton, foot) for foot in bank.feet)
         toes = np.array([0 if leg is None else leg.toe for leg in legs], np.int64)
-        return cls(settings, bank, legs, toes, np.searchsorted(bank.moving, tops_of(bank.skeleton)))
+        return cls(settings, bank, legs, toes, np.searchsorted(bank.moving, tops_of(bank.skeleton)).tolist())
 
     def begin(self, posture: Posture, body: Place3 | None) -> LegsState:
         """No foot has been seen."""
@@ -145,7 +145,8 @@ class Feet:
         height, places = state.hips.now - state.lower.now, posture.positions
         if height != 0.0:
             places = places.copy()
-            places[self.tops, 1] += height
+            for top in self.tops:
+                places[top, 1] += height
             positions[:, 1] += height
         rotations, parents = posture.rotations.copy(), self.bank.skeleton.parents
         for leg, foot, footing in zip(self.legs, feet, state.footings, strict=True):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from played import RATE, bank, decisions, range_of
+from played import LOOPS, RATE, SCHEMA, bank, clips, decisions, range_of
 
 from contextdb.errors import ContextError
-from contextdb.motion import PoseSettings, PoseStream
+from contextdb.motion import PoseBank, PoseSettings, PoseStream
 from contextdb.motion.clips import quaternions
 from contextdb.motion.output.ground import FLAT, STEEPEST, below, standing, swinging
 from contextdb.motion.output.stages import damping
@@ -174,6 +174,16 @@ def test_a_stream_restored_on_stairs_gives_the_same_poses_again():
 def test_a_ground_that_is_none_is_told(wrong):
     with pytest.raises(ContextError):
         streamed(wrong)
+
+
+def test_a_body_without_feet_goes_by_the_ground_below_it():
+    footless = PoseBank.build(clips(), SCHEMA, mirror=True, markup=LOOPS)
+    object.__setattr__(footless, "feet", ())
+    object.__setattr__(footless, "contacts", footless.contacts[:, :0])
+    stream = PoseStream(footless, PoseSettings(root="animation", blend="none"))
+    for d in decisions([("walk", 0.0, 60)], STEP):
+        pose = stream.update(d, STEP if d.tick else 0.0, None, lambda x, z: (1.5, UP))
+    assert pose.positions[HIPS][1] == pytest.approx(streamed(segments=(("walk", 0.0, 60),))[-1].positions[HIPS][1] + 1.5, abs=0.01)
 
 
 # ---- stride

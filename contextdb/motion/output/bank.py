@@ -33,6 +33,7 @@ from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.clips.trajectory import root_trajectory
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
+from contextdb.motion.output.legs import leg_of, steps_of
 from contextdb.motion.output.travel import travels
 
 Flags = NDArray[np.bool_]
@@ -260,9 +261,21 @@ class PoseBank:
 
     @cached_property
     def _steps(self) -> Floats:
-        from contextdb.motion.output.legs import steps_of
+        if not self.feet:
+            return np.zeros((self.n_frames, 0, 3))
+        legs = ((leg_of(self.skeleton, foot), foot) for foot in self.feet)
+        toes = [self._places_of(self.skeleton.index(foot) if leg is None else leg.toe) for leg, foot in legs]
+        return steps_of(self.root, np.stack(toes, axis=1), self.contacts, self._spans)
 
-        return steps_of(self)
+    def _places_of(self, joint: int) -> Floats:
+        """Where a joint is against the root in each frame: [N, 3]."""
+        rotations, found = np.tile([1.0, 0.0, 0.0, 0.0], (self.n_frames, 1)), np.zeros((self.n_frames, 3))
+        for each in (*reversed(self.skeleton.ancestors(joint)), joint):
+            row = self.places[each]
+            own = self.positions[:, row] if row >= 0 else self.skeleton.offsets[each]
+            found = found + quaternions.rotate(rotations, np.broadcast_to(own, found.shape))
+            rotations = quaternions.multiply(rotations, self.rotations[:, each].astype(np.float64))
+        return found
 
     @cached_property
     def places(self) -> Ints:

@@ -6,16 +6,18 @@ where it will come down, seen from the body in that frame. A foot that comes dow
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.clips.trajectory import to_own_frame
-from contextdb.motion.output.bank import Flags, PoseBank
 from contextdb.motion.output.travel import laps_about
+
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,15 +39,17 @@ def leg_of(rig: Skeleton, foot: str) -> Leg | None:
     return Leg(np.array([above[1], above[0], ankle], np.int64), (toes or [ankle])[0])
 
 
-def steps_of(bank: PoseBank) -> Floats:
-    """Share of the swing, and metres to the left and ahead to where the foot comes down: float64 [N, n feet, 3]."""
-    found = np.zeros((bank.n_frames, len(bank.feet), 3))
-    for i, foot in enumerate(bank.feet):
-        leg = leg_of(bank.skeleton, foot)
-        toes = _placed(bank, bank.skeleton.index(foot) if leg is None else leg.toe)
-        for start, stop, loops in zip(bank.starts.tolist(), bank.stops.tolist(), bank.looping.tolist(), strict=True):
-            part = slice(start, stop)
-            found[part, i] = _steps(bank.root[part].astype(np.float64), toes[part], bank.contacts[part, i], loops)
+def steps_of(root: NDArray[np.floating], toes: Floats, contacts: Flags, spans: Sequence[tuple[int, int, bool]]) -> Floats:
+    """Share of the swing, and metres to the left and ahead to where the foot comes down: float64 [N, n feet, 3].
+
+    `root` [N, 3], `toes` against it [N, n feet, 3], which feet are down [N, n feet], and the first frame of each range, its
+    steps to the last, and whether it loops.
+    """
+    found = np.zeros(toes.shape)
+    for start, n_steps, loops in spans:
+        part = slice(start, start + n_steps + 1)
+        for foot in range(toes.shape[1]):
+            found[part, foot] = _steps(np.asarray(root[part], np.float64), toes[part, foot], contacts[part, foot], loops)
     return found
 
 
@@ -65,17 +69,6 @@ def _steps(root: Floats, toes: Floats, is_down: Flags, loops: bool) -> Floats:
     own = slice(laps * period, laps * period + n)
     ways = to_own_frame(places[following[own]] - path[own, :2], path[own, 2])
     return np.column_stack((np.where(down[own], 0.0, shares[own]), ways))
-
-
-def _placed(bank: PoseBank, joint: int) -> Floats:
-    """Where a joint is against the root in each frame: [N, 3]."""
-    rotations = np.tile([1.0, 0.0, 0.0, 0.0], (bank.n_frames, 1))
-    places, moving = np.zeros((bank.n_frames, 3)), bank.moving.tolist()
-    for each in (*reversed(bank.skeleton.ancestors(joint)), joint):
-        own = bank.positions[:, moving.index(each)] if each in moving else bank.skeleton.offsets[each]
-        places = places + quaternions.rotate(rotations, np.broadcast_to(own, places.shape))
-        rotations = quaternions.multiply(rotations, bank.rotations[:, each].astype(np.float64))
-    return places
 
 
 def eased(share: float) -> float:

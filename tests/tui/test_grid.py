@@ -325,7 +325,7 @@ def test_the_cursor_stays_in_sight_when_the_window_becomes_smaller(tmp_path):
 def test_down_from_the_last_row_goes_to_the_test_row_and_up_comes_back(ordinary):
     async def script(app, pilot):
         grid = app.main.assets.grid
-        await press(pilot, "right", "ctrl+end", "down")
+        await press(pilot, "right", "ctrl+end", "down", "down")
         there = grid.is_in_test_row
         await press(pilot, "down", "up")
         return there, grid.is_in_test_row, app.main.session.sheet.cursor
@@ -344,15 +344,15 @@ def test_a_column_that_is_no_condition_has_no_fact(tmp_path):
     assert with_editor(file, script) == ("Only conditions have a fact to test with.", ["walk"])
 
 
-def test_there_is_nothing_to_edit_where_there_is_no_row(tmp_path):
+def test_where_there_is_no_row_what_is_typed_makes_the_first(tmp_path):
     file = tmp_path / "none.csv"
     file.write_text("Asset,hit\n")
 
     async def script(app, pilot):
-        await press(pilot, "x")
-        return said(app)
+        await press(pilot, "x", "enter")
+        return app.main.session.sheet.table.columns[0].to_list()
 
-    assert with_editor(file, script) == "There is no row here. Ctrl+N makes one."
+    assert with_editor(file, script) == ["x"]
 
 
 def test_what_is_typed_faster_than_an_editor_opens_is_all_in_it(ordinary):

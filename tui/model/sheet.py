@@ -133,7 +133,31 @@ class Sheet(ShownTable):
         notes = (f"{plural(n_new, 'row')} added.",) if n_new else ()
         return replace(done, notes=notes, warnings=((cut,) if placed.n_columns_cut else ()) + done.warnings)
 
+    def type_below(self, text: str) -> Fault | None:
+        """Put a text into a new row behind the last one, in the column of the cursor; what is wrong with it as in `type_text`."""
+        if fault := self.check(text):
+            return fault
+        self.append_rows([{self.table.columns[self.selection.column].name: text}])
+        return None
+
+    def paste_below(self, text: str) -> Done:
+        """Put tab-separated text into new rows behind the last one, from the column of the cursor on."""
+        texts, names = parse_tsv(text), [c.name for c in self.table.columns[self.selection.column :]]
+        if not texts:
+            return Done(notes=("The clipboard is empty.",))
+        done = self.append_rows([dict(zip(names, row, strict=False)) for row in texts])
+        n_cut = max(max(map(len, texts)) - len(names), 0)
+        cut = f"{plural(n_cut, 'column')} left out: the sheet ends here. Add columns and paste again."
+        return replace(done, warnings=((cut,) if n_cut else ()) + done.warnings)
+
     # ---- edits of rows
+
+    def append_rows(self, texts: Sequence[Mapping[str, str]]) -> Done:
+        """Insert rows behind the last one of the file; they are then selected, in the column of the cursor."""
+        at = self.table.n_rows
+        done = self._do(edits.insert_rows(self.table, at, list(texts)))
+        self._select_file_rows(at, len(texts))
+        return done
 
     def insert_rows(self, n_rows: int = 1, below: bool = False, texts: Sequence[Mapping[str, str]] = ()) -> Done:
         """Insert rows above the selection, or below it, empty ones or with texts; they are then selected."""

@@ -41,6 +41,8 @@ class _Place:
     row: int = 0
     column: int = 0
     is_fact: bool = False
+    is_new: bool = False
+    """It is in the empty row below the last one."""
 
 
 class AssetsPane(Pane):
@@ -120,6 +122,8 @@ class AssetsPane(Pane):
             fault = sheet.query.faults.get(name)
             about = " · ".join(filter(None, (f"computed: {header.how}" if header.how else "", about)))
             self.query_one(CellLine).show(f"test row · {name}", self.grid.cell_text(), _short(fault), about)
+        elif self.grid.is_in_new_row:
+            self.query_one(CellLine).show(f"new row · {name}", "", "", about or "type or paste here to add rows")
         elif len(sheet.view):
             place = f"row {sheet.row_number(row)} · {name}"
             said = sheet.said_of(int(sheet.view.rows[row])) or about
@@ -136,7 +140,7 @@ class AssetsPane(Pane):
             return
         row, column = self.sheet.cursor
         column = self.grid.field
-        self._edited = _Place(row, column, self.grid.is_in_test_row)
+        self._edited = _Place(row, column, self.grid.is_in_test_row, self.grid.is_in_new_row)
         columns = self.sheet.table.columns
         editor = CellEditor(
             self.sheet.fact_of(column),
@@ -183,7 +187,7 @@ class AssetsPane(Pane):
         event.stop()
         place, clicked = self._edited, self.sheet.selection
         is_elsewhere = (self.sheet.cursor[0], self.grid.field) != (place.row, place.column)
-        is_elsewhere = is_elsewhere or self.grid.is_in_test_row != place.is_fact
+        is_elsewhere = is_elsewhere or (self.grid.is_in_test_row, self.grid.is_in_new_row) != (place.is_fact, place.is_new)
         if place.is_fact:
             self.sheet.set_fact(self.sheet.header(place.column).name, event.text)
             self._close_editor()
@@ -195,17 +199,23 @@ class AssetsPane(Pane):
             self.sheet.go(place.row, place.column)
         if not self._enter(event.text, event.is_fill):
             return
+        if place.is_new:
+            self.grid.goes_to_new_row = not is_elsewhere and event.down > 0
         if is_elsewhere:
             self.sheet.select(lambda _, shape: clicked.within(shape))
-        elif not event.is_fill:
+        elif not event.is_fill and not (place.is_new and not event.text.strip()):
             self.sheet.select(lambda s, shape: s.next_cell(event.down, event.right, shape))
         self.grid.show_cursor()
 
     def _enter(self, text: str, is_fill: bool) -> bool:
         """Put a text into the cell, or into all that are selected; one that is refused stays in the editor."""
-        if is_fill:
+        is_new = self._edited.is_new
+        if is_new and not text.strip():
+            self._close_editor()
+            return True
+        if is_fill and not is_new:
             done = self.sheet.fill(text)
-        elif fault := self.sheet.type_text(text):
+        elif fault := self.sheet.type_below(text) if is_new else self.sheet.type_text(text):
             if self.editor is not None:
                 self.editor.refuse(fault)
             return False

@@ -311,13 +311,21 @@ class MainScreen(Screen[None]):
 
     def action_import(self) -> None:
         """Bring rows in from another file."""
+        self._import()
+
+    def _import(self, text: str | None = None) -> None:
         from tui.screens.import_table import ImportDialog
 
         def chosen(answer: Import | None) -> None:
             if answer is not None:
                 self.apply(answer.edit, answer.notes)
 
-        self.app.push_screen(ImportDialog(self.session.sheet.table, self.workspace.folder), chosen)
+        self.app.push_screen(ImportDialog(self.session.sheet.table, self.workspace.folder, text), chosen)
+
+    @on(Grid.ImportWanted)
+    def _import_text(self, event: Grid.ImportWanted) -> None:
+        """Ask how to read a table that was pasted into an empty one."""
+        self._import(text=event.text)
 
     def action_export(self) -> None:
         """Write the table for another program."""

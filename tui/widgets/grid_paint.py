@@ -52,6 +52,9 @@ class Look:
     is_in_test_row: bool
     has_focus: bool
     has_test_row: bool = True
+    is_in_new_row: bool = False
+    """The cursor is in the empty row below the last one."""
+    has_new_row: bool = False
     field: int | None = None
     """The column of the test row that the cursor is in, where that is not the sheet's: fields behind its last column count on."""
 
@@ -96,6 +99,8 @@ class Painter:
         if y == look.foot:
             return self._test_line(look)
         row = look.top + y - look.n_headers
+        if row == len(self.sheet.view) and look.has_new_row:
+            return self._new_line(look)
         if row >= len(self.sheet.view):
             return self._empty_line(row, look)
         return self._body_line(row, look)
@@ -153,7 +158,8 @@ class Painter:
         window = self._window_at(row, look)
         seen, block, ground = window.row(row), self._block(look), self._ground(row, window)
         asset = self.sheet.asset_at
-        cursor = None if look.is_in_test_row or self.sheet.cursor[0] != row else self.sheet.cursor[1]
+        is_away = look.is_in_test_row or look.is_in_new_row
+        cursor = None if is_away or self.sheet.cursor[0] != row else self.sheet.cursor[1]
 
         n_columns = len(self.sheet.table.columns)
 
@@ -194,7 +200,22 @@ class Painter:
 
     def _block(self, look: Look) -> Block | None:
         block = self.sheet.block
-        return None if block.n_cells <= 1 or look.is_in_test_row else block
+        return None if block.n_cells <= 1 or look.is_in_test_row or look.is_in_new_row else block
+
+    def _new_line(self, look: Look) -> Strip:
+        """The row below the last one, which takes what is typed or pasted."""
+        asset, n_rows = self.sheet.asset_at, len(self.sheet.view)
+        hint = "new row" if n_rows or not self.sheet.table.n_rows else "no row passes the filter"
+
+        def cell(column: int) -> Iterator[Segment]:
+            is_cursor = look.is_in_new_row and column == self.sheet.cursor[1]
+            ground = "row" if not is_cursor else "cursor" if look.has_focus else "cursor-away"
+            text = hint if column == asset and (look.is_in_new_row or not n_rows) else ""
+            said = "on-cursor" if is_cursor and look.has_focus else "muted"
+            yield Segment(" " + cut(text, look.layout.widths[column] - 1), self.style(ground, said))
+
+        gutter = "+".rjust(look.layout.gutter - 3) + "   "
+        return self._joined(Segment(gutter, self.style("gutter", "muted")), cell, look, "row")
 
     def _empty_line(self, row: int, look: Look) -> Strip:
         text = ""

@@ -65,6 +65,10 @@ class GridView(ScrollView, inherit_bindings=False):
     has_test_row: ClassVar[bool] = True
     is_in_test_row = reactive(False)
     """Whether the cursor is in the test row."""
+    has_new_row: ClassVar[bool] = True
+    """Whether an empty row stands below the last one, to type or paste a new one."""
+    goes_to_new_row = reactive(False)
+    """Whether the cursor went to that row; where no row is shown it is there anyhow."""
 
     def __init__(self, sheet: Sheet) -> None:
         super().__init__()
@@ -85,8 +89,13 @@ class GridView(ScrollView, inherit_bindings=False):
         self.sheet = sheet
         self._painter = Painter(sheet, self._style)
         self._widths.clear()
-        self.is_in_test_row = False
+        self.is_in_test_row = self.goes_to_new_row = False
         self.changed()
+
+    @property
+    def is_in_new_row(self) -> bool:
+        """Whether the cursor is in the empty row below the last one."""
+        return self.has_new_row and not self.is_in_test_row and (self.goes_to_new_row or not len(self.sheet.view))
 
     @property
     def field(self) -> int:
@@ -150,14 +159,30 @@ class GridView(ScrollView, inherit_bindings=False):
         """Where the grid is at present."""
         x, y = self.scroll_offset
         height, is_in_test_row = self.window.height, self.is_in_test_row
-        return Look(self.grid_layout, height, x, y, is_in_test_row, self.has_focus, self.has_test_row, self.field)
+        return Look(
+            self.grid_layout,
+            height,
+            x,
+            y,
+            is_in_test_row,
+            self.has_focus,
+            self.has_test_row,
+            self.is_in_new_row,
+            self.has_new_row,
+            self.field,
+        )
 
     def cell_region(self) -> Region:
         """Where the cell of the cursor is on the screen, without its mark."""
-        look, row, column = self.look, self.sheet.cursor[0], self.field
+        look, row, column = self.look, self._cursor_row, self.field
         y = look.foot if self.is_in_test_row else look.n_headers + row - look.top
         x = look.layout.place(column, look.left)
         return Region(self.content_region.x + x + 1, self.content_region.y + y, look.layout.widths[column] - 1, 1)
+
+    @property
+    def _cursor_row(self) -> int:
+        """The row of the view that the cursor is in; behind the last one for the empty row."""
+        return len(self.sheet.view) if self.is_in_new_row else self.sheet.cursor[0]
 
     def render_line(self, y: int) -> Strip:
         return self._painter.line(y, self.look)
@@ -204,7 +229,7 @@ class GridView(ScrollView, inherit_bindings=False):
         rows, total = len(self.sheet.view), self.grid_layout.extent
         if self._said_shape != (rows, total):
             self._said_shape = (rows, total)
-            self.virtual_size = Size(total, rows + n_headers(self.window.height) + self.has_test_row)
+            self.virtual_size = Size(total, rows + self.has_new_row + n_headers(self.window.height) + self.has_test_row)
 
     def on_resize(self) -> None:
         self._layout = None
@@ -222,6 +247,7 @@ class GridView(ScrollView, inherit_bindings=False):
         if not self.size:
             return
         look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else (0, self.field)
+        row = self._cursor_row if self.is_in_new_row else row
         top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
         left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
         if (top, left) != (look.top, look.left):

@@ -35,7 +35,7 @@ class Pointed(Protocol):
         """The app around it."""
         ...
 
-    def moving(self, move: Callable[[], None]) -> None:
+    def moving(self, move: Callable[[], None], in_new_row: bool = False) -> None:
         """Move the cursor, and show what has changed."""
 
     def go_to_field(self, column: int) -> None:
@@ -99,6 +99,9 @@ class Pointer:
             grid.is_in_test_row = True
             grid.moving(lambda: grid.go_to_field(column))
             grid.refresh()
+        elif look.has_new_row and look.top + event.y - look.n_headers == len(grid.sheet.view):
+            grid.is_in_test_row = False
+            grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0], column), in_new_row=True)
         elif self._is_cell_line(event.y, look):
             grid.is_in_test_row = False
             grid.moving(lambda: grid.sheet.go(row, column, event.shift))
@@ -214,4 +217,5 @@ class Pointer:
 
     def _is_cell_line(self, y: int, look: Look) -> bool:
         """Whether cells are on a line of the window: those of a row, or of the test row."""
-        return y == look.foot or (y >= look.n_headers and look.top + y - look.n_headers < len(self.grid.sheet.view))
+        n_rows = len(self.grid.sheet.view) + look.has_new_row
+        return y == look.foot or (y >= look.n_headers and look.top + y - look.n_headers < n_rows)

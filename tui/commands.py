@@ -149,6 +149,10 @@ GRID: tuple[Command, ...] = (
     Command("sort", "alt+s", "Sort", "Show the rows sorted by this column: up, down, as in the file.", "View", "sort"),
     Command("test-row", "f6", "Test row", "Go to the test row, or back to the table.", "Test row", "test_row", in_footer=True),
     Command("open-row", "alt+o", "Open the row", "Open the table that the row refers to.", "Move", "open_row"),
+    Command(
+        "next-failing", "alt+n", "Next failing", "Go to the next cell that fails, or cannot be read.", "Move", "next_failing(False)"
+    ),
+    Command("previous-failing", "alt+v", "Previous failing", "Go to the cell before that fails.", "Move", "next_failing(True)"),
     Command("leave", "escape", "Back", "Leave the test row; end a selection.", "Move", "leave", is_listed=False),
 )
 

@@ -113,7 +113,7 @@ def test_three_lines_of_headers_say_name_type_unit_and_how_many_rows_the_fact_le
     sheet.set_fact("hit", "True")
     assert lines(sheet)[:3] == [
         "#    Asset   ↕│ speed   ↕│ hit     ↕│ gait    ↕│ Enabled ↕│",
-        "     asset    │ number ·…│ bool     │ enum     │ enabled  │",
+        "     asset    │ m/s      │ bool     │ enum     │ enabled  │",
         "              │          │ leaves 2 │          │          │",
     ]
 
@@ -122,7 +122,7 @@ def test_each_mark_says_without_colour_what_a_row_or_a_cell_is():
     sheet = sheet_of()
     sheet.set_fact("hit", "False")
     assert lines(sheet)[3:6] == [
-        "1    walk     │ 0..2     │×True     │ Walk     │ True     │",
+        "1×1  walk     │ 0..2     │×True     │ Walk     │ True     │",
         "2 ◉  run      │ Any      │ Any      │ Run      │ True     │",
         "3 –  jump     │!5; 9     │ False    │          │ False    │",
     ]
@@ -140,7 +140,7 @@ def test_the_test_row_stands_in_the_last_line_and_counts():
     sheet = sheet_of()
     assert lines(sheet)[-1].split() == ["?", "test", "row", "│", "│", "│", "│", "│"]
     sheet.set_fact("hit", "True")
-    assert lines(sheet, width=120)[-1].startswith("?    2 of 3 r…")
+    assert lines(sheet, width=120)[-1].startswith("?    2 of 3 v…")
 
 
 def test_an_empty_table_and_a_filter_that_hides_all_say_so():

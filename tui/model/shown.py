@@ -25,11 +25,17 @@ from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.links import nesting_faults
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
+from tui.model.alignment import indent_of, shared_end
 from tui.model.asked import Offered
 from tui.model.fact_steps import FactSteps
 from tui.model.query_row import QueryRow
 from tui.model.selection import Block, Selection, Shape
 from tui.model.views import Filter, Sort, View, shown_rows
+
+SEEK_ROWS = 4096
+"""So many rows are looked through at once for a cell that fails."""
+NUMBER_JOBS = ("priority", "weight", "cooldown_s", "cooldown_turns")
+"""Columns of these jobs hold numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +70,8 @@ class ShownTable:
         self.filter = Filter()
         self.view = View.of(self.table)
         self.version = 0
+        self._places: dict[str, tuple[TextColumn, int]] = {}
+        """For columns of numbers how far they are indented, for the assets how long their shared end is, and of which texts."""
         self._findings: NDArray[np.bool_] | None = None
         self._inner_faults: tuple[object, dict[str, Fault | None]] = (None, {})
         """The tables of the folder, and what is wrong with naming one in a row, by the text of the cell."""
@@ -126,6 +134,25 @@ class ShownTable:
         if name == table.asset_column:
             return self.inner_fault(text)
         return edits.check_cell(table, name, text)
+
+    def indent(self, column: int) -> int:
+        """How far the points of the numbers of a column are from the left; 0 for a column of no numbers."""
+        condition, texts = self.condition(column), self.table.columns[column]
+        if condition is not None and condition.condition.domain.type.is_numeric:
+            return self._place(texts, indent_of)
+        jobs = {name for job, name in self.table.settings.jobs if job in NUMBER_JOBS}
+        return self._place(texts, indent_of) if texts.name in jobs else 0
+
+    @property
+    def shared_end(self) -> int:
+        """How long the end is that the names of all assets have in common."""
+        return self._place(self.table.columns[self.asset_at], shared_end)
+
+    def _place(self, texts: TextColumn, of: Callable[[TextColumn], int]) -> int:
+        known = self._places.get(texts.name)
+        if known is None or known[0] is not texts:
+            known = self._places[texts.name] = texts, of(texts)
+        return known[1]
 
     def missing_output(self, column: int) -> Output | None:
         """The output that a column is, if its cells may not be empty."""
@@ -200,6 +227,34 @@ class ShownTable:
         if self.table.settings.when in places:
             fails[:, places[self.table.settings.when]] = self.query.excluded_by_rule(rows)
         return fails
+
+    def next_failing(self, is_backwards: bool = False) -> tuple[int, int] | None:
+        """The next cell, row by row and going round at the end, that does not accept its fact, or cannot be read where the test
+        row is empty; None where there is none."""
+        n_rows, n_columns = self.shape
+        here = self.cursor[0] * n_columns + self.cursor[1]
+        blocks = [(top, min(top + SEEK_ROWS, n_rows)) for top in range(0, n_rows, SEEK_ROWS)]
+        first = self.cursor[0] // SEEK_ROWS
+        ahead = [*blocks[first:], *blocks[: first + 1]] if not is_backwards else [*blocks[first::-1], *blocks[first:][::-1]]
+        for at, (top, bottom) in enumerate(ahead):
+            places = np.flatnonzero(self._wrong(top, bottom)) + top * n_columns
+            if at == 0:
+                places = places[places < here] if is_backwards else places[places > here]
+            if len(places):
+                place = int(places[-1] if is_backwards else places[0])
+                return place // n_columns, place % n_columns
+        return None
+
+    def _wrong(self, top: int, bottom: int) -> NDArray[np.bool_]:
+        if not self.query.is_empty:
+            return self.failing(top, bottom)
+        rows = self.view.rows[top:bottom]
+        wrong = np.zeros((len(rows), self.shape[1]), np.bool_)
+        for at, texts in enumerate(self.table.columns):
+            condition = self.condition(at)
+            if condition is not None and condition.faults:
+                wrong[:, at] = np.isin(texts.codes[rows], list(condition.faults))
+        return wrong
 
     def notes(self, row: int) -> dict[int, str]:
         """What is at the right of cells of a row of the file, by column: who is cast, how much of a table inside is valid."""

@@ -165,6 +165,16 @@ class Grid(GridView, can_focus=True):
 
         self.moving(move)
 
+    def action_next_failing(self, is_backwards: bool) -> None:
+        """To the next cell that fails for the test row, or cannot be read where that is empty."""
+        self.is_in_test_row = False
+        place = self.sheet.next_failing(is_backwards)
+        if place is None:
+            what = "No cell that is shown cannot be read" if self.sheet.query.is_empty else "No cell that is shown fails"
+            self.post_message(Told(f"{what}."))
+        else:
+            self.moving(lambda: self.sheet.go(*place))
+
     def action_select_rows(self) -> None:
         self._select(lambda s: s.rows(self.sheet.shape))
 

@@ -5,6 +5,7 @@ Only what is seen is read and painted: see `tui.widgets.grid_paint`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from rich.cells import cell_len
@@ -14,9 +15,10 @@ from textual.reactive import reactive
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout
+from tui.model.alignment import indented
+from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
-from tui.widgets.grid_paint import Look, Painter, n_headers
+from tui.widgets.grid_paint import Look, Painter
 
 GROUNDS = (
     "row", "row-valid", "row-picked", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test",
@@ -76,10 +78,15 @@ class GridView(ScrollView, inherit_bindings=False):
         self._painter = Painter(sheet, self._style)
         self._styles: dict[tuple[str, str], Style] = {}
         self._widths: dict[str, int] = {}
+        """The widths that a person gave to columns."""
+        self._own_widths: dict[str, tuple[int, int]] = {}
+        """For the other columns the width with the name in one line, and with the name wrapped."""
+        self._names = (False, 1)
+        """Whether names are wrapped, and how many lines the longest one takes."""
         self._layout: Layout | None = None
         self._laid_out = sheet.table
         """The table that the layout is of: a step may have made another one before the screen is reported."""
-        self._said_shape = (-1, -1)
+        self._said_shape = (-1, -1, -1)
         self._fields: tuple[str, ...] = ()
         """The fields of the test row behind the columns, that the layout is of."""
         self._extra: int | None = None
@@ -89,6 +96,7 @@ class GridView(ScrollView, inherit_bindings=False):
         self.sheet = sheet
         self._painter = Painter(sheet, self._style)
         self._widths.clear()
+        self._own_widths.clear()
         self.is_in_test_row = self.goes_to_new_row = False
         self.changed()
 
@@ -122,8 +130,12 @@ class GridView(ScrollView, inherit_bindings=False):
     def refit(self) -> None:
         """Make room where something new is beside cells; no column becomes narrower."""
         for at, column in enumerate(self.sheet.table.columns):
+            beside = min(self._beside(at), WIDEST)
             if column.name in self._widths:
-                self._widths[column.name] = max(self._widths[column.name], min(self._beside(at), WIDEST))
+                self._widths[column.name] = max(self._widths[column.name], beside)
+            elif column.name in self._own_widths:
+                wide, narrow = self._own_widths[column.name]
+                self._own_widths[column.name] = max(wide, beside), max(narrow, beside)
 
     def autofit(self) -> None:
         """Make each column as wide as its texts and its name."""
@@ -148,19 +160,34 @@ class GridView(ScrollView, inherit_bindings=False):
         is_same = self._laid_out is self.sheet.table and self._fields == fields
         if self._layout is None or self._layout.width != self.window.width or not is_same:
             self._laid_out, self._fields = self.sheet.table, fields
-            names = [c.name for c in self.sheet.table.columns]
-            widths = [self._width(at, name) for at, name in enumerate((*names, *fields))]
-            n_frozen = names.index(self.sheet.table.asset_column) + 1
-            self._layout = layout(widths, n_frozen if n_frozen <= 3 else 0, self.sheet.table.n_rows, self.window.width)
+            self._layout, is_wrapped, n_names = self._laid(fields)
+            self._names = is_wrapped, n_names
         return self._layout
+
+    def _laid(self, fields: Sequence[str]) -> tuple[Layout, bool, int]:
+        """Where the columns stand; whether names are wrapped, since not all were seen else; how many lines the longest takes."""
+        names = [*(c.name for c in self.sheet.table.columns), *fields]
+        n_frozen = self.sheet.asset_at + 1
+
+        def made(is_wrapped: bool) -> Layout:
+            widths = [self._width(at, name, is_wrapped) for at, name in enumerate(names)]
+            return layout(widths, n_frozen if n_frozen <= 3 else 0, self.sheet.table.n_rows, self.window.width)
+
+        plain = made(False)
+        if plain.total <= self.window.width:
+            return plain, False, 1
+        wrapped = made(True)
+        lines = (len(name_lines(name, width - 1)) for name, width in zip(names, wrapped.widths, strict=True))
+        return wrapped, True, max(lines, default=1)
 
     @property
     def look(self) -> Look:
         """Where the grid is at present."""
         x, y = self.scroll_offset
         height, is_in_test_row = self.window.height, self.is_in_test_row
+        made = self.grid_layout
         return Look(
-            self.grid_layout,
+            made,
             height,
             x,
             y,
@@ -169,6 +196,7 @@ class GridView(ScrollView, inherit_bindings=False):
             self.has_test_row,
             self.is_in_new_row,
             self.has_new_row,
+            *self._names,
             self.field,
         )
 
@@ -191,18 +219,34 @@ class GridView(ScrollView, inherit_bindings=False):
         self._styles.clear()
         super().notify_style_update()
 
-    def _width(self, at: int, name: str) -> int:
-        if name not in self._widths:
-            self._widths[name] = self._fitted(at, WIDEST if name == self.sheet.table.asset_column else COMPACT)
-        return self._widths[name]
+    def _width(self, at: int, name: str, is_wrapped: bool) -> int:
+        if name in self._widths:
+            return self._widths[name]
+        if name not in self._own_widths:
+            self._own_widths[name] = self._width_of(at, name)
+        return self._own_widths[name][is_wrapped]
+
+    def _width_of(self, at: int, name: str) -> tuple[int, int]:
+        """How wide a column is at first: with its name in one line, and with its name wrapped."""
+        widest = WIDEST if name == self.sheet.table.asset_column else COMPACT
+        wide, header = self._fitted(at, widest), self.sheet.header(at)
+        wrapped = max(min(name_width(name), COMPACT) + 1, len(header.kind) + 3)
+        if header.is_extra:
+            return wide, min(wide, max(wrapped, len("no column") + 1))
+        cells = max(self._fitted_cells(at, [], widest), self._beside(at))
+        return wide, min(wide, max(wrapped, cells))
 
     def _fitted(self, at: int, widest: int) -> int:
         header = self.sheet.header(at)
         kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
         if header.is_extra:
             return min(max(len("no column"), cell_len(header.name), cell_len(kind)) + 2, widest)
-        fitted = fitted_width(self.sheet.table.columns[at], [header.name + " ↕", kind], widest)
+        fitted = self._fitted_cells(at, [header.name + " ↕", kind], widest)
         return min(max(fitted, self._beside(at)), WIDEST)
+
+    def _fitted_cells(self, at: int, heads: Sequence[str], widest: int) -> int:
+        indent = self.sheet.indent(at)
+        return fitted_width(self.sheet.table.columns[at], heads, widest, lambda text: indented(text, indent) if indent else text)
 
     def _beside(self, at: int) -> int:
         """How wide a column must be for what is at the right of its cells: the actors of a role, the rows of inner tables."""
@@ -227,9 +271,9 @@ class GridView(ScrollView, inherit_bindings=False):
 
     def _fit(self) -> None:
         rows, total = len(self.sheet.view), self.grid_layout.extent
-        if self._said_shape != (rows, total):
-            self._said_shape = (rows, total)
-            self.virtual_size = Size(total, rows + self.has_new_row + n_headers(self.window.height) + self.has_test_row)
+        if self._said_shape != (rows, total, self.look.n_headers):
+            self._said_shape = (rows, total, self.look.n_headers)
+            self.virtual_size = Size(total, rows + self.has_new_row + self.look.n_headers + self.has_test_row)
 
     def on_resize(self) -> None:
         self._layout = None

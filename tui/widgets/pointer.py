@@ -167,7 +167,7 @@ class Pointer:
         elif column >= grid.sheet.shape[1]:
             grid.is_in_test_row = True
             grid.moving(lambda: grid.go_to_field(column))
-        elif event.y == 0 and event.x >= look.layout.place(column, look.left) + look.layout.widths[column] - 2:
+        elif event.y == look.sort_line and event.x >= look.layout.place(column, look.left) + look.layout.widths[column] - 2:
             grid.sort_by(column)
         else:
             grid.is_in_test_row = False

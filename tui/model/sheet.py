@@ -21,6 +21,7 @@ from contextdb.errors import Fault, TableError, in_quotes, plural, shown
 from contextdb.tables.changes import Cells, Change, Edit
 from contextdb.tables.table import Table
 from tui.model.clipboard import format_tsv, parse_tsv, place_paste
+from tui.model.column_values import mends_of, renamed_value, replaced
 from tui.model.find import Search, find, next_hit, replace_all
 from tui.model.selection import Block
 from tui.model.shown import ShownTable
@@ -273,6 +274,27 @@ class Sheet(ShownTable):
         if not edit.changes:
             return Done(notes=(f"{in_quotes(search.text)} is not found.",))
         return self._do(edit)
+
+    # ---- a column as a whole
+
+    def mend_all(self, texts: Iterable[str] | None = None) -> Done:
+        """Mend every cell of the cursor's column that cannot be read and has a near text that can, or only those of some texts."""
+        column = self.selection.column
+        mends = mends_of(self, column, texts)
+        if not mends:
+            return Done(notes=("No cell of this column has a text that cannot be read and is near to one that can.",))
+        return self._do(replaced(self.table, self.table.columns[column].name, mends, "Mend"))
+
+    def replace_value(self, old: Iterable[str], new: str) -> Done:
+        """Put a text in place of others in every cell of the cursor's column."""
+        name = self.table.columns[self.selection.column].name
+        if fault := self.check(new):
+            raise TableError(fault)
+        return self._do(replaced(self.table, name, dict.fromkeys(old, new), f"Replace by {shown(new)}"))
+
+    def rename_value(self, old: str, new: str) -> Done:
+        """Rename a value of the cursor's column in all its cells, and where it is declared, as one step."""
+        return self._do(renamed_value(self, self.selection.column, old, new))
 
     # ---- history
 

@@ -335,7 +335,9 @@ class ShownTable:
         """Sort and filter again; the selection stays on its rows where they are still shown."""
         rows = [self._file_row(place[0]) for place in self._corners()]
         valid = self.query.valid if self.filter.is_valid else None
-        sort = self.sort if self.sort and any(c.name == self.sort.column for c in self.table.columns) else None
+        names = {c.name for c in self.table.columns}
+        sort = Sort.by([key for key in self.sort.keys if key.column in names]) if self.sort else None
+        self.filter = self.filter.of_columns(names)
         self.view = View.of(self.table, sort, shown_rows(self.table, self.filter, valid, self._findings))
         self._place_selection(rows)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -19,13 +19,14 @@ from contextdb.errors import ContextDBError, ContextError, Fault, TableError, pl
 from tui.clipboard import Clipboard
 from tui.messages import Edited, RenameWanted, Told
 from tui.model.asked import Offered
+from tui.model.column_values import selection_said
 from tui.model.find import PatternError, Search
 from tui.model.problems import findings_at_once
 from tui.model.sheet import Done, Sheet
-from tui.model.views import Filter, Sort
+from tui.model.views import CellTest, Filter, Sort
 from tui.panes.pane import Pane
 from tui.screens.ask import AskDialog
-from tui.widgets.bar import CellLine
+from tui.widgets.bar import Bar, CellLine, Item
 from tui.widgets.cell_editor import CellEditor
 from tui.widgets.find_bar import FilterBar, FindBar, SheetBar
 from tui.widgets.grid import Grid
@@ -57,9 +58,12 @@ class AssetsPane(Pane):
         self.clipboard = clipboard
         self._search = Search("")
         self._edited = _Place()
+        self._typed_test: CellTest | None = None
+        """The test of the filter that is being typed, which the next letter changes."""
 
     def compose(self) -> ComposeResult:
         yield CellLine()
+        yield Bar(id="chips")
         yield Grid(self.sheet)
         yield FilterBar()
         yield FindBar()
@@ -79,6 +83,10 @@ class AssetsPane(Pane):
 
     def show(self) -> None:
         """Show the sheet as it is now."""
+        chips = self.query_one("#chips", Bar)
+        parts = self.sheet.filter.parts
+        chips.display = bool(parts)
+        chips.show([Item(f"unfilter({at})", f"{said} ✕") for at, (said, _) in enumerate(parts)])
         self.grid.changed()
         self._show_cell()
 
@@ -104,10 +112,16 @@ class AssetsPane(Pane):
         if len(sheet.view) < sheet.table.n_rows:
             parts.append(f"{len(sheet.view):,} of {plural(sheet.table.n_rows, 'row')} shown")
         if sheet.sort is not None:
-            parts.append(f"sorted by {sheet.sort.column} {'▼' if sheet.sort.is_descending else '▲'}")
+            keys = (f"{key.column} {'▼' if key.is_descending else '▲'}" for key in sheet.sort.keys)
+            parts.append(f"sorted by {', '.join(keys)}")
         if block.n_cells > 1:
-            parts.append(f"{block.shape[0]:,} × {block.shape[1]:,} selected")
+            parts.append(f"{block.shape[0]:,} × {block.shape[1]:,} selected{selection_said(sheet)}")
         return " · ".join(parts)
+
+    @on(Bar.Pressed)
+    async def _chip_pressed(self, event: Bar.Pressed) -> None:
+        event.stop()
+        await self.run_action(event.command)
 
     # ---- the line of the cell
 
@@ -347,6 +361,68 @@ class AssetsPane(Pane):
             others = tuple(pair for pair in self.sheet.filter.cells if pair[0] != name)
             self._show_filtered(replace(self.sheet.filter, cells=(*others, (name, frozenset([text])))))
 
+    def action_values(self) -> None:
+        """What the cursor's column holds, and what to do with it."""
+        from tui.screens.column_values import ValuesAnswer, ValuesDialog
+
+        column = self.sheet.selection.column
+
+        def decided(answer: ValuesAnswer | None) -> None:
+            if answer is None:
+                return
+            if answer.act == "mend":
+                self._try(lambda: self.sheet.mend_all(answer.texts))
+            elif answer.act in ("only", "without"):
+                self._show_only(column, answer.texts, is_without=answer.act == "without")
+            else:
+                self._ask_value(answer.act == "rename", answer.texts)
+
+        self.app.push_screen(ValuesDialog(self.sheet, column), decided)
+
+    def _show_only(self, column: int, texts: Sequence[str], is_without: bool) -> None:
+        name, wanted = self.sheet.table.columns[column].name, self.sheet.filter
+        if is_without:
+            tests = tuple(CellTest(name, "!=", text) for text in texts)
+            self._show_filtered(replace(wanted, tests=tuple(dict.fromkeys((*wanted.tests, *tests)))))
+        else:
+            others = tuple(pair for pair in wanted.cells if pair[0] != name)
+            self._show_filtered(replace(wanted, cells=(*others, (name, frozenset(texts)))))
+
+    def _ask_value(self, is_rename: bool, texts: Sequence[str]) -> None:
+        """Ask for another name of a value, or for the text that replaces some."""
+        old = texts[0]
+        what = (
+            f"Another name for the value {old}, in every cell and where it is declared"
+            if is_rename
+            else "The text to write instead"
+        )
+
+        def named(text: str | None) -> None:
+            if text is not None and text != old:
+                self._try(lambda: self.sheet.rename_value(old, text) if is_rename else self.sheet.replace_value(texts, text))
+
+        self.app.push_screen(AskDialog("Rename the value" if is_rename else "Replace everywhere", what, old, lambda _: ""), named)
+
+    def action_unfilter(self, at: int = -1) -> None:
+        """Take one part off the filter; the last one unless another is said."""
+        parts = self.sheet.filter.parts
+        if not parts:
+            self.post_message(Told("Every row is shown."))
+        elif -len(parts) <= at < len(parts):
+            self.query_one(FilterBar).clear_text()
+            self._show_filtered(parts[at][1])
+
+    def action_sort_then(self) -> None:
+        """Sort rows that are alike by the cursor's column, too."""
+        name, keys = self.sheet.table.columns[self.sheet.selection.column].name, self.sheet.sort.keys if self.sheet.sort else ()
+        before = next((key for key in keys if key.column == name), None)
+        others = [key for key in keys if key.column != name]
+        if before is None or not before.is_descending:
+            others.append(Sort(name, before is not None))
+        self.sheet.set_sort(Sort.by(others))
+        self.show()
+        self.grid.post_message(Grid.Moved())
+
     def action_show_all(self) -> None:
         """Remove the filter."""
         self.query_one(FilterBar).clear()
@@ -358,9 +434,15 @@ class AssetsPane(Pane):
         if event.has_findings:
             self.sheet.set_findings(findings_at_once(self.sheet.table))
         name = self.sheet.table.columns[self.sheet.selection.column].name
-        columns = ((name, event.text),) if event.in_column and event.text else ()
+        test = CellTest.read(name, event.text) if event.in_column else None
+        columns = ((name, event.text),) if event.in_column and event.text and test is None else ()
         text = "" if event.in_column else event.text
-        self._show_filtered(Filter(text, columns, self.sheet.filter.cells, event.is_valid, event.has_findings))
+        now = self.sheet.filter
+        tests = now.tests if test is None else (*(one for one in now.tests if one is not self._typed_test), test)
+        if test is None and self._typed_test is not None:
+            tests = tuple(one for one in tests if one is not self._typed_test)
+        self._typed_test = test
+        self._show_filtered(Filter(text, columns, now.cells, tests, event.is_valid, event.has_findings))
 
     def _show_filtered(self, wanted: Filter) -> None:
         self.sheet.set_filter(wanted)
@@ -369,6 +451,9 @@ class AssetsPane(Pane):
 
     @on(SheetBar.Closed)
     def _bar_closed(self) -> None:
+        if self._typed_test is not None:  # it stays, and the next one is another
+            self._typed_test = None
+            self.query_one(FilterBar).clear_text()
         self.grid.focus()
 
     def action_sort_file(self) -> None:

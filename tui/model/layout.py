@@ -45,8 +45,8 @@ class Layout:
 
     @cached_property
     def starts(self) -> tuple[int, ...]:
-        """The x of each column, and behind the last the end of all."""
-        return tuple(accumulate((w + 1 for w in self.widths), initial=0))
+        """The x of each column, and behind the last the end of all. A hidden column has no width and no separator."""
+        return tuple(accumulate((w + 1 if w else 0 for w in self.widths), initial=0))
 
     @property
     def frozen(self) -> int:
@@ -79,7 +79,7 @@ class Layout:
     def separator_at(self, x: int, scroll: int) -> int | None:
         """The column whose separator is at cell `x` of the window."""
         column = self.column_at(x, scroll)
-        return column if self.place(column, scroll) + self.widths[column] == x else None
+        return column if self.widths[column] and self.place(column, scroll) + self.widths[column] == x else None
 
     def place(self, column: int, scroll: int) -> int:
         """Where a column's first cell is in the window."""
@@ -105,10 +105,10 @@ def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int) -> Lay
     room = (width - gutter) // 2
     if room < (NARROWEST + 1) * n_frozen:
         n_frozen = 0
-    if gutter + sum(widths) + len(widths) > width:
+    if gutter + sum(widths) + sum(map(bool, widths)) > width:
         room = min(room, max((width - gutter) // 3, LEAST_FROZEN))
     frozen = list(widths[:n_frozen])
-    excess = sum(frozen) + n_frozen - room
+    excess = sum(frozen) + sum(map(bool, frozen)) - room
     for column in sorted(range(len(frozen)), key=lambda c: -frozen[c]):
         cut = max(0, min(excess, frozen[column] - NARROWEST))
         frozen[column] -= cut

@@ -243,6 +243,7 @@ class Sheet(ShownTable):
         """Go to the next cell that is found; gives how many there are."""
         hits = find(self.table, search, self.view.rows, [c.name for c in self.table.columns])
         if (place := next_hit(hits, self.cursor, is_backwards)) is not None:
+            self.columns_shown = self.columns_shown.revealed(self.table.columns[place[1]].name)
             self.go(*place)
         return int(hits.sum())
 

@@ -27,6 +27,7 @@ from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
 from tui.model.alignment import indent_of, shared_end
 from tui.model.asked import Offered
+from tui.model.columns_shown import ColumnsShown
 from tui.model.fact_steps import FactSteps
 from tui.model.query_row import QueryRow
 from tui.model.selection import Block, Selection, Shape
@@ -69,6 +70,7 @@ class ShownTable:
         self.sort: Sort | None = None
         self.filter = Filter()
         self.view = View.of(self.table)
+        self.columns_shown = ColumnsShown()
         self.version = 0
         self._places: dict[str, tuple[TextColumn, int]] = {}
         """For columns of numbers how far they are indented, for the assets how long their shared end is, and of which texts."""
@@ -284,6 +286,24 @@ class ShownTable:
         """Whether a cell holds a text."""
         return bool(self.text(row, column).strip())
 
+    # ---- which columns are seen
+
+    @property
+    def hidden(self) -> tuple[bool, ...]:
+        """Whether each column is hidden."""
+        names = [c.name for c in self.table.columns]
+        return self.columns_shown.are_hidden(names, self.table.asset_column)
+
+    def show_columns(self, wanted: ColumnsShown) -> None:
+        """Hide, fold and freeze columns; the cursor leaves a column that is hidden."""
+        self.columns_shown = wanted
+        self._select(self.selection)
+
+    def hide_columns(self) -> None:
+        """Hide the selected columns, but never that of the assets."""
+        names = set(self.selected_columns) - {self.table.asset_column}
+        self.show_columns(replace(self.columns_shown, hidden=self.columns_shown.hidden | names))
+
     # ---- where one is
 
     def go(self, row: int, column: int, extend: bool = False) -> None:
@@ -295,6 +315,8 @@ class ShownTable:
         if self.view.place(file_row) is None:
             self.set_filter(Filter())
         names = [c.name for c in self.table.columns]
+        if column in names:
+            self.columns_shown = self.columns_shown.revealed(column)
         self.go(self.view.place(file_row) or 0, names.index(column) if column in names else self.selection.column)
 
     def move(self, down: int, right: int, extend: bool = False) -> None:
@@ -310,8 +332,24 @@ class ShownTable:
         self._select(change(self.selection, self.shape))
 
     def _select(self, selection: Selection) -> None:
-        self.selection = selection
+        self.selection = selection if self.columns_shown.is_plain else self._on_seen(selection)
         self.version += 1
+
+    def _on_seen(self, selection: Selection) -> Selection:
+        """A selection whose cursor, or the corner that moves, is on a column that is seen: the next one the way it went."""
+        is_wide = selection.far != (selection.row, selection.column)
+        column = selection.far[1] if is_wide else selection.column
+        hidden = self.hidden
+        if selection.kind in ("columns", "all") or column >= len(hidden) or not hidden[column]:
+            return selection
+        before = self.selection.far[1] if is_wide else self.selection.column
+        ahead, behind = range(column + 1, len(hidden)), range(column - 1, -1, -1)
+        ways = (behind, ahead) if column < before else (ahead, behind)
+        seen = next((at for way in ways for at in way if not hidden[at]), column)
+        far = (selection.far[0], seen)
+        if is_wide:
+            return replace(selection, far=far)
+        return replace(selection, column=seen, anchor=(selection.anchor[0], seen), far=far)
 
     # ---- the view
 

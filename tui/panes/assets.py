@@ -20,6 +20,7 @@ from tui.clipboard import Clipboard
 from tui.messages import Edited, RenameWanted, Told
 from tui.model.asked import Offered
 from tui.model.column_values import selection_said
+from tui.model.columns_shown import prefix_of
 from tui.model.find import PatternError, Search
 from tui.model.problems import findings_at_once
 from tui.model.sheet import Done, Sheet
@@ -111,6 +112,8 @@ class AssetsPane(Pane):
             parts.append(f"{sheet.query.said}{where}")
         if len(sheet.view) < sheet.table.n_rows:
             parts.append(f"{len(sheet.view):,} of {plural(sheet.table.n_rows, 'row')} shown")
+        if any(sheet.hidden):
+            parts.append(f"{plural(sum(sheet.hidden), 'column')} hidden")
         if sheet.sort is not None:
             keys = (f"{key.column} {'▼' if key.is_descending else '▲'}" for key in sheet.sort.keys)
             parts.append(f"sorted by {', '.join(keys)}")
@@ -403,6 +406,61 @@ class AssetsPane(Pane):
 
         self.app.push_screen(AskDialog("Rename the value" if is_rename else "Replace everywhere", what, old, lambda _: ""), named)
 
+    def action_hide_columns(self) -> None:
+        """Hide the selected columns."""
+        self.sheet.hide_columns()
+        self._show_columns("Alt+J shows all columns, and brings hidden ones back.")
+
+    def action_show_columns(self) -> None:
+        """Show every column again."""
+        self.sheet.show_columns(replace(self.sheet.columns_shown, hidden=frozenset(), folded=frozenset()))
+        self._show_columns("Every column is shown.")
+
+    def action_fold(self) -> None:
+        """Fold the columns with the prefix of the cursor's to one, or open them again."""
+        name = self.sheet.table.columns[self.sheet.selection.column].name
+        prefix = prefix_of(name)
+        if prefix is None:
+            self.post_message(Told(f"{name} has no prefix: columns such as Defender.DepthChart are grouped by theirs.", "warning"))
+            return
+        self.sheet.show_columns(self.sheet.columns_shown.folded_at(name))
+        is_folded = prefix in self.sheet.columns_shown.folded
+        self._show_columns(f"The columns of {prefix} are {'folded' if is_folded else 'open again'}.")
+
+    def action_freeze(self) -> None:
+        """Let the columns up to the cursor's never scroll; only the assets where that is so already."""
+        name, now = self.sheet.table.columns[self.sheet.selection.column].name, self.sheet.columns_shown
+        frozen = None if now.frozen == name else name
+        self.sheet.show_columns(replace(now, frozen=frozen))
+        self._show_columns(f"The columns up to {frozen} do not scroll." if frozen else "Only the assets do not scroll.")
+
+    def action_columns(self) -> None:
+        """All columns in a list: go to one, hide, fold, freeze."""
+        from tui.screens.columns import ColumnsAnswer, ColumnsDialog
+
+        def decided(answer: ColumnsAnswer | None) -> None:
+            if answer is None:
+                return
+            self.sheet.show_columns(answer.shown)
+            if answer.column is not None:
+                self.go_to_column(answer.column)
+            self._show_columns("")
+
+        self.app.push_screen(ColumnsDialog(self.sheet), decided)
+
+    def go_to_column(self, name: str) -> None:
+        """Put the cursor on a column, which is shown if it was hidden."""
+        names = [c.name for c in self.sheet.table.columns]
+        self.sheet.show_columns(self.sheet.columns_shown.revealed(name))
+        self.grid.is_in_test_row = False
+        self.grid.changed()
+        self.grid.moving(lambda: self.sheet.go(self.sheet.cursor[0], names.index(name)))
+
+    def _show_columns(self, said: str) -> None:
+        self.show()
+        self.grid.post_message(Grid.Moved())
+        self.post_message(Told(said))
+
     def action_unfilter(self, at: int = -1) -> None:
         """Take one part off the filter; the last one unless another is said."""
         parts = self.sheet.filter.parts
@@ -471,15 +529,25 @@ class AssetsPane(Pane):
         self._try(sorted_file)
 
     def action_go_to(self) -> None:
-        """Ask for a row, by its number or its asset."""
-        dialog = AskDialog("Go to", "A row's number, or the beginning of an asset's name", "", self._check_place)
+        """Ask for a row, by its number or its asset, or for a column."""
+        question = "A row's number, or the beginning of the name of an asset or a column"
+        dialog = AskDialog("Go to", question, "", self._check_place)
         self.app.push_screen(dialog, self._went)
 
     def _check_place(self, text: str) -> str:
         if text.strip().isdigit():
             n_rows = self.sheet.table.n_rows
             return "" if 1 <= int(text) <= n_rows else f"The table has {plural(n_rows, 'row')}."
-        return "" if self._row_named(text) is not None else "No asset has such a name."
+        is_there = self._row_named(text) is not None or self._column_named(text) is not None
+        return "" if is_there else "No asset and no column has such a name."
+
+    def _column_named(self, text: str, is_whole: bool = False) -> str | None:
+        """The column of a name, or else whose name begins so, or has it in it."""
+        word, names = text.strip().casefold(), [c.name for c in self.sheet.table.columns]
+        if is_whole or not word:
+            return next((name for name in names if word and name.casefold() == word), None)
+        begins = (name for name in names if name.casefold().startswith(word))
+        return next(begins, next((name for name in names if word in name.casefold()), None))
 
     def _row_named(self, text: str) -> int | None:
         word = text.strip().casefold()
@@ -488,8 +556,13 @@ class AssetsPane(Pane):
         return next(beginning, next((row for name, row in names if word and word in name), None))
 
     def _went(self, text: str | None) -> None:
-        if text is not None:
-            row = int(text) - 1 if text.strip().isdigit() else self._row_named(text)
+        if text is None:
+            return
+        row = int(text) - 1 if text.strip().isdigit() else self._row_named(text)
+        column = self._column_named(text, is_whole=True) or (self._column_named(text) if row is None else None)
+        if column is not None:
+            self.go_to_column(column)
+        else:
             self.go_to(row or 0, None)
 
     def action_rename_column(self) -> None:

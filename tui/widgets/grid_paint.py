@@ -26,6 +26,8 @@ LOW, ROOMY = 12, 20
 for the type, or for what the fact of the test row leaves."""
 AT_LEFT, AT_RIGHT = "«", "»"
 """Stand at an edge of the window behind which cells of the row fail."""
+HIDES = "║"
+"""Stands behind a column after which others are hidden."""
 UP, DOWN, UNSORTED = "▲", "▼", "↕"
 COMPUTED = "="
 """Stands before a fact of the test row that is computed from others."""
@@ -327,14 +329,18 @@ class Painter:
         """The gutter, the frozen columns and those that are scrolled, each followed by its separator; an arrow stands at an edge
         behind which columns fail."""
         layout = look.layout
-        bar = Segment("│", self.style(ground, "line"))
+        bar, double = Segment("│", self.style(ground, "line")), Segment(HIDES, self.style(ground, "muted"))
+        shown = [at for at, width in enumerate(layout.widths) if width]
+        hides = {at for at, after in zip(shown, [*shown[1:], len(layout.widths)], strict=True) if after > at + 1}
         line = list(gutter)
         for column in range(layout.n_frozen):
-            line += [*cell(column), bar]
+            if layout.widths[column]:
+                line += [*cell(column), double if column in hides else bar]
         moving: list[Segment] = []
         columns = layout.visible(look.left)
         for column in columns:
-            moving += [*cell(column), bar]
+            if layout.widths[column]:
+                moving += [*cell(column), double if column in hides else bar]
         start = look.left - (layout.starts[columns.start] - layout.frozen) if len(columns) else 0
         if any(layout.n_frozen <= column < columns.start + (start > 0) for column in failing):
             line[-1] = _ending(line[-1], AT_LEFT, self.style(ground, "failing"))

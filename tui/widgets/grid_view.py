@@ -167,17 +167,18 @@ class GridView(ScrollView, inherit_bindings=False):
     def _laid(self, fields: Sequence[str]) -> tuple[Layout, bool, int]:
         """Where the columns stand; whether names are wrapped, since not all were seen else; how many lines the longest takes."""
         names = [*(c.name for c in self.sheet.table.columns), *fields]
-        n_frozen = self.sheet.asset_at + 1
+        hidden, asset = self.sheet.hidden, self.sheet.table.asset_column
+        n_frozen = self.sheet.columns_shown.n_frozen([c.name for c in self.sheet.table.columns], asset)
 
         def made(is_wrapped: bool) -> Layout:
-            widths = [self._width(at, name, is_wrapped) for at, name in enumerate(names)]
-            return layout(widths, n_frozen if n_frozen <= 3 else 0, self.sheet.table.n_rows, self.window.width)
+            widths = [0 if at < len(hidden) and hidden[at] else self._width(at, name, is_wrapped) for at, name in enumerate(names)]
+            return layout(widths, n_frozen, self.sheet.table.n_rows, self.window.width)
 
         plain = made(False)
         if plain.total <= self.window.width:
             return plain, False, 1
         wrapped = made(True)
-        lines = (len(name_lines(name, width - 1)) for name, width in zip(names, wrapped.widths, strict=True))
+        lines = (len(name_lines(name, width - 1)) for name, width in zip(names, wrapped.widths, strict=True) if width)
         return wrapped, True, max(lines, default=1)
 
     @property

@@ -26,6 +26,7 @@ from tui.model.problems import findings_at_once
 from tui.model.sheet import Done, Sheet
 from tui.model.views import CellTest, Filter, Sort
 from tui.panes.pane import Pane
+from tui.panes.why import WhyPane
 from tui.screens.ask import AskDialog
 from tui.widgets.bar import Bar, CellLine, Item
 from tui.widgets.cell_editor import CellEditor
@@ -64,6 +65,7 @@ class AssetsPane(Pane):
 
     def compose(self) -> ComposeResult:
         yield CellLine()
+        yield WhyPane()
         yield Bar(id="chips")
         yield Grid(self.sheet)
         yield FilterBar()
@@ -76,6 +78,11 @@ class AssetsPane(Pane):
     def grid(self) -> Grid:
         """The grid."""
         return self.query_one(Grid)
+
+    @property
+    def why_pane(self) -> WhyPane:
+        """The pane beside the grid."""
+        return self.query_one(WhyPane)
 
     @property
     def editor(self) -> CellEditor | None:
@@ -131,6 +138,7 @@ class AssetsPane(Pane):
     @on(Grid.Moved)
     def _show_cell(self) -> None:
         sheet = self.sheet
+        self.why_pane.follow(sheet)
         row, column = sheet.cursor
         column = self.grid.field
         header, condition = sheet.header(column), sheet.fact_of(column)

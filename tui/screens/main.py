@@ -34,6 +34,7 @@ from tui.panes.options import OptionsPane
 from tui.panes.pane import Pane
 from tui.panes.priorities import PrioritiesPane
 from tui.panes.problems import ProblemsPane
+from tui.panes.why import WIDE
 from tui.screens.ask import AskDialog, ChooseDialog
 from tui.screens.asking import TestRow
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
@@ -412,7 +413,15 @@ class MainScreen(Screen[None]):
         self.try_to(self.test_row.actors)
 
     def action_why(self) -> None:
-        """Why the row of the cursor is not valid, and which rows are nearest."""
+        """Why the row of the cursor is not valid: beside the table where there is room, else as `action_nearest`."""
+        pane = self.assets.why_pane
+        if self.tab == "assets" and (pane.is_open or self.size.width >= WIDE):
+            pane.turn(self.session.sheet)
+        else:
+            self.action_nearest()
+
+    def action_nearest(self) -> None:
+        """The row of the cursor cell by cell, and which rows are nearest, in a dialog."""
         self.test_row.why()
 
     def action_refresh(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from contextdb.cells.conditions import Condition, Mirror
@@ -73,6 +73,12 @@ class ConditionForm:
 def names_in(text: str) -> Iterable[str]:
     """The names that a person typed: with spaces, commas or semicolons between them, those in quotes as they are."""
     return (match[1].replace('""', '"') if match[1] is not None else match[2] for match in _NAME.finditer(text))
+
+
+def undeclared(text: str, values: Sequence[str]) -> list[str]:
+    """The names in a cell that are no declared values: without signs, a penalty, and the words of the grammar."""
+    names = (name.lstrip("+-") for name in names_in(text.partition("~")[0]))
+    return [name for name in dict.fromkeys(names) if name and name not in values and name.casefold() not in ("not", "any")]
 
 
 def _mirror_text(mirror: Mirror | None) -> str:

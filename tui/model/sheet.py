@@ -22,8 +22,10 @@ from contextdb.tables.changes import Cells, Change, Edit
 from contextdb.tables.table import Table
 from tui.model.clipboard import format_tsv, parse_tsv, place_paste
 from tui.model.column_values import mends_of, renamed_value, replaced
+from tui.model.condition_form import undeclared
 from tui.model.find import Search, find, next_hit, replace_all
 from tui.model.selection import Block
+from tui.model.series import continued, tells_step
 from tui.model.shown import ShownTable
 from tui.model.views import Sort, sorted_rows
 
@@ -102,6 +104,42 @@ class Sheet(ShownTable):
             return Done(notes=("There is no column to the left to fill from.",))
         cells = ((r, c, self.text(r, source)) for r, c in self._cells(block) if c != source)
         return self._set(cells, f"Fill right {self._size(block)}")
+
+    def fill_series(self) -> Done:
+        """Go on with what the selected columns begin with: one text counts on by 1, two say the step. One cell alone goes on from
+        the cell above it."""
+        block = self.block
+        top = block.top - 1 if block.shape[0] == 1 and block.top else block.top
+        cells: list[tuple[int, int, str]] = []
+        for column in range(block.left, block.right):
+            texts = [self.text(row, column) for row in range(top, block.bottom)]
+            n_begun = 2 if len(texts) > 2 and tells_step(texts[0], texts[1]) else 1
+            more = continued(texts[:n_begun], len(texts) - n_begun)
+            cells += [(top + n_begun + at, column, text) for at, text in enumerate(more)]
+        if not cells:
+            return Done(notes=("Select the first cell and those below it that the series fills.",))
+        return self._set(cells, f"Fill a series of {len(cells)}")
+
+    def declare_value(self, text: str, is_new_row: bool = False) -> Done:
+        """Put a text into the cell of the cursor, or into a new row, and declare the values in it that the condition lacks."""
+        row, column = self.cursor
+        name, condition = self.table.columns[column].name, self.condition(column)
+        assert condition is not None, "only a condition has values"
+        values = condition.condition.domain.values or ()
+        new = undeclared(text, values)
+        declared = edits.set_condition(self.table, name, values=[*values, *new])
+        after = declared.apply(self.table)
+        if fault := edits.check_cell(after, name, text):
+            raise TableError(fault)
+        if is_new_row:
+            cell = edits.insert_rows(after, after.n_rows, [{name: text}])
+        else:
+            cell = edits.set_cells(after, [(int(self.view.rows[row]), name, text)])
+        edit = Edit(f"Add {', '.join(map(shown, new))} to the values of {shown(name)}", (*declared.changes, *cell.changes))
+        done = self._do(edit)
+        if is_new_row:
+            self._select_file_rows(self.table.n_rows - 1, 1)
+        return done
 
     def copy(self) -> str:
         """The selected cells as tab-separated text."""

@@ -60,6 +60,8 @@ class AssetsPane(Pane):
         self.clipboard = clipboard
         self._search = Search("")
         self._edited = _Place()
+        self._run: tuple[int, int, int] | None = None
+        """After Tab the cell that it went to, and the column where the run of Tabs began."""
         self._typed_test: CellTest | None = None
         """The test of the filter that is being typed, which the next letter changes."""
 
@@ -229,8 +231,32 @@ class AssetsPane(Pane):
         if is_elsewhere:
             self.sheet.select(lambda _, shape: clicked.within(shape))
         elif not event.is_fill and not (place.is_new and not event.text.strip()):
+            start, before = self._run_start(event), self.sheet.cursor[0]
             self.sheet.select(lambda s, shape: s.next_cell(event.down, event.right, shape))
+            if start is not None:
+                is_last = before == self.sheet.cursor[0] == len(self.sheet.view) - 1
+                self.sheet.go(self.sheet.cursor[0], start)
+                self.grid.goes_to_new_row = is_last or self.grid.goes_to_new_row
         self.grid.show_cursor()
+
+    def _run_start(self, event: CellEditor.Committed) -> int | None:
+        """The column that Enter goes back to after a run of Tabs in one row; None where there was no such run."""
+        row, column = self.sheet.cursor
+        run = self._run if self._run is not None and self._run[:2] == (row, column) else None
+        if event.is_tab and self.sheet.block.n_cells == 1:
+            self._run = row, column + 1, column if run is None else run[2]
+            return None
+        self._run = None
+        return run[2] if run is not None and event.down == 1 and self.sheet.block.n_cells == 1 else None
+
+    @on(CellEditor.Declared)
+    def _declare(self, event: CellEditor.Declared) -> None:
+        """Take a text with values that are declared with it."""
+        event.stop()
+        place = self._edited
+        self.sheet.go(place.row, place.column)
+        self._close_editor()
+        self._try(lambda: self.sheet.declare_value(event.text, place.is_new))
 
     def _enter(self, text: str, is_fill: bool) -> bool:
         """Put a text into the cell, or into all that are selected; one that is refused stays in the editor."""

@@ -20,7 +20,7 @@ from contextdb.errors import ContextDBError, in_quotes, plural, some
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.clipboard import Clipboard
-from tui.commands import ASSETS, BY_ID, SCREEN, bindings
+from tui.commands import ASSETS, BY_ID, SCREEN, bindings, key_names
 from tui.editor import Editor
 from tui.messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, Told
 from tui.model.coverage_run import CoverageRun
@@ -55,6 +55,15 @@ class Answer(Protocol):
 
 
 TABS = ("assets", "options", "priorities", "coverage", "problems")
+CELL_MENU = (
+    "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "insert-row", "insert-below", "duplicate", "delete-rows",
+    "enable", "filter-same", "values", "nearest",
+)  # fmt: skip
+COLUMN_MENU = (
+    "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "mend-all", "rename-column", "add-column",
+    "column-left", "column-right", "delete-columns",
+)  # fmt: skip
+"""What the right button of the mouse offers."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
 
 
@@ -322,6 +331,21 @@ class MainScreen(Screen[None]):
                 self.apply(answer.edit, answer.notes)
 
         self.app.push_screen(ImportDialog(self.session.sheet.table, self.workspace.folder, text), chosen)
+
+    @on(Grid.MenuWanted)
+    def _menu(self, event: Grid.MenuWanted) -> None:
+        """What can be done with a column, or with cells."""
+        names = COLUMN_MENU if event.of_column else CELL_MENU
+        keys = {name: key_names(self.app.settings.keys.get(name, BY_ID[name].keys)) for name in names}
+        lines = [f"{BY_ID[name].label:<18}{keys[name][0] if keys[name] else ''}" for name in names]
+
+        def chosen(at: int | None) -> None:
+            if at is not None:
+                self.call_later(self.run_command, names[at])
+
+        sheet = self.session.sheet
+        title = sheet.table.columns[sheet.selection.column].name if event.of_column else "Cells"
+        self.app.push_screen(ChooseDialog(title, lines), chosen)
 
     @on(Grid.ImportWanted)
     def _import_text(self, event: Grid.ImportWanted) -> None:

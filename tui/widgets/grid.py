@@ -65,6 +65,12 @@ class Grid(GridView, can_focus=True):
         """Nothing else says what was done."""
 
     @dataclass
+    class MenuWanted(Message):
+        """Show what can be done with what is under the mouse."""
+
+        of_column: bool
+
+    @dataclass
     class ImportWanted(Message):
         """Ask how to read a text that was pasted into an empty table."""
 
@@ -389,6 +395,9 @@ class Grid(GridView, can_focus=True):
         if event.button == 1:
             event.stop()
             self._pointer.press(event)
+        elif event.button == 3:
+            event.stop()
+            self.post_message(self.MenuWanted(self._pointer.point(event)))
 
     def on_mouse_move(self, event: events.MouseMove) -> None:
         self._pointer.move(event)

@@ -112,6 +112,19 @@ class Pointer:
                 grid.action_select_rows()
             self._begin("rows" if event.x < look.layout.gutter else "cells")
 
+    def point(self, event: events.MouseDown) -> bool:
+        """The right button goes down: go there, unless it is selected already; gives whether a column was meant."""
+        grid, look = self.grid, self.grid.look
+        grid.focus()
+        row, column = self._place_at(event.x, event.y)
+        is_header = event.y < look.n_headers
+        n_columns, block = grid.sheet.shape[1], grid.sheet.block
+        if column < n_columns and (is_header or self._is_cell_line(event.y, look)) and event.y != look.foot:
+            grid.is_in_test_row = False
+            if not (block.holds(row, column) or (is_header and block.left <= column < block.right)):
+                grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0] if is_header else row, column))
+        return is_header
+
     def move(self, event: events.MouseMove) -> None:
         """The mouse moves with its button down."""
         grid, look = self.grid, self.grid.look

@@ -141,7 +141,7 @@ class EditorApp(Editor):
 
     def begun_with(self, answer: Import) -> None:
         """Put rows into the table that was just opened, once it is seen."""
-        self.main.call_after_refresh(self.main.apply, answer.edit, answer.notes)
+        self.main.call_after_refresh(self.main.take_import, answer)
 
     def open_table(self, name: str) -> None:
         """Show a table; one with a conflict between marks asks first which side holds."""

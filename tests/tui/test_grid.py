@@ -442,3 +442,45 @@ def test_whatever_is_pressed_undoing_all_gives_the_same_bytes(keys, tmp_path_fac
         return bytes_for(sheet.table, file)
 
     assert with_editor(file, script) == file.read_bytes()
+
+
+def test_after_a_paste_of_many_rows_one_stays_where_one_was(tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,note\n" + "".join(f"a{at},x\n" for at in range(300)))
+
+    async def script(app, pilot):
+        grid = app.main.assets.grid
+        grid.paste("\n".join(f"b{at}" for at in range(200)))
+        await press(pilot)
+        pasted = grid.look.top, app.main.session.sheet.cursor[0]
+        await press(pilot, *["shift+down"] * 3)
+        return pasted, grid.look.top > 0
+
+    assert with_editor(file, script) == ((0, 0), True)
+
+
+def test_a_selection_of_filtered_rows_does_not_grow_when_all_are_shown(tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,note\n" + "".join(f"a{at},{'x' if at % 2 else 'y'}\n" for at in range(8)))
+
+    async def script(app, pilot):
+        sheet = app.main.session.sheet
+        await press(pilot, "right", "alt+e", "shift+down", "shift+down")
+        before = sheet.selected_rows
+        await press(pilot, "alt+g")
+        return before, sheet.selected_rows
+
+    assert with_editor(file, script) == ([0, 2, 4], [0])
+
+
+def test_a_column_that_was_added_has_the_cursor_so_that_the_next_comes_behind_it(tmp_path):
+    (tmp_path / "contextdb.toml").write_text('[conditions.hit]\ntype = "bool"\n[conditions.way]\ntype = "angle"\n')
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,note,last\nwalk,x,y\n")
+
+    async def script(app, pilot):
+        for name in ("hit", "way"):
+            await press(pilot, "alt+c", *name, "enter")
+        return [c.name for c in app.main.session.sheet.table.columns]
+
+    assert with_editor(file, script) == ["Asset", "hit", "way", "note", "last"]

@@ -371,13 +371,19 @@ class ShownTable:
 
     def refresh(self) -> None:
         """Sort and filter again; the selection stays on its rows where they are still shown."""
-        rows = [self._file_row(place[0]) for place in self._corners()]
+        rows, chosen = [self._file_row(place[0]) for place in self._corners()], self._chosen()
         valid = self.query.valid if self.filter.is_valid else None
         names = {c.name for c in self.table.columns}
         sort = Sort.by([key for key in self.sort.keys if key.column in names]) if self.sort else None
         self.filter = self.filter.of_columns(names)
         self.view = View.of(self.table, sort, shown_rows(self.table, self.filter, valid, self._findings))
         self._place_selection(rows)
+        if self.selection.kind in ("cells", "rows") and len(chosen) > 1 and not np.array_equal(chosen, self._chosen()):
+            self.go(*self.cursor)  # other rows would be selected than those that were
+
+    def _chosen(self) -> NDArray[np.int64]:
+        """The rows of the file that are selected, in the order of the file."""
+        return np.sort(self.view.rows[self.block.top : self.block.bottom])
 
     def set_fact(self, condition: str, text: str) -> Fault | None:
         """Write one fact of the test row; gives what is wrong with it. One that is computed cannot be written."""

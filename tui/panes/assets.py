@@ -51,7 +51,7 @@ class _Place:
 class AssetsPane(Pane):
     """A table as a spreadsheet, with the test row at its foot."""
 
-    DEFAULT_CSS = "AssetsPane { layout: vertical; & Grid { height: 1fr; } }"
+    DEFAULT_CSS = "AssetsPane { layout: vertical; & Grid { height: 1fr; } & #chips { display: none; } }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f6", "back", "Back to the table", show=False)]
 
     def __init__(self, sheet: Sheet, clipboard: Clipboard) -> None:

@@ -328,9 +328,14 @@ class MainScreen(Screen[None]):
 
         def chosen(answer: Import | None) -> None:
             if answer is not None:
-                self.apply(answer.edit, answer.notes)
+                self.take_import(answer)
 
         self.app.push_screen(ImportDialog(self.session.sheet.table, self.workspace.folder, text), chosen)
+
+    def take_import(self, answer: Import) -> None:
+        """Put the rows of another file into the table, and fit the columns to them."""
+        self.apply(answer.edit, answer.notes)
+        self.assets.grid.forget_widths()
 
     @on(Grid.MenuWanted)
     def _menu(self, event: Grid.MenuWanted) -> None:
@@ -410,8 +415,15 @@ class MainScreen(Screen[None]):
         self.app.push_screen(Blueprints(sheet.table, sheet.selected_columns, sheet.selection.column), self._answered)
 
     def _answered(self, answer: Answer | None) -> None:
-        if answer is not None:
-            self.try_to(lambda: self.apply(answer.edit(self.session.sheet.table)))
+        """Make the edit; the cursor goes to the column that is new, so that the next one comes behind it."""
+        if answer is None:
+            return
+        sheet = self.session.sheet
+        before = {column.name for column in sheet.table.columns}
+        self.try_to(lambda: self.apply(answer.edit(sheet.table)))
+        new = [column.name for column in sheet.table.columns if column.name not in before]
+        if new:
+            self.assets.go_to_column(new[-1])
 
     def apply(self, edit: Edit, notes: Sequence[str] = ()) -> None:
         """Make an edit, show it and say what was done; what cannot be done is said."""

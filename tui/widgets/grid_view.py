@@ -124,8 +124,13 @@ class GridView(ScrollView, inherit_bindings=False):
         self._painter.changed()
         self._layout = None
         self._fit()
-        self.show_cursor()
+        self.show_cursor(is_after_edit=True)
         self.refresh()
+
+    def forget_widths(self) -> None:
+        """Fit the columns again that nobody gave a width: their texts are others now."""
+        self._own_widths.clear()
+        self.changed()
 
     def refit(self) -> None:
         """Make room where something new is beside cells; no column becomes narrower."""
@@ -261,6 +266,13 @@ class GridView(ScrollView, inherit_bindings=False):
             return longest + len(" 000 of 000 rows") + 1
         return longest + max(cell_len(str(actor.get("name", ""))) for actor in query.actors[role]) + 3
 
+    def _kept_in_sight(self, row: int, column: int) -> tuple[int, int]:
+        """The cursor, where the far corner of the selection is not seen, so that a paste of many rows does not carry one away."""
+        look, here = self.look, self.sheet.cursor
+        columns = {*range(look.layout.n_frozen), *look.layout.visible(look.left)}
+        is_seen = look.top <= row < look.top + max(look.n_body, 1) and column in columns
+        return (row, column) if is_seen else here
+
     def _style(self, ground: str, meant: str) -> Style:
         if (ground, meant) not in self._styles:
             under = self.get_component_rich_style(f"grid--{ground}")
@@ -279,7 +291,7 @@ class GridView(ScrollView, inherit_bindings=False):
     def on_resize(self) -> None:
         self._layout = None
         self._fit()
-        self.show_cursor()
+        self.show_cursor(is_after_edit=True)
 
     def on_focus(self) -> None:
         self.refresh()
@@ -287,12 +299,16 @@ class GridView(ScrollView, inherit_bindings=False):
     def on_blur(self) -> None:
         self.refresh()
 
-    def show_cursor(self) -> None:
-        """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again."""
+    def show_cursor(self, is_after_edit: bool = False) -> None:
+        """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again. After an
+        edit of many cells it is enough that one of the two is seen."""
         if not self.size:
             return
         look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else (0, self.field)
         row = self._cursor_row if self.is_in_new_row else row
+        is_wide = self.sheet.selection.far != self.sheet.cursor
+        if is_after_edit and is_wide and not (self.is_in_test_row or self.is_in_new_row):
+            row, column = self._kept_in_sight(row, column)
         top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
         left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
         if (top, left) != (look.top, look.left):

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from contextdb.edits import edits
+from contextdb.edits.renaming_values import with_value
 from contextdb.errors import Fault, TableError, in_quotes, plural, shown
 from contextdb.tables.changes import Cells, Edit
 from contextdb.tables.table import Table
@@ -82,8 +83,9 @@ def replaced(table: Table, column: str, by: Mapping[str, str], name: str) -> Edi
     return Edit(f"{name} in {plural(len(cells), 'cell')}", (Cells({column: cells}),) if cells else ())
 
 
-def renamed_value(sheet: ShownTable, column: int, old: str, new: str) -> Edit:
-    """The edit that renames a value in every cell of a column; a declared value is renamed where it is declared, too.
+def renamed_value(sheet: ShownTable, column: int, old: str, new: str, keeps_old: bool = False) -> Edit:
+    """The edit that renames a value in every cell of a column. A declared value is renamed where it is declared, too; `keeps_old`
+    leaves it there for others, and declares the new one beside it.
 
     Raises
     ------
@@ -99,25 +101,15 @@ def renamed_value(sheet: ShownTable, column: int, old: str, new: str) -> Edit:
         return replaced(table, name, {old: new}, what)
     if new in values:
         raise TableError(Fault(f"{in_quotes(new)} is a value of {shown(name)} already.", "a name that there is not yet"))
-    declared = edits.set_condition(table, name, values=[new if value == old else value for value in values])
+    now = [*values, new] if keeps_old else [new if value == old else value for value in values]
+    declared = edits.set_condition(table, name, values=now)
     after = declared.apply(table)
-    cells = {text: other for text in condition.texts.texts if (other := _with_value(text, old, new)) != text}
+    cells = {text: other for text in condition.texts.texts if (other := with_value(text, old, new)) != text}
     wrong = {condition.texts.texts[code] for code in condition.faults}
     for text, other in cells.items():
         if text not in wrong and (fault := edits.check_cell(after, name, other)):
             raise TableError(fault)
     return Edit(what, (*declared.changes, *replaced(table, name, cells, what).changes))
-
-
-def _with_value(text: str, old: str, new: str) -> str:
-    """A cell of names with one of them renamed; it is whole between spaces, signs and quotes."""
-    from contextdb.cells.words import quoted
-
-    words = text.split(" ")
-    if quoted(old) != old or any('"' in word for word in words):
-        return text.replace(quoted(old), quoted(new))
-    signs = "~!+-,;()"
-    return " ".join(word.replace(bare, quoted(new)) if (bare := word.strip(signs)) == old else word for word in words)
 
 
 MOST_SUMMED = 100_000

@@ -331,9 +331,10 @@ class Sheet(ShownTable):
             raise TableError(fault)
         return self._do(replaced(self.table, name, dict.fromkeys(old, new), f"Replace by {shown(new)}"))
 
-    def rename_value(self, old: str, new: str) -> Done:
-        """Rename a value of the cursor's column in all its cells, and where it is declared, as one step."""
-        return self._do(renamed_value(self, self.selection.column, old, new))
+    def rename_value(self, old: str, new: str, keeps_old: bool = False) -> Done:
+        """Rename a value of the cursor's column in all its cells, and where it is declared, as one step of this table; where others
+        speak of the value see `Workspace.rename_value`."""
+        return self._do(renamed_value(self, self.selection.column, old, new, keeps_old))
 
     # ---- history
 

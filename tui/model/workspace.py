@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from contextdb.edits.renaming import renaming
+from contextdb.edits.renaming import Renaming, renaming
+from contextdb.edits.renaming_values import value_renaming
 from contextdb.errors import ContextDBError, Fault, FileError, TableError, some
 from contextdb.tables.nesting.links import Neighbours
 from contextdb.tables.places import table_path
@@ -122,6 +123,19 @@ class Workspace:
             A table that is to be written has unsaved edits; else as `contextdb.edits.renaming`. Nothing has changed then.
         """
         found = renaming(self.sessions[name].sheet.table, old, new, only_here)
+        return self._write_renaming(name, found, {old: new})
+
+    def rename_value(self, name: str, condition: str, old: str, new: str) -> tuple[str, ...]:
+        """Give a declared value of a condition another name in the files of the project; gives which were written.
+
+        Raises
+        ------
+        TableError, SchemaError, FileError
+            As of `rename`; else as `contextdb.edits.renaming_values`. Nothing has changed then.
+        """
+        return self._write_renaming(name, value_renaming(self.sessions[name].sheet.table, condition, old, new), {})
+
+    def _write_renaming(self, name: str, found: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
         paths = {file.path.resolve() for file in found.files}
         open_here = [one for one, session in self.sessions.items() if session.path.resolve() in paths or one == name]
         if waiting := [one for one in open_here if one in self.unsaved]:
@@ -132,7 +146,7 @@ class Workspace:
         found.write()
         for one in open_here:
             query = self.sessions[one].sheet.query
-            self.reopen(one).sheet.query.load({new if fact == old else fact: text for fact, text in query.texts.items()})
+            self.reopen(one).sheet.query.load({names.get(fact, fact): text for fact, text in query.texts.items()})
         return tuple(file.path.name for file in found.files)
 
     @property

@@ -17,7 +17,7 @@ from contextdb.cells.words import MARK
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, ContextError, Fault, TableError, plural
 from tui.clipboard import Clipboard
-from tui.messages import Edited, RenameWanted, Told
+from tui.messages import Edited, RenameWanted, Told, ValueRenameWanted
 from tui.model.asked import Offered
 from tui.model.column_values import selection_said
 from tui.model.columns_shown import prefix_of
@@ -435,8 +435,13 @@ class AssetsPane(Pane):
         )
 
         def named(text: str | None) -> None:
-            if text is not None and text != old:
-                self._try(lambda: self.sheet.rename_value(old, text) if is_rename else self.sheet.replace_value(texts, text))
+            if text is None or text == old:
+                return
+            if is_rename:
+                name = self.sheet.table.columns[self.sheet.selection.column].name
+                self.post_message(ValueRenameWanted(name, old, text.strip()))
+            else:
+                self._try(lambda: self.sheet.replace_value(texts, text))
 
         self.app.push_screen(AskDialog("Rename the value" if is_rename else "Replace everywhere", what, old, lambda _: ""), named)
 

@@ -16,13 +16,14 @@ from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
 from contextdb.edits.renaming import Uses, uses_of
+from contextdb.edits.renaming_values import ValueUses, value_uses
 from contextdb.errors import ContextDBError, in_quotes, plural, some
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.clipboard import Clipboard
 from tui.commands import ASSETS, BY_ID, SCREEN, bindings, key_names
 from tui.editor import Editor
-from tui.messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, Told
+from tui.messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, Told, ValueRenameWanted
 from tui.model.coverage_run import CoverageRun
 from tui.model.importing import Import
 from tui.model.new_table import make_table, name_fault
@@ -400,6 +401,37 @@ class MainScreen(Screen[None]):
 
         title, about = f"Rename {old} to {new}", f"{old} is used by {uses.text}.\n{written}"
         self.app.push_screen(ChooseDialog(title, [*lines, "Cancel"], about=about), chosen)
+
+    @on(ValueRenameWanted)
+    def _rename_value(self, event: ValueRenameWanted) -> None:
+        """Rename a value; where others speak of it, ask whether they go along."""
+        sheet, old, new = self.session.sheet, event.old, event.new
+        condition = next((c.condition for c in sheet.table.conditions if c.condition.name == event.column), None)
+        is_declared = condition is not None and condition.is_declared and old in (condition.domain.values or ())
+        uses = value_uses(sheet.table, event.column, old) if is_declared else ValueUses()
+        if not uses.text:
+            self.try_to(lambda: self._edited(Edited(sheet.rename_value(old, new))))
+            return
+        lines = [
+            "Rename everywhere: in all that uses it, written to the files at once",
+            f"Only here: the cells of this table; {old} stays a value for others",
+            "Cancel",
+        ]
+
+        def chosen(at: int | None) -> None:
+            if at == 0:
+                self.try_to(lambda: self._rename_value_files(event))
+            elif at == 1:
+                self.try_to(lambda: self._edited(Edited(sheet.rename_value(old, new, keeps_old=True))))
+
+        named = f"\nTables: {', '.join(uses.tables)}." if uses.tables else ""
+        about = f"{old} of {event.column} is used by {uses.text}.{named}"
+        self.app.push_screen(ChooseDialog(f"Rename {old} to {new}", lines, about=about), chosen)
+
+    def _rename_value_files(self, event: ValueRenameWanted) -> None:
+        files = self.workspace.rename_value(self.table_name, event.column, event.old, event.new)
+        self.app.open_table(self.table_name)
+        self.app.say_renamed(f"Renamed {event.old} to {event.new} everywhere, in {some(files)}. To undo it, rename it back.")
 
     def _rename_files(self, old: str, new: str, only_here: bool) -> None:
         files = self.workspace.rename(self.table_name, old, new, only_here)

@@ -174,7 +174,7 @@ _OF_ASSETS = (
     Command("filter-same", "alt+e,alt+f", "Filter same", "Show only rows with the text of this cell.", "View", "filter_same"),
     Command("show-all", "alt+g", "Show all rows", "Remove the filter.", "View", "show_all"),
     Command("columns", "alt+j", "Columns", "All columns: go to one, hide, fold, freeze.", "Columns", "columns"),
-    Command("hide-columns", "alt+u", "Hide columns", "Hide the selected columns.", "Columns", "hide_columns"),
+    Command("hide-columns", "alt+0", "Hide columns", "Hide the selected columns.", "Columns", "hide_columns"),
     Command("show-columns", "", "Show all columns", "Show hidden columns again.", "Columns", "show_columns"),
     Command("fold", "", "Fold the group", "Fold the columns of one prefix, or open them.", "Columns", "fold"),
     Command("freeze", "", "Freeze columns", "The columns up to this one never scroll.", "Columns", "freeze"),

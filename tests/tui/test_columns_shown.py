@@ -71,7 +71,7 @@ def path(tmp_path: Path) -> Path:
 
 def test_the_cursor_goes_over_hidden_columns_both_ways(path):
     async def script(app, pilot):
-        await press(pilot, "right", "shift+right", "alt+u")
+        await press(pilot, "right", "shift+right", "alt+0")
         sheet, columns = app.main.session.sheet, []
         for key in ("home", "right", "left", "end", "left", "left"):
             await press(pilot, key)
@@ -99,7 +99,7 @@ def test_a_group_is_folded_by_the_palettes_command_and_a_double_line_says_so(pat
 
 def test_finding_a_text_in_a_hidden_column_shows_it(path):
     async def script(app, pilot):
-        await press(pilot, "right", "right", "right", "alt+u", "ctrl+f", *"Run", "enter", "escape")
+        await press(pilot, "right", "right", "right", "alt+0", "ctrl+f", *"Run", "enter", "escape")
         sheet = app.main.session.sheet
         return sheet.cursor, any(sheet.hidden)
 
@@ -108,7 +108,7 @@ def test_finding_a_text_in_a_hidden_column_shows_it(path):
 
 def test_going_to_a_column_by_its_name_shows_it(path):
     async def script(app, pilot):
-        await press(pilot, "right", "right", "right", "alt+u", "home", "ctrl+g", *"gai", "enter")
+        await press(pilot, "right", "right", "right", "alt+0", "home", "ctrl+g", *"gai", "enter")
         sheet = app.main.session.sheet
         return sheet.cursor, any(sheet.hidden)
 
@@ -140,7 +140,7 @@ def test_frozen_columns_stay_where_the_others_scroll(path):
 
 def test_problems_go_to_a_hidden_column_and_show_it(path):
     async def script(app, pilot):
-        await press(pilot, "right", "right", "right", "alt+u", "home")
+        await press(pilot, "right", "right", "right", "alt+0", "home")
         app.main.assets.go_to(1, "gait")
         await press(pilot)
         return app.main.session.sheet.cursor

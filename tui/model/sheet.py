@@ -224,7 +224,9 @@ class Sheet(ShownTable):
     def move_rows(self, down: int) -> Done:
         """Move the selected rows past the next shown row: down 1 or up -1. Not in a sorted view, whose order is not the file's."""
         if self.view.is_sorted:
-            raise TableError(Fault("the rows are shown sorted.", "the order of the file", "to show them as they are in the file"))
+            raise TableError(
+                Fault("the rows are shown sorted.", "the order of the file", "to show them as in the file: Alt+S, again")
+            )
         block, rows = self.block, self.selected_rows
         beside = block.top - 1 if down < 0 else block.bottom
         if not 0 <= beside < len(self.view):

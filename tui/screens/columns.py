@@ -40,7 +40,7 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
     }
     """
     title_text = "Columns"
-    keys_text = "Enter go there · Space hide, show · G fold the group · F freeze up to here · Esc done"
+    keys_text = "Enter go there · Space hide · G fold the group · F freeze · Esc"
 
     def __init__(self, sheet: ShownTable) -> None:
         super().__init__()

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from contextdb.columns import TextColumn
 from tui.model.layout import MOST_TEXTS
 
+MOST_ALIGNED = 200
+"""By so many distinct texts of a column it is decided how far its numbers are indented."""
 MOST_BEFORE = 8
 """Texts with more before their point, such as words, are not aligned."""
 LEAST_SHARED = 4
@@ -23,9 +26,10 @@ def before_point(text: str) -> int | None:
 
 def indent_of(column: TextColumn) -> int:
     """How far the point of every first number of a column is from the left: as far as the longest whole part needs."""
-    return max((before for text in column.texts[:MOST_TEXTS] if (before := before_point(text)) is not None), default=0)
+    return max((before for text in column.texts[:MOST_ALIGNED] if (before := before_point(text)) is not None), default=0)
 
 
+@lru_cache(maxsize=1 << 14)
 def indented(text: str, indent: int) -> str:
     """A text with its point so far from the left; one without a number as it is."""
     before = before_point(text)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import accumulate
@@ -47,6 +47,13 @@ class Layout:
     def starts(self) -> tuple[int, ...]:
         """The x of each column, and behind the last the end of all. A hidden column has no width and no separator."""
         return tuple(accumulate((w + 1 if w else 0 for w in self.widths), initial=0))
+
+    @cached_property
+    def hides(self) -> frozenset[int]:
+        """The columns that are seen, behind which others are hidden."""
+        shown = [at for at, width in enumerate(self.widths) if width]
+        following = [*shown[1:], len(self.widths)]
+        return frozenset(at for at, after in zip(shown, following, strict=True) if after > at + 1)
 
     @property
     def frozen(self) -> int:
@@ -116,10 +123,9 @@ def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int) -> Lay
     return Layout((*frozen, *widths[n_frozen:]), n_frozen, gutter, width)
 
 
-def fitted_width(column: TextColumn, heads: Sequence[str], widest: int = WIDEST, shown: Callable[[str], str] = str) -> int:
-    """How wide a column must be for its texts and what stands over it, a mark on the left and a space on the right; `shown` is
-    how a text is shown."""
-    texts = [*map(shown, column.texts[:MOST_TEXTS]), *heads]
+def fitted_width(column: TextColumn, heads: Sequence[str], widest: int = WIDEST) -> int:
+    """How wide a column must be for its texts and what stands over it, a mark on the left and a space on the right."""
+    texts = [*column.texts[:MOST_TEXTS], *heads]
     return max(NARROWEST, min(max(map(cell_len, texts), default=0) + 2, widest))
 
 

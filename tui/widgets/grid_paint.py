@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 from rich.cells import cell_len
 from rich.segment import Segment
@@ -40,6 +41,7 @@ StyleOf = Callable[[str, str], Style]
 """The style of a ground and of what is on it: `style("cursor", "text")`."""
 
 
+@lru_cache(maxsize=256)
 def header_lines(height: int, n_names: int, is_wrapped: bool = False) -> tuple[str, ...]:
     """What the lines over the rows say in a window so high, where the longest name takes `n_names` lines."""
     if height < LOWEST:
@@ -330,8 +332,7 @@ class Painter:
         behind which columns fail."""
         layout = look.layout
         bar, double = Segment("│", self.style(ground, "line")), Segment(HIDES, self.style(ground, "muted"))
-        shown = [at for at, width in enumerate(layout.widths) if width]
-        hides = {at for at, after in zip(shown, [*shown[1:], len(layout.widths)], strict=True) if after > at + 1}
+        hides = layout.hides
         line = list(gutter)
         for column in range(layout.n_frozen):
             if layout.widths[column]:
@@ -345,10 +346,10 @@ class Painter:
         if any(layout.n_frozen <= column < columns.start + (start > 0) for column in failing):
             line[-1] = _ending(line[-1], AT_LEFT, self.style(ground, "failing"))
         line += _from(moving, start)
-        strip = Strip(line).adjust_cell_length(layout.width, self.style(ground, "text"))
-        if any(column >= columns.stop for column in failing):
-            strip = Strip.join([strip.crop(0, layout.width - 1), Strip([Segment(AT_RIGHT, self.style(ground, "failing"))])])
-        return strip
+        if not any(column >= columns.stop for column in failing):
+            return Strip(line).adjust_cell_length(layout.width, self.style(ground, "text"))
+        inner = Strip(line).adjust_cell_length(layout.width - 1, self.style(ground, "text"))
+        return Strip([*inner, Segment(AT_RIGHT, self.style(ground, "failing"))], layout.width)
 
 
 def _ending(segment: Segment, sign: str, style: Style) -> Segment:

@@ -15,7 +15,7 @@ from textual.reactive import reactive
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from tui.model.alignment import indented
+from tui.model.alignment import MOST_ALIGNED, indented
 from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
 from tui.widgets.grid_paint import Look, Painter
@@ -235,11 +235,14 @@ class GridView(ScrollView, inherit_bindings=False):
     def _width_of(self, at: int, name: str) -> tuple[int, int]:
         """How wide a column is at first: with its name in one line, and with its name wrapped."""
         widest = WIDEST if name == self.sheet.table.asset_column else COMPACT
-        wide, header = self._fitted(at, widest), self.sheet.header(at)
+        header = self.sheet.header(at)
         wrapped = max(min(name_width(name), COMPACT) + 1, len(header.kind) + 3)
         if header.is_extra:
+            wide = self._fitted(at, widest)
             return wide, min(wide, max(wrapped, len("no column") + 1))
         cells = max(self._fitted_cells(at, [], widest), self._beside(at))
+        kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
+        wide = min(max(cells, min(max(cell_len(name) + 4, cell_len(kind) + 2), widest)), WIDEST)
         return wide, min(wide, max(wrapped, cells))
 
     def _fitted(self, at: int, widest: int) -> int:
@@ -251,8 +254,9 @@ class GridView(ScrollView, inherit_bindings=False):
         return min(max(fitted, self._beside(at)), WIDEST)
 
     def _fitted_cells(self, at: int, heads: Sequence[str], widest: int) -> int:
-        indent = self.sheet.indent(at)
-        return fitted_width(self.sheet.table.columns[at], heads, widest, lambda text: indented(text, indent) if indent else text)
+        indent, column = self.sheet.indent(at), self.sheet.table.columns[at]
+        aligned = [indented(text, indent) for text in column.texts[:MOST_ALIGNED]] if indent else []
+        return fitted_width(column, [*heads, *aligned], widest)
 
     def _beside(self, at: int) -> int:
         """How wide a column must be for what is at the right of its cells: the actors of a role, the rows of inner tables."""

@@ -264,5 +264,5 @@ def test_a_folder_of_clips_without_a_project_is_checked_by_itself(game: Path):
 def test_a_project_without_motion_databases_is_told_so_and_its_clips_are_checked(game: Path):
     (game / "contextdb.toml").write_text("[tables.moves]\n", encoding="utf-8")
     (game / "clips" / "broken.bvh").write_text("HIERARCHY\n", encoding="utf-8")
-    assert [finding["rule"] for finding in findings()][0] == "no-databases"
+    assert findings()[0]["rule"] == "no-databases"
     assert run("motion", "check", "game").lines[-1] == "3 clips checked: 2 errors."

@@ -246,3 +246,23 @@ def test_bones_of_no_file_or_a_broken_one_are_bad_use(game: Path):
     assert (result.code, result.out) == (2, "")
     assert run("motion", "bones").code == 2
     assert run("motion", "bones", game / "clips" / "walk.bvh", "--metres-per-unit", "0").code == 2
+
+
+def test_a_folder_of_clips_without_a_project_is_checked_by_itself(game: Path):
+    (game / "contextdb.toml").unlink()
+    assert run("motion", "check", "game/clips").lines[-1] == "3 clips checked: nothing found."
+    put(game, changed(make_clip("walk").clip, metres_per_unit=1.0), "vast")
+    (game / "clips" / "broken.bvh").write_text("HIERARCHY\n", encoding="utf-8")
+    (game / "clips" / "empty.bvh").write_bytes(b"")
+    result = run("motion", "check", "game", "--json")
+    assert result.code == 1
+    told = {(finding["level"], Path(finding["file"]).name) for finding in result.json["findings"]}
+    assert {("error", "broken.bvh"), ("error", "empty.bvh")} <= told
+    assert result.json["databases"] == [{"database": None, "clips": 4}]
+
+
+def test_a_project_without_motion_databases_is_told_so_and_its_clips_are_checked(game: Path):
+    (game / "contextdb.toml").write_text("[tables.moves]\n", encoding="utf-8")
+    (game / "clips" / "broken.bvh").write_text("HIERARCHY\n", encoding="utf-8")
+    assert findings()[0]["rule"] == "no-databases"
+    assert run("motion", "check", "game").lines[-1] == "3 clips checked: 2 errors."

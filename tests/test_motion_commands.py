@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -487,7 +488,7 @@ def test_a_stick_that_cannot_be_followed_is_refused_with_its_place(here: Path, t
         (["game", "player", "stick.csv", "--out", "new.parquet", "--seed", "x"], '"x" is not a seed.'),
         (
             ["game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.fbx"],
-            "new.fbx: poses cannot be written to such a file. Accepted: a name that ends in .bvh or .npz",
+            "new.fbx: poses cannot be written to such a file. Accepted: a name that ends in .bvh, .npz or .glb",
         ),
         (["game", "player", "stick.csv", "--out", "new.parquet", "--poses", "none/new.npz"], 'there is no folder "none".'),
     ],
@@ -508,6 +509,20 @@ def test_a_run_writes_the_poses_of_its_decisions_as_arrays_and_as_bvh(here: Path
         assert poses["rate"] == 30.0
         shown = poses_of(load_bvh(here / "new.bvh")).positions
         np.testing.assert_allclose(shown, poses["positions"], atol=1e-5)
+
+
+def test_a_run_writes_its_poses_as_gltf(here: Path):
+    pygltflib = pytest.importorskip("pygltflib", reason="needs the extra gltf")
+    motion("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.glb")
+    gltf = pygltflib.GLTF2().load(str(here / "new.glb"))
+    assert gltf.accessors[gltf.animations[0].samplers[0].input].count == len(Trace.load("new.parquet"))
+
+
+def test_without_the_library_a_run_to_gltf_is_refused_before_it_begins(here: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "pygltflib", None)
+    told = refused("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.glb")
+    assert 'pip install "contextdb[gltf]"' in told
+    assert not (here / "new.parquet").exists()
 
 
 def test_the_same_run_writes_the_same_poses(here: Path):

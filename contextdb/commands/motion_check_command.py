@@ -1,9 +1,11 @@
 """Find what is wrong with clips, markup and motion settings: bones that lack, other units and axes, jumps, idle markup.
 
-Every clip is read as a build reads it. Exits with 1 if there are findings at the level of --fail-on, with 2 if there is no such
-folder. What looks wrong and may be right, such as a body of 170 m, is a warning.
+Every clip is read as a build reads it. Where no motion database is declared, all clips below the folder are checked. Exits
+with 1 if there are findings at the level of --fail-on, with 2 if there is no such folder. What looks wrong and may be right is a
+warning, such as a body of 170 m.
 
   contextdb motion check game/
+  contextdb motion check clips/          clips that no project names yet
   contextdb motion check game/ --json
   contextdb motion check game/ --fail-on error --format github
 """
@@ -23,7 +25,7 @@ from contextdb.console import ExitCode, output, terminal_width, wants_colour
 from contextdb.errors import ContextDBError, Fault, Place, plural
 from contextdb.findings import LEVELS, Finding
 from contextdb.motion.storage.building import CACHE_FOLDER
-from contextdb.motion.storage.checking import check_motion
+from contextdb.motion.storage.checking import check_clips, check_motion
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.report.results import CheckReport
 from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
@@ -34,7 +36,7 @@ FORMATS = ("text", "json", "github", "junit", "markdown")
 
 @dataclass(frozen=True, slots=True)
 class MotionReport(CheckReport):
-    """What was found, and of each database how many clips can be used."""
+    """What was found, and of each database how many clips can be used; "" is the database of clips that are in none."""
 
     n_clips: dict[str, int] = field(default_factory=dict)
 
@@ -42,6 +44,8 @@ class MotionReport(CheckReport):
     def summary(self) -> str:
         """How much was checked, and how many findings of each level there are."""
         said = CheckReport((), self.findings).summary.partition(": ")[2]
+        if self.n_clips.keys() == {""}:
+            return f"{plural(self.n_clips[''], 'clip')} checked: {said}"
         databases, clips = plural(len(self.n_clips), "database"), plural(sum(self.n_clips.values()), "clip")
         return f"{databases} and {clips} checked: {said}"
 
@@ -55,7 +59,7 @@ class MotionReport(CheckReport):
 
     def to_json(self) -> dict[str, object]:
         """The JSON document."""
-        databases = [{"database": name, "clips": n_clips} for name, n_clips in self.n_clips.items()]
+        databases = [{"database": name or None, "clips": n_clips} for name, n_clips in self.n_clips.items()]
         return {"format": 1, "findings": [finding.to_json() for finding in self.findings], "databases": databases}
 
 
@@ -101,6 +105,8 @@ def check_path(path: str, *, cache: bool = True) -> MotionReport:
         There is no such folder.
     """
     folder = folder_of(Path(path))
+    if not (folder / SCHEMA_FILE).exists() and (clips := sorted(folder.rglob("*.bvh"))):
+        return _of_clips(clips)
     try:
         project = Project.load(folder, strict=False)
         config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
@@ -109,10 +115,18 @@ def check_path(path: str, *, cache: bool = True) -> MotionReport:
     if not config.databases:
         accepted = 'a section such as [databases.jog] with features and clips = "clips/*.bvh"'
         none = Fault("no motion database is declared.", accepted, place=Place(str(folder / SCHEMA_FILE)), rule="no-databases")
-        return MotionReport((), (Finding.of(none),))
+        found = _of_clips(sorted(folder.rglob("*.bvh")))
+        return replace(found, findings=(Finding.of(none), *found.findings))
     assets = {name: leaf_assets(table) for name, table in project.tables.items()}
     with building_bar() as progress:
         checked = check_motion(config, folder, assets, progress, cache=CACHE_FOLDER if cache else None)
+    return MotionReport((), checked.findings, checked.n_clips)
+
+
+def _of_clips(paths: list[Path]) -> MotionReport:
+    """The report on clips that no database names."""
+    with building_bar() as progress:
+        checked = check_clips(paths, progress)
     return MotionReport((), checked.findings, checked.n_clips)
 
 

@@ -4,7 +4,8 @@ STICK is a CSV or Parquet file with a row for each moment, which lasts until the
 and strafe_deg as for `motion search`, or x_mps and z_mps, a velocity over the ground, and facing_deg. All other columns are facts.
 The facts speed, direction and turn are the character's own where the file does not give them. Paths begin where the poses are.
 
-With --poses the poses of the character are written too, as BVH or as arrays of numpy; [output.CONTROLLER] says how they are made.
+With --poses the poses of the character are written too, as BVH, as arrays of numpy or as glTF; [output.CONTROLLER] says how they
+are made.
 
 Exits with 1 if nothing ever plays.
 
@@ -58,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
     parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what the player requests, moment by moment")
     parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
-    parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh or .npz")
+    parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh, .npz or .glb")
     parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
     parser.add_argument("--k", metavar="N", type=_count, default=12, help=K_HELP)
     parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="seed of the controller's variation (default: 0)")

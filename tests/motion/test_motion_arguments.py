@@ -42,6 +42,7 @@ FALLS = motion.footfalls(CLIP)
 LIVE = motion.LivePose(motion.poses_of(CLIP).positions[0], motion.local_poses(CLIP).rotations[0])
 HISTORY = motion.PoseHistory(CLIP.skeleton)
 NODE = motion.MatchNode(motion.MotionDatabase.build([CLIP], SCHEMA))
+PLAY = NODE.enter(NODE.database.raw(0), motion.Target(0, 1))
 BANK = motion.PoseBank.build([CLIP], SCHEMA)
 BUILT = motion.MotionDatabase.build([CLIP], SCHEMA)
 DECISION = motion.Controller(motion.Selector([motion.Entry("only", BUILT)])).update(0.0, BUILT.raw(0))
@@ -220,6 +221,7 @@ CALLS: dict[str, Call] = {
     "MatchGate(threshold)": lambda x: motion.MatchGate(DATABASE, x),
     "MatchGate.update(query)": lambda x: motion.MatchGate(DATABASE, 1.0).update(x),
     "MatchNode.enter(query)": lambda x: NODE.enter(x, motion.Target(0, 1)),
+    "MatchPlay.decision(database)": lambda x: isinstance(x, str) or PLAY.decision(x),
     "MatchNode.enter(target)": lambda x: NODE.enter([0.0] * SCHEMA.n_features, x),
     "Target(left_m)": lambda x: motion.Target(x, 1.0),
     "Markup.parse(text)": lambda x: motion.Markup.parse(x),
@@ -258,6 +260,9 @@ CALLS: dict[str, Call] = {
     "PoseStream.update(decision)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(x, 0.1),
     "PoseStream.update(dt)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(DECISION, x),
     "PoseStream.update(body)": lambda x: x is None or motion.PoseStream(BANK).update(DECISION, 0.1, x),
+    "PoseStream.update(ground)": lambda x: (
+        x is None or callable(x) or motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1, None, x)
+    ),
     "PoseStream.restore(state)": lambda x: motion.PoseStream(BANK).restore(x),
     "clip_of_poses(poses)": lambda x: motion.clip_of_poses(x, BANK, 30.0),
     "clip_of_poses(poses), one": lambda x: motion.clip_of_poses([x], BANK, 30.0),

@@ -33,6 +33,8 @@ PathChannels = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[What | No
 
 SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror", "feet", "heels", "toes")
 MOST_RATE = 1000.0
+ABOUT_S = 0.5
+"""How fast a path goes is the mean of about so many seconds."""
 MOST_SMOOTH_S = 2.0
 A_FACING = 'the left and the right bone, such as ["LeftUpLeg", "RightUpLeg"]'
 A_FOOT = 'the left and the right bone, such as ["LeftFoot", "RightFoot"]'
@@ -100,6 +102,23 @@ class FeatureSchema:
             if channel.type == "trajectory":
                 found.setdefault((channel.at, channel.along), []).append((channel.what, self.slices[channel.name]))
         return tuple((at, along, tuple(channels)) for (at, along), channels in found.items())
+
+    @cached_property
+    def speed_features(self) -> tuple[slice, float] | None:
+        """Which features say how fast a path goes, and what their length is divided by for metres a second; None where none do."""
+        for kind in ("position", "velocity", "speed"):
+            size = 1 if kind == "speed" else 2
+            points = [
+                (seconds, self.slices[channel.name].start + i * size)
+                for channel in self.channels
+                if channel.type == "trajectory" and channel.what == kind
+                for i, seconds in enumerate(channel.at)
+                if seconds > 0.0 or kind != "position"
+            ]
+            if points:
+                seconds, start = min(points, key=lambda point: abs(point[0] - ABOUT_S))
+                return slice(start, start + size), seconds if kind == "position" else 1.0
+        return None
 
     @property
     def weights(self) -> Floats:

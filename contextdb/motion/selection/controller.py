@@ -40,9 +40,10 @@ from contextdb.motion.selection.guards import Held
 from contextdb.motion.selection.history import remembered
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.ongoing import Ongoing
+from contextdb.motion.selection.play_rate import eased, play_rate
 from contextdb.motion.selection.root_motion import NO_MOTION
 from contextdb.motion.selection.selector import Selector
-from contextdb.motion.selection.step import Step
+from contextdb.motion.selection.step import Outcome, Step
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.selection.worked_out import WorkedOut
@@ -128,7 +129,7 @@ class Controller:
 
     def _ongoing(self, dt_s: float) -> Ongoing | None:
         """What plays, moved on; the last is kept, for an update mostly follows what was asked of `upcoming`."""
-        asked = (self._state.playing, self.selector, self.settings.rate, dt_s)
+        asked = (self._state.playing, self.selector, self.settings.rate, dt_s * self._state.play_rate)
         if self._moved is None or self._moved[0] != asked:
             self._moved = asked, Ongoing.of(*asked)
         return self._moved[1]
@@ -267,6 +268,7 @@ class Controller:
             root_weight=self._root_weight(outcome.playing),
             body=asking.body,
             held=str(outcome.held),
+            play_rate=self._play_rate(step, outcome),
             filters=filters,
             inputs=self._inputs(asking),
         )
@@ -282,7 +284,7 @@ class Controller:
         waiting_since_s = state.waiting_since_s if decision.held not in ("", Held.HYSTERESIS) else None
         if decision.held == Held.COST_BAR and waiting_since_s is None:
             waiting_since_s = step.now_s
-        return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent, waiting_since_s)
+        return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent, decision.play_rate, waiting_since_s)
 
     @property
     def _n_candidates(self) -> int:
@@ -308,6 +310,16 @@ class Controller:
 
     def _root_weight(self, playing: Playing | None) -> float:
         return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)
+
+    def _play_rate(self, step: Step, outcome: Outcome) -> float:
+        """How fast what plays goes on."""
+        playing = outcome.playing
+        if playing is None or outcome.action is Action.HOLD:
+            return 1.0
+        limits = self.settings.min_play_rate, self.settings.max_play_rate
+        wanted = play_rate(self.selector.databases[playing.database], playing.frame, step.query, limits)
+        is_new = outcome.action in (Action.START, Action.JUMP)
+        return wanted if is_new else eased(self._state.play_rate, wanted, step.dt_s)
 
     def checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""

@@ -5,6 +5,8 @@
     search_every_s = 0.1       # between two searches, unless one is forced
     jump_threshold_s = 0.2     # frames so near to the playing one, in its own range, are not candidates
     history_s = 0.5            # frames played within so many seconds are not entered again
+    min_play_rate = 0.8        # clips are played as fast as the character is asked to go, within these limits; 1 and 1 is never
+    max_play_rate = 1.25
     cost_bar = 1.0             # a jump out of an asset that is no longer valid waits if it costs more
     grace_s = 0.3              # for at most so long
     until_natural = true       # and an asset without a loop then plays on to its end
@@ -35,6 +37,10 @@ SECONDS = {
     "history_s": ("seconds from 0 to 60, such as 0.5; 0 is no memory", 60.0),
     "grace_s": ("seconds from 0 to 60, such as 0.3; 0 is no grace", 60.0),
 }
+RATES = {
+    "min_play_rate": ("a number from 0.1 to 1, such as 0.8; 1 plays nothing slower", 0.1, 1.0),
+    "max_play_rate": ("a number from 1 to 10, such as 1.25; 1 plays nothing faster", 1.0, 10.0),
+}
 VARIATION = ("variation_within", "variation_memory")
 BAR = "a cost from 0 to 1e30, such as 1.0"
 WITHIN = "a cost from 0 to 1e30, such as 0.05"
@@ -42,7 +48,7 @@ MEMORY = "a whole number from 0 to 1000, such as 2"
 MOST_COST, MOST_ASSETS = 1e30, 1000
 USUAL_BAR = 1.0
 """Half of what two frames cost on average that have nothing to do with each other."""
-KEYS = ("selector", *SECONDS, "cost_bar", "until_natural", *VARIATION)
+KEYS = ("selector", *SECONDS, *RATES, "cost_bar", "until_natural", *VARIATION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +74,14 @@ class ControllerSettings:
         Random choice among near ties. Default: always the best.
     rate : float
         Frames a second of databases made from features; those built from clips know theirs.
+    min_play_rate, max_play_rate : float
+        Between which limits a clip is played slower or faster, so that it goes about as fast as the query asks for.
 
     Raises
     ------
     MotionError
-        Seconds or a bar that are no finite numbers of 0 or more, a rate that is not above 0, or `until_natural` is no bool.
+        Seconds or a bar that are no finite numbers of 0 or more, a rate that is not above 0, a play rate out of its limits, or
+        `until_natural` is no bool.
     """
 
     search_every_s: float = 0.1
@@ -80,6 +89,8 @@ class ControllerSettings:
     history_s: float = 0.5
     variation: Variation | None = None
     rate: float = 30.0
+    min_play_rate: float = 0.8
+    max_play_rate: float = 1.25
     cost_bar: float | None = None
     grace_s: float = 0.3
     until_natural: bool = False
@@ -92,7 +103,7 @@ class ControllerSettings:
 
     def __post_init__(self) -> None:
         faults = [
-            Fault(f"{field.name} is {value!r}.", f"a number, {'above 0' if field.name == 'rate' else '0 or more'}")
+            Fault(f"{field.name} is {value!r}.", _accepted(field.name))
             for field in fields(self)
             if field.name not in ("variation", "until_natural") and not _is_accepted(field.name, value := getattr(self, field.name))
         ]
@@ -102,10 +113,16 @@ class ControllerSettings:
             raise MotionError(*faults)
 
 
+def _accepted(name: str) -> str:
+    return RATES[name][0] if name in RATES else f"a number, {'above 0' if name == 'rate' else '0 or more'}"
+
+
 def _is_accepted(name: str, value: object) -> bool:
     if name == "cost_bar" and value is None:
         return True
     number = as_number(value)
+    if name in RATES:
+        return number is not None and RATES[name][1] <= number <= RATES[name][2]
     return number is not None and (number > 0.0 or (number == 0.0 and name != "rate"))
 
 
@@ -124,6 +141,7 @@ def read_controllers(
             values["cost_bar"] = section.number("cost_bar", BAR, 0.0, MOST_COST)
         if "until_natural" in part:
             values["until_natural"] = _read_flag(section, "until_natural")
+        values |= {key: section.number(key, *RATES[key]) for key in RATES if key in part}
         variation = _read_variation(section)
         if len(faults) == n_faults and selector is not None:
             yield name, selector, ControllerSettings(**values, variation=variation)

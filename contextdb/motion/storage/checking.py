@@ -6,14 +6,15 @@ would warn of a warning, and one broken thing hides no other.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-from contextdb.errors import ContextDBError, Fault, Place, nearest, plural, some
+from contextdb.errors import ContextDBError, Fault, MotionError, Place, nearest, plural, some
 from contextdb.findings import Finding
+from contextdb.motion.clips.clip import CENTIMETRE, load_bvh
 from contextdb.motion.clips.doubts import ClipFinding, Measures, doubts, measure
 from contextdb.motion.storage import building
 from contextdb.motion.storage.build_inputs import Assets, Faults, Inputs, told_once
@@ -52,6 +53,29 @@ def check_motion(
     found += _of_settings(config)
     found += _of_assets(config, folder, assets)
     return MotionFindings(tuple(found), {name: len(each.computed) + len(each.cached) for name, each in built.items()})
+
+
+def check_clips(paths: Sequence[Path], progress: Progress | None = None, metres_per_unit: float = CENTIMETRE) -> MotionFindings:
+    """Check clips that no project names yet; those of one rig are compared with each other.
+
+    `metres_per_unit` is what one unit of the files is taken to be.
+    """
+    found: list[Finding] = []
+    rigs: dict[tuple[str, ...], list[tuple[str, str, Measures]]] = {}
+    for i, path in enumerate(paths):
+        if progress is not None:
+            progress(i, len(paths), path.name)
+        try:
+            clip = load_bvh(path, metres_per_unit=metres_per_unit)
+            if not clip.n_frames:
+                raise MotionError(Fault("the clip has no frame (Frames: 0).", "one frame or more", place=Place(str(path))))
+        except ContextDBError as error:
+            found += [Finding.of(fault if fault.place.file else fault.at(Place(str(path)))) for fault in error.faults]
+            continue
+        rigs.setdefault(clip.skeleton.names, []).append((path.stem, str(path), measure(clip)))
+    for measured in rigs.values():
+        found += [Finding(doubt.rule, "warning", doubt.message, file=doubt.file, asset=doubt.asset) for doubt in doubts(measured)]
+    return MotionFindings(tuple(found), {"": sum(map(len, rigs.values()))})
 
 
 def _in_files(faults: Iterable[Fault], files: Mapping[str, list[ClipFile]]) -> Iterator[Fault]:

@@ -191,6 +191,8 @@ def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]
     if move != NO_MOTION or decision.root_weight != 1.0:
         turn = math.degrees(move.turn_rad)
         yield "moved", f"{move.ahead_m:.3f} m ahead, {move.left_m:.3f} m left, turned {turn:.1f}°; weight {decision.root_weight:g}"
+    if decision.play_rate != 1.0:
+        yield "play rate", f"{decision.play_rate:.2f}"
     if decision.search_us is not None:
         yield "search", f"{decision.search_us:,.0f} µs"
     if decision.context:

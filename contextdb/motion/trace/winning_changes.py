@@ -248,6 +248,8 @@ def _weight_of_tie(channel: str, now: float, at: Place, winner: ReaskedSearch, f
         others = winner.database.with_weights({channel: weight}).cost_weights
         return own - float((others * winner.sums[:, frame]).sum() + winner.biases[frame])
 
+    if not np.delete(at.search.database.weights, at.search.database.channel_names.index(channel)).any():
+        return None  # the only channel that weighs
     old, value = now, behind(now)
     slope = (behind(now + 1.0) - value) / 1.0
     for _ in range(MOST_STEPS):

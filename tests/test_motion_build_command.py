@@ -7,6 +7,7 @@ import errno
 import io
 import os
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from unittest import mock
@@ -37,6 +38,7 @@ clips = "clips/*_tired.bvh"
 features = "loco"
 mirror = true
 """
+WRITTEN_BEFORE = Path(__file__).parent / "written_before"
 JOG, TIRED = "game/jog.motion.safetensors", "game/tired.motion.safetensors"
 
 
@@ -73,6 +75,15 @@ def megabytes(path: str) -> str:
 
 
 # ---- what it writes and prints
+
+
+def test_a_database_of_an_older_layout_is_replaced_with_a_word(here: Path):
+    shutil.copy(WRITTEN_BEFORE / "walk.database.safetensors", here / JOG)
+    result = build("game")
+    said = f"{JOG} was of layout 1 and is replaced by one of layout 2. Since layout 2 costs are divided"
+    assert [said in line for line in result.err.splitlines() if "layout" in line] == [True]
+    assert open_database(JOG).n_frames > 0
+    assert "layout" not in build("game").err
 
 
 def test_every_database_is_saved_beside_its_toml_and_told_in_a_table(here: Path):

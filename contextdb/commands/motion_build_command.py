@@ -25,6 +25,7 @@ from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, aligned, output, printable
 from contextdb.disk import make_folder
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
+from contextdb.files.tensors import other_layout
 from contextdb.motion.clips.doubts import grouped
 from contextdb.motion.storage import building
 from contextdb.motion.storage.build_inputs import told_once
@@ -32,7 +33,7 @@ from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.pose_files import open_or_build_poses, poses_path, save_poses
-from contextdb.motion.storage.stored import save_database
+from contextdb.motion.storage.stored import STORED, save_database
 from contextdb.tables.project import SCHEMA_FILE, Project
 from contextdb.tables.table import leaf_assets
 
@@ -70,12 +71,13 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             tolerates=left_out.take if arguments.keep_going else None,
         )
     targets = {name: target for name, target in targets.items() if name in built}
+    replaced = [sentence for target in targets.values() for sentence in _replaced(target)]
     for name, target in targets.items():
         make_folder(target.parent)
         save_database(built[name].database, target, inputs=built[name].digest)
     if arguments.poses:
         _save_poses(project, built, targets)
-    warn(project.warnings(built))
+    warn([*replaced, *project.warnings(built)])
     with output():
         if arguments.json:
             rows = [_as_json(project, name, built[name], target) for name, target in targets.items()]
@@ -85,6 +87,13 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             print("\n".join(aligned([HEADER, *cells], right=range(1, 8))))
     warn(left_out.sentences())
     return ExitCode.FOUND if left_out.errors else ExitCode.OK
+
+
+def _replaced(target: Path) -> Iterator[str]:
+    """What is said where a database of a layout that this version cannot read is replaced."""
+    layout = other_layout(target, STORED)
+    if layout is not None:
+        yield f"{target} was of layout {layout} and is replaced by one of layout {STORED.layout}. {STORED.since}"
 
 
 def _save_poses(project: MotionProject, built: Mapping[str, Built], targets: Mapping[str, Path]) -> None:

@@ -173,16 +173,25 @@ def metadata_of(path: Path, kind: FileKind) -> dict[str, str]:
     FileError
         The file cannot be read.
     """
-    from safetensors import SafetensorError, safe_open
-
     if not os.path.isfile(path) or path.stat().st_size < 8:  # Path raises, where this says no, to a name that no file can have
         raise kind.refused(path, f"the file has {len(read_bytes(path))} bytes, too few for any artefact.")
+    from safetensors import SafetensorError, safe_open
+
     try:
         with safe_open(path, framework="numpy") as frame:
             return dict(frame.metadata() or {})
     except (SafetensorError, OSError) as error:
         read_bytes(path)  # raises FileError where it is the disk that refuses
         raise kind.refused(path, f"not a whole .safetensors file ({error}).") from None
+
+
+def other_layout(path: Path, kind: FileKind) -> str | None:
+    """The layout of a file of this kind that this version cannot read; None for all other files, and where there is none."""
+    try:
+        layout = metadata_of(path, kind).get(kind.key)
+    except ContextDBError:
+        return None
+    return None if layout in [str(known) for known in (kind.layout, *kind.also)] else layout
 
 
 def _check_frame(path: Path, kind: FileKind) -> None:

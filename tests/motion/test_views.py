@@ -100,8 +100,8 @@ def test_a_decision_in_full():
 
         plays       jog at 1.50 s, frame 45 of loco
         before      walk at 1.00 s, frame 30 of loco, if it played on
-        cost        0.750: pose 0.500, trajectory 0.250
-        playing on  1.990: pose 1.750, trajectory 0.250, bias -0.010
+        cost        0.7500: pose 0.5000, trajectory 0.2500
+        playing on  1.990: pose 1.750, trajectory 0.2500, bias -0.01000
         events      Move.Run
         moved       0.041 m ahead, 0.000 m left, turned -1.5°; weight 0.5
         search      84 µs
@@ -109,27 +109,27 @@ def test_a_decision_in_full():
 
         searches
 
-        order  database  asset                  time s  frame   cost  threshold  result
-            0  loco      walk                     1.00     30  1.990             plays on
-            1  tired     walk_tired (mirrored)   40.13  1,204  3.500       2.75  beaten
-            2  starts                                                         1  not among
-            3  loco      jog                      1.50     45  0.750             winner, lowest cost
+        order  database  asset                  time s  frame    cost  threshold  result
+            0  loco      walk                     1.00     30   1.990             plays on
+            1  tired     walk_tired (mirrored)   40.13  1,204   3.500       2.75  beaten
+            2  starts                                                          1  not among
+            3  loco      jog                      1.50     45  0.7500             winner, lowest cost
 
         top candidates (summary)
 
-        rank  asset                 database  time s  frame  mirrored  left out          cost   pose
-           1  jog         chosen    loco        1.50     45                             0.750  0.500
-           2  jog                   loco        1.53     46                             0.795  0.800
-           3  walk        plays on  loco        1.00     30                             1.990  1.750
-           4  sprint                loco        0.40     12            asset not valid  2.500  2.000
-           5  walk_tired            tired      40.13  1,204  yes                        3.500  2.500
+        rank  asset                 database  time s  frame  mirrored  left out           cost    pose
+           1  jog         chosen    loco        1.50     45                             0.7500  0.5000
+           2  jog                   loco        1.53     46                             0.7951  0.8000
+           3  walk        plays on  loco        1.00     30                              1.990   1.750
+           4  sprint                loco        0.40     12            asset not valid   2.500   2.000
+           5  walk_tired            tired      40.13  1,204  yes                         3.500   2.500
 
-        rank  asset       trajectory    bias
-           1  jog              0.250       0
-           2  jog             0.0001  -0.005
-           3  walk             0.250  -0.010
-           4  sprint           0.500       0
-           5  walk_tired       1.000       0
+        rank  asset       trajectory       bias
+           1  jog             0.2500          0
+           2  jog           0.000100  -0.005000
+           3  walk            0.2500   -0.01000
+           4  sprint          0.5000          0
+           5  walk_tired       1.000          0
 
         left out of tired: 1,200 asset not valid, 9 clip end
         left out of loco: 31 asset not valid
@@ -145,20 +145,20 @@ def tables(view, **options):
 
 def test_the_view_of_the_pose_has_a_column_for_each_channel_of_it():
     assert tables(View.POSE) == golden("""
-                                                                                               LeftFoot      Hips
-        rank  asset                 database  time s  frame  mirrored  left out          cost  position  velocity
-           1  jog         chosen    loco        1.50     45                             0.750     0.250     0.250
-           2  jog                   loco        1.53     46                             0.795     0.500     0.300
-           3  walk        plays on  loco        1.00     30                             1.990     1.000     0.750
-           4  sprint                loco        0.40     12            asset not valid  2.500     1.000     1.000
-           5  walk_tired            tired      40.13  1,204  yes                        3.500     1.000     1.500
+                                                                                                LeftFoot      Hips
+        rank  asset                 database  time s  frame  mirrored  left out           cost  position  velocity
+           1  jog         chosen    loco        1.50     45                             0.7500    0.2500    0.2500
+           2  jog                   loco        1.53     46                             0.7951    0.5000    0.3000
+           3  walk        plays on  loco        1.00     30                              1.990     1.000    0.7500
+           4  sprint                loco        0.40     12            asset not valid   2.500     1.000     1.000
+           5  walk_tired            tired      40.13  1,204  yes                         3.500     1.000     1.500
     """)
 
 
 def test_the_view_of_biases_has_only_what_some_frame_has():
     header, *rows = tables(View.BIAS).splitlines()
-    assert header.endswith("cost  looping  continuing")
-    assert [row.split()[-1] for row in rows] == ["0.750", "-0.005", "-0.010", "2.500", "3.500"]
+    assert header.split()[-3:] == ["cost", "looping", "continuing"]
+    assert [row.split()[-1] for row in rows] == ["0.7500", "-0.005000", "-0.01000", "2.500", "3.500"]
 
 
 def test_the_view_of_the_trajectory_and_that_of_all_share_its_columns():
@@ -171,7 +171,7 @@ def test_the_view_of_the_trajectory_and_that_of_all_share_its_columns():
 def test_the_view_of_events_tells_the_markup_of_each_frame():
     rows = tables(View.EVENTS).splitlines()
     assert rows[0].split()[-1] == "events"
-    assert rows[1].endswith("0.750  Move.Run")
+    assert rows[1].endswith("0.7500  Move.Run")
     assert rows[3].endswith("1.990  Move.Walk, CostModifier 0.5")
 
 
@@ -222,13 +222,13 @@ SESSION = [
 
 def test_a_session_has_a_row_for_each_change_and_says_how_long_it_went_on():
     assert text(session_lines(SESSION)) == golden("""
-                                                                         playing
-        tick  time s  search                         asset  at s   cost       on  for s
-           0    0.00  nothing played  plays nothing                                0.20
-           2    0.20  nothing played  starts         walk   0.40  0.040            0.30
-           5    0.50                  loops          walk   0.03                   0.10
-           6    0.60  due             jumps          jog    1.00  0.200    3.000   0.20
-           8    0.80  ended           holds          jog    1.10                   0.10
+                                                                           playing
+        tick  time s  search                         asset  at s     cost       on  for s
+           0    0.00  nothing played  plays nothing                                  0.20
+           2    0.20  nothing played  starts         walk   0.40  0.04000            0.30
+           5    0.50                  loops          walk   0.03                     0.10
+           6    0.60  due             jumps          jog    1.00   0.2000    3.000   0.20
+           8    0.80  ended           holds          jog    1.10                     0.10
     """)
 
 
@@ -331,11 +331,18 @@ def test_what_is_too_wide_goes_on_below_with_its_keys():
     [
         (None, ""),
         (0.0, "0"),
-        (-0.005, "-0.005"),
-        (0.00012, "0.0001"),
+        (-0.005, "-0.005000"),
+        (0.01034, "0.01034"),
+        (0.01126, "0.01126"),
+        (0.00012345, "0.000123"),
+        (1e-6, "0.000001"),
         (4e-7, "4e-07"),
         (3e-16, "0.000"),
-        (1234.5678, "1,234.568"),
+        (0.99996, "1.000"),
+        (12.345678, "12.35"),
+        (-999.96, "-1,000"),
+        (1234.5678, "1,235"),
+        (1e8, "100,000,000"),
         (1e30, "1e+30"),
         (math.inf, "inf"),
     ],
@@ -347,6 +354,6 @@ def test_a_cost_reads_as_a_number(cost, told):
 def test_candidates_without_times_and_of_one_database_need_no_columns_for_these():
     rows = [Ranked(1, "loco", replace(JUMP.candidates[1][1].rows[0], time_s=None))]
     assert text(candidate_lines(rows)) == golden("""
-        rank  asset  frame   cost   pose  trajectory  bias
-           1  jog       45  0.750  0.500       0.250     0
+        rank  asset  frame    cost    pose  trajectory  bias
+           1  jog       45  0.7500  0.5000      0.2500     0
     """)

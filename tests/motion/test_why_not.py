@@ -35,7 +35,7 @@ def kinds(found):
 def test_an_asset_that_costs_more_needs_a_bias():
     found = told("jog")
     assert (found.winner, found.winner_cost, found.cost, found.rank) == ("walk", 0.0, 0.0625, 2)
-    assert found.reasons == ("cost: 0.062, 0.062 more than walk",)
+    assert found.reasons == ("cost: 0.06250, 0.06250 more than walk",)
     assert found.changes[0].kind == "bias"
     assert found.changes[0].to == pytest.approx(-0.0625, rel=1e-2)
     assert found.changes[0].wins

@@ -20,6 +20,9 @@ PATH = "trajectory "
 ROUNDING = 1e-7
 """Of float32 features: costs below are as good as 0."""
 
+SMALLEST = 5e-7
+"""The least cost that six digits behind the point show."""
+
 
 class View(StrEnum):
     """Which costs of a candidate are shown next to its total."""
@@ -114,12 +117,15 @@ def _names(parts: Iterator[Mapping[str, float]] | Collection[Mapping[str, float]
 
 
 def cost_text(cost: float | None) -> str:
-    """A cost for people: three digits behind the point; one digit where these would say 0."""
+    """A cost for people: four digits, at most six behind the point; one digit where these would say 0."""
     if cost is None:
         return ""
     if cost == 0.0 or not abs(cost) < 1e9:
         return f"{cost:.4g}"
-    return f"{cost:.1g}" if ROUNDING < abs(cost) < 0.0005 else f"{cost:,.3f}"
+    if abs(cost) < SMALLEST:
+        return f"{cost:.1g}" if abs(cost) > ROUNDING else "0.000"
+    exponent = int(f"{cost:.3e}".partition("e")[2])  # of the cost in four digits: 0.99996 is 1.000
+    return f"{cost:,.{min(max(3 - exponent, 0), 6)}f}"
 
 
 def seconds(time_s: float | None) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -243,6 +244,7 @@ def test_edits_after_one_that_could_not_be_kept_do_not_come_back_without_it(fold
 
 OPENERS = {"write_text", "write_bytes", "NamedTemporaryFile", "mkstemp", "sink_csv", "sink_parquet"}
 SYSTEM = {"open", "write", "replace", "rename", "link", "fsync", "truncate", "ftruncate"}
+CALLED = re.compile(rf"\b({'|'.join(OPENERS | SYSTEM)})\s*\(")
 ALLOWED = {
     "contextdb/console.py": {"os.open"},  # nowhere
     "contextdb/telemetry/evaluate_file.py": {"os.rename", "write_parquet"},  # into the folder of what is not finished
@@ -257,8 +259,11 @@ ALLOWED = {
 
 def writes_of(path: Path) -> set[str]:
     """The calls of a module that write to the disk."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    found: set[str] = set()
+    source = path.read_text(encoding="utf-8")
+    if not CALLED.search(source):
+        return found
+    for node in ast.walk(ast.parse(source)):
         if not isinstance(node, ast.Call):
             continue
         called = ast.unparse(node.func)

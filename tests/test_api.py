@@ -132,11 +132,12 @@ def test_a_public_name_has_a_docstring_and_a_call_says_what_it_raises(name: str)
         assert re.search(r"\b[Rr]aise|Never fails", said), f"{name} does not say what it raises"
 
 
-@pytest.mark.parametrize("kind", [cdb.CompiledTable, cdb.LiveContext, cdb.Picker, cdb.Pick])
+@pytest.mark.parametrize("kind", [cdb.CompiledTable, cdb.LiveContext, cdb.Picker, cdb.Pick, cdb.Explanation])
 def test_a_class_shows_the_names_of_the_page_and_no_others(kind: type):
     """What an editor offers after the dot; the names of a mapping are those of every mapping."""
     fields = {field.name for field in dataclasses.fields(kind)} if dataclasses.is_dataclass(kind) else set()
-    shown = {name for name in {*dir(kind), *fields} if not name.startswith("_")}
+    set_at_start = re.findall(r"^ +self\.(\w+)\b.* = ", inspect.getsource(kind), re.MULTILINE)
+    shown = {name for name in {*dir(kind), *fields, *set_at_start} if not name.startswith("_")}
     on_page = {name.split(".")[1] for name in NAMES if name.startswith(f"{kind.__name__}.")}
     inherited = set(dir(MutableMapping)) if issubclass(kind, MutableMapping) else set()
     assert sorted(shown - inherited) == sorted(on_page - inherited)

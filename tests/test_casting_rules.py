@@ -106,7 +106,7 @@ def test_a_row_is_valid_when_some_casting_makes_its_rule_true(moment):
     explanation = compiled.explain(context, actors=actors)
     for row, found in enumerate(expected):
         assert explanation.row(row).is_valid == (found is not None)
-        assert bool(explanation.n_failures[row]) == (found is None)
+        assert bool(explanation._n_failures[row]) == (found is None)
         if found is not None:
             castings = matches.castings(row)
             by_name = lambda c: sorted((r, a["id"]) for r, a in c.items())  # noqa: E731

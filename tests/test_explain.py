@@ -13,6 +13,7 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 
+from contextdb import bitmask
 from contextdb.cells.domains import Domain
 from contextdb.cells.facts import cell
 from contextdb.cells.grammar import parse_cell
@@ -92,7 +93,7 @@ def test_each_row_fails_with_the_cells_that_reading_them_finds(table: Table, dat
         assert (found.row, found.asset, found.is_enabled) == (row, table.assets[row], oracles.is_enabled(table, row))
     valid = [row for row in range(table.n_rows) if explanation.row(row).is_valid]
     assert valid == explanation.matches.indices.tolist() == oracles.rows(table, plain, unknown)
-    assert explanation.always_rows() == oracles.rows_always(table, plain, unknown)
+    assert bitmask.rows(explanation.matches.always).tolist() == oracles.rows_always(table, plain, unknown)
 
 
 @given(strategies.tables(), st.data(), UNKNOWN)
@@ -100,10 +101,10 @@ def test_rows_come_valid_first_then_with_fewest_failures_then_the_least_far_off(
     context, plain = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
     compiled = table.compile()
     explanation = compiled.explain(context, unknown=unknown)
-    order = explanation.order.tolist()
+    order = explanation._order.tolist()
     assert sorted(order) == list(range(table.n_rows))
     n_failures = [len(failing(table, plain, r, unknown)) + (not oracles.is_enabled(table, r)) for r in range(table.n_rows)]
-    assert explanation.n_failures.tolist() == n_failures
+    assert explanation._n_failures.tolist() == n_failures
     assert order[: len(explanation.matches)] == explanation.matches.indices.tolist()
     told = [(n_failures[r], distance(compiled, table, plain, r, unknown)) for r in order]
     for (n, far), (next_n, next_far) in pairwise(told):
@@ -115,7 +116,7 @@ def test_rows_come_valid_first_then_with_fewest_failures_then_the_least_far_off(
 @given(strategies.tables(), st.data(), UNKNOWN)
 def test_rows_with_the_same_cells_stay_in_the_order_of_the_file(table: Table, data: st.DataObject, unknown: str):
     context, _ = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
-    place = np.argsort(table.compile().explain(context, unknown=unknown).order)
+    place = np.argsort(table.compile().explain(context, unknown=unknown)._order)
     cells = [tuple(texts[row] for _, _, texts in oracles.columns(table)) for row in range(table.n_rows)]
     keys = [(oracles.is_enabled(table, row), cells[row]) for row in range(table.n_rows)]
     for key in set(keys):
@@ -127,7 +128,7 @@ def test_rows_with_the_same_cells_stay_in_the_order_of_the_file(table: Table, da
 def test_a_row_whose_failing_cells_are_changed_as_said_is_valid(table: Table, data: st.DataObject, unknown: str):
     context, _ = data.draw(strategies.contexts(table, has_missing=True, has_sets=True))
     explanation = table.compile().explain(context, unknown=unknown)
-    rows = explanation.order.tolist()[:: max(1, table.n_rows // 8)]
+    rows = explanation._order.tolist()[:: max(1, table.n_rows // 8)]
     edits = [(row, f.condition, f.mend) for row in rows for f in explanation.row(row).failures]
     mended = table.with_cells(edits).compile().query(context, unknown=unknown)
     assert [row for row in rows if oracles.is_enabled(table, row) and row not in mended] == []
@@ -291,12 +292,12 @@ def test_a_disabled_row_is_not_valid_and_says_so():
     assert not explanation.matches
     assert str(explanation.row(0)) == "a: the row is disabled"
     assert str(explanation.row(2)) == "c: x is 1, the cell says 3; the row is disabled"
-    assert explanation.order.tolist() == [0, 1, 2]
-    assert explanation.n_failures.tolist() == [1, 1, 2]
+    assert explanation._order.tolist() == [0, 1, 2]
+    assert explanation._n_failures.tolist() == [1, 1, 2]
 
 
 def test_a_soft_cell_never_fails():
-    assert table_of("number", "1 ~2.5", "5..3 ~1").explain({"x": 9}).n_failures.tolist() == [0, 0]
+    assert table_of("number", "1 ~2.5", "5..3 ~1").explain({"x": 9})._n_failures.tolist() == [0, 0]
 
 
 def test_a_fact_that_cannot_be_used_is_refused_as_in_a_query():
@@ -323,7 +324,7 @@ def test_a_table_whose_cells_were_mended_by_an_edit_is_explained():
 
 def test_numbers_at_the_end_of_the_doubles_are_ordered_by_distance():
     explanation = table_of("number", "-1.7e308", "1.7e308").explain({"x": 1e308})
-    assert explanation.order.tolist() == [1, 0]
+    assert explanation._order.tolist() == [1, 0]
 
 
 # ---- only what is asked for is worked out

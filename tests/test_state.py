@@ -217,8 +217,8 @@ def test_the_arrays_of_many_answers_and_of_explanations_cannot_be_written_to(act
     columns = {name: [value] * 3 for name, value in given_facts.items()}
     many = compiled.query_many(columns) if actors is None else compiled.query_many(columns, actors=actors)
     explanation = compiled.explain(given_facts, actors=actors)
-    for array in (many.counts, many.hits, many.mask, *many.lists(), *(m.indices for m in many), explanation.n_failures,
-                  explanation.order, explanation.breaks_rule, MOVES.priorities, MOVES.row_weights):  # fmt: skip
+    for array in (many.counts, many.hits, many.mask, *many.lists(), *(m.indices for m in many), explanation._n_failures,
+                  explanation._order, explanation._breaks_rule, MOVES.priorities, MOVES.row_weights):  # fmt: skip
         assert not array.flags.writeable
 
 
@@ -372,7 +372,7 @@ def test_a_pickle_is_the_same_before_and_after_a_table_was_asked(table: Table, f
     compiled = table.compile()
     before = len(pickle.dumps(compiled))
     assert len(pickle.dumps(asked(compiled, facts))) <= 1.2 * before
-    assert again(compiled).explain(facts).n_failures.tolist() == compiled.explain(facts).n_failures.tolist()
+    assert again(compiled).explain(facts)._n_failures.tolist() == compiled.explain(facts)._n_failures.tolist()
 
 
 THINGS: dict[str, Callable[[], object]] = {

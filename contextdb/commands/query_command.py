@@ -15,6 +15,7 @@ import re
 import sys
 from collections.abc import Iterator
 
+from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
 from contextdb.cells.output_types import OutputValue
@@ -153,7 +154,7 @@ def _count(text: str) -> int:
 
 def _document(compiled: CompiledTable, explanation: Explanation, explains: bool, most: int) -> dict[str, object]:
     matches = explanation.matches
-    always = set(explanation.always_rows())
+    always = set(bitmask.rows(matches.always).tolist())
     context = {n: _json_fact(f, n, compiled) for n, f in explanation.facts.items() if f is not None}
     outcome, undecided = Outcome(data_of(compiled), matches), explanation.undecided
     rows: list[dict[str, object]] = []

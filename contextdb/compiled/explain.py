@@ -90,7 +90,7 @@ class Explanation:
     """All rows for one context, in order: valid ones, then the nearest. Iterate, index, or ask for one row or asset."""
 
     def __init__(self, compiled: CompiledData, facts: dict[str, Fact], unknown: Unknown, matches: Matches) -> None:
-        self.compiled = compiled
+        self._compiled = compiled
         self.facts = facts
         """The facts in canonical form."""
         self.matches = matches
@@ -98,31 +98,31 @@ class Explanation:
         self._unknown = unknown
 
     def __len__(self) -> int:
-        return self.compiled.n_rows
+        return self._compiled.n_rows
 
     def __iter__(self) -> Iterator[RowExplanation]:
-        return (self.row(r) for r in self.order.tolist())
+        return (self.row(r) for r in self._order.tolist())
 
     def __getitem__(self, place: int) -> RowExplanation:
-        return self.row(int(self.order[require_place(place, len(self), "place")]))
+        return self.row(int(self._order[require_place(place, len(self), "place")]))
 
     def row(self, row: int) -> RowExplanation:
         """Why this row is valid or not; raises NoSuchPlace, also an IndexError, for a row that the table does not have."""
         row = require_row(row, len(self))
         at = np.flatnonzero(self._fails[:, row]).tolist()
         failures = [failure for i in at for failure in self._failures(i, row)]
-        if self.breaks_rule[row]:
+        if self._breaks_rule[row]:
             failures += self._rule_failures(row)
-        return RowExplanation(row, self.compiled.assets[row], bool(self._enabled[row]), tuple(failures))
+        return RowExplanation(row, self._compiled.assets[row], bool(self._enabled[row]), tuple(failures))
 
     def asset(self, asset: str) -> list[RowExplanation]:
         """Why the rows of this asset, with or without its path, are valid or not. Raises ContextError, with the nearest asset,
         where no row has it."""
         require_text(asset, "asset")
-        names = zip(self.compiled.assets, self.compiled.leaves, strict=True)
+        names = zip(self._compiled.assets, self._compiled.leaves, strict=True)
         found = [self.row(r) for r, (path, leaf) in enumerate(names) if asset in (path, leaf)]
         if not found:
-            raise self.compiled.answering.no_asset(asset)
+            raise self._compiled.answering.no_asset(asset)
         return found
 
     def nearest(self, most: int = 5) -> list[RowExplanation]:
@@ -131,17 +131,13 @@ class Explanation:
         Raises ContextError where `most` is no whole number.
         """
         most = require_whole(most, "most")
-        rows = np.flatnonzero(self.n_failures)
+        rows = np.flatnonzero(self._n_failures)
         if most <= 0:
             return []
         if most < len(rows):  # how far off a row is need be known only of those that may be among the nearest
-            limit = np.partition(self.n_failures[rows], most - 1)[most - 1]
-            rows = rows[self.n_failures[rows] <= limit]
+            limit = np.partition(self._n_failures[rows], most - 1)[most - 1]
+            rows = rows[self._n_failures[rows] <= limit]
         return [self.row(r) for r in self._sorted(rows)[:most].tolist()]
-
-    def always_rows(self) -> list[int]:
-        """The rows that match for every value of set-valued facts."""
-        return [int(r) for r in bitmask.rows(self.matches.always)]
 
     @cached_property
     def undecided(self) -> int:
@@ -152,27 +148,29 @@ class Explanation:
 
     def _decided(self, always: int) -> int:
         """Of rows whose cells match for every value those whose rule does too, and is not open."""
-        when = self.compiled.when
+        when = self._compiled.when
         return always if when is None else when.left_with_care(always, always, self.facts, "never")[1]
 
     @cached_property
-    def n_failures(self) -> NDArray[np.int64]:
+    def _n_failures(self) -> NDArray[np.int64]:
         """How many cells of each row fail: int64 [n_rows]; a rule counts as one, cells of one condition in tables inside each other
         count as one, and a disabled row one more."""
-        return bitmask.read_only(np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled)
+        return bitmask.read_only(np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self._breaks_rule + ~self._enabled)
 
     @cached_property
-    def order(self) -> Rows:
+    def _order(self) -> Rows:
         """Row numbers, valid ones first, then by failing cells, how far the facts are off, and place in the file: int64
         [n_rows]."""
-        return bitmask.read_only(self._sorted(np.arange(self.compiled.n_rows)))
+        return bitmask.read_only(self._sorted(np.arange(self._compiled.n_rows)))
 
     def __str__(self) -> str:
-        lines = [f"{len(self.matches)} of {plural(self.compiled.n_rows, 'row')} valid"]
+        lines = [f"{len(self.matches)} of {plural(self._compiled.n_rows, 'row')} valid"]
         return "\n".join(lines + [str(r) for r, _ in zip(self, range(10), strict=False)])
 
     def __repr__(self) -> str:
-        return one_line("Explanation", self.compiled.name, f"{len(self.matches):,} of {plural(self.compiled.n_rows, 'row')} valid")
+        return one_line(
+            "Explanation", self._compiled.name, f"{len(self.matches):,} of {plural(self._compiled.n_rows, 'row')} valid"
+        )
 
     def _repr_html_(self) -> str:
         rows = ((r.asset, "" if r.is_valid else str(r).removeprefix(f"{r.asset}: ")) for r in self)
@@ -180,12 +178,12 @@ class Explanation:
 
     @cached_property
     def _enabled(self) -> NDArray[np.bool_]:
-        return bitmask.unpack(self.compiled.enabled, self.compiled.n_rows)
+        return bitmask.unpack(self._compiled.enabled, self._compiled.n_rows)
 
     @cached_property
     def _fails(self) -> NDArray[np.bool_]:
         """Whether the cell of a condition fails: bool [conditions, n_rows]."""
-        compiled = self.compiled
+        compiled = self._compiled
         fails = np.empty((len(compiled.conditions), compiled.n_rows), np.bool_)
         for at, condition in enumerate(compiled.conditions):
             bits, _ = compiled.condition_bits(at, self.facts[condition.name], self._unknown)
@@ -193,9 +191,9 @@ class Explanation:
         return fails
 
     @cached_property
-    def breaks_rule(self) -> NDArray[np.bool_]:
+    def _breaks_rule(self) -> NDArray[np.bool_]:
         """Whether each row has a rule that does not hold: bool [n_rows]; an open one only where it is not ignored."""
-        when = self.compiled.when
+        when = self._compiled.when
         return self._flags(0 if when is None else self._broken_rules(when))
 
     def _broken_rules(self, when: WhenRules) -> int:
@@ -203,41 +201,43 @@ class Explanation:
         return when.rows & ~left
 
     def _flags(self, bits: int) -> NDArray[np.bool_]:
-        return bitmask.read_only(bitmask.unpack(bitmask.from_int(bits, self.compiled.n_rows), self.compiled.n_rows))
+        return bitmask.read_only(bitmask.unpack(bitmask.from_int(bits, self._compiled.n_rows), self._compiled.n_rows))
 
     @property
     def _lenient(self) -> Unknown:
         return "any" if self._unknown == "any" else "never"
 
     def _rule_failures(self, row: int) -> Iterator[Failure]:
-        for is_open, part in rules_that_fail(self.compiled, row, self.facts, self._lenient):
+        for is_open, part in rules_that_fail(self._compiled, row, self.facts, self._lenient):
             yield part.failure(f"{'open' if is_open else 'false'} with {told_facts(part.rule, self.facts)}")
 
     def _sorted(self, rows: Rows) -> Rows:
-        return rows[np.lexsort((self._distances(rows), self.n_failures[rows]))]
+        return rows[np.lexsort((self._distances(rows), self._n_failures[rows]))]
 
     def _distances(self, rows: Rows) -> NDArray[np.float64]:
         """How far the failing facts are off, summed: float64 [len(rows)]; a number by its share of the domain, at most 1; others
         1."""
         far = np.zeros(len(rows))
-        for at, condition in enumerate(self.compiled.conditions):
+        for at, condition in enumerate(self._compiled.conditions):
             fails, fact = self._fails[at, rows], self.facts[condition.name]
             if fails.any():
                 far[fails] += self._column_distances(at, fact, rows[fails]) if isinstance(fact, float) else 1.0
-        return far + self.breaks_rule[rows]
+        return far + self._breaks_rule[rows]
 
     def _column_distances(self, at: int, fact: float, rows: Rows) -> NDArray[np.float64]:
-        column, condition = self.compiled.texts[at], self.compiled.conditions[at]
-        width = _width(condition, self.compiled.masks[at])
+        column, condition = self._compiled.texts[at], self._compiled.conditions[at]
+        width = _width(condition, self._compiled.masks[at])
         codes, which = np.unique(column.codes[rows], return_inverse=True)
-        is_single = self.compiled.ways is None  # of tables in tables no text need be one cell; all are read together
-        cells = [parse_cell(column.texts[c], condition.domain) if is_single else self.compiled.cells(at)[c] for c in codes.tolist()]
+        is_single = self._compiled.ways is None  # of tables in tables no text need be one cell; all are read together
+        cells = [
+            parse_cell(column.texts[c], condition.domain) if is_single else self._compiled.cells(at)[c] for c in codes.tolist()
+        ]
         return np.array([_distance(c.accepts, fact, width) for c in cells], np.float64)[which]
 
     def _failures(self, at: int, row: int) -> Iterator[Failure]:
-        condition = self.compiled.conditions[at]
+        condition = self._compiled.conditions[at]
         fact = self.facts[condition.name]
-        yield from cell_failures(self.compiled, at, row, fact, _with_unit(describe_fact(fact, condition), condition))
+        yield from cell_failures(self._compiled, at, row, fact, _with_unit(describe_fact(fact, condition), condition))
 
 
 def explain(compiled: CompiledData, context: Context, unknown: Unknown = "error") -> Explanation:

@@ -33,7 +33,7 @@ class CastExplanation(Explanation):
     def __init__(self, compiled: CompiledData, stage: Stage, plain: Mapping[int, tuple[int, int]], matches: CastMatches) -> None:
         facts = {compiled.conditions[at].name: fact for at, fact in stage.plain_facts.items()}
         super().__init__(compiled, facts, "error", matches)
-        self.stage = stage
+        self._stage = stage
         self._plain = plain
 
     def row(self, row: int) -> RowExplanation:
@@ -44,47 +44,47 @@ class CastExplanation(Explanation):
 
     def _broken_rules(self, when: WhenRules) -> int:
         """The rows whose rule does not hold: with plain facts, or for no casting though the needed roles can be filled."""
-        stage = replace(self.stage, unknown=self._lenient, rules=self._cast_rules)
+        stage = replace(self._stage, unknown=self._lenient, rules=self._cast_rules)
         left, _ = stage.left_by_rules(when.rows, when.rows)
         cast = self._cast_rules.rows & ~stage.offered.bits if self._cast_rules is not None else 0
         return when.rows & ~left & ~cast
 
     def _decided(self, always: int) -> int:
         """The same with the rules of castings."""
-        rules = self.stage.rules
+        rules = self._stage.rules
         strict = None if rules is None else replace(rules, unknown="never", _known={})
-        return replace(self.stage, unknown="never", rules=strict).left_by_rules(always, always)[1]
+        return replace(self._stage, unknown="never", rules=strict).left_by_rules(always, always)[1]
 
     @property
     def _lenient(self) -> Unknown:
-        return "any" if self.stage.unknown == "any" else "never"
+        return "any" if self._stage.unknown == "any" else "never"
 
     @cached_property
     def _cast_rules(self) -> CastRules | None:
-        rules = self.stage.rules
+        rules = self._stage.rules
         return None if rules is None else replace(rules, unknown=self._lenient)
 
     def _rule_failures(self, row: int) -> Iterator[Failure]:
         rules = self._cast_rules
         if rules is None or not rules.rows >> row & 1:
-            for is_open, part in rules_that_fail(self.compiled, row, self.stage.rule_facts, self._lenient):
-                yield part.failure(f"{'open' if is_open else 'false'} with {told_facts(part.rule, self.stage.rule_facts)}")
+            for is_open, part in rules_that_fail(self._compiled, row, self._stage.rule_facts, self._lenient):
+                yield part.failure(f"{'open' if is_open else 'false'} with {told_facts(part.rule, self._stage.rule_facts)}")
             return
-        facts = rules.facts(row, _most_filled(self.stage.parts(row)[0]))
-        for _, part in rules_that_fail(self.compiled, row, facts, self._lenient):
+        facts = rules.facts(row, _most_filled(self._stage.parts(row)[0]))
+        for _, part in rules_that_fail(self._compiled, row, facts, self._lenient):
             yield part.failure(f"false for every casting, such as {told_facts(part.rule, facts)}")
 
     @cached_property
-    def n_failures(self) -> NDArray[np.int64]:
+    def _n_failures(self) -> NDArray[np.int64]:
         """How many cells of each row fail: int64 [n_rows]; a disabled row counts one more."""
-        counts = np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self.breaks_rule + ~self._enabled
-        for row in bitmask.rows(bitmask.from_int(((1 << len(counts)) - 1) & ~self.stage.offered.bits, len(counts))).tolist():
+        counts = np.asarray(self._fails.sum(axis=0, dtype=np.int64)) + self._breaks_rule + ~self._enabled
+        for row in bitmask.rows(bitmask.from_int(((1 << len(counts)) - 1) & ~self._stage.offered.bits, len(counts))).tolist():
             counts[row] += len(list(self._role_failures(row)))
         return bitmask.read_only(counts)
 
     @cached_property
     def _fails(self) -> NDArray[np.bool_]:
-        compiled = self.compiled
+        compiled = self._compiled
         fails = np.zeros((len(compiled.conditions), compiled.n_rows), np.bool_)
         for at, (bits, _) in self._plain.items():
             fails[at] = ~bitmask.unpack(bitmask.from_int(bits, compiled.n_rows), compiled.n_rows)
@@ -92,14 +92,14 @@ class CastExplanation(Explanation):
 
     def _distances(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
         far = np.zeros(len(rows))
-        for at, fact in self.stage.plain_facts.items():
+        for at, fact in self._stage.plain_facts.items():
             fails = self._fails[at, rows]
             if fails.any():
                 far[fails] += self._column_distances(at, fact, rows[fails]) if isinstance(fact, float) else 1.0
-        return far + self.breaks_rule[rows]
+        return far + self._breaks_rule[rows]
 
     def _role_failures(self, row: int) -> Iterator[Failure]:
-        needed, _ = self.stage.parts(row)
+        needed, _ = self._stage.parts(row)
         cast = _most_filled(needed)
         for role, fitting in needed:
             if role in cast:
@@ -107,18 +107,18 @@ class CastExplanation(Explanation):
             if fitting:
                 others = [f"{offer.name} plays {name}" for name, offer in cast.items() if offer.key in {o.key for o in fitting}]
                 yield Failure(role, "(needed)", f"not filled: {', '.join(others)}", "(one more actor who fits)")
-            elif self.stage.offers[role]:
-                yield from min((list(self._misfits(o, row)) for o in self.stage.offers[role]), key=len)
+            elif self._stage.offers[role]:
+                yield from min((list(self._misfits(o, row)) for o in self._stage.offers[role]), key=len)
             else:
                 yield Failure(role, "(needed)", "not filled: nobody is offered", "(an actor who fits)")
 
     def _misfits(self, offer: Offer, row: int) -> Iterator[Failure]:
         """The cells of a row that do not accept an actor."""
         for at, fact in offer.facts.items():
-            bits, _ = self.compiled.condition_bits(at, fact, self.stage.unknown)
+            bits, _ = self._compiled.condition_bits(at, fact, self._stage.unknown)
             if not bits >> row & 1:
-                told = f"{describe_fact(fact, self.compiled.conditions[at])} of {offer.name}"
-                yield from cell_failures(self.compiled, at, row, fact, told)
+                told = f"{describe_fact(fact, self._compiled.conditions[at])} of {offer.name}"
+                yield from cell_failures(self._compiled, at, row, fact, told)
 
 
 def _most_filled(parts: list[Part]) -> dict[str, Offer]:

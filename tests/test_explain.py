@@ -209,6 +209,15 @@ def test_an_angle_a_hair_below_the_cell_stretches_it_by_that_hair_and_not_the_wh
     assert mend_of("angle", "-180..-170", math.nextafter(180.0, 0.0)) == "179.99999999999997..-170"
 
 
+def test_a_fact_of_many_digits_is_rounded_away_from_the_cell_where_it_stays_near():
+    assert mend_of("number", "2.8..4.6", 1.3165655792130349) == "1.316..4.6"
+    assert mend_of("number", "0..1", 1.3165655792130349) == "0..1.317"
+    assert mend_of("number", "0..1", -1.3165655792130349) == "-1.317..1"
+    assert mend_of("angle", "0..10", 59.65371234567891) == "0..59.66"
+    assert mend_of("number", "0..1", 1.0000000000000002) == "0..1.0000000000000002"
+    assert mend_of("number", "0..5", 1234567.8901234567) == "0..1235000"
+
+
 def test_a_number_with_many_digits_is_left_in_the_old_words_of_the_cell():
     assert 20 + 9.99 == 29.990000000000002
     assert mend_of("angle", "20, 9.99", 5) == "20, 9.99 | 5..10.01"

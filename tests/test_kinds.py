@@ -26,6 +26,8 @@ OTHER_WORDS = {
     "contextdb/expressions/parse.py": "tokens",
     "contextdb/files/parquet.py": "sorts of files",
     "contextdb/commands/coverage_command.py": "formats of reports",
+    "contextdb/commands/motion_check_command.py": "formats of reports",
+    "contextdb/edits/renaming_values.py": "tokens",
     "tui/widgets/grid_paint.py": "looks of cells",
 }
 """Modules that compare with words that are names of types too, and what the words mean there."""

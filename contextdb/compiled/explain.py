@@ -6,6 +6,7 @@ row are worked out when they are asked for.
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -39,6 +40,8 @@ from contextdb.expressions.rules.rules import Rule, values_of
 
 FEW_DIGITS = 12
 """A number of more characters than this is the work of rounding, not of a person: 29.990000000000002."""
+
+ROUNDED_DIGITS = 4
 
 ONE_BOUND = 1e-12
 """Bounds that are closer than this share of their size are those of one number: it and the double after it."""
@@ -315,6 +318,8 @@ def describe_fact(fact: Fact, condition: Condition) -> str:
 def mended(text: str, fact: Fact, domain: Domain) -> str:
     """The cell that holds what `text` says and the fact, or all values of a set-valued one; in few digits where that can be."""
     accepts = parse_cell(text, domain).accepts
+    if isinstance(accepts, NumberSet) and isinstance(fact, float):
+        fact = _rounded_outwards(fact, accepts, domain)
     wider = widened(accepts, fact)
     mend = format_cell(Cell(wider), domain)
     if not (isinstance(accepts, NumberSet) and isinstance(fact, float)) or _most_digits(mend) <= FEW_DIGITS:
@@ -324,6 +329,18 @@ def mended(text: str, fact: Fact, domain: Domain) -> str:
     in_old_words = f"{text} | {write(low)}..{write(high)}"
     is_same = reads(in_old_words, domain) and parse_cell(in_old_words, domain).accepts == wider
     return min((mend, in_old_words), key=_most_digits) if is_same else mend
+
+
+def _rounded_outwards(fact: float, accepts: NumberSet, domain: Domain) -> float:
+    """A number of many digits, as a game computes them, in four, away from the set; itself where that would be far, or no fact."""
+    if len(repr(fact)) <= FEW_DIGITS or fact == 0.0 or not math.isfinite(fact) or not accepts.spans:
+        return fact
+    low, high = _stretch(accepts, fact)
+    unit = 10.0 ** (math.floor(math.log10(abs(fact))) - ROUNDED_DIGITS + 1)
+    outer = float(f"{(math.floor if fact == low else math.ceil)(fact / unit) * unit:.{ROUNDED_DIGITS}g}")
+    is_near = abs(outer - fact) <= _gap(high if fact == low else low, fact, accepts.is_circular)
+    is_fact = domain.minimum <= outer <= domain.maximum and not (accepts.is_circular and abs(outer) >= 180.0)
+    return outer if is_near and is_fact else fact
 
 
 def widened(accepts: Accepted | None, fact: Fact) -> Accepted | None:

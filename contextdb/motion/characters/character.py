@@ -28,6 +28,7 @@ from contextdb.motion.arguments import HasAssets
 from contextdb.motion.characters import tables as asking
 from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
 from contextdb.motion.characters.paths import ahead_s, apart_of, back_s, path_from_place, place_beside
+from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
 from contextdb.motion.characters.tables import Facts, Tables, Unknown
 from contextdb.motion.clips.quaternions import Floats
@@ -35,7 +36,7 @@ from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, to_own_frame
 from contextdb.motion.features.extraction import Features, with_path
 from contextdb.motion.features.schema import FeatureSchema
-from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.bank import Place3, PoseBank
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.asked import Among, OfPenalties, OfTags, OfValid
@@ -346,9 +347,18 @@ class Character:
         place = place_beside((*moved.position, moved.heading), self._apart)
         own, facts = self.asked_facts, given
         if any(name not in given for name in own):
-            moment = Moment(dt, stick, facing, moved, self.playing)
+            moment = Moment(dt, stick, facing, moved, self.playing, self._played())
             facts = {**{name: of(moment) for name, of in own.items() if name not in given}, **given}
         return Step(dt, moved, place, self._trail_after(dt, place), facts)
+
+    def _played(self) -> Played | None:
+        """What plays, with what it is of."""
+        playing = self.playing
+        if playing is None:
+            return None
+        banks = {} if self.stream is None else self.stream.banks
+        bank = banks if isinstance(banks, PoseBank) else banks.get(playing.database)
+        return Played(playing, self.controller.selector.databases.get(playing.database), bank)
 
     def steered(self, step: Step, stick: Ground, facing: float | None) -> Trajectory:
         """The path of the body if the stick stays as it is, as far as a search must know it."""

@@ -1,7 +1,8 @@
 """What a character knows of itself, as facts for its tables: how fast it goes, where the stick points, how it turns.
 
 A fact is a function of the character's moment. Those of `FACTS` are given to each table that asks for a fact of that name, as a
-number or an angle in the same unit, unless the game gives it.
+number or an angle in the same unit, unless the game gives it. Facts of what plays have names of their own, see
+`contextdb.motion.characters.played`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from contextdb.cells.conditions import Condition
+from contextdb.motion.characters.played import Played, of_played
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.selection.decision import Playing
 
@@ -34,6 +36,8 @@ class Moment:
         The body now: already moved by this update.
     playing : Playing or None
         What plays up to now.
+    played : Played or None
+        The same with its database and poses.
     """
 
     dt_s: float
@@ -41,6 +45,7 @@ class Moment:
     facing: float | None
     body: Steered
     playing: Playing | None
+    played: Played | None = None
 
 
 FactOf = Callable[[Moment], object]
@@ -76,4 +81,13 @@ def is_asked(name: str, function: FactOf, condition: Condition) -> bool:
     """Whether a condition of that name asks for what the function gives. One of one's own is given whatever the condition is."""
     if FACTS.get(name) is not function:
         return True
-    return condition.domain.kind in ("number", "angle") and condition.unit.strip() in UNITS[name]
+    return condition.domain.type.is_decimal and not condition.domain.type.is_whole and condition.unit.strip() in UNITS[name]
+
+
+def fact_of_played(name: str, condition: Condition) -> FactOf | None:
+    """The function of a fact of what plays, where a condition of that name asks for one."""
+    found = of_played(name, condition)
+    if found is None:
+        return None
+    told, before = found
+    return lambda moment: before if moment.played is None else told(moment.played)

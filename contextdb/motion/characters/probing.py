@@ -208,13 +208,13 @@ def _single_values(tables: Sequence[Table], asked: Mapping[str, Condition]) -> t
     for name, condition in asked.items():
         if condition.domain.everything:
             continue
-        if condition.domain.type.fixed or condition.domain.kind not in ("number", "int", "angle"):
+        if condition.domain.type.fixed or not condition.domain.type.is_decimal:
             left_open.append(name)
             continue
         least, most = condition.domain.ends
         is_bounded = math.isfinite(least) and math.isfinite(most)
         tried = np.linspace(least, most, 13).tolist() if is_bounded else [each for each in TRIED if least <= each <= most]
-        if condition.domain.kind == "int":
+        if condition.domain.type.is_whole:
             tried = [int(each) for each in tried]
         chosen[name] = max(tried, key=lambda value: len(_assets(tables, {name: value})), default=0)
     return chosen, left_open

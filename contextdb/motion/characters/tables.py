@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol, TypeAlias, TypeGuard, cast
 from contextdb.cells.conditions import Condition
 from contextdb.errors import ContextError, Fault
 from contextdb.motion.arguments import HasAssets
-from contextdb.motion.characters.facts import FactOf, is_asked
+from contextdb.motion.characters.facts import FactOf, fact_of_played, is_asked
 from contextdb.motion.selection.asked import OfValid
 
 Facts = Mapping[str, object]
@@ -98,9 +98,11 @@ def _by_database(tables: Tables) -> Mapping[str, Table]:
 
 
 def own_facts_of(tables: Tables, functions: Mapping[str, FactOf]) -> dict[str, FactOf]:
-    """The functions whose facts the tables ask for."""
+    """The functions whose facts the tables ask for, and those of what plays; of one name the given one."""
     asked = {name: condition for table in each_of(tables) for name, condition in table.asked.items()}
-    return {name: function for name, function in functions.items() if name in asked and is_asked(name, function, asked[name])}
+    found = {name: of for name, condition in asked.items() if (of := fact_of_played(name, condition)) is not None}
+    given = {name: function for name, function in functions.items() if name in asked and is_asked(name, function, asked[name])}
+    return {**found, **given}
 
 
 def valid_of(tables: Tables, answers: Mapping[int, HasAssets]) -> OfValid | None:

@@ -116,11 +116,11 @@ def clip_contexts(
     if answers is None:
         why = why or f"there are more than {MOST_ANSWERS:,} different answers"
         answers = boxes.drawn(Sampler(boxes.space, progress, drawer), np.random.default_rng(seed))
-    total, contexts = boxes.contexts(answers, dict(axes or {}))
-    held = sum(each.share for each in contexts)
+    contexts = boxes.contexts(answers, dict(axes or {}))
+    held = math.fsum(each.share for each in contexts)
     return TableContexts(
         tuple(sorted(contexts, key=lambda each: (-each.share, each.id))),
-        1.0 - held / total if total > 0.0 and held < total else 0.0,
+        max(0.0, 1.0 - held),
         tuple(boxes.never_valid(progress)),
         SAMPLES if why else 0,
         why,
@@ -224,8 +224,8 @@ class _Boxes:
                 found[bits] = before[0] + n / SAMPLES, before[1] | own_classes
         return found
 
-    def contexts(self, answers: Answers, axes: Mapping[str, str]) -> tuple[float, list[ClipContexts]]:
-        """The share of the contexts that can happen, and those of them with a valid clip, by their clips."""
+    def contexts(self, answers: Answers, axes: Mapping[str, str]) -> list[ClipContexts]:
+        """The contexts that can happen and have a valid clip, by their clips."""
         n_rows, n_kept = len(self.rows), len(self.rows) + len(self.mirrored)
         total, found = 0.0, dict[tuple[frozenset[str], frozenset[str]], tuple[float, int]]()
         for bits, (share, classes) in answers.items():
@@ -238,7 +238,7 @@ class _Boxes:
             if assets or mirrored:
                 before = found.get((assets, mirrored), (0.0, 0))
                 found[assets, mirrored] = before[0] + share, before[1] | classes
-        return total, [self._told(*clips, share, classes, axes) for clips, (share, classes) in found.items()]
+        return [self._told(*clips, share / total, classes, axes) for clips, (share, classes) in found.items()]
 
     def _told(
         self, assets: frozenset[str], mirrored: frozenset[str], share: float, classes: int, axes: Mapping[str, str]

@@ -33,8 +33,11 @@ from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import Span
+from contextdb.motion.measuring.coverage import ClipContexts, ClipFrames, ContextCoverage, MotionCoverage, ToCapture, coverage
 from contextdb.motion.measuring.measure import measure
 from contextdb.motion.measuring.measures import Measures
+from contextdb.motion.measuring.near_clips import Near
+from contextdb.motion.measuring.transition_names import Transitions
 from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
@@ -84,9 +87,12 @@ __all__ = [
     "Channel",
     "Choice",
     "Clip",
+    "ClipContexts",
     "ClipError",
     "ClipFeatures",
     "ClipFinding",
+    "ClipFrames",
+    "ContextCoverage",
     "Controller",
     "ControllerGroup",
     "ControllerSettings",
@@ -115,8 +121,10 @@ __all__ = [
     "MatchPlay",
     "Measures",
     "MotionConfig",
+    "MotionCoverage",
     "MotionDatabase",
     "MotionError",
+    "Near",
     "Normalisation",
     "Parting",
     "Playing",
@@ -147,8 +155,10 @@ __all__ = [
     "Steered",
     "TagFilter",
     "Target",
+    "ToCapture",
     "Trace",
     "Trajectory",
+    "Transitions",
     "Variation",
     "WarpShare",
     "WhatIf",
@@ -159,6 +169,7 @@ __all__ = [
     "build_databases",
     "clip_features",
     "clip_of_poses",
+    "coverage",
     "descriptions",
     "doubts_of",
     "features_of",

@@ -28,11 +28,12 @@ from contextdb.report.motion_coverage_results import (
 MOST_CONTEXTS = 50
 EDGES = (0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 """Colours change at these shares, as those of table coverage do."""
+BOTH = " (and to the other side, mirrored)"
 OWN_STYLE = """
 .motion td, .motion th { text-align: center; }
 .motion .square { width: 4.2rem; height: 1.9rem; line-height: 1.8rem; }
-.motion thead th { vertical-align: bottom; font-weight: 600; font-size: .75rem; }
-.motion .name { white-space: nowrap; }
+.motion thead th { vertical-align: bottom; font-weight: 600; font-size: .75rem; max-width: 4.2rem; overflow-wrap: normal; }
+.motion .name { white-space: nowrap; vertical-align: middle; }
 .legend .square { display: inline-block; width: 2.6rem; }
 details { margin: .5rem 0; } summary { cursor: pointer; overflow-wrap: anywhere; }
 """
@@ -79,21 +80,10 @@ def _section(measured: MotionMeasured) -> Iterator[str]:
     yield _legend()
     if found.to_capture:
         yield "<h3>Capture next</h3>\n"
-        columns = (
-            ("movement", False),
-            ("fills", True),
-            ("missing in", True),
-            ("both sides", False),
-            ("moves so, not valid there", False),
-        )
+        columns = (("movement", False), ("fills", True), ("missing in", True), ("moves so, not valid there", False))
+        both = {False: "", True: BOTH}
         lines = [
-            [
-                _cell(c.words),
-                _share(c.fills),
-                _share(c.contexts),
-                _cell("yes" if c.is_both_sides else ""),
-                _cell(_named(c.elsewhere)),
-            ]
+            [_cell(f"{c.words}{both[c.is_both_sides]}"), _share(c.fills), _share(c.contexts), _cell(_named(c.elsewhere))]
             for c in found.to_capture
         ]
         yield _table("Capture next", columns, lines)

@@ -30,7 +30,7 @@ WINDOW_S = 1.0
 """What is measured at a frame is the mean over so many seconds about it."""
 LEAST_FRAMES = 3
 """A bin is filled from so many frames on: fewer are passed through by chance."""
-SPEED_EDGES_MPS = (0.2, 0.8, 1.4, 2.0, 3.0, 4.0, 5.5, 7.0)
+SPEED_EDGES_MPS = (0.2, 0.6, 1.0, 1.5, 2.1, 3.0, 4.0, 5.0, 7.0)
 """Slower than the first a body stands; the last bin has no end."""
 TURN_EDGES_DPS = (15.0, 35.0, 70.0, 135.0)
 """To the left, and in the same way to the right; the last bins have no end. Turns of 45, 60, 90 and 180 are well inside."""

@@ -38,7 +38,7 @@ from contextdb.tables.table import EitherTable, Table
 
 MOST_ANSWERS = 3_000
 """From more different answers on contexts are drawn."""
-SAMPLES = 20_000
+SAMPLES = 5_000
 STEPS = 20_000
 AXES = (SPEED, TURN, DIRECTION)
 Answers = dict[int, tuple[float, int]]
@@ -190,8 +190,8 @@ class _Boxes:
                 for rejected, (weight, side) in parts.items():
                     before = divided.get(bits & ~rejected, (0.0, 0))
                     divided[bits & ~rejected] = before[0] + share * weight, before[1] | classes | side
-            if len(divided) > MOST_ANSWERS:
-                return None
+                if len(divided) > MOST_ANSWERS:
+                    return None
             found = divided
         return found
 

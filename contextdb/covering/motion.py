@@ -12,7 +12,7 @@ from typing import Any
 
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.covering.clip_contexts import TableContexts, asked_axes, clip_contexts
-from contextdb.covering.progress import SILENT, Progress
+from contextdb.covering.space import require_counts
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
 from contextdb.motion.measuring.coverage import ContextCoverage, MotionCoverage, coverage
 from contextdb.motion.measuring.moves import DIRECTION, MAPS, SPEED, TURN
@@ -27,6 +27,7 @@ from contextdb.tables.table import Table, leaf_assets
 
 MOST_CONTEXTS = 50
 """So many contexts of a table are in the JSON, the largest shares first."""
+DATABASES = "a mapping of names to MotionDatabase"
 Tell = Callable[[int, int, str], None]
 
 
@@ -135,7 +136,6 @@ def motion_coverage(
     near_cost: float = NEAR_COST,
     seed: int = 0,
     progress: Tell | None = None,
-    steps: Progress = SILENT,
 ) -> ProjectMotion:
     """Measure where in speed, turn and direction the clips of a project have nothing, for all contexts of its tables.
 
@@ -154,8 +154,6 @@ def motion_coverage(
     seed : int
         Of contexts that have to be drawn.
     progress : function of (done, total, clip name), optional
-    steps : Progress
-        Whom to ask whether to stop while contexts are worked out.
 
     Raises
     ------
@@ -165,9 +163,14 @@ def motion_coverage(
         An argument of another type, or a condition of `axes` that no table with clips has.
     """
     require_kind(project, Project, "project", "a Project")
+    require_counts(seed=seed)
     config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
     assets = {name: leaf_assets(table) for name, table in project.tables.items()}
-    built = open_or_build(config, project.folder, assets, progress) if databases is None else dict(databases)
+    built = (
+        open_or_build(config, project.folder, assets, progress)
+        if databases is None
+        else dict(require_mapping(databases, "databases", DATABASES))
+    )
     missing, unlisted = unmatched(config.databases.values(), project.folder, assets)
     groups: dict[str | None, dict[str, MotionDatabase]] = {}
     for name, settings in config.databases.items():
@@ -177,8 +180,7 @@ def motion_coverage(
     asked = _axes(tables, axes)
     options: dict[str, Any] = {"pattern": pattern, "near_cost": near_cost, "progress": progress}
     found = [
-        _of_table(table, groups[name], asked[name], tuple(missing.get(name, ())), seed, steps, options)
-        for name, table in tables.items()
+        _of_table(table, groups[name], asked[name], tuple(missing.get(name, ())), seed, options) for name, table in tables.items()
     ]
     if None in groups:
         found.append(TableMotion(coverage(groups[None], **options)))
@@ -191,7 +193,6 @@ def _of_table(
     axes: Mapping[str, str],
     missing: tuple[str, ...],
     seed: int,
-    steps: Progress,
     options: Mapping[str, Any],
 ) -> TableMotion:
     clips = {asset for database in databases.values() for asset in database.assets}
@@ -201,7 +202,7 @@ def _of_table(
         for asset, is_mirrored in zip(database.assets, database.mirrored.tolist(), strict=True)
         if is_mirrored
     }
-    contexts = clip_contexts(table, clips, mirrored, axes=axes, seed=seed, progress=steps)
+    contexts = clip_contexts(table, clips, mirrored, axes=axes, seed=seed)
     found = coverage(databases, contexts.contexts, table=table.name, never_valid=contexts.never_valid, **options)
     return TableMotion(found, contexts, axes, missing)
 

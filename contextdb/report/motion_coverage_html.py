@@ -18,12 +18,15 @@ from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, Counts, Map
 from contextdb.report.coverage_html import POLICY
 from contextdb.report.measure_results import Gate
 from contextdb.report.motion_coverage_results import (
+    AHEAD_ALONE,
     MotionCoverageResults,
     MotionMeasured,
     context_words,
     hole_words,
+    is_ahead_alone,
     worst_contexts,
 )
+from contextdb.report.motion_coverage_text import header_of
 
 MOST_CONTEXTS = 50
 EDGES = (0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
@@ -33,6 +36,7 @@ OWN_STYLE = """
 .motion td, .motion th { text-align: center; }
 .motion .square { width: 4.2rem; height: 1.9rem; line-height: 1.8rem; }
 .motion thead th { vertical-align: bottom; font-weight: 600; font-size: .75rem; max-width: 4.2rem; overflow-wrap: normal; }
+@media (max-width: 44rem) { .motion .square { width: 2.3rem; font-size: .7rem; } .motion thead th { font-size: .65rem; } }
 .motion .name { white-space: nowrap; vertical-align: middle; }
 .legend .square { display: inline-block; width: 2.6rem; }
 details { margin: .5rem 0; } summary { cursor: pointer; overflow-wrap: anywhere; }
@@ -116,12 +120,14 @@ def _context(each: ContextCoverage) -> str:
     )
     valid = _paragraph(f"Valid: {', '.join(sorted(contexts.assets)) or 'none'}")
     valid += _paragraph(f"Valid mirrored: {', '.join(sorted(contexts.mirrored))}") if contexts.mirrored else ""
-    missing = _paragraph(f"Missing: {', '.join(hole_words(each))}")
+    missing = _paragraph(f"Missing: {'; '.join(hole_words(each))}")
     return f'<details id="c{contexts.id}"><summary>{_text(told)}</summary>\n{valid}{missing}{maps}</details>\n'
 
 
 def _map(of: Map, frames: Counts, wanted: Floats, holes: Floats) -> str:
-    head = "".join(f'<th scope="col">{escape(column.name)}</th>' for column in of.columns)
+    if is_ahead_alone(of, frames, holes):
+        return _paragraph(AHEAD_ALONE, "muted")
+    head = "".join(f'<th scope="col">{"<br>".join(filter(None, header_of(column.name)))}</th>' for column in of.columns)
     last = max((row for row in range(of.shape[0]) if frames[row].any() or wanted[row].any()), default=-1)
     body = "".join(
         f'<tr><th class="name" scope="row">{escape(of.rows[row].name)}</th>'

@@ -9,7 +9,7 @@ from contextdb.console import printable
 from contextdb.report.measure_results import Gate
 from contextdb.report.motion_coverage_results import MotionCoverageResults, MotionMeasured, capture_sentence
 
-MOST_CAPTURES = 20
+MOST_CAPTURES = 5
 
 
 def render(results: MotionCoverageResults) -> str:

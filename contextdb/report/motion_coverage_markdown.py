@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from contextdb.motion.measuring.moves import MAPS
-from contextdb.report.motion_coverage_results import MotionCoverageResults, MotionMeasured, capture_sentence
+from contextdb.report.motion_coverage_results import (
+    AHEAD_ALONE,
+    MotionCoverageResults,
+    MotionMeasured,
+    capture_sentence,
+    is_ahead_alone,
+)
 from contextdb.report.motion_coverage_text import LEGEND, map_lines
 from contextdb.report.render_markdown import MOST_BYTES, escaped
 
@@ -32,9 +38,11 @@ def _lines(measured: MotionMeasured) -> Iterator[str]:
     yield from (f"- **{escaped(gate.name)}**: {escaped(gate.message)}" for gate in measured.gates)
     yield from (f"\n{escaped(sentence)}" for sentence in measured.notes())
     for name, of in MAPS.items():
-        yield f"\n{of.told.capitalize()}\n\n```text"
-        yield from map_lines(of, found.frames[name], found.hole_shares[name])
-        yield "```"
+        yield f"\n{of.told.capitalize()}\n"
+        if is_ahead_alone(of, found.frames[name], found.hole_shares[name]):
+            yield AHEAD_ALONE
+        else:
+            yield "\n".join(["```text", *map_lines(of, found.frames[name], found.hole_shares[name]), "```"])
     yield f"\n{escaped(LEGEND)}"
     if found.to_capture:
         yield "\n**Capture next**\n"

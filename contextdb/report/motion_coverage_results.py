@@ -17,12 +17,13 @@ from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, some
 from contextdb.findings import Finding
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage, ToCapture, about_bins
-from contextdb.motion.measuring.moves import MAPS
+from contextdb.motion.measuring.moves import DIRECTION, MAPS, Counts, Map
 from contextdb.motion.measuring.near_clips import Near
 from contextdb.report.coverage_results import reaches
 from contextdb.report.measure_results import Gate
 from contextdb.report.results import CheckReport, Subject
 
+AHEAD_ALONE = "No clip goes another way than ahead, and none is wanted to."
 BASELINE = "the document that `contextdb motion coverage --format json` writes"
 EXACT, DRAWN = 1e-9, 0.02
 """A share of contexts fell when it is less by more than this: by roundings, or where contexts are drawn by chance."""
@@ -161,7 +162,7 @@ def _near_words(near: Iterable[Near]) -> Iterator[str]:
     for each in near:
         if (each.other, each.asset) not in told:
             told.add((each.asset, each.other))
-            cost = "< 0.0001" if each.cost < 0.0001 else f"{each.cost:.4f}"
+            cost = "<0.0001" if each.cost < 0.0001 else f"{each.cost:.4f}"
             yield f"{each.asset} ~ {each.other}{' mirrored' if each.is_mirrored else ''} ({cost})"
 
 
@@ -238,17 +239,26 @@ def _earlier(entry: Mapping[str, Any]) -> Earlier:
 
 
 def lost_since(motion: TableMotion, earlier: Earlier) -> tuple[Lost, ...]:
-    """The bins that are filled in a smaller share of the contexts than they were; those that lost most first."""
+    """The bins that are filled in a smaller share of the contexts than they were; those that lost most first. What goes ahead is
+    told of in the map of turns."""
     slack = EXACT if motion.is_exact and earlier.is_exact else DRAWN
     found = []
     for name, before in earlier.filled.items():
         now = motion.coverage.filled_shares[name]
         for row, column in np.argwhere(now < before - slack).tolist():
+            if name == DIRECTION and column == MAPS[name].centre:
+                continue
             found.append(Lost(name, row, column, float(before[row, column]), float(now[row, column])))
     return tuple(sorted(found, key=lambda each: (each.now - each.before, each.map, each.row, each.column)))
 
 
 # ---- words that several formats share
+
+
+def is_ahead_alone(of: Map, frames: Counts, holes: Floats) -> bool:
+    """Whether the map of directions has nothing to show but what goes ahead, of which the map of turns tells more."""
+    others = np.arange(of.shape[1]) != of.centre
+    return of.name == DIRECTION and not frames[:, others].any() and not (holes > 0.0).any()
 
 
 def capture_sentence(each: ToCapture) -> str:

@@ -17,11 +17,13 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.coverage import ContextCoverage
 from contextdb.motion.measuring.moves import LEAST_FRAMES, MAPS, Counts, Map
 from contextdb.report.motion_coverage_results import (
+    AHEAD_ALONE,
     MotionCoverageResults,
     MotionMeasured,
     capture_sentence,
     context_words,
     hole_words,
+    is_ahead_alone,
     worst_contexts,
 )
 from contextdb.report.render_text import wrapped
@@ -29,7 +31,7 @@ from contextdb.report.render_text import wrapped
 SQUARE = 8
 LABEL = 7
 SHADES = "░▒▓█"
-"""For fewer than 30 frames, 300, 3,000, and more."""
+"""For fewer than ten times what fills a bin, a hundred times, a thousand times, and more."""
 FEW_CAPTURES, FEW_CONTEXTS, FEW_ITEMS = 6, 3, 6
 INDENT = "   "
 LEGEND = f"Numbers are frames; a bin is filled from {LEAST_FRAMES} on. ! wanted in some contexts that have no valid clip for it."
@@ -50,14 +52,14 @@ def render_context(measured: MotionMeasured, each: ContextCoverage, colour: bool
     contexts = each.contexts
     lines = wrapped(printable(f"{measured.motion.name}, {context_words(each)}"), width)
     n_holes = f"{plural(each.n_holes, 'hole')} among {plural(each.n_wanted, 'wanted movement')}"
-    lines += [f"{format_percent(contexts.share, 1)} of the contexts with a valid clip, id {contexts.id}: {n_holes}", ""]
+    lines += [f"{format_percent(contexts.share, 1)} of the contexts, id {contexts.id}: {n_holes}", ""]
     lines += wrapped(printable(f"valid: {', '.join(sorted(contexts.assets)) or 'none'}"), width)
     if contexts.mirrored:
         lines += wrapped(printable(f"valid mirrored: {', '.join(sorted(contexts.mirrored))}"), width)
     holes = {name: flags.astype(np.float64) for name, flags in each.holes.items()}
     lines += list(_maps(each.frames, holes, colour, width))
-    for words in hole_words(each):
-        lines.append(f"{INDENT}{words}")
+    missing = hole_words(each)
+    lines += ["", "Missing", *(f"{INDENT}{words}" for words in missing)] if missing else []
     return "\n".join(lines) + "\n"
 
 
@@ -85,24 +87,33 @@ def _maps(frames: Mapping[str, Counts], holes: Mapping[str, Floats], colour: boo
     for name, of in MAPS.items():
         yield ""
         yield of.told.capitalize()
-        yield from map_lines(of, frames[name], holes[name], colour)
+        if is_ahead_alone(of, frames[name], holes[name]):
+            yield AHEAD_ALONE
+        else:
+            yield from map_lines(of, frames[name], holes[name], colour)
     yield ""
     yield from wrapped(LEGEND, width)
 
 
 def map_lines(of: Map, frames: Counts, holes: Floats, colour: bool = False) -> Iterator[str]:
-    """One map, from its slowest speed to the fastest that is filled or wanted."""
+    """One map, from the slowest speed that is filled or wanted to the fastest."""
     for line in range(2):
         corner = "m/s" if line else ""
         yield (f"{corner:<{LABEL}}" + "".join(_header(column.name, line) for column in of.columns)).rstrip()
     used = np.flatnonzero(((frames > 0) | (holes > 0.0)).any(axis=1))
-    for row in range(int(used[-1]) + 1 if len(used) else 0):
+    for row in range(int(used[0]), int(used[-1]) + 1) if len(used) else ():
         squares = [_square(int(n), float(hole), colour) for n, hole in zip(frames[row], holes[row], strict=True)]
         yield (f"{of.rows[row].name:<{LABEL}}" + "".join(squares)).rstrip()
 
 
-def _header(name: str, line: int) -> str:
+def header_of(name: str) -> tuple[str, str]:
+    """The name of a column in two lines; the second is empty where it is one word."""
     first, _, second = name.partition(" " if " " in name else "-")
+    return first, second
+
+
+def _header(name: str, line: int) -> str:
+    first, second = header_of(name)
     return (
         f"{(first if second else '', second or first)[line]:>{SQUARE - 1}} "
         if len(name) < SQUARE or second
@@ -146,7 +157,7 @@ def _contexts(measured: MotionMeasured, width: int, shows_all: bool) -> Iterator
     yield "Contexts that miss most"
     shown = worst if shows_all else worst[:FEW_CONTEXTS]
     for each in shown:
-        share, missing = format_percent(each.contexts.share, 1), _listed(hole_words(each), shows_all, 2)
+        share, missing = format_percent(each.contexts.share, 1), _listed(hole_words(each), shows_all, 2, "; ")
         head = f"{each.contexts.id}  {share} of the contexts, {each.n_holes} of {each.n_wanted} missing: {missing}"
         yield from wrapped(printable(head), width)
         yield from (f"{INDENT}{line}" for line in wrapped(printable(context_words(each)), width - len(INDENT)))
@@ -154,6 +165,6 @@ def _contexts(measured: MotionMeasured, width: int, shows_all: bool) -> Iterator
         yield f"{INDENT}and {len(worst) - len(shown):,} more (--all; --context ID shows the maps of one)"
 
 
-def _listed(items: Sequence[str], shows_all: bool, few: int = FEW_ITEMS) -> str:
+def _listed(items: Sequence[str], shows_all: bool, few: int = FEW_ITEMS, between: str = ", ") -> str:
     shown = items if shows_all else items[:few]
-    return ", ".join(shown) + (f" and {len(items) - len(shown):,} more" if len(items) > len(shown) else "")
+    return between.join(shown) + (f" and {len(items) - len(shown):,} more" if len(items) > len(shown) else "")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contextdb.errors import ContextError, MotionError
-from contextdb.motion import ClipContexts, FeatureSchema, Markup, MotionCoverage, MotionDatabase, coverage, make_clip
+from contextdb.motion import ClipContexts, FeatureSchema, Markup, MotionCoverage, MotionDatabase, coverage, load_clips, make_clip
 from contextdb.motion.measuring.coverage import _between, _straightest
 from contextdb.motion.measuring.moves import DIRECTION, LEAST_FRAMES, MAPS, TURN
 from contextdb.motion.measuring.transition_names import transitions_of
@@ -144,7 +146,7 @@ def test_the_covered_share_is_that_of_the_wanted_bins_by_the_share_of_their_cont
     few, more = valid("walk", share=0.3, asked=asked), valid("walk", "walk_turn_left_45", share=0.1, asked=asked)
     found = measured(contexts=[few, more])
     assert found.covered == pytest.approx(0.75 * (1 / 5) + 0.25 * (2 / 5), abs=0.06)
-    by_hand = sum(each.contexts.share * (each.n_wanted - each.n_holes) for each in found.contexts) / 5
+    by_hand = sum(each.contexts.share * (each.n_wanted - each.n_holes) for each in found.contexts) / (5 * 0.4)
     assert found.covered == pytest.approx(by_hand)
     assert sum(each.fills for each in found.to_capture) == pytest.approx(1.0 - found.covered)
 
@@ -244,3 +246,23 @@ def test_the_straightest_column_is_the_nearest_to_straight_ahead():
 
 def test_what_goes_sideways_between_two_directions_is_wanted_and_ahead_is_left_to_the_map_of_turns():
     assert not measured().contexts[0].wanted[DIRECTION][:, MAPS[DIRECTION].centre].any()
+
+
+MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))
+
+
+@pytest.mark.skipif(not (MOCAP / "assets.csv").is_file(), reason="no captured clips: set CONTEXTDB_MOCAP to their folder")
+def test_captured_clips_are_in_the_bins_of_what_their_names_say():
+    schema = FeatureSchema.from_dict("hips", {"rate": 30.0, "channels": [{"type": "velocity", "bone": "Hips"}]})
+    clips = load_clips(sorted((MOCAP / "bandai_namco").glob("*_walk-[bt]*.bvh")))
+    found = coverage({"captured": MotionDatabase.build(clips, schema)})
+    assert len(found.clips) > 40
+    centre = MAPS[TURN].centre
+    for clip in found.clips:
+        turns, directions = clip.plain[TURN].sum(axis=0), clip.plain[DIRECTION].sum(axis=0)
+        if "walk-back" in clip.asset:
+            assert directions[-1] > 0.8 * directions.sum(), clip.asset
+        elif "walk-turn-left" in clip.asset:
+            assert turns[:centre].sum() > turns[centre + 1 :].sum(), clip.asset
+        elif "walk-turn-right" in clip.asset:
+            assert turns[:centre].sum() < turns[centre + 1 :].sum(), clip.asset

@@ -25,8 +25,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.arguments import require_kind, require_many, require_mapping
-from contextdb.errors import ContextError, Fault, MotionError, in_quotes
+from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_point, require_real, require_text
+from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.moves import DIRECTION, LEAST_FRAMES, MAPS, SPEED, TURN, WINDOW_S, Bin, Counts, Map, Moves, Span
 from contextdb.motion.measuring.near_clips import NEAR_COST, Near, Tell, near_clips
@@ -35,6 +35,7 @@ from contextdb.motion.measuring.usage import usable
 from contextdb.motion.search.database import MotionDatabase
 
 Bools = NDArray[np.bool_]
+ASKED = 'a mapping such as {"speed": [(0.0, 2.0)]}'
 MOST_ELSEWHERE = 3
 """So many clips are named that move as a hole asks, but are not valid there."""
 NO_FRAMES = {name: np.zeros(of.shape, np.int64) for name, of in MAPS.items()}
@@ -64,6 +65,16 @@ class ClipContexts:
     cells: Mapping[str, str] = field(default_factory=dict)
     asked: Mapping[str, Sequence[Span]] = field(default_factory=dict)
     is_symmetric: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("assets", "mirrored"):
+            listed = require_many(getattr(self, name), name, "the names of clips")
+            object.__setattr__(self, name, frozenset(require_text(each, f"one of {name}") for each in listed))
+        require_real(self.share, "share", 0.0, 1.0)
+        require_mapping(self.cells, "cells", "a mapping of conditions to cells")
+        for axis, spans in require_mapping(self.asked, "asked", ASKED).items():
+            for span in require_many(spans, f"asked[{axis!r}]", ASKED):
+                require_point(span, "a span", ASKED)
 
     @property
     def id(self) -> str:
@@ -163,7 +174,7 @@ class ToCapture:
 
 @dataclass(frozen=True, eq=False)
 class MotionCoverage:
-    """What the clips of one table, or of databases without one, have of motion. Shares are of the contexts with a valid clip.
+    """What the clips of one table, or of databases without one, have of motion. Shares are of all contexts.
 
     Attributes
     ----------
@@ -297,6 +308,13 @@ def coverage(
     ContextError
         An argument of another type.
     """
+    require_text(pattern, "pattern")
+    require_real(near_cost, "near_cost", 0.0)
+    if table is not None:
+        require_text(table, "table")
+    never = tuple(
+        require_text(each, "one of never_valid") for each in require_many(never_valid, "never_valid", "the names of clips")
+    )
     given = dict(require_mapping(databases, "databases", "a mapping of names to MotionDatabase"))
     for name, database in given.items():
         require_kind(database, MotionDatabase, "one of databases", "a MotionDatabase")
@@ -320,7 +338,7 @@ def coverage(
         tuple(measured),
         transitions,
         tuple(sorted(once.values(), key=lambda each: (each.cost, each.asset))),
-        tuple(never_valid),
+        never,
     )
 
 
@@ -350,23 +368,22 @@ def _clips(databases: Mapping[str, MotionDatabase]) -> Iterator[ClipFrames]:
 
 
 def _measured(clips: Sequence[ClipFrames], contexts: Sequence[ClipContexts]) -> Iterator[ContextCoverage]:
-    """What each of some contexts have; those without a clip are left out, and shares are of the rest."""
-    of_asset = {clip.asset: clip for clip in clips}
-    played = [each for each in contexts if any(_played(of_asset, each))]
-    total = sum(each.share for each in played)
-    if not played:
-        return
-    if not total > 0.0:
-        raise ContextError(Fault("the shares of the contexts are not above 0.", "a share from 0 to 1 for each"))
+    """What each of some contexts have, the largest share first; those without a clip are left out."""
+    numbers = {clip.asset: i for i, clip in enumerate(clips)}
+    seen = {clip.asset for clip in clips if clip.mirrored is not None}
+    played = [each for each in contexts if each.assets & numbers.keys() or each.mirrored & seen]
+    plain, mirrored = _tables([clip.plain for clip in clips]), _tables([clip.mirrored or NO_FRAMES for clip in clips])
     for each in sorted(played, key=lambda each: -each.share):
-        frames = _summed(_played(of_asset, each))
+        own = [numbers[asset] for asset in each.assets if asset in numbers]
+        opposite = [numbers[asset] for asset in each.mirrored if asset in seen]
+        frames = {name: plain[name][own].sum(axis=0) + mirrored[name][opposite].sum(axis=0) for name in MAPS}
         wanted = {name: _wanted(MAPS[name], counts >= LEAST_FRAMES, each) for name, counts in frames.items()}
-        yield ContextCoverage(replace(each, share=each.share / total), frames, wanted)
+        yield ContextCoverage(each, frames, wanted)
 
 
-def _played(clips: Mapping[str, ClipFrames], contexts: ClipContexts) -> Iterator[Mapping[str, Counts]]:
-    yield from (clips[asset].plain for asset in contexts.assets if asset in clips)
-    yield from (found for asset in contexts.mirrored if asset in clips and (found := clips[asset].mirrored) is not None)
+def _tables(counts: Sequence[Mapping[str, Counts]]) -> dict[str, Counts]:
+    """For each map the bins of all clips: [clips, rows, columns]."""
+    return {name: np.array([each[name] for each in counts], np.int64) for name in MAPS}
 
 
 def _summed(counts: Iterable[Mapping[str, Counts]]) -> dict[str, Counts]:

@@ -28,7 +28,7 @@ from contextdb.motion.clips.trajectory import rates_of_change
 
 WINDOW_S = 1.0
 """What is measured at a frame is the mean over so many seconds about it."""
-LEAST_FRAMES = 3
+LEAST_FRAMES = 5
 """A bin is filled from so many frames on: fewer are passed through by chance."""
 SPEED_EDGES_MPS = (0.2, 0.6, 1.0, 1.5, 2.1, 3.0, 4.0, 5.0, 7.0)
 """Slower than the first a body stands; the last bin has no end."""

@@ -129,16 +129,21 @@ def clip_contexts(
 
 
 def asked_axes(table: EitherTable) -> dict[str, str]:
-    """The conditions of a table that say how fast a clip is asked for, and how fast it turns: numbers of these names, "speed" in
-    m/s and "turn" in degrees a second, which need not be said. What a "direction" is against, a name does not say."""
+    """The conditions of a table that say how fast a clip is asked for, and how fast it turns: numbers with min and max of these names,
+    "speed" in m/s and "turn" in degrees a second, which need not be said. What a "direction" is against, a name does not say."""
     found = {}
     units = {SPEED: ("", "m/s"), TURN: ("", "deg/s", "°/s", "degrees/s", "degrees a second", "degrees per second")}
     for column in table.flat().conditions:
         condition = column.condition
         name = condition.name.casefold()
-        if name in units and condition.domain.type.is_numeric and (condition.unit or "") in units[name]:
+        if name in units and is_axis(condition) and (condition.unit or "") in units[name]:
             found[name] = condition.name
     return found
+
+
+def is_axis(condition: Condition) -> bool:
+    """Whether a condition can say which movement is asked for: numbers with both ends, or angles."""
+    return condition.domain.type.is_numeric and all(map(math.isfinite, condition.domain.ends))
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,12 +269,10 @@ class _Boxes:
         return side | (empty & (side << 1 | side >> 1))
 
     def _spans(self, at: int, sides: Sides) -> list[tuple[float, float]]:
-        """The numbers of a condition that a box holds; what has no end reaches as far as some cell does."""
-        accepts, domain = self.space.accepted(at, sides), self.space.conditions[at].domain
-        spans = list(accepts.spans) if isinstance(accepts, NumberSet) else [domain.ends]
-        ends = [end for spans_of in (spans, [domain.ends]) for span in spans_of for end in span if math.isfinite(end)]
-        furthest = max(map(abs, ends), default=0.0)
-        return [(max(low, -furthest), min(high, furthest)) for low, high in spans]
+        """The numbers of a bounded condition that a box holds."""
+        accepts, (least, most) = self.space.accepted(at, sides), self.space.conditions[at].domain.ends
+        spans = accepts.spans if isinstance(accepts, NumberSet) else [(least, most)]
+        return [(max(low, least), min(high, most)) for low, high in spans]
 
     def never_valid(self, progress: Progress) -> Iterator[str]:
         """The clips whose rows are valid in no context that can happen."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from contextdb.cells.arguments import require_kind, require_mapping
-from contextdb.covering.clip_contexts import TableContexts, asked_axes, clip_contexts
+from contextdb.covering.clip_contexts import TableContexts, asked_axes, clip_contexts, is_axis
 from contextdb.covering.space import require_counts
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
 from contextdb.motion.measuring.coverage import ContextCoverage, MotionCoverage, coverage
@@ -146,7 +146,7 @@ def motion_coverage(
         Its databases, by name. Default: the saved ones that are up to date are opened, the others built.
     axes : mapping of str to str, optional
         For "speed" (m/s), "turn" (degrees a second) and "direction" (degrees, of movement against facing) the condition that says
-        what is asked for. Default: the number conditions that are named "speed" and "turn".
+        what is asked for. Default: the number conditions named "speed" and "turn" that have min and max.
     pattern : str
         How clips of transitions are named.
     near_cost : float
@@ -215,19 +215,18 @@ def _axes(tables: Mapping[str, Table], axes: Mapping[str, str] | None) -> dict[s
             raise ContextError(Fault(f"nothing is measured that is called {in_quotes(str(axis))}.", some((SPEED, TURN, DIRECTION))))
         has = set(_having(tables, condition))
         if not has:
-            known = sorted(
-                {c.condition.name for t in tables.values() for c in t.flat().conditions if c.condition.domain.type.is_numeric}
-            )
+            known = sorted({c.condition.name for t in tables.values() for c in t.flat().conditions if is_axis(c.condition)})
             near = nearest(str(condition), known)
-            found = f"no table with clips has a condition {in_quotes(str(condition))} of numbers."
-            raise ContextError(Fault(found, some(known) or "none: no condition is a number", in_quotes(near) if near else ""))
+            found = f"no table with clips has a condition {in_quotes(str(condition))} of numbers with min and max."
+            accepted = some(known) or "none: no condition is an angle, or a number with min and max"
+            raise ContextError(Fault(found, accepted, in_quotes(near) if near else ""))
         for name in has:
             named[name][axis] = condition
     return named
 
 
 def _having(tables: Mapping[str, Table], condition: str) -> Iterator[str]:
-    """The tables that have a condition of numbers of a name."""
+    """The tables that have such a condition of a name."""
     for name, table in tables.items():
-        if any(c.condition.name == condition and c.condition.domain.type.is_numeric for c in table.flat().conditions):
+        if any(c.condition.name == condition and is_axis(c.condition) for c in table.flat().conditions):
             yield name

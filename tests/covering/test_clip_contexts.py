@@ -6,8 +6,10 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 from typing import Any
 
+import nested_files
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -130,6 +132,19 @@ def test_speeds_and_turns_that_are_asked_for_are_known_by_name_and_unit():
     (found,) = clip_contexts(table, axes={"speed": "Speed", "direction": "direction"}).contexts
     assert found.asked == {"speed": [(1.0, 2.0)], "direction": [(-30.0, 30.0)]}
     assert found.cells == {"Speed": "1..2", "direction": "-30..30"}
+
+
+def test_a_number_without_bounds_asks_for_nothing():
+    table = cdb.Table.from_columns({"Asset": ["a"], "speed": ["<=1.5"]}, schema={"speed": {"type": "number", "min": 0.0}})
+    assert asked_axes(table) == {}
+
+
+def test_rows_of_inner_tables_count_by_their_own_assets(tmp_path: Path):
+    table = cdb.load(nested_files.write(tmp_path) / "tackle.csv")
+    found = clip_contexts(table, ["Hit", "Left", "Right"])
+    shares = {tuple(sorted(each.assets)): each.share for each in found.contexts}
+    assert shares == pytest.approx({("Hit",): 0.5, ("Left",): 0.05, ("Left", "Right"): 0.2, ("Right",): 0.1})
+    assert found.without == pytest.approx(0.15)
 
 
 def test_contexts_of_one_side_are_not_the_same_in_a_mirror():

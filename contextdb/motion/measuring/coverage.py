@@ -359,11 +359,12 @@ def _clips(databases: Mapping[str, MotionDatabase]) -> Iterator[ClipFrames]:
             if stop == start:
                 continue
             counts = Moves.of(database.root[start:stop].astype(np.float64), database.schema.rate).counts(plays[start:stop])
-            if bool(database.mirrored[number]):
-                known = found[asset]
-                found[asset] = known if known.mirrored is not None else replace(known, mirrored=counts)
-            else:
-                found.setdefault(asset, ClipFrames(asset, name, stop - start, int((~plays[start:stop]).sum()), counts, None))
+            is_mirrored = bool(database.mirrored[number])
+            n_dead = int((~plays[start:stop]).sum())
+            new = ClipFrames(asset, name, stop - start, n_dead, NO_FRAMES if is_mirrored else counts, None)
+            known = found.setdefault(asset, new)
+            if is_mirrored and known.mirrored is None:
+                found[asset] = replace(known, mirrored=counts)
     yield from found.values()
 
 

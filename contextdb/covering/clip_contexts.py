@@ -129,8 +129,8 @@ def clip_contexts(
 
 
 def asked_axes(table: EitherTable) -> dict[str, str]:
-    """The conditions of a table that say how fast a clip is asked for, and how fast it turns: numbers with min and max, "speed" in m/s
-    and "turn" in degrees a second. The unit need not be said. What a "direction" is against, a name does not say."""
+    """The conditions of a table that say how fast a clip is asked for, and how fast it turns: numbers with min and max, "speed" in
+    m/s and "turn" in degrees a second. The unit need not be said. What a "direction" is against, a name does not say."""
     found = {}
     units = {SPEED: ("", "m/s"), TURN: ("", "deg/s", "°/s", "degrees/s", "degrees a second", "degrees per second")}
     for column in table.flat().conditions:

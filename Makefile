@@ -73,6 +73,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/crowd.py
 	$(PY) benchmarks/poses.py
+	$(PY) benchmarks/motion_quality.py
 	$(PY) benchmarks/editor.py
 	$(PY) benchmarks/start.py
 	$(PY) benchmarks/no_numba.py

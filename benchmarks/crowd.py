@@ -48,7 +48,9 @@ from contextdb.motion import (
     MotionDatabase,
     Selector,
     Steered,
+    Trajectory,
 )
+from contextdb.motion.features.extraction import trajectory_features
 
 TABLES = Path(__file__).parent.parent / "tables"
 N_AGENTS = 10_000
@@ -306,6 +308,14 @@ class _Crowd:
         poses = self.group.poses(DT_S)
         each = list(zip(past, [(float(x), float(z)) for x, z in self.sticks], strict=True))
         return {
+            "one's path, by moments and at once": (
+                lambda: [_path_by_moments(bodies, stick) for bodies, stick in each],
+                lambda: [motion.steered_path(bodies, stick) for bodies, stick in each],
+            ),
+            "one's query, by channels and at once": (
+                lambda: [_query_by_channels(self.schema, pose, paths[i]) for i, pose in enumerate(poses)],
+                lambda: [motion.with_path(self.schema, pose, paths[i]) for i, pose in enumerate(poses)],
+            ),
             "paths of sticks": (
                 lambda: [motion.steered_path(bodies, stick) for bodies, stick in each],
                 lambda: motion.steered_paths(self.past, self.sticks),
@@ -345,6 +355,22 @@ class _Crowd:
             self._turn_sticks()
         self.past = [*self.past, self.past[-1].moved(DT_S, self.sticks)][-PAST:]
         return motion.with_paths(self.schema, self.group.poses(DT_S), motion.steered_paths(self.past, self.sticks))
+
+
+def _path_by_moments(past: Sequence[Steered], stick: tuple[float, float]) -> Trajectory:
+    """The path of a body, each moment of it moved to alone: what `steered_path` gives."""
+    bodies = [*past, *(past[-1].moved(i * DT_S, stick) for i in range(1, round(RATE) + 1))]
+    headings = np.unwrap([body.heading for body in bodies])
+    return Trajectory(RATE, np.array([body.position for body in bodies]), headings, len(past) - 1)
+
+
+def _query_by_channels(schema: FeatureSchema, pose: Any, path: Trajectory) -> Any:
+    """A query with a path, each point of each channel looked up alone, as a database does: what `with_path` gives."""
+    query, now = np.array(pose, np.float32), np.array([path.now])
+    for channel in schema.channels:
+        if channel.type == "trajectory":
+            query[schema.slices[channel.name]] = trajectory_features(channel, path, now)[0]
+    return query
 
 
 SECTIONS: dict[str, Callable[[int], dict[str, Any]]] = {"picks": _picks, "searches": _searches, "frames": _frames}

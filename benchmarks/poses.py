@@ -3,7 +3,8 @@
     python benchmarks/poses.py              on the made clips, in a few seconds
 
 A controller follows a stick over all made clips for a minute; its decisions are then played by streams with more and more stages,
-in turn, round by round. A figure is the median of the rounds.
+in turn, round by round. A figure is the median of the rounds. The controller's own cost stands beside them, its path and its query
+not in it, and what a pose costs each of a thousand characters.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import statistics
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 if __package__ in (None, ""):
@@ -22,6 +24,7 @@ from benchmarks import timing
 from benchmarks.sections import print_aligned
 from contextdb import motion
 from contextdb.motion import Controller, Decision, Entry, FeatureSchema, MotionDatabase, PoseBank, PoseSettings, Selector, Steered
+from contextdb.motion.output.stages import Ground
 
 RATE, SECONDS, ROUNDS = 30.0, 60, 15
 CHANNELS = [
@@ -30,13 +33,18 @@ CHANNELS = [
     {"type": "velocity", "bone": "Hips"},
     {"type": "trajectory", "what": "position", "at": [0.33, 0.67, 1.0]},
 ]
+EVEN = PoseSettings(path_alignment=False, min_stride=1.0, max_stride=1.0)
 STAGES = {
     "clip": PoseSettings(root="animation", blend="none", foot_lock=False),
-    "root mixed": PoseSettings(blend="none", foot_lock=False),
-    "and spring": PoseSettings(foot_lock=False),
+    "root mixed": replace(EVEN, blend="none", foot_lock=False),
+    "and spring": replace(EVEN, foot_lock=False),
+    "and alignment": PoseSettings(foot_lock=False, min_stride=1.0, max_stride=1.0),
+    "and stride": PoseSettings(foot_lock=False),
     "and foot lock": PoseSettings(),
-    "dead blending and foot lock": PoseSettings(blend="dead"),
+    "and ground": PoseSettings(),
+    "dead blending, all but ground": PoseSettings(blend="dead"),
 }
+CROWD = 1000
 
 
 def main() -> None:
@@ -44,20 +52,30 @@ def main() -> None:
     schema = FeatureSchema.from_dict("loco", {"rate": RATE, "channels": CHANNELS})
     clips = [made.clip for made in motion.made_clips()]
     bank = PoseBank.build(clips, schema)
-    played = decisions(MotionDatabase.build(clips, schema), schema)
+    controller_us: list[float] = []
+    database = MotionDatabase.build(clips, schema)
+    played = decisions(database, schema, controller_us)
     print(", ".join(f"{name} {value}" for name, value in timing.machine().items()))
     print(f"{len(played):,} frames, {bank.n_joints} joints, median of {ROUNDS} rounds\n")
     times: dict[str, list[float]] = {name: [] for name in STAGES}
     for i in range(ROUNDS + 1):
         for name, settings in STAGES.items():
-            us = microseconds(bank, settings, played)
+            us = microseconds(bank, settings, played, stairs if name == "and ground" else None)
             if i:  # the first round compiles
                 times[name].append(us)
     rows = [(name, f"{statistics.median(each):.1f}", f"{min(each):.1f}") for name, each in times.items()]
+    rows.append(("controller, on the mean", f"{statistics.mean(controller_us[100:]):.1f}", ""))
+    crowd = crowd_microseconds(bank, played)
+    rows.append((f"all but ground, {CROWD:,} characters", f"{statistics.median(crowd):.1f}", f"{min(crowd):.1f}"))
     print_aligned([("stages", "us", "least"), *rows])
 
 
-def decisions(database: MotionDatabase, schema: FeatureSchema) -> list[tuple[Decision, Steered]]:
+def stairs(x: float, z: float) -> tuple[float, tuple[float, float, float]]:
+    """Steps of half a metre along z."""
+    return 0.12 * math.floor(z / 0.5), (0.0, 1.0, 0.0)
+
+
+def decisions(database: MotionDatabase, schema: FeatureSchema, times_us: list[float]) -> list[tuple[Decision, Steered]]:
     """A minute of a character that turns every three seconds, and where the game has its body."""
     controller, body = Controller(Selector([Entry("loco", database)])), Steered()
     past, found = [body], []
@@ -70,16 +88,33 @@ def decisions(database: MotionDatabase, schema: FeatureSchema) -> list[tuple[Dec
         ahead = controller.upcoming(1.0 / RATE)
         pose = pose if ahead is None else database.raw(ahead.frame)
         query = motion.with_path(schema, pose, motion.steered_path(past, stick))
-        found.append((controller.update(1.0 / RATE, query), body))
+        began = time.process_time()
+        decision = controller.update(1.0 / RATE, query)
+        times_us.append((time.process_time() - began) * 1e6)
+        found.append((decision, body))
     return found
 
 
-def microseconds(bank: PoseBank, settings: PoseSettings, played: Sequence[tuple[Decision, Steered]]) -> float:
+def crowd_microseconds(bank: PoseBank, played: Sequence[tuple[Decision, Steered]]) -> list[float]:
+    """Of processor time, a character, in each of ten frames of a crowd."""
+    streams, found = [motion.PoseStream(bank) for _ in range(CROWD)], []
+    for frame in range(10):
+        began = time.process_time()
+        for i, stream in enumerate(streams):
+            decision, body = played[(i + frame) % len(played)]
+            stream.update(decision, 1.0 / RATE, body)
+        found.append((time.process_time() - began) / CROWD * 1e6)
+    return found[1:]
+
+
+def microseconds(
+    bank: PoseBank, settings: PoseSettings, played: Sequence[tuple[Decision, Steered]], ground: Ground | None = None
+) -> float:
     """Of processor time, a frame."""
     stream = motion.PoseStream(bank, settings)
     began = time.process_time()
     for decision, body in played:
-        stream.update(decision, 1.0 / RATE, body)
+        stream.update(decision, 1.0 / RATE, body, ground)
     return (time.process_time() - began) / len(played) * 1e6
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from running import run
 
 from contextdb.commands.demo_command import sample_folder
@@ -49,6 +51,14 @@ def test_of_two_teams_it_casts_the_nearest_who_fits_and_says_of_everybody_near_w
     assert sorted(line.partition(" of ")[2].partition(",")[0] for line in reasons) == sorted(
         str(p["name"]) for p in near if p not in fitting
     )
+
+
+def test_it_plays_a_steered_character_and_writes_its_poses(tmp_path):
+    out = run("demo", "--keep", str(tmp_path / "game")).out
+    clip = load_bvh(tmp_path / "game" / "player.bvh")
+    assert (clip.n_frames, clip.skeleton.n_joints) == (330, 19)
+    assert "11 s, 330 poses of 19 joints: player.bvh" in out
+    assert re.search(r"\d\.\d jumps a second; feet that are down slide \d+\.\d cm/s, in the clips 0\.\d; 0\.\d\d m from", out)
 
 
 def test_it_prints_the_cast_between_the_first_answer_and_the_search():

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import json
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +25,7 @@ from contextdb.motion import (
     write_bvh,
 )
 from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.what_if import run_again
 from contextdb.tables.project import Project
 
 TOML = """
@@ -137,10 +141,13 @@ def rows_of(result: Result) -> list[list[str]]:
 def test_the_group_lists_its_commands(arguments: list[str]):
     result = motion(*arguments)
     assert [line.split()[0] for line in result.lines[result.lines.index("commands:") + 1 :] if line[2:3].strip()] == [
+        "bones",
+        "check",
         "build",
         "search",
         "select",
         "run",
+        "probe",
         "measure",
         "replay",
     ]
@@ -148,7 +155,7 @@ def test_the_group_lists_its_commands(arguments: list[str]):
     assert run("help", "motion") == result
 
 
-@pytest.mark.parametrize("command", ["build", "search", "select", "run", "measure", "replay"])
+@pytest.mark.parametrize("command", ["bones", "check", "build", "search", "select", "run", "probe", "measure", "replay"])
 @pytest.mark.parametrize("width", [60, 100])
 def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("COLUMNS", str(width))
@@ -162,10 +169,9 @@ def test_each_command_has_a_help_that_fits_with_examples(command: str, width: in
 
 @pytest.mark.parametrize(("word", "near"), [("serch", "search"), ("Replay", "replay"), ("selekt", "select"), ("bild", "build")])
 def test_a_misspelt_command_of_the_group_is_named_with_the_nearest(word: str, near: str):
-    assert refused(word, "game") == (
-        f'contextdb: there is no command "motion {word}". Accepted: build, search, select, run, measure, replay. '
-        f'Did you mean "motion {near}"?\n'
-    )
+    told = refused(word, "game")
+    assert told.startswith(f'contextdb: there is no command "motion {word}". Accepted: bones, check, build, search, select, ')
+    assert told.endswith(f' Did you mean "motion {near}"?\n')
 
 
 # ---- search
@@ -482,7 +488,7 @@ def test_a_stick_that_cannot_be_followed_is_refused_with_its_place(here: Path, t
         (["game", "player", "stick.csv", "--out", "new.parquet", "--seed", "x"], '"x" is not a seed.'),
         (
             ["game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.fbx"],
-            "new.fbx: poses cannot be written to such a file. Accepted: a name that ends in .bvh or .npz",
+            "new.fbx: poses cannot be written to such a file. Accepted: a name that ends in .bvh, .npz or .glb",
         ),
         (["game", "player", "stick.csv", "--out", "new.parquet", "--poses", "none/new.npz"], 'there is no folder "none".'),
     ],
@@ -505,6 +511,20 @@ def test_a_run_writes_the_poses_of_its_decisions_as_arrays_and_as_bvh(here: Path
         np.testing.assert_allclose(shown, poses["positions"], atol=1e-5)
 
 
+def test_a_run_writes_its_poses_as_gltf(here: Path):
+    pygltflib = pytest.importorskip("pygltflib", reason="needs the extra gltf")
+    motion("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.glb")
+    gltf = pygltflib.GLTF2().load(str(here / "new.glb"))
+    assert gltf.accessors[gltf.animations[0].samplers[0].input].count == len(Trace.load("new.parquet"))
+
+
+def test_without_the_library_a_run_to_gltf_is_refused_before_it_begins(here: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "pygltflib", None)
+    told = refused("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.glb")
+    assert 'pip install "contextdb[gltf]"' in told
+    assert not (here / "new.parquet").exists()
+
+
 def test_the_same_run_writes_the_same_poses(here: Path):
     for name in ("one", "two"):
         motion("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", f"{name}.npz")
@@ -522,6 +542,85 @@ def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
         np.testing.assert_allclose(poses["root"][:, 1], 1.2 * np.arange(61) / 30.0, atol=1e-9)
     bodies = [decision.body for decision in Trace.load("new.parquet")]
     np.testing.assert_allclose(bodies, [(0.0, 0.04 * i, 0.0) for i in range(61)], atol=1e-9)
+
+
+def test_the_character_s_own_facts_are_computed_where_the_file_gives_none(here: Path):
+    (here / "own.csv").write_text(
+        "time_s,x_mps,z_mps,gait,speed,style\n0,0,1.3,Walk,,normal\n1,0,1.3,Walk,0.75,normal\n2,0,1.3,Walk,,normal\n",
+        encoding="utf-8",
+    )
+    motion("run", "game", "player", "own.csv", "--out", "own.parquet")
+    speeds = [decision.context["speed"] for decision in Trace.load("own.parquet").brief()]
+    assert speeds[0] == 0.0
+    assert speeds[:30] == sorted(speeds[:30])
+    assert speeds[30:60] == [0.75] * 30
+    assert speeds[60] == pytest.approx(1.3, abs=0.01)
+    whole = (here / "own.csv").read_text(encoding="utf-8").replace(",speed", "").replace(",,", ",").replace("0.75,", "")
+    (here / "own.csv").write_text(whole, encoding="utf-8")
+    motion("run", "game", "player", "own.csv", "--out", "without.parquet")
+    assert Trace.load("without.parquet")[20].context["speed"] == speeds[20]
+
+
+def test_a_table_that_asks_for_the_character_s_own_facts_alone_filters_without_facts_in_the_file(here: Path):
+    (here / "game" / "moves.csv").write_text("Asset,speed\nidle,0..0.3\njog,>0.3\n", encoding="utf-8")
+    (here / "own.csv").write_text("time_s,speed_mps\n0,0\n1,1.3\n2,1.3\n", encoding="utf-8")
+    motion("run", "game", "player", "own.csv", "--out", "own.parquet")
+    played = [decision.playing.asset for decision in Trace.load("own.parquet").brief()]
+    assert (played[10], played[40]) == ("idle", "jog")
+
+
+def test_a_session_is_the_same_with_and_without_its_poses(here: Path):
+    motion("run", "game", "player", "stick.csv", "--out", "new.parquet", "--poses", "new.npz")
+    assert (here / "new.parquet").read_bytes() == (here / "session.parquet").read_bytes()
+
+
+# ---- probe
+
+
+KEYS = {
+    "file", "seconds", "jumps_per_s", "forced_jumps", "jump_cm", "skate_cm_s", "skate_raw_cm_s", "accel_p99", "accel_raw_p99",
+    "path_rms_m", "heading_rms_deg", "reach_s", "stay_s", "frames_used_share", "assets_never_used",
+}  # fmt: skip
+"""What `motion measure --json` has of each session."""
+
+
+def test_a_probe_chooses_contexts_and_speeds_and_measures_each_drive(here: Path):
+    result = motion("probe", "game", "player", "--drive", "straight", "--drive", "stops", "--json", "--out", "probed")
+    sessions = result.json["sessions"]
+    assert result.json["format"] == 1
+    assert {session["facts"]["style"] for session in sessions} == {"normal", "tired"}
+    assert {session["drive"] for session in sessions} == {"straight", "starts and stops"}
+    assert all(session.keys() >= KEYS for session in sessions)
+    for session in sessions:
+        trace = Trace.load(session["file"])
+        assert trace[-1].time_s == pytest.approx(session["seconds"], abs=0.05)
+        assert {decision.context["style"] for decision in trace.brief()} == {session["facts"]["style"]}
+        if session["drive"] == "straight":
+            assert session["path_rms_m"] < 0.15
+    assert "drives style=normal at" in result.err
+    assert "gait=Idle while the stick asks for about 0.0" in result.err
+
+
+def test_a_probe_exits_with_1_where_a_drive_is_over_a_bar():
+    drive = ("probe", "game", "player", "--drive", "straight", "--speed", "1.2")
+    assert motion(*drive, "--max-skate", "1000", "--max-jumps", "30").lines[-1] == "2 drives"
+    result = motion(*drive, "--max-jumps", "0", code=1)
+    assert "style=normal straight at 1.2 m/s: jumps a second: " in result.err
+    assert ", more than 0.00." in result.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["game", "plyer"], 'there is no [controllers.plyer]. Accepted: "player". Did you mean "player"?'),
+        (["game", "player", "--drive", "loops"], 'there is no "loops". Accepted: "straight", "turns"'),
+        (["game", "player", "--speed", "fast"], '"fast" is not a speed to drive at. Accepted: 0.1 to 100 m/s'),
+        (["game", "player", "--max-skate", "-1"], '"-1" is not a bar.'),
+        (["game", "player", "--out", "stick.csv"], "stick.csv: this is a file. Accepted: a folder."),
+    ],
+)
+def test_a_wrong_argument_of_a_probe_is_told(arguments: list[str], message: str):
+    assert message in refused("probe", *arguments)
 
 
 # ---- replay
@@ -614,3 +713,169 @@ def test_replay_works_the_costs_of_any_asset_out_again(here, monkeypatch):
 def first_assets(folder: str) -> set[str]:
     """The clips of a project."""
     return {path.stem for path in Path(folder).glob("**/*.bvh")}
+
+
+# ---- a session asked again
+
+
+def at_jump() -> str:
+    """The tick at which jog starts."""
+    return next(line.split()[0] for line in motion("replay", "session.parquet").lines if " jog " in line)
+
+
+def test_why_not_says_the_cell_and_the_change_that_wins():
+    tick = at_jump()
+    result = motion("replay", "session.parquet", "--at", tick, "--why", "walk_tired")
+    assert result.lines[0].startswith(f"tick {tick} at ")
+    assert "table: row 3 of moves: style is normal, the cell says tired" in result.lines
+    assert {"why not", "what would have to change"} <= set(result.lines)
+    document = motion("replay", "session.parquet", "--at", tick, "--why", "walk_tired", "--json").json
+    why_not = document["why_not"]
+    assert list(why_not) == ["asset", "frame", "rank", "cost", "winner_cost", "reasons", "changes"]
+    assert all(list(change) == ["kind", "what", "to", "wins"] for change in why_not["changes"])
+    assert any(change["wins"] for change in why_not["changes"])
+    assert (document["tick"], why_not["asset"]) == (int(tick), "walk_tired")
+    assert why_not["cost"] > why_not["winner_cost"]
+    chosen = motion("replay", "session.parquet", "--at", tick, "--why", "jog", "--json").json["why_not"]
+    assert (chosen["reasons"], chosen["changes"], chosen["rank"]) == ([], [], 1)
+
+
+def test_a_proposed_cell_written_into_the_table_makes_what_was_said_true(here: Path):
+    (here / "stick.csv").write_text("time_s,speed_mps,gait,speed,style\n0,1.3,Walk,1.2,normal\n1,1.3,Walk,1.2,normal\n", "utf-8")
+    motion("run", "game", "player", "stick.csv", "--out", "s.parquet")
+    told = motion("replay", "s.parquet", "--at", "0", "--why", "walk_tired", "--json").json["why_not"]
+    change = next(change for change in told["changes"] if change["kind"] == "cell")
+    assert change["what"] == "row 3 of moves: style"
+    project = Project.load("game")
+    table = project["moves"].with_cell(2, "style", change["to"])
+    asked = Trace.load("s.parquet").reasked(project, tables={"moves": table})
+    assert (asked[0].choice.hit.asset == "walk_tired") == change["wins"]
+    (here / "game" / "moves.csv").write_text(
+        TABLE.replace("walk_tired,Walk,0.3..2,tired", f"walk_tired,Walk,0.3..2,{change['to']}")
+    )
+    motion("run", "game", "player", "stick.csv", "--out", "t.parquet")
+    assert (Trace.load("t.parquet")[0].choice.hit.asset == "walk_tired") == change["wins"]
+
+
+def test_the_figures_of_a_session_are_those_of_its_decisions():
+    document = motion("replay", "session.parquet", "--stats", "--json").json
+    stats, decisions = document["stats"], list(Trace.load("session.parquet"))
+    jumps = [decision for decision in decisions if decision.action == "jumps"]
+    assert (stats["updates"], stats["jumps"], stats["searches"]) == (151, len(jumps), sum(d.searched for d in decisions))
+    assert stats["forced_jumps"] == sum(decision.continuing_cost is None for decision in jumps)
+    assert stats["jumps_per_s"] == pytest.approx(len(jumps) / 5.0)
+    assert sum(stats["causes"].values()) == stats["searches"]
+    used = {decision.playing.asset for decision in decisions}
+    assert set(stats["assets_never_used"]) == {"idle", "walk", "walk_tired", "jog"} - used
+    assert motion("replay", "session.parquet", "--stats").lines[0].startswith("5.00 s: 151 updates")
+
+
+def test_what_if_counts_the_searches_that_choose_otherwise():
+    heavy = motion(
+        "replay", "session.parquet", "--what-if", "LeftFoot position=50", "--what-if", "continuing=-0.25", "--json"
+    ).json["what_if"]
+    trace = Trace.load("session.parquet")
+    assert heavy["searches"] == sum(decision.searched for decision in trace)
+    assert heavy["other_frames"] >= len(heavy["other_assets"])
+    assert set(heavy["before"]) == set(heavy["after"]) >= {"jumps_per_s", "forced_jumps", "stay_s", "frames_used_share"}
+    same = motion("replay", "session.parquet", "--what-if", "LeftFoot position=1", "--json").json["what_if"]
+    assert (same["other_frames"], same["before"]) == (0, same["after"])
+    lines = motion("replay", "session.parquet", "--what-if", "threshold tired=0").lines
+    assert lines[0].startswith(f"of {heavy['searches']} recorded searches, ")
+
+
+def test_what_if_of_another_table_runs_the_session_again_with_its_answers():
+    project, trace = Project.load("game"), Trace.load("session.parquet")
+    slower = project["moves"].with_cell(3, "speed", "9")
+    told = trace.what_if(project, tables={"moves": slower})
+    assert {each.was for each in told.other_assets} == {"jog"}
+    again = run_again(trace.reasked(project, tables={"moves": slower}))
+    assert "jog" not in {decision.playing.asset for decision in again}
+    assert "jog" in {decision.playing.asset for decision in run_again(trace.reasked(project))}
+
+
+def test_a_project_with_other_markup_or_clips_is_asked_by_the_names_of_assets(here: Path):
+    tick = int(at_jump())
+    trace = Trace.load("session.parquet")
+    assert not any(each.is_changed for each in trace.reasked(Project.load("game")))
+    marks = here / "game" / "clips" / "marks.csv"
+    marks.write_text(f"{MARKS}jog,DoNotChoose,,,\n", encoding="utf-8")
+    marked = trace.reasked(Project.load("game"))
+    assert marked.changed == {"all"}
+    assert marked[tick].choice.hit.asset != "jog"
+    assert marked.why_not(tick, "jog").reasons[0] == "markup: DoNotChoose"
+    assert not marked[0].is_changed
+    marks.write_text(MARKS, encoding="utf-8")
+    (here / "game" / "clips" / "idle.bvh").unlink()
+    fewer = trace.reasked(Project.load("game"))
+    assert "all" in fewer.changed
+    assert fewer[0].decision.choice.hit.asset == "idle"
+    assert fewer[0].choice.hit.asset != "idle"
+    assert len(run_again(fewer)) == 151
+
+
+def test_a_diff_says_where_two_sessions_part(here: Path):
+    assert motion("replay", "session.parquet", "--diff", "session.parquet").lines[0] == "both play the same in all 151 updates"
+    (here / "other.csv").write_text(STICK.replace("12.5,2.5,20,Run,2,normal", "12.5,1.2,0,Walk,1.2,normal"), encoding="utf-8")
+    motion("run", "game", "player", "other.csv", "--out", "other.parquet")
+    diff = motion("replay", "session.parquet", "--diff", "other.parquet", "--json").json["diff"]
+    first, second = Trace.load("session.parquet"), Trace.load("other.parquet")
+    parts = next(i for i, (a, b) in enumerate(zip(first, second, strict=True)) if a.playing != b.playing)
+    assert diff["parting"]["tick"] == parts
+    assert diff["other_frames"] == sum(a.playing != b.playing for a, b in zip(first, second, strict=True))
+    assert motion("replay", "session.parquet", "--diff", "other.parquet").lines[0].startswith(f"they part at tick {parts}, ")
+
+
+def test_a_chrome_trace_has_slices_counters_and_instants(here: Path):
+    motion("replay", "session.parquet", "--trace", "session.json")
+    events = json.loads((here / "session.json").read_text(encoding="utf-8"))["traceEvents"]
+    decisions = list(Trace.load("session.parquet"))
+    slices = [event for event in events if event["ph"] == "X" and event["cat"] == "plays"]
+    assert sum(event["dur"] for event in slices) == round(decisions[-1].time_s * 1e6)
+    assert all(one["ts"] + one["dur"] == other["ts"] for one, other in itertools.pairwise(slices))
+    instants = [event["args"]["tick"] for event in events if event["ph"] == "i"]
+    assert instants == [decision.tick for decision in decisions if decision.action in ("starts", "jumps")]
+    counters = [event["args"]["cost"] for event in events if event["ph"] == "C"]
+    assert counters == [decision.cost for decision in decisions if decision.cost is not None]
+
+
+def test_without_its_databases_a_session_says_what_is_missing(here: Path):
+    whole = motion("replay", "session.parquet", "--at", "0").out
+    (here / "game").rename(here / "moved")
+    gone = motion("replay", "session.parquet", "--at", "0").out
+    assert "no candidates are shown: its project is no longer at" in gone
+    assert "top candidates" not in gone
+    assert motion("replay", "session.parquet", "--at", "0", "--project", "moved").out == whole
+    for asked in (["--at", "0", "--why", "jog"], ["--what-if", "continuing=-1"]):
+        assert "the session cannot be asked again: its project is no longer at" in refused("replay", "session.parquet", *asked)
+    toml = (here / "moved" / "contextdb.toml").read_text(encoding="utf-8")
+    heavier = toml.replace('{ type = "velocity", bone = "Hips" }', '{ type = "velocity", bone = "Hips", weight = 3.0 }')
+    (here / "moved" / "contextdb.toml").write_text(heavier, encoding="utf-8")
+    assert (
+        "is another than the one that the session was recorded with"
+        in motion("replay", "session.parquet", "--at", "0", "--project", "moved").out
+    )
+    changed = Trace.load("session.parquet").reasked(Project.load("moved"))
+    assert changed.changed == {"tired", "all"}
+    assert any(each.is_changed for each in changed)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--why", "jog"], "--why shows an asset in one decision. Accepted: --at N|TIME with it"),
+        (["--at", "0", "--why", "jgo"], 'there is no asset "jgo".'),
+        (["--at", "0", "--why", "jgo"], 'Did you mean "jog"?'),
+        (["--at", "1", "--why", "jog"], "nothing was searched at tick 1: what played, played on."),
+        (["--what-if", "LeftFoot positon=2"], 'Did you mean "LeftFoot position=2"?'),
+        (["--what-if", "threshold tird=2"], 'Did you mean "threshold tired=2"?'),
+        (["--what-if", "LeftFoot position"], '"LeftFoot position" is no change.'),
+        (["--what-if", "LeftFoot position=much"], '"much" is no number.'),
+        (["--what-if", "LeftFoot position=-1"], 'the weight of "LeftFoot position" is -1.'),
+        (["--diff", "sesion.parquet"], 'sesion.parquet: there is no such file. Did you mean "session.parquet"?'),
+        (["--trace", "session.txt"], "a name that ends in .json"),
+        (["--trace", "nowhere/session.json"], 'there is no folder "nowhere".'),
+    ],
+)
+def test_a_wrong_question_about_a_session_is_told(arguments: list[str], message: str):
+    assert message in refused("replay", "session.parquet", *arguments)

@@ -14,6 +14,8 @@ from test_motion_commands import MARKS, STICK, TABLE, TOML
 
 from contextdb.motion import Trace, make_clip, measure, write_bvh
 
+OUTPUT = "[output.player]\nfoot_lock = false\n"
+"""So that feet slide."""
 KEYS = [
     "file",
     "seconds",
@@ -38,7 +40,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project in game/, a session of it, its poses, and its measures."""
     folder = tmp_path_factory.mktemp("made")
     (folder / "game" / "clips").mkdir(parents=True)
-    (folder / "game" / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    (folder / "game" / "contextdb.toml").write_text(f"{TOML}{OUTPUT}", encoding="utf-8")
     (folder / "game" / "moves.csv").write_text(TABLE, encoding="utf-8")
     (folder / "game" / "clips" / "marks.csv").write_text(MARKS, encoding="utf-8")
     for name in ("idle", "walk", "walk_tired", "jog"):
@@ -96,14 +98,14 @@ def test_poses_that_were_written_measure_as_those_made_again():
     again, written = session_of("session.parquet"), session_of("session.parquet", "--poses", "poses.npz")
     for key, value in again.items():
         if isinstance(value, float):
-            assert written[key] == pytest.approx(value, rel=1e-2, abs=1e-3), key
+            assert written[key] == pytest.approx(value, rel=0.2, abs=0.02), key  # a session keeps places of the body alone
 
 
 def test_a_file_of_poses_is_measured_against_the_clips_of_a_project():
     session, alone = session_of("poses.npz", "--project", "game"), session_of("session.parquet")
     for key in ("seconds", "jumps_per_s", "forced_jumps", "skate_raw_cm_s", "accel_raw_p99", "stay_s"):
         assert session[key] == pytest.approx(alone[key]), key
-    assert session["skate_cm_s"] == pytest.approx(alone["skate_cm_s"], rel=0.02, abs=0.02)
+    assert session["skate_cm_s"] == pytest.approx(alone["skate_cm_s"], rel=0.2, abs=0.02)
     assert session["path_rms_m"] is None
     assert session["missing"]["path_rms_m"] == "the session does not say where the game had the body"
 
@@ -178,7 +180,7 @@ def test_another_database_than_the_recorded_one_is_told(here: Path):
 
 def test_the_output_of_the_controller_says_how_poses_are_made(here: Path):
     toml = here / "game" / "contextdb.toml"
-    toml.write_text(toml.read_text(encoding="utf-8") + '\n[output.player]\nroot = "code"\n', encoding="utf-8")
+    toml.write_text(f'{toml.read_text(encoding="utf-8")}root = "code"\n', encoding="utf-8")
     assert session_of("session.parquet")["path_rms_m"] == 0.0
 
 

@@ -274,12 +274,14 @@ def test_a_type_of_another_language_is_mended(found: str, mend: str):
         (
             "tpye = 'bool'",
             'line 2: [conditions.x] has no key "tpye". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight". Did you mean "type"?',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", '
+            '"mirror", "weight", "hysteresis". Did you mean "type"?',
         ),
         (
             "type = 'enum'\noptions = ['A']",
             'line 3: [conditions.x] has no key "options". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight". Did you mean "values"?',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", '
+            '"mirror", "weight", "hysteresis". Did you mean "values"?',
         ),
     ],
 )
@@ -480,7 +482,7 @@ def test_conditions_given_in_python_are_checked_as_those_of_a_file():
         (
             {"speed": {"type": "number", 7: 1}},
             '[conditions.speed] has no key "7". '
-            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight".',
+            'Accepted: "type", "min", "max", "values", "unit", "description", "expr", "mirror", "weight", "hysteresis".',
         ),
     ],
 )

@@ -24,8 +24,10 @@ from tui.commands import BY_ID, COMMANDS, bindings, key_names
 from tui.editor import Editor
 from tui.editor_settings import EditorSettings
 from tui.model.conflicted import conflicts_in, write_decided
+from tui.model.importing import Import
 from tui.model.session import Session
 from tui.model.workspace import Workspace
+from tui.screens.begin import Begin
 from tui.screens.conflicts import ConflictsDialog
 from tui.screens.leaving import HeldDialog, LeavingDialog
 from tui.screens.main import MainScreen
@@ -87,7 +89,10 @@ class EditorApp(Editor):
         return sorted([*(theme.name for theme in THEMES), *BUILTIN_THEMES])
 
     def on_mount(self) -> None:
-        self.open_table(self.workspace.first)
+        if self.workspace.beginning is not None:
+            Begin(self, self.workspace, self.workspace.beginning).ask()
+        else:
+            self.open_table(self.workspace.first)
 
     # ---- typing faster than the screen
 
@@ -133,6 +138,10 @@ class EditorApp(Editor):
     def say_renamed(self, text: str) -> None:
         """Say on the screen that is shown now that a condition was renamed, also after its next change."""
         self.main.renamed = text
+
+    def begun_with(self, answer: Import) -> None:
+        """Put rows into the table that was just opened, once it is seen."""
+        self.main.call_after_refresh(self.main.take_import, answer)
 
     def open_table(self, name: str) -> None:
         """Show a table; one with a conflict between marks asks first which side holds."""
@@ -204,7 +213,8 @@ class EditorApp(Editor):
             self.exit(return_code=2, message=text)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        for command in COMMANDS:
+        has_table = any(isinstance(one, MainScreen) for one in self.screen_stack)
+        for command in COMMANDS if has_table else ():
             if command.is_listed and command.id != "palette":
                 keys = key_names(self.settings.keys.get(command.id, command.keys))
                 about = f"{command.about}  {keys[0]}" if keys else command.about

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from textual.app import App
 
 from tui.editor_settings import EditorSettings
+from tui.model.importing import Import
 
 
 class Editor(App[None]):
@@ -30,3 +31,7 @@ class Editor(App[None]):
     @abstractmethod
     def say_renamed(self, text: str) -> None:
         """Say on the screen that is shown now that a condition was renamed, also after its next change."""
+
+    @abstractmethod
+    def begun_with(self, answer: Import) -> None:
+        """Put the rows of another file into the table that was just made and opened."""

@@ -55,6 +55,15 @@ class Told(Message):
 
 
 @dataclass
+class ValueRenameWanted(Message):
+    """Give a value of a column another name."""
+
+    column: str
+    old: str
+    new: str
+
+
+@dataclass
 class RenameWanted(Message):
     """Give a column another name, and ask where others speak of its condition."""
 

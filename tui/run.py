@@ -43,11 +43,15 @@ def _forget_exported_size() -> None:
 
 
 def _require_readable(workspace: Workspace) -> None:
-    """Say what cannot be read before the screen is taken; a file with a conflict between marks is asked about there."""
+    """Say what cannot be read before the screen is taken; a file with a conflict between marks is asked about there, and so is
+    one of another program, that can be imported."""
+    if not workspace.first:
+        return
     try:
         workspace.session(workspace.first)
     except ContextDBError:
-        if conflicts_in(workspace.files[workspace.first]) is None:
+        path = workspace.files[workspace.first]
+        if conflicts_in(path) is None and not workspace.begin_from(path):
             raise
 
 

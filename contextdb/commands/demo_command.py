@@ -1,5 +1,5 @@
 """A tour of the sample tables: a context, its valid assets, why the others are not valid, a player from two teams cast for a role,
-and a search of the valid clips' frames.
+a search of the valid clips' frames, and a character that is steered, its poses written as BVH.
 
 Formulas make the clips, not motion capture. They are written as BVH files and read back like any others.
 """
@@ -25,14 +25,19 @@ from contextdb.disk import make_folder, refused_writing
 from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.motion import (
+    Character,
     FeatureSchema,
     MotionConfig,
     MotionDatabase,
+    PoseStream,
     Selector,
     load_bvh,
+    measure,
+    open_or_build_poses,
     query_from,
     steady_path,
     write_made_clips,
+    write_poses,
 )
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.storage.building import build
@@ -52,13 +57,24 @@ REST = {"gait": "Walk", "speed": 1.3, "direction": 0.0, "style": "normal"}
 TIRED = {"gait": "Walk", "speed": 1.3, "direction": 0.0, "style": "tired"}
 TURN = {"gait": "Walk", "speed": 1.3, "direction": 65.0, "style": "tired"}
 SPEED_MPS, TURN_DPS = 1.3, 60.0
+STEERED = (  # seconds, what the stick asks for in m/s, and what the game says
+    (1.0, (0.0, 0.0), "Idle"),
+    (3.0, (0.0, 1.3), "Walk"),
+    (2.5, (1.3, 0.0), "Walk"),
+    (2.5, (3.0, 0.0), "Run"),
+    (2.0, (0.0, 0.0), "Idle"),
+)
+RATE = 30
+POSES = "player.bvh"
 N_NEAREST = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("--tables", metavar="FOLDER", help="the sample tables (default: those that came with contextdb)")
-    parser.add_argument("--keep", metavar="FOLDER", help="a new folder for the tables and the synthetic clips, to experiment with")
+    parser.add_argument(
+        "--keep", metavar="FOLDER", help="a new folder for the tables, the synthetic clips and the poses, to experiment with"
+    )
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -164,6 +180,9 @@ def _motion(project: Project, folder: Path) -> Iterator[str]:
     yield "7. The same, turning sharply: no tired clip fits well, so all valid clips are searched and the lowest cost wins"
     yield ""
     yield from _choice(stage, TURN, stage.query("walk", 40, TURN_DPS))
+    yield "8. The player stands, walks, turns to the left, runs and stops: the table says what may play, and poses come out"
+    yield ""
+    yield from _steered(stage, folder)
     yield 'Next: "contextdb query --help", and docs/tutorial.md.'
 
 
@@ -177,6 +196,7 @@ class Stage:
     features: FeatureSchema
     folder: Path
     n_clips: int
+    player: Character
 
     @classmethod
     def of(cls, project: Project, folder: Path) -> Stage:
@@ -192,11 +212,37 @@ class Stage:
             config.features["loco"],
             clips,
             len(list(clips.glob("*.bvh"))),
+            cls._player(config, folder, table, databases),
         )
+
+    @staticmethod
+    def _player(config: MotionConfig, folder: Path, table: CompiledTable, databases: Mapping[str, MotionDatabase]) -> Character:
+        """The character of the sample, as `Character.of` makes it of a project."""
+        stream = PoseStream(open_or_build_poses(config, folder, {"locomotion": table.assets}), config.output_of("player"))
+        return Character(config.controller("player", databases), config.features["loco"], table, stream)
 
     def query(self, clip: str, frame: int, turn_dps: float = 0.0) -> Features:
         """The pose of a clip's frame, and the wish to go on at walking speed."""
         return query_from(self.features, load_bvh(self.folder / f"{clip}.bvh"), frame, steady_path(SPEED_MPS, turn_dps))
+
+
+def _steered(stage: Stage, folder: Path) -> Iterator[str]:
+    """Steer the character, write its poses, and say how well it moved."""
+    player = stage.player
+    assert player.stream is not None, "it was made with one"
+    trace, moments = player.record(0), [(stick, gait) for seconds, stick, gait in STEERED for _ in range(round(seconds * RATE))]
+    updated = [player.update(1.0 / RATE, stick, {"gait": gait, "style": "normal"}) for stick, gait in moments]
+    poses = [each.pose for each in updated if each.pose is not None]
+    write_poses(poses, player.stream.rig, folder / POSES, RATE)
+    played = dict.fromkeys(pose.playing.asset for pose in poses if pose.playing is not None)
+    measures = measure(trace, player.stream.banks, poses=poses, wanted=[stick for stick, _ in moments])
+    yield f"   {len(poses) / RATE:g} s, {plural(len(poses), 'pose')} of {player.stream.rig.n_joints} joints: {POSES}"
+    yield f"   plays {', '.join(played)}"
+    yield (
+        f"   {measures.jumps_per_s:.1f} jumps a second; feet that are down slide {measures.skate_cm_s:.1f} cm/s,"
+        f" in the clips {measures.skate_raw_cm_s:.1f}; {measures.path_rms_m:.2f} m from the body that the stick moves"
+    )
+    yield ""
 
 
 def _context(context: Context) -> Iterator[str]:

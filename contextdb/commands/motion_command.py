@@ -1,5 +1,7 @@
 """Motion matching over the valid assets: databases from clips, a search with its costs, a choice of databases, recorded sessions.
 
+  contextdb motion bones game/clips/walk.bvh
+  contextdb motion check game/
   contextdb motion build game/
   contextdb motion search game/ loco --query walk@1.5 --speed 1.3
   contextdb motion run game/ player stick.csv --out session.parquet
@@ -11,11 +13,14 @@ The command `demo --keep game` makes a project to try them on.
 from __future__ import annotations
 
 COMMANDS = {
+    "bones": "the bones of clips, and which are found as feet, hips and head",
+    "check": "what is wrong with clips, markup and motion settings",
     "build": "save the motion databases that contextdb.toml declares",
     "search": "the best frames of one database, with what each channel adds to their cost",
     "select": "which database of a selector wins, with which frame, and why",
     "run": "steer a character along a recorded stick, and record what it decides",
     "coverage": "which movements have no clip, in which contexts, and what to capture next",
+    "probe": "drive a character over the contexts of its tables by itself, and measure how well it moves",
     "measure": "how good the motion of a session is, beside the clips that it is made of",
     "replay": "what was decided in a recorded session, and why",
 }

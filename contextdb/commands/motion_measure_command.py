@@ -29,13 +29,13 @@ from contextdb.commands.motion_replay_command import project_of
 from contextdb.console import ExitCode, output, terminal_width, wants_colour
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quotes, plural
-from contextdb.motion import MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
+from contextdb.motion import Measures, MotionDatabase, PoseBank, PoseSettings, measure, open_or_build, open_or_build_poses
 from contextdb.motion.storage.written_poses import NPZ
 from contextdb.motion.trace.filter_rows import fingerprint
 from contextdb.motion.trace.session import Trace
 
 if TYPE_CHECKING:
-    from contextdb.report.measure_results import MeasureResults, SessionMeasures
+    from contextdb.report.measure_results import Gate, MeasureResults, SessionMeasures
 
 BARS = {
     "skate": ("skate_cm_s", "CM_S", "the most that planted feet may slide, cm/s"),
@@ -55,8 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--poses", metavar="FILE", action="append", help="the poses of the session, .npz; once for each")
     parser.add_argument("--project", metavar="FOLDER", help="the project with the clips (default: as recorded)")
     parser.add_argument("--controller", metavar="NAME", help="whose [output.NAME] makes the poses (default: as recorded)")
-    for name, (_, unit, told) in BARS.items():
-        parser.add_argument(f"--max-{name}", metavar=unit, type=_number, help=told)
+    add_bars(parser)
     parser.add_argument("--baseline", metavar="FILE", help="an earlier report by --json; what got worse fails")
     parser.add_argument("--all", action="store_true", help="every asset that is never played, and every comparison")
     add_format_arguments(parser, report.formats("measures"))
@@ -124,7 +123,7 @@ class Clips:
 def _measured(
     arguments: argparse.Namespace, file: str, poses: str | None, known: dict[str, Clips], before: Mapping[str, object]
 ) -> SessionMeasures:
-    from contextdb.report.measure_results import Bar, SessionMeasures, compared, held_to
+    from contextdb.report.measure_results import SessionMeasures, compared
 
     trace = None if Path(file).suffix == NPZ else Trace.load(file)
     if trace is None and poses:
@@ -144,10 +143,23 @@ def _measured(
         raise type(error)(*(fault if fault.place.file else fault.at(Place(file)) for fault in error.faults)) from None
     if why:
         warn([f"{file}: without clips to compare with: {why}"])
+    gates = (*gates_of(arguments, found, file), *compared(before, found))
+    return SessionMeasures(file, found, before, gates)
+
+
+def add_bars(parser: argparse.ArgumentParser) -> None:
+    """An option for each bar."""
+    for name, (_, unit, told) in BARS.items():
+        parser.add_argument(f"--max-{name}", metavar=unit, type=_number, help=told)
+
+
+def gates_of(arguments: argparse.Namespace, measures: Measures, file: str) -> list[Gate]:
+    """The gate of each bar that the options set. Raises ContextError for one that cannot be judged."""
+    from contextdb.report.measure_results import Bar, held_to
+
     asked = {name: getattr(arguments, f"max_{name.replace('-', '_')}") for name in BARS}
     bars = [Bar(f"max-{name}", BARS[name][0], most) for name, most in asked.items() if most is not None]
-    gates = (*(held_to(bar, found, file) for bar in bars), *compared(before, found))
-    return SessionMeasures(file, found, before, gates)
+    return [held_to(bar, measures, file) for bar in bars]
 
 
 def _of(clips: Clips | None, trace: Trace | None, file: str) -> tuple[Mapping[str, PoseBank], Mapping[str, MotionDatabase]]:

@@ -15,6 +15,8 @@ asset to be chosen, --what-if what other weights, biases and thresholds would ha
   contextdb motion replay session.parquet --what-if "LeftFoot velocity=2"
   contextdb motion replay session.parquet --diff other.parquet
   contextdb motion replay session.parquet --trace session.json          for Perfetto
+  contextdb motion replay session.parquet --html session.html           plays in any browser
+  contextdb motion replay new.parquet --diff old.parquet --html both.html --markdown
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from contextdb.commands.motion_build_command import MotionProject
+from contextdb.commands.motion_build_command import MotionProject, warn
+from contextdb.commands.motion_page import Played, comment_of, page_file, write_page
 from contextdb.commands.motion_stage import add_view
 from contextdb.commands.motion_what_if import changes_of
 from contextdb.commands.progress import building_bar
@@ -68,6 +71,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--diff", metavar="OTHER", help="where this session and another one part")
     parser.add_argument("--trace", metavar="OUT", help="write a Chrome trace, a .json file that Perfetto opens")
+    parser.add_argument("--html", metavar="OUT", help="write a page that plays the session, with --diff both side by side")
+    parser.add_argument("--markdown", action="store_true", help="the comment of a review: measures, and what changed")
     parser.add_argument("--project", metavar="FOLDER", help="the project with the databases (default: as recorded)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
 
@@ -78,8 +83,19 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         for option, given, shows in (("--view", arguments.view, "the costs of"), ("--why", arguments.why, "an asset in")):
             if given is not None:
                 raise QueryError(Fault(f"{option} shows {shows} one decision.", "--at N|TIME with it, such as --at 2.5s"))
+    if arguments.markdown and (arguments.json or arguments.at is not None):
+        raise QueryError(Fault("--markdown is of a whole session.", "--markdown without --json and --at"))
+    page = None if arguments.html is None else page_file(arguments.html)
     replay = Replay(Trace.load(arguments.file), arguments)
     other = None if arguments.diff is None else Trace.load(arguments.diff)
+    if page is not None or arguments.markdown:
+        sessions = [_played(replay), *([] if other is None else [_played(Replay(other, arguments, arguments.diff))])]
+        if page is not None:
+            write_page(page, sessions)
+        if arguments.markdown:
+            with output():
+                print(comment_of(sessions, arguments.html), end="")
+            return ExitCode.OK
     place = None if arguments.at is None else place_of(arguments.at, replay.trace, arguments.file)
     parts = list(_parts(replay, other))
     if arguments.trace is not None:
@@ -87,7 +103,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if place is not None:
         parts.insert(0, _Shown.of(replay, place).part())
     if not parts:
-        parts.append(_session(replay))
+        parts.append(_session(replay) if page is None else ({}, [summary_line(replay.trace.brief())]))
     with output():
         if arguments.json:
             told = {key: value for document, _ in parts for key, value in document.items()}
@@ -107,13 +123,19 @@ class Replay:
 
     trace: Trace
     asked: argparse.Namespace
+    of_file: str = ""
     missing: str = field(default="", init=False)
+
+    @property
+    def file(self) -> str:
+        """The session's file."""
+        return self.of_file or str(self.asked.file)
 
     @cached_property
     def databases(self) -> dict[str, MotionDatabase]:
         """The databases of the session's project; `missing` says why some are not what was recorded."""
         try:
-            found, why = databases_of(self.trace, self.asked.project, self.asked.file)
+            found, why = databases_of(self.trace, self.asked.project, self.file)
         except ContextDBError as error:
             if self.asked.project is not None:
                 raise
@@ -125,7 +147,7 @@ class Replay:
     def reasked(self, changes: Changes | None = None, *, with_tables: bool = False) -> Reasked:
         """The session asked again of its databases, and of the project's tables."""
         stock = Stock(self.databases)
-        folder, why = project_of(self.trace, self.asked.project, self.asked.file)
+        folder, why = project_of(self.trace, self.asked.project, self.file)
         if with_tables and not why:
             stock = Stock.with_tables(self.databases, Project.load(folder))
         return Reasked(self.trace, self.trace.about, stock, changes or {})
@@ -134,6 +156,17 @@ class Replay:
         """Raise MotionError where the session cannot be asked again, with the reason."""
         if not self.databases or self.missing:
             raise MotionError(Fault(f"the session cannot be asked again: {self.missing}", place=Place(self.asked.file)))
+
+
+def _played(replay: Replay) -> Played:
+    """A session with its poses."""
+    folder, why = project_of(replay.trace, replay.asked.project, replay.file)
+    if why:
+        raise MotionError(Fault(f"its poses cannot be made: {why}", place=Place(replay.file)))
+    databases = replay.databases
+    if replay.missing:
+        warn([f"{replay.file}: no candidates are shown: {replay.missing}"])
+    return Played(replay.file, replay.trace, folder, replay.trace.databases if databases else {})
 
 
 def _parts(replay: Replay, other: Trace | None) -> Iterator[Part]:

@@ -2,8 +2,10 @@
 
 STICK is a CSV or Parquet file with a row for each moment, which lasts until the next. Its columns are time_s; speed_mps, turn_dps
 and strafe_deg as for `motion search`, or x_mps and z_mps, a velocity over the ground, and facing_deg. All other columns are facts.
+The facts speed, direction and turn are the character's own where the file does not give them. Paths begin where the poses are.
 
-With --poses the poses of the character are written too, as BVH or as arrays of numpy; [output.CONTROLLER] says how they are made.
+With --poses the poses of the character are written too, as BVH, as arrays of numpy or as glTF; [output.CONTROLLER] says how they
+are made.
 
 Exits with 1 if nothing ever plays.
 
@@ -18,40 +20,37 @@ import argparse
 import math
 import os
 import random
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from contextdb.cells.facts import UNKNOWN_MODES
+from contextdb.cells.facts import UNKNOWN_MODES, Unknown
 from contextdb.commands.motion_stage import Stage, reach_s
 from contextdb.commands.motion_stick import Moments, Stick, conditions_of
 from contextdb.console import ExitCode, output, progress
 from contextdb.disk import path_in_quotes
-from contextdb.errors import Fault, FileError, Place, in_quotes
+from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes
 from contextdb.motion import (
-    Decision,
-    FeatureSchema,
-    Pose,
-    PoseBank,
+    Character,
     PoseStream,
+    Steered,
+    Trace,
     Trajectory,
-    open_or_build_poses,
+    Updated,
     steady_path,
-    with_path,
     write_poses,
 )
-from contextdb.motion.clips.steering import Steered, steered_path
-from contextdb.motion.features.extraction import Features
-from contextdb.motion.selection.controller import Controller
+from contextdb.motion.characters.project import banks_of
+from contextdb.motion.characters.tables import Facts
 from contextdb.motion.storage.written_poses import pose_file
-from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.views import summary_line
 from contextdb.report.render_json import as_json
 from contextdb.tables.table import leaf_assets
 
 SUFFIX = ".parquet"
+K_HELP = "candidates of each search that replay shows; with 0, none, and no search can be asked again (default: 12)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,9 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("controller", metavar="CONTROLLER", help="the name of a [controllers.NAME]")
     parser.add_argument("stick", metavar="STICK", help="a CSV or Parquet file of what the player requests, moment by moment")
     parser.add_argument("--out", metavar="FILE", required=True, help=f"the session to write: a {SUFFIX} file")
-    parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh or .npz")
-    parser.add_argument("--rate", metavar="HZ", type=_rate, help="updates per second (default: the rate of the features)")
-    parser.add_argument("--k", metavar="N", type=_count, default=12, help="candidates of each search to keep (default: 12)")
+    parser.add_argument("--poses", metavar="FILE", help="write the poses to this file too: .bvh, .npz or .glb")
+    parser.add_argument("--rate", metavar="HZ", type=rate_of, help="updates per second (default: the rate of the features)")
+    parser.add_argument("--k", metavar="N", type=_count, default=12, help=K_HELP)
     parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="seed of the controller's variation (default: 0)")
     parser.add_argument("--unknown", choices=UNKNOWN_MODES, default="error", help="how to treat a missing fact (default: error)")
     parser.add_argument("--json", action="store_true", help="a JSON document instead of text")
@@ -73,29 +72,34 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     out = _out_file(Path(arguments.out), Path(arguments.stick))
     poses_out = None if arguments.poses is None else _checked_file(pose_file(arguments.poses), Path(arguments.stick), "the poses")
     stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
-    controller = stage.config.controller(arguments.controller, stage.databases, rng=random.Random(arguments.seed))
-    trace = controller.recorder = Trace(arguments.k, controller.selector.databases)
-    where = {**_project(stage.folder, out), "controller": arguments.controller}
-    trace.about = {name: {**about, **where} for name, about in trace.about.items()}
-    names = list(controller.selector.names)
-    tables = stage.tables(names)
+    character = character_of(stage, arguments.controller, arguments.seed, arguments.unknown)
+    trace = character.record(arguments.k)
+    say_where(trace, stage, arguments.controller, out)
+    tables = stage.tables(character.controller.selector.names)
     path = Path(arguments.stick)
     stick = Stick.read(path, conditions_of(tables))
-    table_of = {name: table for name in names if (table := stage.config.databases[name].table) is not None}
-    moments = Moments.read(path, table_of, tables, arguments.unknown)
-    schema = stage.schema(names[0])
-    rate = schema.rate if arguments.rate is None else arguments.rate
-    show = None if poses_out is None else Show.of(stage, arguments.controller, names)
-    steer(controller, schema, stick, moments, rate, show)
+    moments = Moments.read(path, tables, arguments.unknown, character.asked_facts)
+    if moments is None:
+        character.tables = None
+    rate = character.schema.rate if arguments.rate is None else arguments.rate
+    if poses_out is not None and character.stream is None:
+        raise ContextDBError(Fault("there is no clip to take poses of.", "a database with a clip"))
+    poses = [updated.pose for updated in steer(character, stick, moments, rate)]
     trace.save(out, timings=False)
-    if show is not None and poses_out is not None:
-        show.write(poses_out, rate)
+    if poses_out is not None and character.stream is not None:
+        write_poses([pose for pose in poses if pose is not None], character.stream.rig, poses_out, rate)
     with output():
         if arguments.json:
             print(as_json({"format": 1, "file": str(out), "updates": len(trace), "bytes": out.stat().st_size}), end="")
         else:
             print(summary_line(trace.brief()))
     return ExitCode.OK if any(decision.playing is not None for decision in trace.brief()) else ExitCode.FOUND
+
+
+def say_where(trace: Trace, stage: Stage, controller: str, out: Path) -> None:
+    """Keep in a session what it is of, for what reads it later."""
+    where = {**_project(stage.folder, out), "controller": controller}
+    trace.about = {name: {**about, **where} for name, about in trace.about.items()}
 
 
 def _project(folder: Path, out: Path) -> dict[str, str]:
@@ -106,100 +110,69 @@ def _project(folder: Path, out: Path) -> dict[str, str]:
         return {}
 
 
-@dataclass(frozen=True, eq=False)
-class Show:
-    """The poses of a character, as they are made."""
-
-    stream: PoseStream
-    bank: PoseBank
-    poses: list[Pose] = field(default_factory=list)
-
-    @classmethod
-    def of(cls, stage: Stage, controller: str, names: Sequence[str]) -> Show:
-        """For the controller of a name over some databases."""
-        assets = {table: leaf_assets(stage.project[table]) for table in stage.project.tables}
-        banks = open_or_build_poses(stage.config, stage.folder, assets, names=names)
-        return cls(PoseStream(banks, stage.config.output_of(controller)), banks[names[0]])
-
-    def take(self, decision: Decision, dt_s: float, body: Steered) -> None:
-        """Add the pose after a decision."""
-        self.poses.append(self.stream.update(decision, dt_s, body))
-
-    def write(self, path: Path, rate: float) -> None:
-        """Write all poses."""
-        write_poses(self.poses, self.bank, path, rate)
+def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "error") -> Character:
+    """The character of a controller, with its poses; without where its databases have no clips."""
+    controller = stage.config.controller(name, stage.databases, rng=random.Random(seed))
+    names = list(controller.selector.names)
+    assets = {table: leaf_assets(stage.project[table]) for table in stage.project.tables}
+    banks = banks_of(stage.config, stage.folder, assets, controller.selector.databases)
+    tables = stage.tables(names)
+    table_of = {each: tables[table] for each in names if (table := stage.config.databases[each].table) is not None}
+    stream = None if banks is None else PoseStream(banks, stage.config.output_of(name))
+    return Character(controller, stage.schema(names[0]), table_of or None, stream, unknown=unknown)
 
 
-def steer(
-    controller: Controller, schema: FeatureSchema, stick: Stick, moments: Moments | None, per_s: float, show: Show | None = None
-) -> None:
-    """Update a controller from the stick's first moment to its last, so many times a second."""
+def steer(character: Character, stick: Stick, moments: Moments | None, per_s: float) -> Iterator[Updated]:
+    """Update a character from the stick's first moment to its last, so many times a second."""
     n_updates = math.floor(stick.duration_s * per_s + 1e-6) + 1
-    paths = _paths(stick, schema, per_s)
+    update = _over_ground if stick.is_velocity else _from_body
     for i in progress(range(n_updates), "steering"):
         moment, dt_s = stick.at(i / per_s), 1.0 / per_s if i else 0.0
-        path, body = next(paths)
-        query = with_path(schema, _pose(controller, schema, dt_s), path)
-        valid, context = (None, None) if moments is None else (moments.valid[moment], moments.contexts[moment])
-        decision = controller.update(dt_s, query, valid, context=context, body=body)
-        if show is not None:
-            show.take(decision, dt_s, body)
+        yield update(character, stick, moment, dt_s, None if moments is None else moments.contexts[moment])
 
 
-def _pose(controller: Controller, schema: FeatureSchema, dt_s: float) -> Features:
-    """The pose that would play on; the mean pose of all clips where nothing plays."""
-    upcoming, databases = controller.upcoming(dt_s), controller.selector.databases
-    if upcoming is None:
-        mean = next(iter(databases.values())).normalisation.undo(np.zeros(schema.n_features))
-        return mean.astype(np.float32)
-    return databases[upcoming.database].raw(upcoming.frame).astype(np.float32)
+def _over_ground(character: Character, stick: Stick, moment: int, dt_s: float, facts: Facts | None) -> Updated:
+    """A body that follows the stick smoothly, as `contextdb.motion.clips.steering` has it."""
+    degrees = stick.value("facing_deg", moment, math.nan)
+    facing = None if math.isnan(degrees) else math.radians(degrees)
+    return character.update(dt_s, (stick.value("x_mps", moment), stick.value("z_mps", moment)), facts, facing)
 
 
-def _paths(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[tuple[Trajectory, Steered]]:
-    """The wished path at each update, and where the game has the body."""
-    return _along_ground(stick, schema, per_s) if stick.is_velocity else _from_body(stick, schema, per_s)
+def _from_body(character: Character, stick: Stick, moment: int, dt_s: float, facts: Facts | None) -> Updated:
+    """A body that goes at once at a speed, turns evenly, and keeps both.
 
-
-def _from_body(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[tuple[Trajectory, Steered]]:
-    body = Steered()
-    for i in _counting():
-        moment = stick.at(i / per_s)
-        speed, turn, strafe = (stick.value(name, moment) for name in ("speed_mps", "turn_dps", "strafe_deg"))
-        if i:
-            body = _after(body, speed, math.radians(turn), math.radians(strafe), 1.0 / per_s)
-        yield steady_path(speed, turn, strafe_deg=strafe, reach_s=reach_s(schema, speed), rate=schema.rate), body
+    The stick that would make a body turn so points ahead of its facing, by what it turns while it follows.
+    """
+    speed, turn, strafe = (stick.value(name, moment) for name in ("speed_mps", "turn_dps", "strafe_deg"))
+    body = _after(character.body, speed, math.radians(turn), math.radians(strafe), dt_s)
+    schema = character.schema
+    path = steady_path(speed, turn, strafe_deg=strafe, reach_s=reach_s(schema, speed), rate=schema.rate)
+    points = body.heading + math.radians(strafe + turn * body.heading_halflife_s / math.log(2.0))
+    wanted = (speed * math.sin(points), speed * math.cos(points))
+    return character.update(dt_s, wanted, facts, body=body, path=_placed(path, body))
 
 
 def _after(body: Steered, speed_mps: float, turn: float, strafe: float, dt_s: float) -> Steered:
     """A body that goes at one speed and turns evenly, some time later: on an arc, whose chord points half the turn ahead."""
     half = turn * dt_s / 2.0
     chord = speed_mps * dt_s * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
-    way = body.heading + half + strafe
+    way, goes = body.heading + half + strafe, body.heading + 2.0 * half + strafe
     x, z = body.position
-    return replace(body, position=(x + chord * math.sin(way), z + chord * math.cos(way)), heading=body.heading + 2.0 * half)
+    return replace(
+        body,
+        position=(x + chord * math.sin(way), z + chord * math.cos(way)),
+        velocity=(speed_mps * math.sin(goes), speed_mps * math.cos(goes)),
+        heading=body.heading + 2.0 * half,
+        turn_rate=turn,
+    )
 
 
-def _along_ground(stick: Stick, schema: FeatureSchema, per_s: float) -> Iterator[tuple[Trajectory, Steered]]:
-    """A body that follows the stick smoothly, as `contextdb.motion.clips.steering` has it."""
-    body = Steered()
-    past = [body]
-    for i in _counting():
-        moment = stick.at(i / per_s)
-        wanted = (stick.value("x_mps", moment), stick.value("z_mps", moment))
-        degrees = stick.value("facing_deg", moment, math.nan)
-        facing = None if math.isnan(degrees) else math.radians(degrees)
-        if i:
-            past.append(past[-1].moved(1.0 / per_s, wanted, facing))
-        reach = reach_s(schema, math.hypot(*wanted))
-        past = past[-math.ceil(reach * per_s) - 1 :]
-        yield steered_path(past, wanted, facing, reach_s=reach, rate=per_s), past[-1]
-
-
-def _counting() -> Iterator[int]:
-    i = 0
-    while True:
-        yield i
-        i += 1
+def _placed(path: Trajectory, body: Steered) -> Trajectory:
+    """A path in the body's own frame, over the ground."""
+    sin, cos = math.sin(body.heading), math.cos(body.heading)
+    left, ahead = path.positions.T
+    positions = np.stack((cos * left + sin * ahead, cos * ahead - sin * left), axis=1) + np.array(body.position)
+    return Trajectory(path.rate, positions, path.headings + body.heading, path.now)
 
 
 def _out_file(out: Path, stick: Path) -> Path:
@@ -221,7 +194,8 @@ def _checked_file(out: Path, stick: Path, what: str) -> Path:
     return out
 
 
-def _rate(text: str) -> float:
+def rate_of(text: str) -> float:
+    """Updates a second, as an option gives them."""
     try:
         rate = float(text)
     except ValueError:

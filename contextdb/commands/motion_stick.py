@@ -7,8 +7,8 @@ facts. A moment lasts until the next one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +16,13 @@ import numpy as np
 from contextdb.cells.facts import Unknown
 from contextdb.columns import TextColumn
 from contextdb.commands import missing_facts_by_option
-from contextdb.compiled.matches import Matches
 from contextdb.compiled.table import CompiledTable
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, nearest, some
 from contextdb.files.texts import AnySource, read_texts
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.reading import as_number
-from contextdb.telemetry.contexts import read_contexts
+from contextdb.telemetry.contexts import Contexts, read_contexts
 
 BY_SPEED = ("speed_mps", "turn_dps", "strafe_deg")
 BY_VELOCITY = ("x_mps", "z_mps", "facing_deg")
@@ -100,14 +99,15 @@ class Stick:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """The facts of each moment of a stick, and the rows that are valid then."""
+    """The facts of each moment of a stick."""
 
     contexts: Sequence[Mapping[str, object]]
-    valid: Sequence[Mapping[str, Matches]]
 
     @classmethod
-    def read(cls, path: Path, table_of: Mapping[str, str], tables: Mapping[str, CompiledTable], unknown: Unknown) -> Moments | None:
-        """Read the facts for databases, each with the name of its table. None when the file has no facts: nothing is filtered.
+    def read(cls, path: Path, tables: Mapping[str, CompiledTable], unknown: Unknown, own: Collection[str] = ()) -> Moments | None:
+        """Read the facts for some tables; those named `own` the character computes where the file does not give them.
+
+        None when the file has no facts, and the tables ask for others than the character's own: nothing is filtered.
 
         Raises
         ------
@@ -116,17 +116,24 @@ class Moments:
         """
         read = {name: read_contexts(path, table) for name, table in tables.items()}
         known = {name: [c for c in each.facts.columns if c in tables[name].asked] for name, each in read.items()}
-        if not any(known.values()):
+        is_own = bool(tables) and all(set(own).issuperset(table.asked) for table in tables.values())
+        if not any(known.values()) and not is_own:
             return None
         for name, each in read.items():
             with missing_facts_by_option():
-                each.ask(tables[name], unknown)  # tells all that is wrong, with its line
-        facts = {name: each.facts.select(known[name]).to_dicts() for name, each in read.items()}
-        n_moments = max(map(len, facts.values()))
-        merged = [_given([each[i] for each in facts.values()]) for i in range(n_moments)]
-        answers = {name: [tables[name].query(_given([row]), unknown=unknown) for row in facts[name]] for name in facts}
-        valid = [{database: answers[table][i] for database, table in table_of.items()} for i in range(n_moments)]
-        return cls(merged, valid)
+                _with_own(each, tables[name], own).ask(tables[name], unknown)  # tells all that is wrong, with its line
+        facts = [each.facts.select(known[name]).to_dicts() for name, each in read.items() if known[name]]
+        n_moments = max((len(each.facts) for each in read.values()), default=0)
+        return cls([_given([each[i] for each in facts]) for i in range(n_moments)])
+
+
+def _with_own(contexts: Contexts, table: CompiledTable, own: Collection[str]) -> Contexts:
+    """Contexts in which no fact that is computed later is missing."""
+    import polars as pl
+
+    columns = contexts.facts.columns
+    filled = [pl.col(name).fill_null(0) if name in columns else pl.lit(0.0).alias(name) for name in own if name in table.asked]
+    return replace(contexts, facts=contexts.facts.with_columns(filled))
 
 
 def _given(rows: Sequence[Mapping[str, object]]) -> dict[str, object]:

@@ -302,16 +302,17 @@ def _condition_to_json(condition: Condition) -> dict[str, object]:
         "description": condition.description,
         "expr": condition.expr,
         "is_declared": condition.is_declared,
-    } | ({} if condition.mirror is None else {"mirror": condition.mirror})
+        **({} if condition.mirror is None else {"mirror": condition.mirror}),
+        **({"hysteresis": condition.hysteresis} if condition.hysteresis else {}),
+    }
 
 
 def _condition_from_json(about: dict[str, Any]) -> Condition:
     low, high = about["bounds"]
     values = None if about["values"] is None else tuple(about["values"])
     domain = Domain(about["type"], values, -math.inf if low is None else low, math.inf if high is None else high)
-    return Condition(
-        about["name"], domain, about["unit"], about["description"], about["expr"], about["is_declared"], _mirror(about)
-    )
+    own = about["name"], domain, about["unit"], about["description"], about["expr"], about["is_declared"], _mirror(about)
+    return Condition(*own, hysteresis=float(about.get("hysteresis", 0.0)))
 
 
 def _mirror(about: dict[str, Any]) -> Any:

@@ -162,6 +162,8 @@ class BatchMatches(ManyMatches):
             return matches
         if self.compiled.mirroring:
             matches.with_mirrored(lambda: self.mirrored[context])
+        if self.compiled.widening:
+            matches.with_widened(lambda: self.compiled.query_widened(kept.of_context(context), kept.unknown))
         if self.compiled.is_soft:
             matches.with_penalties(lambda: self.compiled.layered_penalties(kept.of_context(context), kept.unknown))
         return matches

@@ -26,6 +26,7 @@ from contextdb.cells.arguments import require_row
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, missing_error, misspelt, read_fact, require_context
 from contextdb.cells.grammar import parse_cell, reads
+from contextdb.cells.hysteresis import widened_fact, with_hysteresis
 from contextdb.cells.mirroring import changed_in_mirror, in_mirror, kept_facts, mirrored_facts
 from contextdb.cells.notebook import one_line
 from contextdb.cells.sets import ANY, Cell
@@ -47,6 +48,13 @@ from contextdb.expressions.rules import WhenRules
 from contextdb.schema.shapes import Policy
 
 Made = TypeVar("Made")
+Change = Callable[[Fact, Condition], Fact]
+
+
+def as_given(fact: Fact, condition: Condition) -> Fact:
+    """A fact as it is."""
+    return fact
+
 
 SoftMasks = tuple[ColumnMasks, NDArray[np.float64]]
 
@@ -145,7 +153,7 @@ class CompiledData(Unchanging):
             check_mode(unknown)
         try:
             found = self._ask(context)
-            return found if unknown == "error" or not self.mirroring else found.with_mirrored(self.keeping(unknown)(context))
+            return found if unknown == "error" or not self.keeps_facts else self.with_others(found, context, unknown)
         except UNUSUAL:
             return self.query_with_care(context, unknown)
         except Exception:  # no mapping, which can raise anything, or a fault of ours
@@ -191,14 +199,15 @@ class CompiledData(Unchanging):
         costs: NDArray[np.float64] = self.layered_penalties(context, unknown).sum(axis=0)
         return costs
 
-    def layered_penalties(self, context: Context, unknown: Unknown = "error") -> NDArray[np.float64]:
-        """The same for the cells of each depth: float64 [D, n_rows]; D is 1 for a table without tables inside."""
+    def layered_penalties(self, context: Context, unknown: Unknown = "error", change: Change = as_given) -> NDArray[np.float64]:
+        """The same for the cells of each depth: float64 [D, n_rows]; D is 1 for a table without tables inside. `change` is what
+        becomes of each fact before it is looked up."""
         costs = np.zeros((self.n_depths, self.n_rows))
         if any(self.soft):
             facts = self.read_context(context, unknown)
             for at, condition in enumerate(self.conditions):
                 if self.soft[at] is not None:
-                    costs += self.column_penalties(at, facts[condition.name], unknown)
+                    costs += self.column_penalties(at, change(facts[condition.name], condition), unknown)
         return costs
 
     @property
@@ -218,6 +227,20 @@ class CompiledData(Unchanging):
         """The conditions of `asked` whose facts change in a mirror."""
         return changed_in_mirror(self.asked.values())
 
+    @cached_property
+    def widening(self) -> dict[str, Condition]:
+        """The columns whose cells are widened for what plays already."""
+        return with_hysteresis(self.conditions)
+
+    def query_widened(self, context: Context, unknown: Unknown = "error") -> Matches:
+        """The answer to a context with its facts widened, see `contextdb.cells.hysteresis`. What is derived is computed from the
+        facts themselves and then widened; rules see no widened facts."""
+        bits, always = self._bits_carefully(context, unknown, widened_fact)
+        found = self.matches(bits, always)
+        if self.mirroring:
+            found.with_mirrored(lambda: self.query_widened(mirrored_facts(context, self.mirroring), unknown))
+        return found.with_penalties(partial(self.layered_penalties, context, unknown, widened_fact)) if self.is_soft else found
+
     def query_mirrored(self, context: Context, unknown: Unknown = "error") -> Matches:
         """The answer to a context as a mirror shows it. What is derived is computed from mirrored facts."""
         try:
@@ -227,9 +250,15 @@ class CompiledData(Unchanging):
 
     def bound(self, matches: Matches, context: Context, unknown: Unknown = "error") -> Matches:
         """An answer that knows what else hangs on the facts of its moment: what soft cells cost, and the answer in a mirror."""
+        if self.keeps_facts:
+            self.with_others(matches, context, unknown)
+        return matches.with_penalties(partial(self.layered_penalties, self.keep(context), unknown)) if self.is_soft else matches
+
+    def with_others(self, matches: Matches, context: Context, unknown: Unknown) -> Matches:
+        """An answer that knows what its context answers in a mirror, and with widened facts."""
         if self.mirroring:
             matches.with_mirrored(self.keeping(unknown)(context))
-        return matches.with_penalties(partial(self.layered_penalties, self.keep(context), unknown)) if self.is_soft else matches
+        return matches.with_widened(partial(self.query_widened, self.keep(context), unknown)) if self.widening else matches
 
     def keeping(self, unknown: Unknown) -> Callable[[Context], dict[str, object] | Callable[[], Matches]]:
         """What makes of a context that an answer was asked with what `Matches.with_mirrored` takes."""
@@ -246,9 +275,14 @@ class CompiledData(Unchanging):
         return any(self.soft)
 
     @cached_property
+    def keeps_facts(self) -> bool:
+        """Whether other questions hang on the facts of an answer: those in a mirror, and with widened facts."""
+        return bool(self.mirroring) or bool(self.widening)
+
+    @cached_property
     def is_bound(self) -> bool:
         """Whether answers must keep the facts that they were asked with."""
-        return self.is_soft or bool(self.mirroring)
+        return self.is_soft or self.keeps_facts
 
     def cells(self, at: int) -> tuple[Cell, ...]:
         """What the distinct texts of condition number `at` mean, read once; Any for one that cannot be read, which no row holds."""
@@ -379,7 +413,8 @@ class CompiledData(Unchanging):
     @property
     def _said(self) -> tuple[object, ...]:
         """All that an answer, and what is picked from it, hangs on."""
-        conditions = [(c.name, c.domain, c.expr, c.mirror) for c in (*self.conditions, *self.ruled)]
+        own = [*self.conditions, *self.ruled]
+        conditions = [(c.name, c.domain, c.expr, c.mirror, *((c.hysteresis,) if c.hysteresis else ())) for c in own]
         derived = [(step.condition.name, step.expression.text) for step in self.derivation.steps] if self.derivation else []
         ways = [] if self.ways is None else [self.ways.numbers, self.ways.rows]
         inner = () if self.ways is None else self.ways.tables
@@ -399,7 +434,7 @@ class CompiledData(Unchanging):
 
     def _build_and_ask(self, context: Context) -> Matches:
         """The first question builds the function that answers all others."""
-        is_plain = self.is_bound and not (self.is_soft or self.when or self.derivation)
+        is_plain = self.is_bound and not (self.is_soft or self.when or self.derivation or self.widening)
         columns = list(zip(self.conditions, self.masks, strict=True))
         ask = build_ask(columns, self.enabled_bits, self.answering, self.keep if is_plain else None)
         if self.when is not None:
@@ -414,11 +449,11 @@ class CompiledData(Unchanging):
     def _binding(self, ask: StraightAsk) -> StraightAsk:
         return lambda context: self.bound(ask(context), context)
 
-    def _bits_carefully(self, context: Context, unknown: Unknown) -> tuple[int, int]:
+    def _bits_carefully(self, context: Context, unknown: Unknown, change: Change = as_given) -> tuple[int, int]:
         facts = self.read_context(context, unknown)
         some_bits = every = self.enabled_bits
         for at, condition in enumerate(self.conditions):
-            one, all_ = self.condition_bits(at, facts[condition.name], unknown)
+            one, all_ = self.condition_bits(at, change(facts[condition.name], condition), unknown)
             some_bits &= one
             every &= all_
         return (some_bits, every) if self.when is None else self.when.left_with_care(some_bits, every, facts, unknown)

@@ -14,6 +14,7 @@ from operator import and_
 from typing import Any, Never, Self
 
 from contextdb.cells.arguments import by_name
+from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import NAMES, Unknown, alike, as_context, no_condition, read_fact, require_names
 from contextdb.cells.mirroring import kept_facts
 from contextdb.cells.notebook import one_line
@@ -115,10 +116,10 @@ class LiveContext(MutableMapping[str, object]):
         """Other names that `update` was given and that are like none of these."""
         self._alike: dict[str, tuple[str, ...]] = {}
         """For each other name the facts that it is like."""
-        self._keep = compiled.keeping(unknown) if compiled.mirroring and not compiled.is_soft else None
+        self._keep = compiled.keeping(unknown) if compiled.mirroring and not (compiled.is_soft or compiled.widening) else None
         """What keeps the facts of an answer, where it must know them for a mirror alone."""
         self._is_bound = compiled.is_bound
-        """Whether an answer must know the facts, for the costs of soft cells or for a mirror."""
+        """Whether an answer must know the facts, for the costs of soft cells, for a mirror or for widened cells."""
         self._answer = Matches(0, self._answering)
         """The last answer: while the rows stay the same, so does the object."""
         for condition in compiled.conditions:
@@ -256,6 +257,11 @@ class LiveContext(MutableMapping[str, object]):
             self._odd[CAST] = (0, False)
 
     @property
+    def asked(self) -> dict[str, Condition]:
+        """The conditions whose facts can be set, by name."""
+        return self._compiled.asked
+
+    @property
     def facts(self) -> dict[str, object]:
         """The facts as they were set, without derived ones; None where one is missing."""
         return dict(self._told)
@@ -267,7 +273,7 @@ class LiveContext(MutableMapping[str, object]):
 
     def matches(self) -> Matches:
         """The valid rows now; the same object as before while they stay the same, in a table without soft cells and without
-        conditions whose facts change in a mirror.
+        conditions whose facts change in a mirror or that have a hysteresis.
 
         Raises
         ------

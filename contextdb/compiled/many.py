@@ -52,6 +52,11 @@ class ManyMatches(Unchanging, Sequence[Matches]):
         """The rows of some contexts as bits."""
 
     @property
+    def is_widening(self) -> bool:
+        """Whether `widened` of an answer may be another one: whether a condition of the table has a hysteresis."""
+        return bool(self.compiled.widening)
+
+    @property
     def n_rows(self) -> int:
         """The number of rows of the table, valid or not."""
         return self.compiled.n_rows

@@ -172,10 +172,12 @@ class Matches:
         The rows that accept *all* values of facts given as sets; the same as `mask` without such facts.
     """
 
-    __slots__ = ("_mirrored", "_penalties", "_rows", "_table", "bits")
+    __slots__ = ("_mirrored", "_penalties", "_rows", "_table", "_widened", "bits")
 
     _mirrored: Matches | dict[str, object] | Callable[[], Matches]
     """Set for tables with conditions whose facts change in a mirror: the answer there, the facts to ask with, or what asks."""
+    _widened: Matches | Callable[[], Matches]
+    """Set for tables with conditions with a hysteresis: the answer with widened facts, or what asks for it."""
     _penalties: Callable[[], NDArray[np.float64]]
     """Set for tables with soft cells only: a plain answer has nothing to pay for."""
 
@@ -298,6 +300,34 @@ class Matches:
         self._mirrored = asked
         return self
 
+    @property
+    def widened(self) -> Matches:
+        """The answer to the same query with widened facts: the rows that stay valid where they play already, by the `hysteresis` of
+        conditions.
+
+        Computed on first use, with the facts as they were. The same object where no condition of the table has a hysteresis, and
+        for an answer asked by codes, which keep no facts.
+
+        Raises
+        ------
+        ContextError
+            A derived fact or a rule cannot be computed.
+        """
+        known = getattr(self, "_widened", self)
+        if not isinstance(known, Matches):
+            known = self._widened = known()
+        return known
+
+    @property
+    def is_widening(self) -> bool:
+        """Whether `widened` may be another answer: whether a condition of the table has a hysteresis."""
+        return hasattr(self, "_widened")
+
+    def with_widened(self, ask: Callable[[], Matches]) -> Matches:
+        """The same answer, of a table with conditions with a hysteresis, with what asks with widened facts."""
+        self._widened = ask
+        return self
+
     def casting(self, row: int) -> Mapping[str, Mapping[str, Any]]:
         """Who fills which role in a valid row, as {role: actor}; for an answer to a query with actors.
 
@@ -369,6 +399,8 @@ class Matches:
         found._keep(bits)
         if self._table.is_mirroring:
             found.with_mirrored(lambda: self.mirrored.kept(bits))
+        if self.is_widening:
+            found.with_widened(lambda: self.widened.kept(bits))
         return found
 
     def _keep(self, bits: int) -> None:
@@ -413,6 +445,8 @@ class Matches:
             found.with_penalties(costs[0]._penalties if len(costs) == 1 or join is and_ else lambda: _costs_of_both(*costs))
         if self._table.is_mirroring:
             found.with_mirrored(lambda: self.mirrored.joined(other.mirrored, join))
+        if self.is_widening:
+            found.with_widened(lambda: self.widened.joined(other if join is minus else other.widened, join))
         return found
 
     def require_own(self, table: Answering) -> None:
@@ -430,6 +464,8 @@ class Matches:
         state = _slots(self) | {"_rows": None}
         if state.pop("_mirrored", None) is not None and (seen := self._mirrored_or_none()) is not None:
             state["_mirrored"] = seen
+        if state.pop("_widened", None) is not None and (wide := self._widened_or_none()) is not None:
+            state["_widened"] = wide
         return state | {"_penalties": partial(_known, self.layered_penalties)} if self.has_penalties else state
 
     def _mirrored_or_none(self) -> Matches | None:
@@ -441,6 +477,13 @@ class Matches:
         if not isinstance(getattr(seen, "_mirrored", None), Matches):
             seen._mirrored = self
         return seen
+
+    def _widened_or_none(self) -> Matches | None:
+        """The answer with widened facts; None where it cannot be had."""
+        try:
+            return self.widened
+        except ContextError:
+            return None
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._set(state)

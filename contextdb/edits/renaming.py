@@ -107,7 +107,7 @@ class Renaming:
 
 
 @dataclass(frozen=True)
-class _File:
+class TableFile:
     """A table's file and what is in it."""
 
     name: str
@@ -117,7 +117,7 @@ class _File:
     columns: tuple[TextColumn, ...]
 
     @classmethod
-    def read(cls, name: str, path: Path, settings: TableSettings) -> _File:
+    def read(cls, name: str, path: Path, settings: TableSettings) -> TableFile:
         source, columns = read_texts(path)
         return cls(name, path, settings, source, tuple(columns))
 
@@ -139,11 +139,11 @@ def uses_of(table: Table, condition: str) -> Uses:
     if table.when is not None:
         n_own_rules = _n_rules(table.text_column(table.when.name), condition)
     n_cases = n_own_cases = _n_cases(table.path, condition) if table.path is not None else 0
-    for name, path in table_files(_folder(table), schema) if table.path is not None else ():
+    for name, path in table_files(folder_of(table), schema) if table.path is not None else ():
         if table.path is not None and path.resolve() == table.path.resolve():
             continue
         try:
-            file = _File.read(name, path, schema.tables.get(name, TableSettings(name)))
+            file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
         except ContextDBError:  # what it holds is not known
             others.append(name)
             continue
@@ -166,7 +166,7 @@ def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renam
     TableError, SchemaError, FileError
         The new name is taken or no name; a file cannot be read, or could not say what it should.
     """
-    folder, schema = _folder(table), table.schema
+    folder, schema = folder_of(table), table.schema
     assert table.path is not None
     raw = read_bytes(folder / SCHEMA_FILE) if (folder / SCHEMA_FILE).is_file() else b""
     on_disk = read_folder_schema(folder) if raw else schema
@@ -176,15 +176,16 @@ def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renam
     for name, path in table_files(folder, on_disk):
         is_own = path.resolve() == table.path.resolve()
         if is_own or not only_here:
-            files += _rewritten_table(_File.read(name, path, on_disk.tables.get(name, TableSettings(name))), old, new)
+            files += _rewritten_table(TableFile.read(name, path, on_disk.tables.get(name, TableSettings(name))), old, new)
     own = next((n for n, p in table_files(folder, on_disk) if p.resolve() == table.path.resolve()), table.name)
     if raw:
         change = (lambda said: _only_here(said, old, new, own)) if only_here else (lambda said: _everywhere(said, old, new))
-        files += _rewritten_toml(folder / SCHEMA_FILE, raw, change, (old, new) if not only_here else None)
+        files += rewritten_toml(folder / SCHEMA_FILE, raw, change, (old, new) if not only_here else None)
     return Renaming(old, new, tuple(files))
 
 
-def _folder(table: Table) -> Path:
+def folder_of(table: Table) -> Path:
+    """The folder of the project that a table is in."""
     return schema_path(table).parent
 
 
@@ -212,18 +213,18 @@ def _n_cases(table: Path, condition: str) -> int:
 # ---- files under the new name
 
 
-def _rewritten_table(file: _File, old: str, new: str) -> Iterator[Rewrite]:
+def _rewritten_table(file: TableFile, old: str, new: str) -> Iterator[Rewrite]:
     """The table and its saved contexts, where they speak of the condition."""
     columns = [c.renamed(new) if c.name == old and file.has_condition(old) else c for c in file.columns]
     _require_free(file.path, columns)
     columns = [_with_rules(c, old, new) if file.rules is not None and c.name == file.rules.name else c for c in columns]
-    yield from _rewritten(file.path, file.source, file.columns, columns)
+    yield from rewritten(file.path, file.source, file.columns, columns)
     cases = cases_path(file.path)
     if cases.is_file() and old not in CASE_COLUMNS:
         source, found = read_texts(cases)
         renamed = [c.renamed(new) if c.name == old else c for c in found]
         _require_free(cases, renamed)
-        yield from _rewritten(cases, source, found, renamed)
+        yield from rewritten(cases, source, found, renamed)
     yield from _rewritten_actors(file.path.with_name(file.path.stem + ACTORS_SUFFIX), old, new)
 
 
@@ -255,7 +256,8 @@ def _require_free(path: Path, columns: Sequence[TextColumn]) -> None:
         raise TableError(Fault(found, "a name that no column has yet", place=Place(str(path))))
 
 
-def _rewritten(path: Path, source: AnySource, before: Sequence[TextColumn], after: Sequence[TextColumn]) -> Iterator[Rewrite]:
+def rewritten(path: Path, source: AnySource, before: Sequence[TextColumn], after: Sequence[TextColumn]) -> Iterator[Rewrite]:
+    """A file of columns as it is to be written, where one of them is another."""
     if all(one is other for one, other in zip(before, after, strict=True)):
         return
     yield Rewrite(path, source.raw, written_over(source, after, np.arange(after[0].n_rows)).raw)
@@ -290,7 +292,7 @@ def _assume(part: dict[str, Any], old: str, new: str) -> None:
         part["assume"] = [with_names(text, {old: new}) for text in part["assume"]]
 
 
-def _rewritten_toml(
+def rewritten_toml(
     path: Path, raw: bytes, change: Callable[[dict[str, Any]], None], moved: tuple[str, str] | None
 ) -> Iterator[Rewrite]:
     """contextdb.toml with a change; only the keys that say something else are written, and a section that moves keeps its lines."""

@@ -5,6 +5,7 @@
                                       Controller: one character in time ─► Decision ─► Trace
                                       PoseStream: its decisions as poses, from a PoseBank ─► Pose
                                       ControllerGroup: a crowd of them, searched for at once
+                                      Character, Crowd: stick, body, facts, table and all of this in one update
                                       MatchNode, MatchGate: one-offs that end at a target
 
 A table's query says which assets are valid; this finds the best frame among theirs. It takes masks and names, never a table.
@@ -12,6 +13,10 @@ Metres, seconds, y up; angles are positive to the left. numba makes the search f
 """
 
 from contextdb.errors import ClipError, MotionError, QueryError
+from contextdb.motion.characters.character import Character, CharacterState, Updated
+from contextdb.motion.characters.crowd import Crowd
+from contextdb.motion.characters.facts import FACTS, Moment
+from contextdb.motion.characters.paths import path_from
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
@@ -24,6 +29,7 @@ from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, steady_path
 from contextdb.motion.features.channels import Channel
 from contextdb.motion.features.extraction import ClipFeatures, clip_features, features_of, query_from, with_path
+from contextdb.motion.features.live_query import LivePose, PoseHistory, query_from_pose
 from contextdb.motion.features.many_queries import with_paths
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
@@ -72,10 +78,12 @@ from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.session_diff import Parting, SessionDiff
 from contextdb.motion.trace.stats import SessionStats
 from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
-from contextdb.motion.trace.why_not import Change, WhyNot
+from contextdb.motion.trace.why_not import WhyNot
+from contextdb.motion.trace.winning_changes import Change, ChangePart
 
 __all__ = [
     "ANY_TAGS",
+    "FACTS",
     "RECIPES",
     "Action",
     "Biases",
@@ -83,8 +91,11 @@ __all__ = [
     "Candidate",
     "Candidates",
     "Change",
+    "ChangePart",
     "ChangedChoice",
     "Channel",
+    "Character",
+    "CharacterState",
     "Choice",
     "Clip",
     "ClipContexts",
@@ -97,6 +108,7 @@ __all__ = [
     "ControllerGroup",
     "ControllerSettings",
     "ControllerState",
+    "Crowd",
     "CustomFunction",
     "DatabaseSettings",
     "Decision",
@@ -108,6 +120,7 @@ __all__ = [
     "Hit",
     "Inputs",
     "LeftOut",
+    "LivePose",
     "LocalPoses",
     "MadeClip",
     "ManySteered",
@@ -120,6 +133,7 @@ __all__ = [
     "MatchNode",
     "MatchPlay",
     "Measures",
+    "Moment",
     "MotionConfig",
     "MotionCoverage",
     "MotionDatabase",
@@ -130,6 +144,7 @@ __all__ = [
     "Playing",
     "Pose",
     "PoseBank",
+    "PoseHistory",
     "PoseSettings",
     "PoseState",
     "PoseStream",
@@ -159,6 +174,7 @@ __all__ = [
     "Trace",
     "Trajectory",
     "Transitions",
+    "Updated",
     "Variation",
     "WarpShare",
     "WhatIf",
@@ -190,11 +206,13 @@ __all__ = [
     "open_poses",
     "parse_bvh",
     "partners_of",
+    "path_from",
     "pose_arrays",
     "pose_schema",
     "poses_of",
     "poses_path",
     "query_from",
+    "query_from_pose",
     "resampled",
     "root_trajectory",
     "save_database",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import NoneType
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -21,7 +21,8 @@ NO_BIASES: Floats = np.empty(0)
 class HasAssets(Protocol):
     """What a table's query answers: something with the names of the valid assets.
 
-    Where it has an attribute `mirrored`, that is the same for animations that are played mirrored.
+    Where it has an attribute `mirrored`, that is the same for animations that are played mirrored; one `widened` is the same for
+    the animation that plays already.
     """
 
     @property
@@ -34,6 +35,8 @@ class ValidRanges(NamedTuple):
 
     flags: Flags
     biases: Floats
+    widened: Callable[[], Valid | None] | None = None
+    """Gives the same for what plays already, as `valid` of a search; None where that is nothing else."""
 
 
 Valid: TypeAlias = HasAssets | ArrayLike | ValidRanges
@@ -151,6 +154,14 @@ def currents_of(current: Currents | None, n: int, n_frames: int) -> NDArray[np.i
         if not n or (frames.min() >= -1 and frames.max() < n_frames):
             return frames
     return np.array([current_of(frame, n_frames) for frame in current], np.int64)
+
+
+def widened_of(valid: Valid | None) -> Valid | None:
+    """What may play for what plays already, if that is anything else than what may play for all."""
+    if isinstance(valid, ValidRanges):
+        return None if valid.widened is None else valid.widened()
+    wide = getattr(valid, "widened", None)
+    return None if wide is valid else wide
 
 
 def is_one_for_each(valid: object) -> bool:

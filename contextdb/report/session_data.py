@@ -63,10 +63,11 @@ class Detail:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ghost:
-    """A pose that could have played, moving: joints [F, J, 3] in metres, relative to the root on the ground."""
+    """A pose that could have played, moving: joints [F, J, 3] in metres, relative to the root on the ground, so many a second."""
 
     asset: str
     positions: Floats
+    rate: float
     plays_on: bool
 
 
@@ -148,7 +149,8 @@ class SessionView:
         What is drawn below the timeline: "cost", "skate", "accel", "error", "valid", as far as known.
     moments : sequence of Moment
         In order of time.
-    measures : mapping of str to str
+    measures : mapping of str to (str, str)
+        By name: of the session, and of the raw clips.
     """
 
     name: str
@@ -166,7 +168,7 @@ class SessionView:
     strips: Mapping[str, Floats]
     moments: Sequence[Moment]
     changes: Sequence[ChangeLine]
-    measures: Mapping[str, str] = field(default_factory=dict)
+    measures: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     @property
     def seconds(self) -> float:
@@ -238,7 +240,7 @@ def _moment(moment: Moment, names: _Names, step: int, rate: float, detail: Detai
         "context": [list(pair) for pair in moment.context],
         "channels": list(moment.channels),
         "candidates": [_candidate(each, names) for each in moment.candidates[: detail.candidates]],
-        "ghosts": [_ghost(each, step, rate, detail) for each in moment.ghosts[: detail.ghosts]],
+        "ghosts": [_ghost(each, rate / step, detail) for each in moment.ghosts[: detail.ghosts]],
         "landscape": _landscape(rows, names, detail.bins) if rows else None,
     }
 
@@ -255,8 +257,9 @@ def _candidate(each: Candidate, names: _Names) -> dict[str, object]:
     }
 
 
-def _ghost(ghost: Ghost, step: int, rate: float, detail: Detail) -> dict[str, object]:
-    shown = ghost.positions[: max(1, round(detail.ghost_s * rate)) : step]
+def _ghost(ghost: Ghost, shown_hz: float, detail: Detail) -> dict[str, object]:
+    moments = np.arange(max(1, round(detail.ghost_s * shown_hz))) / shown_hz
+    shown = ghost.positions[np.minimum(np.round(moments * ghost.rate).astype(np.int64), len(ghost.positions) - 1)]
     packed = _packed(_whole(shown, 1000.0, np.int16).reshape(len(shown), -1), is_delta=True)
     return {**packed, "asset": ghost.asset, "plays_on": ghost.plays_on, "frames": len(shown)}
 

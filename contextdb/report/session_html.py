@@ -106,12 +106,13 @@ def _measures(sessions: Sequence[SessionView], names: Sequence[str]) -> str:
     """A row for each measure, a column for each session, and what the raw clips have."""
     rows: dict[str, list[str]] = {}
     for place, session in enumerate(sessions):
-        for name, value in session.measures.items():
-            rows.setdefault(name, [""] * len(sessions))[place] = value
+        for name, (value, raw) in session.measures.items():
+            row = rows.setdefault(name, [""] * (len(sessions) + 1))
+            row[place], row[-1] = value, raw or row[-1]
     if not rows:
         return ""
+    head = ["measure", *(names if len(names) > 1 else ["session"]), "raw clips"]
     lines = [[name, *values] for name, values in rows.items()]
-    head = ["measure", *(names if len(names) > 1 else ["value"])]
     return f"<h2>Measures</h2>\n{_table(head, lines, numbers=range(1, len(head)))}"
 
 

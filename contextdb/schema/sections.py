@@ -40,6 +40,8 @@ def condition_to_dict(condition: Condition) -> Part:
         said["mirror"] = dict(condition.mirror) if isinstance(condition.mirror, tuple) else condition.mirror
     if condition.weight != 1.0:
         said["weight"] = condition.weight
+    if condition.hysteresis:
+        said["hysteresis"] = condition.hysteresis
     return said
 
 

@@ -44,6 +44,7 @@ _EACH_ONCE = 'each name in one pair, such as { Left = "Right" }'
 KINDS_WITH = {
     **dict.fromkeys(("min", "max"), names_where(lambda kind: kind.is_bounded)),
     "values": names_where(lambda kind: kind.has_values),
+    "hysteresis": names_where(lambda kind: kind.is_decimal),
 }
 
 
@@ -359,6 +360,9 @@ def _condition_faults(path: Path, part: Section) -> Iterator[Found]:
         yield from (((*path, key), fault) for key, fault in unread.items())
         if kind in KINDS:
             yield from _bound_faults(path, of, {key: bound for key, bound in bounds.items() if key not in unread})
+    if kind in KINDS and KINDS[kind].is_whole and fitting.get("hysteresis", 0) % 1:
+        found = f"{_header(path)} {_said('hysteresis', fitting['hysteresis'])}: {KINDS[kind].noun} has only whole neighbours."
+        yield (*path, "hysteresis"), Fault(found, "a whole number", _said("hysteresis", math.ceil(fitting["hysteresis"])))
     if kind in KINDS and "mirror" in fitting:
         yield from _mirror_faults(path, fitting)
 
@@ -556,6 +560,7 @@ def _condition(name: str, part: Section) -> Condition:
         part.get("expr"),
         mirror=_mirror(part.get("mirror")),
         weight=float(part.get("weight", 1.0)),
+        hysteresis=float(part.get("hysteresis", 0.0)),
     )
 
 

@@ -213,6 +213,7 @@ EXPRESSION = Shape('an expression as text, such as "speed - target_speed"', wron
 EXPRESSIONS = Shape('a list of expressions, such as ["not (IsRunning and IsIdle)"]', _wrong_list, _meant_names(r"\A|\Z"))
 NUMBER = Shape("a number, such as -1.5", _wrong_number, _meant_number)
 WEIGHT = Shape("a number from 0 up, such as 2.0", _wrong_weight, _meant_number)
+HYSTERESIS = Shape("a number from 0 up, such as 0.2", _wrong_weight, _meant_number)
 BOUND = Shape("a number, such as -1.5", _wrong_bound, _meant_number)
 """A number as its type writes it; whether that fits is for the type to say."""
 NAMES = Shape('a list of different names, such as ["A", "B"]', _wrong_list, _meant_names(","))
@@ -241,6 +242,7 @@ SECTIONS: dict[str, Mapping[str, Shape] | None] = {
         "expr": EXPRESSION,
         "mirror": MIRROR,
         "weight": WEIGHT,
+        "hysteresis": HYSTERESIS,
     },
     "tables": {
         "file": FILE,

@@ -15,7 +15,7 @@ from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError, SchemaError
 from contextdb.motion import Clip, FeatureSchema, Skeleton, features_of, make_clip, query_from, steady_path
-from contextdb.motion.clips.feet import feet_of
+from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.features.channels import AXES, WHATS
 from contextdb.motion.features.extraction import clip_features
 from contextdb.motion.features.schema import Channel

@@ -32,6 +32,9 @@ SETTINGS = st.builds(
     history_s=SECONDS,
     variation=st.sampled_from([None, None, Variation(1.0), Variation(4.0, 2)]),
     rate=st.just(RATE),
+    cost_bar=st.sampled_from([None, 0.0, 1.0, 4.0]),
+    grace_s=SECONDS,
+    until_natural=st.booleans(),
 )
 
 
@@ -79,8 +82,9 @@ def crowds(draw):
 
 def answers(data, n):
     """What a table whose rows are the assets answers to n contexts."""
-    cells = data.draw(st.lists(st.sampled_from(["Any", "<2", ">1"]), min_size=3, max_size=3))
-    compiled = cdb.Table.from_columns({"Asset": list(NAMES), "speed": cells}, {"speed": {"type": "number"}}).compile()
+    cells = data.draw(st.lists(st.sampled_from(["Any", "<2", ">1", "<2 ~0.5"]), min_size=3, max_size=3))
+    speed = {"type": "number", "hysteresis": data.draw(st.sampled_from([0.0, 1.25]))}
+    compiled = cdb.Table.from_columns({"Asset": list(NAMES), "speed": cells}, {"speed": speed}).compile()
     return compiled.query_many({"speed": data.draw(st.lists(st.sampled_from([0.0, 1.5, 3.0]), min_size=n, max_size=n))})
 
 

@@ -32,9 +32,11 @@ def scenes(draw):
             rows.append(f"{name},{tag},{start},{start + length},{0.1 if length and tag == 'NextNaturalOnly' else ''}")
     made = line("\n".join(rows), continuing=draw(st.sampled_from([0.0, -0.5, -3.0])), **assets)
     seconds = st.sampled_from([0.0, 0.1, 0.2, 0.3])
-    rules = {key: draw(seconds) for key in ("search_every_s", "jump_threshold_s", "history_s")}
+    rules = {key: draw(seconds) for key in ("search_every_s", "jump_threshold_s", "history_s", "grace_s")}
+    rules["cost_bar"] = draw(st.sampled_from([None, 0.0, 1.0, 4.0]))
+    rules["until_natural"] = draw(st.booleans())
     masks = st.one_of(st.none(), st.lists(st.booleans(), min_size=len(names), max_size=len(names)))
-    asked = draw(st.lists(st.tuples(st.integers(0, 6), masks), min_size=1, max_size=25))
+    asked = draw(st.lists(st.tuples(st.integers(0, 6), masks, st.sampled_from([False] * 4 + [True])), min_size=1, max_size=25))
     return made, rules, asked
 
 
@@ -44,10 +46,11 @@ def test_every_update_follows_from_the_rules_read_frame_by_frame(scene):
     database, rules, asked = scene
     one = Controller(Selector([Entry("a", database)]), ControllerSettings(**rules, rate=RATE))
     oracle = Oracle(database, rules)
-    for place, mask in asked:
-        decision = one.update(DT, [float(place)], None if mask is None else np.array(mask))
-        expected = oracle.update(float(place), mask)
+    for place, mask, interrupt in asked:
+        decision = one.update(DT, [float(place)], None if mask is None else np.array(mask), interrupt=interrupt)
+        expected = oracle.update(float(place), mask, interrupt)
         assert (decision.action, decision.searched, decision.playing and decision.playing.frame) == expected
+        assert decision.held == oracle.held
 
 
 class Oracle:
@@ -55,17 +58,25 @@ class Oracle:
 
     def __init__(self, database, rules):
         self.database = database
-        self.n = {key: round(seconds * RATE) for key, seconds in rules.items()}
+        self.n = {key: round(seconds * RATE) for key, seconds in rules.items() if key.endswith("_s")}
+        self.bar, self.is_until_natural = math.inf if rules["cost_bar"] is None else rules["cost_bar"], rules["until_natural"]
         self.frame, self.tick, self.searched_at, self.played = None, 0, 0, {}
+        self.held, self.waiting_from = "", None
 
-    def update(self, place, mask):
+    def update(self, place, mask, interrupt=False):
         self.tick += 1
         following, passed, is_looped = self._following()
-        searched = self._must_search(following, mask)
-        may_continue = following is not None and self._is_valid(following, mask)
+        is_forced = following is not None and not interrupt and not self._is_valid(following, mask)
+        self.held = self._held_by_nature(following, is_looped) if is_forced else ""
+        searched = not self.held and (interrupt or self._must_search(following, mask))
+        may_continue = following is not None and not interrupt and self._is_valid(following, mask)
         before, here = self.frame, (passed or [self.frame])[-1]
         self.played.update(dict.fromkeys(passed, self.tick))
         chosen = self._best(place, mask, here, may_continue, following is None) if searched else following
+        is_over = is_forced and searched and chosen is not None and self._cost(chosen, place) > self.bar
+        if is_over and self.tick - (self.waiting_from or self.tick) < self.n["grace_s"]:
+            self.held, chosen = "cost bar", None
+        self.waiting_from = (self.waiting_from or (self.tick if self.held == "cost bar" else None)) if self.held else None
         if searched:
             self.searched_at = self.tick
         self.frame = here if chosen is None else chosen
@@ -79,6 +90,18 @@ class Oracle:
         if chosen == following and (may_continue or not searched):
             return onward, searched, chosen
         return Action.START if before is None else Action.JUMP, True, chosen
+
+    def _held_by_nature(self, following, is_looped):
+        if self.database.marks.mark_of(following) & Mark.NEXT_NATURAL and not is_looped:
+            return "next natural"
+        is_looping = self._loops(self.database.range_of(following))
+        return "until natural" if self.is_until_natural and not is_looping else ""
+
+    def _loops(self, i):
+        return self.database.marks.looping[i] and self.database.stops[i] - self.database.starts[i] > 1
+
+    def _cost(self, frame, place):
+        return float(self.database.features[frame, 0] - place) ** 2
 
     def _following(self):
         """The frame one on, None for none; the frames that are passed on the way; and whether the end was passed."""
@@ -109,7 +132,7 @@ class Oracle:
             is_current = may_continue and frame == here
             if not is_current and not self._may_enter(frame, mask, here, is_ended):
                 continue
-            cost = float(self.database.features[frame, 0] - place) ** 2
+            cost = self._cost(frame, place)
             cost += self.database.biases.continuing if is_current else 0.0
             if cost < least or (cost == least and is_current):
                 found, least = frame, cost

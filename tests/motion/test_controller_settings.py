@@ -20,6 +20,8 @@ def test_settings_are_read_from_the_project():
     found, faults = read(**keys)
     assert found == [("player", "loco", ControllerSettings(0.0, 0.5, 1.0, Variation(0.05, 2)))]
     assert faults == []
+    guards = {"cost_bar": 2, "grace_s": 0.5, "until_natural": True}
+    assert read(**guards)[0] == [("player", "loco", ControllerSettings(**guards))]
     assert read()[0] == [("player", "loco", ControllerSettings())]
 
 
@@ -32,6 +34,10 @@ def test_settings_are_read_from_the_project():
         ({"jump_threshold_s": -1}, "jump_threshold_s = -1: this is out of range"),
         ({"variation_memory": 2}, 'has "variation_memory", but without "variation_within" nothing varies'),
         ({"variation_within": 0.1, "variation_memory": 1.5}, "this is not a whole number. Accepted: a whole number from 0 to 1000"),
+        ({"cost_bar": "high"}, 'cost_bar = "high": this is text, not a number. Accepted: a cost from 0 to 1e30, such as 1.0'),
+        ({"grace_s": 61}, "grace_s = 61: this is out of range"),
+        ({"grace": 0.2}, 'has no key "grace"'),
+        ({"until_natural": "yes"}, 'until_natural = "yes": this is text, neither true nor false. Accepted: true or false'),
         ({"variation_within": True}, "variation_within = true: this is true or false, not a number"),
     ],
 )

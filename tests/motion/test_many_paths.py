@@ -13,6 +13,8 @@ from strategies import examples
 from contextdb.errors import MotionError, QueryError
 from contextdb.motion import FeatureSchema, ManySteered, ManyTrajectories, Trajectory, steered_paths, with_path, with_paths
 from contextdb.motion.clips.steering import Steered, steered_path
+from contextdb.motion.features.extraction import trajectory_features
+from contextdb.motion.features.path_features import write_paths
 
 WHATS = ("position", "direction", "velocity", "direction_to_velocity", "speed")
 SIZES = st.floats(-20.0, 20.0)
@@ -52,6 +54,21 @@ def test_the_queries_of_a_crowd_are_those_of_each_alone_to_the_last_bit(schema, 
         found = with_paths(schema, poses, wanted)
         assert found.dtype == np.float32
         assert np.array_equal(found, expected)
+
+
+@examples(2)
+@given(schemas(), st.data())
+def test_the_features_of_a_wished_path_are_those_that_a_database_has_of_it(schema, data):
+    n_frames = data.draw(st.integers(1, 20))
+    path = data.draw(trajectories(n_frames, data.draw(st.integers(0, n_frames - 1))))
+    pose = np.random.default_rng(1).normal(size=(1, schema.n_features))
+    expected, found = pose.copy(), pose.copy()
+    for channel in schema.channels:
+        if channel.type == "trajectory":
+            expected[:, schema.slices[channel.name]] = trajectory_features(channel, path, np.array([path.now]))
+    write_paths(schema, found, ManyTrajectories.of([path]))
+    assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    assert np.array_equal(with_path(schema, pose[0], path), found[0].astype(np.float32))
 
 
 @given(st.lists(st.tuples(BODIES, PAIRS, SIZES), max_size=4), st.booleans(), st.floats(0.0, 1.0))

@@ -244,7 +244,8 @@ def test_poses_tell_their_jumps_without_a_session():
     decided = session(("low", 30), ("high", 31))
     stream = PoseStream(TWO, PoseSettings(root="animation", blend="none", foot_lock=False))
     poses = [stream.update(decision, 1.0 / RATE) for decision in decided]
-    alone, with_session = measure(poses, TWO, rate=RATE), measure(traced(decided), TWO, poses=poses)
+    alone, with_session = measure(poses, TWO), measure(traced(decided), TWO, poses=poses)
+    assert alone == measure(poses, TWO, rate=RATE)
     again = measure(traced(decided), TWO, settings=PoseSettings(root="animation", blend="none", foot_lock=False))
     assert with_session == again
     for name in ("jumps", "jump_cm", "jump_mps", "forced_jumps", "stay_s", "skate_cm_s", "accel_p99", "frames_used_share"):

@@ -13,7 +13,7 @@ from test_mocap import FOLDER, listed, load
 
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, FeatureSchema, LocalPoses, Skeleton, forward_kinematics, local_poses, make_clip, poses_of
-from contextdb.motion.clips.feet import feet_of
+from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.mirror import mirrored, mirrored_path, partners_of, unevenness
 from contextdb.motion.clips.own_axes import fixed_joints, has_even_axes, own_axes
 from contextdb.motion.clips.quaternions import inverse, matrices, multiply, rotation_vectors

@@ -75,7 +75,7 @@ def test_searches_starts_and_reasons_all_go_by_the_mirror(database):
 
 
 def test_what_plays_mirrored_plays_on_while_the_mirrored_facts_allow_it(database):
-    settings = ControllerSettings(search_every_s=60.0, jump_threshold_s=0.0, history_s=0.0, rate=30.0)
+    settings = ControllerSettings(search_every_s=60.0, jump_threshold_s=0.0, history_s=0.0, rate=30.0, grace_s=0.0)
     one, compiled = Controller(Selector([Entry("a", database)]), settings), table()
     at = next(i for i, a in enumerate(database.assets) if a == TURNS[1] and database.mirrored[i])
     query = database.raw(int(database.starts[at]))
@@ -87,6 +87,20 @@ def test_what_plays_mirrored_plays_on_while_the_mirrored_facts_allow_it(database
     jumped = one.update(DT, query, live.matches())
     assert (jumped.playing.asset, jumped.playing.mirrored) in {(TURNS[0], True), (TURNS[1], False)}
     assert "not valid" in jumped.why
+
+
+def test_what_plays_mirrored_stays_valid_by_the_hysteresis_of_mirrored_facts(database):
+    direction = {"type": "angle", "hysteresis": 10.0}
+    compiled = cdb.Table.from_columns(COLUMNS, {"direction": direction}).compile()
+    one = Controller(Selector([Entry("a", database)]), ControllerSettings(60.0, 0.0, 0.0, rate=30.0, grace_s=0.0))
+    at = next(i for i, a in enumerate(database.assets) if a == TURNS[1] and database.mirrored[i])
+    query = database.raw(int(database.starts[at]))
+    decisions = [one.update(DT, query, compiled.query({"direction": degrees})) for degrees in (50.0, 36.0, 34.0)]
+    assert [(d.playing.asset, d.playing.mirrored, d.held) for d in decisions[:2]] == [
+        (TURNS[1], True, ""),
+        (TURNS[1], True, "hysteresis"),
+    ]
+    assert (decisions[2].action, decisions[2].playing.asset) == (Action.JUMP, "walk")
 
 
 def test_soft_cells_cost_a_mirrored_range_what_they_cost_with_mirrored_facts(database):
@@ -154,6 +168,7 @@ order = [{ database = "turns" }]
 
 [controllers.player]
 selector = "turns"
+grace_s = 0
 """
 
 

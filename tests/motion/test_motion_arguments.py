@@ -39,12 +39,16 @@ STEERED = [motion.Steered()]
 MANY_STEERED = motion.ManySteered.of(STEERED)
 CONFIG = motion.MotionConfig()
 FALLS = motion.footfalls(CLIP)
+LIVE = motion.LivePose(motion.poses_of(CLIP).positions[0], motion.local_poses(CLIP).rotations[0])
+HISTORY = motion.PoseHistory(CLIP.skeleton)
 NODE = motion.MatchNode(motion.MotionDatabase.build([CLIP], SCHEMA))
+PLAY = NODE.enter(NODE.database.raw(0), motion.Target(0, 1))
 BANK = motion.PoseBank.build([CLIP], SCHEMA)
 BUILT = motion.MotionDatabase.build([CLIP], SCHEMA)
 DECISION = motion.Controller(motion.Selector([motion.Entry("only", BUILT)])).update(0.0, BUILT.raw(0))
 BY_CLIP = motion.PoseSettings(root="animation")
 POSED = [motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1)]
+PLAYER = motion.Character(motion.Controller(motion.Selector([motion.Entry("only", BUILT)])), SCHEMA, None, motion.PoseStream(BANK))
 Call = Callable[[object], object]
 CALLS: dict[str, Call] = {
     "load_bvh(path)": lambda x: motion.load_bvh(x),
@@ -68,7 +72,6 @@ CALLS: dict[str, Call] = {
     "footfalls(clip)": lambda x: motion.footfalls(x),
     "footfalls(feet)": lambda x: motion.footfalls(CLIP, x),
     "footfalls(slowest_mps)": lambda x: motion.footfalls(CLIP, slowest_mps=x),
-    "footfalls(highest_m)": lambda x: motion.footfalls(CLIP, highest_m=x),
     "mirrored(moved)": lambda x: motion.mirrored(x, [("LeftFoot", "RightFoot")]),
     "mirrored(pairs)": lambda x: motion.mirrored(POSES, x),
     "mirrored_path(path)": lambda x: motion.mirrored_path(x),
@@ -87,6 +90,13 @@ CALLS: dict[str, Call] = {
     "query_from(schema)": lambda x: motion.query_from(x, CLIP),
     "query_from(clip)": lambda x: motion.query_from(SCHEMA, x),
     "query_from(frame)": lambda x: motion.query_from(SCHEMA, CLIP, x),
+    "query_from_pose(schema)": lambda x: motion.query_from_pose(x, LIVE, HISTORY),
+    "query_from_pose(pose)": lambda x: motion.query_from_pose(SCHEMA, x, HISTORY),
+    "query_from_pose(history)": lambda x: motion.query_from_pose(SCHEMA, LIVE, x),
+    "PoseHistory(skeleton)": lambda x: motion.PoseHistory(x),
+    "PoseHistory(rate)": lambda x: motion.PoseHistory(CLIP.skeleton, x),
+    "PoseHistory(seconds)": lambda x: motion.PoseHistory(CLIP.skeleton, 30.0, x),
+    "PoseHistory.add(pose)": lambda x: HISTORY.add(x),
     "query_from(wanted)": lambda x: motion.query_from(SCHEMA, CLIP, 0, x),
     "with_path(schema)": lambda x: motion.with_path(x, PARTS[0].features[0], PATH),
     "with_path(query)": lambda x: motion.with_path(SCHEMA, x, PATH),
@@ -176,6 +186,9 @@ CALLS: dict[str, Call] = {
     "pose_schema(rate)": lambda x: motion.pose_schema(CLIP.skeleton, rate=x),
     "ControllerSettings(search_every_s)": lambda x: motion.ControllerSettings(x),
     "ControllerSettings(rate)": lambda x: motion.ControllerSettings(rate=x),
+    "ControllerSettings(cost_bar)": lambda x: motion.ControllerSettings(cost_bar=x),
+    "ControllerSettings(grace_s)": lambda x: motion.ControllerSettings(grace_s=x),
+    "ControllerSettings(until_natural)": lambda x: motion.ControllerSettings(until_natural=x),
     "ControllerSettings(variation)": lambda x: motion.ControllerSettings(variation=x),
     "Variation(within)": lambda x: motion.Variation(x),
     "Variation(memory)": lambda x: motion.Variation(0.1, x),
@@ -208,6 +221,7 @@ CALLS: dict[str, Call] = {
     "MatchGate(threshold)": lambda x: motion.MatchGate(DATABASE, x),
     "MatchGate.update(query)": lambda x: motion.MatchGate(DATABASE, 1.0).update(x),
     "MatchNode.enter(query)": lambda x: NODE.enter(x, motion.Target(0, 1)),
+    "MatchPlay.decision(database)": lambda x: isinstance(x, str) or PLAY.decision(x),
     "MatchNode.enter(target)": lambda x: NODE.enter([0.0] * SCHEMA.n_features, x),
     "Target(left_m)": lambda x: motion.Target(x, 1.0),
     "Markup.parse(text)": lambda x: motion.Markup.parse(x),
@@ -246,6 +260,9 @@ CALLS: dict[str, Call] = {
     "PoseStream.update(decision)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(x, 0.1),
     "PoseStream.update(dt)": lambda x: motion.PoseStream(BANK, BY_CLIP).update(DECISION, x),
     "PoseStream.update(body)": lambda x: x is None or motion.PoseStream(BANK).update(DECISION, 0.1, x),
+    "PoseStream.update(ground)": lambda x: (
+        x is None or callable(x) or motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1, None, x)
+    ),
     "PoseStream.restore(state)": lambda x: motion.PoseStream(BANK).restore(x),
     "clip_of_poses(poses)": lambda x: motion.clip_of_poses(x, BANK, 30.0),
     "clip_of_poses(poses), one": lambda x: motion.clip_of_poses([x], BANK, 30.0),
@@ -314,6 +331,38 @@ CALLS: dict[str, Call] = {
     "Steered.moved(dt_s)": lambda x: motion.Steered().moved(x, (0.0, 1.0)),
     "Steered.moved(wanted)": lambda x: motion.Steered().moved(0.1, x),
     "Steered(position)": lambda x: motion.Steered(x),
+    "Character(controller)": lambda x: motion.Character(x, SCHEMA),
+    "Character(schema)": lambda x: motion.Character(PLAYER.controller, x),
+    "Character(tables)": lambda x: motion.Character(PLAYER.controller, SCHEMA, x),
+    "Character(stream)": lambda x: motion.Character(PLAYER.controller, SCHEMA, None, x),
+    "Character(body)": lambda x: motion.Character(PLAYER.controller, SCHEMA, None, None, x),
+    "Character(own_facts)": lambda x: motion.Character(PLAYER.controller, SCHEMA, own_facts=x),
+    "Character(pose)": lambda x: motion.Character(PLAYER.controller, SCHEMA, pose=x),
+    "Character(unknown)": lambda x: motion.Character(PLAYER.controller, SCHEMA, unknown=x),
+    "Character.of(project)": lambda x: motion.Character.of(x, "player"),
+    "Character.record(n_candidates)": lambda x: PLAYER.copy().record(x),
+    "Character.body": lambda x: setattr(PLAYER.copy(), "body", x),
+    "Character.restore(state)": lambda x: PLAYER.restore(x),
+    "Character.update(dt)": lambda x: PLAYER.copy().update(x),
+    "Character.update(stick)": lambda x: PLAYER.copy().update(0.1, x),
+    "Character.update(facts)": lambda x: PLAYER.copy().update(0.1, facts=x),
+    "Character.update(facing)": lambda x: PLAYER.copy().update(0.1, facing=x),
+    "Character.update(body)": lambda x: PLAYER.copy().update(0.1, body=x),
+    "Character.update(path)": lambda x: PLAYER.copy().update(0.1, path=x),
+    "Character.update(tags)": lambda x: PLAYER.copy().update(0.1, tags=x),
+    "Character.update(valid)": lambda x: PLAYER.copy().update(0.1, valid=x),
+    "path_from(root)": lambda x: motion.path_from(x, PATH),
+    "path_from(path)": lambda x: motion.path_from((0.0, 0.0, 0.0), x),
+    "path_from(halflife_s)": lambda x: motion.path_from((0.0, 0.0, 1.0), PATH, halflife_s=x),
+    "Crowd(characters)": lambda x: motion.Crowd(x),
+    "Crowd(characters), one": lambda x: motion.Crowd([x]),
+    "Crowd.add(character)": lambda x: motion.Crowd().add(x),
+    "Crowd.remove(character)": lambda x: motion.Crowd().remove(x),
+    "Crowd.restore(states)": lambda x: motion.Crowd([PLAYER.copy()]).restore(x),
+    "Crowd.update(dt)": lambda x: motion.Crowd([PLAYER.copy()]).update(x, [(0.0, 1.0)]),
+    "Crowd.update(sticks)": lambda x: motion.Crowd([PLAYER.copy()]).update(0.1, x),
+    "Crowd.update(facts)": lambda x: motion.Crowd([PLAYER.copy()]).update(0.1, [(0.0, 1.0)], x),
+    "Crowd.update(facing)": lambda x: motion.Crowd([PLAYER.copy()]).update(0.1, [(0.0, 1.0)], facing=x),
     "Marks.left_out(tags)": lambda x: DATABASE.marks.left_out(x),
     "Marks.tag_biases(tags)": lambda x: DATABASE.marks.tag_biases(x),
 }

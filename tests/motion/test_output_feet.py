@@ -173,3 +173,13 @@ def test_a_place_out_of_reach_stretches_the_leg_toward_it_and_the_knee_never_sla
     assert max(angles) < 173.0
     assert np.diff(angles).min() > -1e-9
     assert np.linalg.norm(c - a) > 0.997 * (0.46 + 0.45)
+
+
+def test_a_foot_that_had_to_be_let_go_is_locked_again_while_it_is_down():
+    def body(t):
+        return (0.0, 3.0 * min(t, 0.3), 0.0)
+
+    poses = streamed([("idle", 0.0, 60)], body, root="code", foot_radius_m=0.3)
+    over, _ = slides(poses[30:])
+    assert slides(poses[:20])[0].max() > 0.02
+    assert over.max() < 1e-6

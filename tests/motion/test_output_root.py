@@ -54,6 +54,7 @@ def test_a_steered_body_may_be_given_as_it_is():
 @pytest.mark.parametrize("weight", [0.0, 0.3, 1.0])
 def test_weights_share_the_movement_between_animation_and_game(weight):
     free = {"position_pull_s": 0.0, "rotation_pull_s": 0.0, "position_clamp_m": 1000.0, "rotation_clamp_deg": 180.0}
+    free |= {"path_alignment": False, "min_stride": 1.0, "max_stride": 1.0}
     settings = PoseSettings(position_weight=weight, rotation_weight=0.0, blend="none", **free)
     found = roots([("walk", 0.0, 61)], settings, lambda t: (3.0 * t, 0.0, 0.0))
     clip = bank().root[bank().starts[range_of("walk")] :][[0, 60]].astype(float)
@@ -122,3 +123,30 @@ def test_the_velocity_of_the_root_has_no_step_where_a_run_becomes_an_idle():
     assert abs(steps[1][600] - steps[1][598]) > 2.0
     assert abs(steps[0][600] - steps[0][598]) < 0.3
     np.testing.assert_allclose(smooth[-1], cut[-1], atol=0.02)
+
+
+def test_in_the_mode_path_the_clip_says_how_fast_and_the_game_where_to():
+    settings = PoseSettings(root="path", blend="none")
+    found = roots([("walk", 0.0, 90)], settings, lambda t: (0.3 * t, 0.4 * t, 0.0))
+    away = np.abs(found[:, 0] * 0.8 - found[:, 1] * 0.6)
+    assert away.max() < 1e-6
+    clip = bank().root[bank().starts[range_of("walk")] :][:90].astype(float)
+    far = np.linalg.norm(np.diff(clip[:, :2], axis=0), axis=1)[1:].sum()
+    assert math.hypot(*(found[-1] - found[1])[:2]) == pytest.approx(far, rel=0.01)
+
+
+def test_in_the_mode_path_what_lies_to_the_side_of_the_way_is_made_up_for():
+    stream = PoseStream(bank(), PoseSettings(root="path"))
+    poses = [
+        stream.update(d, STEP if d.tick else 0.0, (0.1 if d.tick else 0.0, 0.04 * d.tick, 0.3 if d.tick else 0.0))
+        for d in decisions([("walk", 0.0, 60)], STEP)
+    ]
+    assert poses[-1].root[0] == pytest.approx(0.1, abs=0.01)
+    assert poses[-1].root[2] == pytest.approx(0.3, abs=0.01)
+
+
+def test_in_the_mode_path_who_is_told_to_stand_is_left_where_the_clip_puts_it():
+    found = roots(
+        [("walk", 0.0, 30)], PoseSettings(root="path", position_pull_s=0.0, position_clamp_m=1000.0), lambda t: (0.0, 0.0, 0.0)
+    )
+    assert found[-1][1] > 0.8

@@ -112,6 +112,23 @@ def test_a_jump_changes_neither_the_pose_nor_its_velocity(settings, segments, th
     np.testing.assert_allclose(velocities[1], velocities[0], atol=0.02 * fastest)
 
 
+@given(st.floats(0.6, 1.6), st.floats(0.6, 1.6), between_frames, between_frames)
+def test_a_jump_between_rates_of_play_changes_no_velocity(rate, to_rate, from_s, to_s):
+    short, velocities = 1e-5, []
+    for then in ("walk", "run"):
+        stream = PoseStream(bank(), SPRING)
+        time_s, shown = from_s, []
+        for i in range(5):
+            name, own = ("walk", rate) if i < 3 else (then, rate if then == "walk" else to_rate)
+            before = None if i == 0 else playing_at("walk", from_s + i * rate * short)
+            time_s = to_s if i == 3 and then == "run" else from_s if i == 0 else time_s + (own if i != 3 else rate) * short
+            action = Action.START if i == 0 else Action.JUMP if i == 3 and then == "run" else Action.CONTINUE
+            decision = Decision(i, 0.0, action, "", False, playing_at(name, time_s), before, play_rate=own)
+            shown.append(stream.update(decision, short if i else 0.0))
+        velocities.append((shown[4].rotations - shown[3].rotations) / short)
+    np.testing.assert_allclose(velocities[1], velocities[0], atol=0.06)
+
+
 def test_the_shown_pose_is_off_by_no_more_than_the_jump_and_comes_to_the_clip():
     poses = streamed([("run", 0.1, 10), ("idle", 0.5, 60)], SPRING)
     plain = streamed([("run", 0.1, 10), ("idle", 0.5, 60)], OFF)

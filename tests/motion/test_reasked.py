@@ -180,3 +180,34 @@ def test_a_session_of_format_1_is_read_with_the_candidates_that_it_kept(trace, t
     assert kept[dense].candidates[0][1].rows[:3] == trace[dense].candidates[0][1].rows[:3]
     with pytest.raises(MotionError, match="does not say how its updates were made"):
         kept.what_if(DATABASES)
+
+
+def test_recording_works_no_candidate_out_until_it_is_asked_for(monkeypatch):
+    asked = []
+    of = candidates.of
+    monkeypatch.setattr(candidates, "of", lambda *given: asked.append(given) or of(*given))
+    recorder = Trace(4)
+    controller = Controller(Selector([Entry("loco", LOCO)]), recorder=recorder)
+    decisions = [controller.update(1 / 30, LOCO.raw(frame), force=True) for frame in (3, 40, 90)]
+    assert (len(recorder), len(asked)) == (3, 0)
+    assert decisions[1].candidates[0][1].rows[0].cost == decisions[1].choice.hit.cost
+    assert len(asked) == 2
+
+
+def test_a_session_without_candidates_holds_nothing_to_ask_again():
+    recorder = Trace(0)
+    controller = Controller(Selector([Entry("loco", LOCO)]), recorder=recorder)
+    controller.update(1 / 30, LOCO.raw(3))
+    assert (recorder[0].candidates, recorder[0].filters, recorder[0].inputs) == ((), (), None)
+    with pytest.raises(MotionError, match="it was to keep no candidates"):
+        recorder.reasked({"loco": LOCO})[0]
+
+
+def test_a_caller_that_changes_its_arrays_later_changes_no_recorded_search():
+    recorder = Trace(4)
+    controller = Controller(Selector([Entry("loco", LOCO)]), recorder=recorder)
+    valid, bias = np.ones(len(LOCO.assets), np.bool_), np.zeros(LOCO.n_frames)
+    decision = controller.update(1 / 30, LOCO.raw(3), {"loco": valid}, bias={"loco": bias})
+    valid[:], bias[:] = False, np.inf
+    assert decision.candidates[0][1].rows[0].cost == decision.choice.hit.cost
+    assert recorder.reasked()[0].choice == decision.choice

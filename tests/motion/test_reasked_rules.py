@@ -168,6 +168,7 @@ def test_a_database_with_more_assets_before_the_others_is_asked_alike(seed):
             continue
         if not decision.choice:
             continue
+        assert not each.is_changed
         assert each.choice.database == decision.choice.database
         assert each.choice.hit.asset == decision.choice.hit.asset
         assert each.choice.hit.frame == decision.choice.hit.frame + 5

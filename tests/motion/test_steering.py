@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -31,6 +32,33 @@ def test_it_turns_the_shorter_way_and_faces_where_it_goes(heading, direction):
     body = Steered(heading=heading).moved(10.0, wanted)
     assert math.remainder(body.heading - direction, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-4)
     assert abs(body.heading - heading) <= math.pi + 1e-6
+
+
+PLACES = st.floats(-50.0, 50.0)
+PAIRS = st.tuples(PLACES, PLACES)
+HALFLIVES = st.floats(0.02, 2.0)
+BODIES = st.builds(Steered, PAIRS, PAIRS, PAIRS, st.floats(-9.0, 9.0), SPEEDS, HALFLIVES, HALFLIVES)
+
+
+def path_step_by_step(past, wanted, facing, reach_s, rate):
+    """The bodies of a path one by one, each a long step from the present."""
+    future = [past[-1].moved(i / rate, wanted, facing) for i in range(1, math.ceil(reach_s * rate) + 1)]
+    bodies = [*past, *future]
+    return np.array([body.position for body in bodies]), np.unwrap([body.heading for body in bodies])
+
+
+@given(
+    st.lists(BODIES, min_size=1, max_size=3),
+    PAIRS,
+    st.none() | st.floats(-9.0, 9.0),
+    st.floats(0.0, 2.0),
+    st.sampled_from([10.0, 30.0, 60.0]),
+)
+def test_a_path_is_what_each_of_its_moments_is_alone(past, wanted, facing, reach_s, rate):
+    path = steered_path(past, wanted, facing, reach_s=reach_s, rate=rate)
+    positions, headings = path_step_by_step(past, wanted, facing, reach_s, rate)
+    assert path.positions == pytest.approx(positions, rel=1e-12, abs=1e-12 * 2e3)
+    assert path.headings == pytest.approx(headings, rel=1e-12, abs=1e-12)
 
 
 def test_standing_it_keeps_its_facing_unless_told():

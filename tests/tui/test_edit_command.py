@@ -80,16 +80,14 @@ def test_without_a_terminal_it_says_what_to_use_instead(folder):
     [
         (["t.csv"], {"TERM": "dumb"}, "the terminal cannot move its cursor (TERM is dumb)"),
         (["t.csv"], {"TERM": ""}, "the terminal cannot move its cursor (TERM is not set)"),
-        (["nowhere.csv"], {}, "nowhere.csv: there is no such"),
-        (["empty"], {}, "the folder holds no table"),
+        (["no/where.csv"], {}, "no/where.csv: there is no such"),
         (["t.csv", "--theme", "contextdb-drak"], {}, 'there is no theme "contextdb-drak"'),
         (["t.csv"], {"CONTEXTDB_EDITOR": "bad.toml"}, "cannot read the settings of the editor"),
         (["twice.csv"], {}, 'the column name "a" appears twice'),
     ],
-    ids=["dumb", "unset", "no-file", "empty-folder", "theme", "settings", "unreadable"],
+    ids=["dumb", "unset", "no-file", "theme", "settings", "unreadable"],
 )
 def test_what_cannot_be_opened_is_said_in_one_message(folder, arguments, more, said):
-    (folder / "empty").mkdir()
     (folder / "bad.toml").write_text("[keys")
     (folder / "twice.csv").write_text("a,a\nx,y\n")
     code, found = in_a_terminal(folder, *arguments, **more)

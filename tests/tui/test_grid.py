@@ -113,7 +113,7 @@ def test_three_lines_of_headers_say_name_type_unit_and_how_many_rows_the_fact_le
     sheet.set_fact("hit", "True")
     assert lines(sheet)[:3] == [
         "#    Asset   ↕│ speed   ↕│ hit     ↕│ gait    ↕│ Enabled ↕│",
-        "     asset    │ number ·…│ bool     │ enum     │ enabled  │",
+        "     asset    │ m/s      │ bool     │ enum     │ enabled  │",
         "              │          │ leaves 2 │          │          │",
     ]
 
@@ -122,7 +122,7 @@ def test_each_mark_says_without_colour_what_a_row_or_a_cell_is():
     sheet = sheet_of()
     sheet.set_fact("hit", "False")
     assert lines(sheet)[3:6] == [
-        "1    walk     │ 0..2     │×True     │ Walk     │ True     │",
+        "1×1  walk     │ 0..2     │×True     │ Walk     │ True     │",
         "2 ◉  run      │ Any      │ Any      │ Run      │ True     │",
         "3 –  jump     │!5; 9     │ False    │          │ False    │",
     ]
@@ -140,7 +140,7 @@ def test_the_test_row_stands_in_the_last_line_and_counts():
     sheet = sheet_of()
     assert lines(sheet)[-1].split() == ["?", "test", "row", "│", "│", "│", "│", "│"]
     sheet.set_fact("hit", "True")
-    assert lines(sheet, width=120)[-1].startswith("?    2 of 3 r…")
+    assert lines(sheet, width=120)[-1].startswith("?    2 of 3 v…")
 
 
 def test_an_empty_table_and_a_filter_that_hides_all_say_so():
@@ -325,7 +325,7 @@ def test_the_cursor_stays_in_sight_when_the_window_becomes_smaller(tmp_path):
 def test_down_from_the_last_row_goes_to_the_test_row_and_up_comes_back(ordinary):
     async def script(app, pilot):
         grid = app.main.assets.grid
-        await press(pilot, "right", "ctrl+end", "down")
+        await press(pilot, "right", "ctrl+end", "down", "down")
         there = grid.is_in_test_row
         await press(pilot, "down", "up")
         return there, grid.is_in_test_row, app.main.session.sheet.cursor
@@ -344,15 +344,15 @@ def test_a_column_that_is_no_condition_has_no_fact(tmp_path):
     assert with_editor(file, script) == ("Only conditions have a fact to test with.", ["walk"])
 
 
-def test_there_is_nothing_to_edit_where_there_is_no_row(tmp_path):
+def test_where_there_is_no_row_what_is_typed_makes_the_first(tmp_path):
     file = tmp_path / "none.csv"
     file.write_text("Asset,hit\n")
 
     async def script(app, pilot):
-        await press(pilot, "x")
-        return said(app)
+        await press(pilot, "x", "enter")
+        return app.main.session.sheet.table.columns[0].to_list()
 
-    assert with_editor(file, script) == "There is no row here. Ctrl+N makes one."
+    assert with_editor(file, script) == ["x"]
 
 
 def test_what_is_typed_faster_than_an_editor_opens_is_all_in_it(ordinary):
@@ -442,3 +442,45 @@ def test_whatever_is_pressed_undoing_all_gives_the_same_bytes(keys, tmp_path_fac
         return bytes_for(sheet.table, file)
 
     assert with_editor(file, script) == file.read_bytes()
+
+
+def test_after_a_paste_of_many_rows_one_stays_where_one_was(tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,note\n" + "".join(f"a{at},x\n" for at in range(300)))
+
+    async def script(app, pilot):
+        grid = app.main.assets.grid
+        grid.paste("\n".join(f"b{at}" for at in range(200)))
+        await press(pilot)
+        pasted = grid.look.top, app.main.session.sheet.cursor[0]
+        await press(pilot, *["shift+down"] * 3)
+        return pasted, grid.look.top > 0
+
+    assert with_editor(file, script) == ((0, 0), True)
+
+
+def test_a_selection_of_filtered_rows_does_not_grow_when_all_are_shown(tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,note\n" + "".join(f"a{at},{'x' if at % 2 else 'y'}\n" for at in range(8)))
+
+    async def script(app, pilot):
+        sheet = app.main.session.sheet
+        await press(pilot, "right", "alt+e", "shift+down", "shift+down")
+        before = sheet.selected_rows
+        await press(pilot, "alt+g")
+        return before, sheet.selected_rows
+
+    assert with_editor(file, script) == ([0, 2, 4], [0])
+
+
+def test_a_column_that_was_added_has_the_cursor_so_that_the_next_comes_behind_it(tmp_path):
+    (tmp_path / "contextdb.toml").write_text('[conditions.hit]\ntype = "bool"\n[conditions.way]\ntype = "angle"\n')
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,note,last\nwalk,x,y\n")
+
+    async def script(app, pilot):
+        for name in ("hit", "way"):
+            await press(pilot, "alt+c", *name, "enter")
+        return [c.name for c in app.main.session.sheet.table.columns]
+
+    assert with_editor(file, script) == ["Asset", "hit", "way", "note", "last"]

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from rich.cells import cell_len
 
 from contextdb.columns import TextColumn
-from tui.model.layout import NARROWEST, WIDEST, Layout, cut, fitted_width, layout
+from tui.model.alignment import indent_of, indented, shared_end
+from tui.model.layout import NARROWEST, WIDEST, Layout, cut, cut_middle, fitted_width, layout, name_lines, name_width
 
 
 @st.composite
@@ -141,3 +142,52 @@ def test_a_column_is_as_wide_as_its_longest_text_within_bounds():
     assert fitted_width(TextColumn.of("a", ["x" * 500]), ["a"]) == WIDEST
     assert fitted_width(TextColumn.of("a", ["日本語日本"]), ["a"]) == 12
     assert fitted_width(TextColumn.of("a", []), ["a longer name"]) == 15
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "lines"),
+    [
+        ("ActivateDiveAtMidAirHigh", 9, ("Activate", "DiveAtMid", "AirHigh")),
+        ("Defender.MidAir_Contesting", 10, ("Defender.", "MidAir_", "Contesting")),
+        ("dir_to_tackle_target_future_pos", 17, ("dir_to_tackle_", "target_future_pos")),
+        ("speed", 12, ("speed",)),
+    ],
+)
+def test_a_name_is_parted_at_its_joints_and_capitals(name, width, lines):
+    assert name_lines(name, width) == lines
+
+
+@given(st.from_regex(r"[A-Za-z_.]{1,60}", fullmatch=True))
+def test_a_name_is_whole_in_the_least_width_that_it_needs(name):
+    lines = name_lines(name, name_width(name))
+    assert "".join(lines) == name
+    assert len(lines) <= 3
+
+
+@given(st.text(min_size=1, max_size=80), st.integers(5, 30))
+def test_no_line_of_a_name_is_wider_than_its_column(name, width):
+    lines = name_lines(name, width)
+    assert len(lines) <= 3
+    assert all(cell_len(line) <= width for line in lines)
+
+
+def test_names_that_differ_at_their_end_still_differ_when_they_are_cut():
+    assert cut_middle("MidAir_Tackle_Dive_High_Left_D1_v1", 21) == "MidAir_Tac…Left_D1_v1"
+    assert cut_middle("D3_Contested_MidAir_V1_ScenarioController", 21, 19) == "D3_Contest…MidAir_V1…"
+
+
+def test_frozen_columns_take_a_third_where_not_all_columns_are_seen():
+    assert layout([50, 30, 30], 1, 9, 160).widths[0] == 50
+    assert layout([50, 10, 10, 10, 10], 1, 9, 80).widths[0] == 24
+
+
+def test_the_points_of_numbers_are_below_each_other():
+    column = TextColumn.of("a", ["2.5000, 5.0000", "-20.0000, 9.9900", "Any", ">8", "..5"])
+    indent = indent_of(column)
+    assert [indented(text, indent) for text in column.texts] == ["  2.5000, 5.0000", "-20.0000, 9.9900", "Any", " >8", "..5"]
+
+
+def test_the_end_that_all_texts_have_in_common_is_found():
+    assert shared_end(TextColumn.of("a", ["V1_Controller", "V2_Controller", ""])) == len("_Controller")
+    assert shared_end(TextColumn.of("a", ["V1_x", "V2_x"])) == 0
+    assert shared_end(TextColumn.of("a", ["V1_Controller"])) == 0

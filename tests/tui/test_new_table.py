@@ -43,7 +43,7 @@ def test_a_new_table_is_made_from_a_blueprint_and_opens(folder: Path):
     text = drive(EditorApp(Workspace(folder)), script)
     assert (folder / "swim.csv").read_bytes() == b"Asset Name,speed\n"
     assert text.startswith(" swim ")
-    assert "the table has no rows: Ctrl+N makes one" in text
+    assert "+    new row" in text
 
 
 def test_saving_as_another_table_leaves_the_old_file_and_goes_on_with_the_new_one(folder: Path):

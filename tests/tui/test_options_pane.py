@@ -300,3 +300,20 @@ def test_a_mirror_that_has_no_place_under_another_type_goes_with_the_old_one():
     pairs = ConditionForm("text", mirror="L = R")
     assert pairs.of_kind("tags").declared()[0] == {"type": "tags", "mirror": {"L": "R"}}
     assert pairs.of_kind("bool").declared()[0] == {"type": "bool"}
+
+
+def test_the_weight_of_a_condition_is_typed_and_taken_away():
+    app = PaneApp(sided())
+
+    async def script(pilot):
+        await submit(pilot, "#condition-weight", "2.5")
+        assert app.sheet.table.condition("side").condition.weight == 2.5
+        await submit(pilot, "#condition-weight", "-1")
+        assert "below 0" in wrong(app, "weight")
+        await submit(pilot, "#condition-weight", "much")
+        assert wrong(app, "weight") == '"much" is not a number.'
+        assert app.sheet.table.condition("side").condition.weight == 2.5
+        await submit(pilot, "#condition-weight", "")
+        assert app.sheet.table.condition("side").condition.weight == 1.0
+
+    drive(app, script)

@@ -280,3 +280,26 @@ def test_a_hundred_thousand_problems_are_paged_without_building_their_lines(tabl
     assert "100,000 errors." in screen
     assert "cannot read 99999." in screen
     assert len(built) < 500
+
+
+def test_problems_are_grouped_by_kind_and_mended_all_at_once(tmp_path):
+    (tmp_path / "contextdb.toml").write_text('[conditions.speed]\ntype = "number"\n')
+    file = tmp_path / "t.csv"
+    file.write_text("Asset,speed\n" + "".join(f"a{at},{at};1\n" for at in range(5)) + "b,1..2\n")
+
+    async def script(app, pilot):
+        await press(pilot, "alt+5", "2", "g")
+        pane = app.main.query_one(ProblemsPane)
+        grouped = [problem.message for problem in pane.lines]
+        await press(pilot, "m")
+        sheet = app.main.session.sheet
+        mended = sheet.table.text_column("speed").to_list(), [problem.level for problem in pane.lines]
+        sheet.undo()
+        return grouped, mended, sheet.table.text_column("speed").to_list()[0]
+
+    grouped, (texts, levels), undone = with_editor(file, script, (100, 30))
+    assert len(grouped) == 1
+    assert grouped[0].startswith("5 like this: ")
+    assert texts == ["0, 1", "1, 1", "2, 1", "3, 1", "4, 1", "1..2"]
+    assert levels == []
+    assert undone == "0;1"

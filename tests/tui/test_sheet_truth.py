@@ -227,13 +227,13 @@ def test_the_screen_marks_what_is_picked_outranked_undecided_and_excluded_by_a_c
         app.main.session.sheet.query.load(SAMPLE.facts)
         app.main.show()
         first = screen_text(app)
-        await press(pilot, "f12")
+        await press(pilot, "shift+f12")
         why = screen_text(app)
-        await press(pilot, "escape", "down", "f12", "tab")
+        await press(pilot, "escape", "down", "shift+f12", "tab")
         return first, why, screen_text(app)
 
     first, why, second = with_editor(tmp_path / "outer.csv", script, (140, 24))
-    assert marks_on(first) == ["●", " ", "◐", "◉"]
+    assert marks_on(first) == ["●", "1", "◐", "◉"]
     assert "=2.5" in first
     assert "● Row 1, A: valid; outranked by D (priority 5)" in why
     assert "closing is 2.5" in second or "2.5" in second

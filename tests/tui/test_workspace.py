@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from contextdb.errors import ContextDBError, FileError, SchemaError
+from contextdb.errors import ContextDBError, SchemaError
+from tui.model.beginning import Beginning
 from tui.model.workspace import Workspace
 
 RAW = "Asset,hit\nwalk,True\n"
@@ -86,12 +87,18 @@ def test_a_link_opens_the_table_that_it_leads_to(folder):
     assert space.files[space.first].resolve() == (folder / "b.csv").resolve()
 
 
-def test_an_empty_folder_says_what_to_do(tmp_path):
-    with pytest.raises(FileError, match=r"the folder holds no table.*its first line names the columns"):
-        Workspace(tmp_path)
+def test_an_empty_folder_is_one_to_begin_in(tmp_path):
+    space = Workspace(tmp_path)
+    assert (space.first, space.beginning) == ("", Beginning(tmp_path))
 
 
-@pytest.mark.parametrize("name", ["nowhere", "nowhere.csv", "no/such/table.csv", ""])
+@pytest.mark.parametrize("name", ["nowhere", "nowhere.csv"])
+def test_a_name_that_does_not_exist_is_one_to_begin_with(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    assert Workspace(name).beginning == Beginning(Path(), "nowhere")
+
+
+@pytest.mark.parametrize("name", ["no/such/table.csv", "nowhere.xlsx", "nowhere.txt"])
 def test_what_is_not_there_is_named(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ContextDBError):

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from contextdb.tables.table import Table
 from tui.model.selection import Block
 
 Texts = list[list[str]]
@@ -87,3 +88,13 @@ def place_paste(texts: Texts, selected: Block, n_columns: int) -> Placed:
     right = min(selected.left + wide, n_columns)
     cut = selected.left + wide - right
     return Placed(Block(selected.top, selected.left, selected.top + tall, right), texts, cut)
+
+
+def asks_how_to_read(text: str, table: Table) -> bool:
+    """Whether a text that is pasted into a table without rows is a table itself: it has a line of names, or columns to spare."""
+    if table.n_rows:
+        return False
+    texts = parse_tsv(text)
+    names = {column.name.casefold() for column in table.columns}
+    has_names = bool(texts) and any(cell.strip().casefold() in names for cell in texts[0])
+    return bool(texts) and (has_names or len(texts[0]) > len(table.columns))

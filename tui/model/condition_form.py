@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from contextdb.cells.conditions import Condition, Mirror
@@ -30,6 +30,8 @@ class ConditionForm:
     description: str = ""
     mirror: str = ""
     """"negate", "none", or names that change places: Left = Right, Up = Down."""
+    weight: str = ""
+    """What a cell counts under the policy "specific"; empty: 1."""
 
     @classmethod
     def of(cls, condition: Condition) -> ConditionForm:
@@ -37,7 +39,9 @@ class ConditionForm:
         domain = condition.domain
         low, high = (domain.type.spelling.write(x) if math.isfinite(x) else "" for x in (domain.minimum, domain.maximum))
         values = " ".join(quoted(value) for value in domain.values or ())
-        return cls(domain.kind, low, high, condition.unit, values, condition.description, _mirror_text(condition.mirror))
+        weight = "" if condition.weight == 1.0 else repr(condition.weight).removesuffix(".0")
+        mirror = _mirror_text(condition.mirror)
+        return cls(domain.kind, low, high, condition.unit, values, condition.description, mirror, weight)
 
     def of_kind(self, kind: str) -> ConditionForm:
         """The same for another type, without a mirror that has no place there."""
@@ -58,6 +62,10 @@ class ConditionForm:
         if has_place("values", self.kind) and self.values.strip():
             said["values"] = list(dict.fromkeys(names_in(self.values)))
         said["mirror"] = _mirror(self.mirror)
+        if self.weight.strip():
+            said["weight"] = _number(self.weight)
+            if said["weight"] is None:
+                wrong["weight"] = f'"{self.weight.strip()}" is not a number.'
         said = {key: value for key, value in said.items() if value not in ("", None)}
         return said, wrong or _faults(said)
 
@@ -65,6 +73,12 @@ class ConditionForm:
 def names_in(text: str) -> Iterable[str]:
     """The names that a person typed: with spaces, commas or semicolons between them, those in quotes as they are."""
     return (match[1].replace('""', '"') if match[1] is not None else match[2] for match in _NAME.finditer(text))
+
+
+def undeclared(text: str, values: Sequence[str]) -> list[str]:
+    """The names in a cell that are no declared values: without signs, a penalty, and the words of the grammar."""
+    names = (name.lstrip("+-") for name in names_in(text.partition("~")[0]))
+    return [name for name in dict.fromkeys(names) if name and name not in values and name.casefold() not in ("not", "any")]
 
 
 def _mirror_text(mirror: Mirror | None) -> str:
@@ -100,7 +114,7 @@ def _faults(said: dict[str, object]) -> dict[str, str]:
 
 
 def _field_of(fault: Fault) -> str:
-    key = re.match(r"\[conditions\.x\] (min|max|values|unit|description|mirror)\b", fault.found)
+    key = re.match(r"\[conditions\.x\] (min|max|values|unit|description|mirror|weight)\b", fault.found)
     return key[1] if key else "values" if "values" in fault.found + fault.accepted else "type"
 
 

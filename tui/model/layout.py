@@ -6,6 +6,7 @@ a separator of one cell. `x` counts from the end of the gutter; a column's first
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,8 +21,15 @@ NARROWEST, WIDEST = 6, 60
 """Of a column fitted to its texts."""
 COMPACT = 22
 """The most a column takes for its name when a table is opened; what is cut can be seen in the line over the grid."""
+LEAST_FROZEN = 24
+"""Frozen columns are not made narrower than this together, where that is not more than half of the window."""
 MOST_TEXTS = 2000
 """So many distinct texts of a column are measured."""
+
+N_NAME_LINES = 3
+"""So many lines a name over a column may take."""
+_JOINT = re.compile(r"(?<=[_.\-/ ])|(?<=[a-z0-9])(?=[A-Z])")
+"""Where a name may go on in the next line: behind a sign that joins words, and before a capital."""
 
 _SHOWN = {ord(c): s for c, s in zip("\n\r\t", "⏎⏎⇥", strict=True)}
 
@@ -37,8 +45,15 @@ class Layout:
 
     @cached_property
     def starts(self) -> tuple[int, ...]:
-        """The x of each column, and behind the last the end of all."""
-        return tuple(accumulate((w + 1 for w in self.widths), initial=0))
+        """The x of each column, and behind the last the end of all. A hidden column has no width and no separator."""
+        return tuple(accumulate((w + 1 if w else 0 for w in self.widths), initial=0))
+
+    @cached_property
+    def hides(self) -> frozenset[int]:
+        """The columns that are seen, behind which others are hidden."""
+        shown = [at for at, width in enumerate(self.widths) if width]
+        following = [*shown[1:], len(self.widths)]
+        return frozenset(at for at, after in zip(shown, following, strict=True) if after > at + 1)
 
     @property
     def frozen(self) -> int:
@@ -71,7 +86,7 @@ class Layout:
     def separator_at(self, x: int, scroll: int) -> int | None:
         """The column whose separator is at cell `x` of the window."""
         column = self.column_at(x, scroll)
-        return column if self.place(column, scroll) + self.widths[column] == x else None
+        return column if self.widths[column] and self.place(column, scroll) + self.widths[column] == x else None
 
     def place(self, column: int, scroll: int) -> int:
         """Where a column's first cell is in the window."""
@@ -91,13 +106,16 @@ class Layout:
 
 
 def layout(widths: Sequence[int], n_frozen: int, n_rows: int, width: int) -> Layout:
-    """The layout of columns of these widths. Frozen ones take at most half of the window: they are narrowed, or scroll too."""
+    """The layout of columns of these widths. Frozen ones take at most half of the window, and about a third where not all columns
+    are seen: they are narrowed, or scroll too."""
     gutter = len(str(n_rows)) + 3
     room = (width - gutter) // 2
     if room < (NARROWEST + 1) * n_frozen:
         n_frozen = 0
+    if gutter + sum(widths) + sum(map(bool, widths)) > width:
+        room = min(room, max((width - gutter) // 3, LEAST_FROZEN))
     frozen = list(widths[:n_frozen])
-    excess = sum(frozen) + n_frozen - room
+    excess = sum(frozen) + sum(map(bool, frozen)) - room
     for column in sorted(range(len(frozen)), key=lambda c: -frozen[c]):
         cut = max(0, min(excess, frozen[column] - NARROWEST))
         frozen[column] -= cut
@@ -109,6 +127,50 @@ def fitted_width(column: TextColumn, heads: Sequence[str], widest: int = WIDEST)
     """How wide a column must be for its texts and what stands over it, a mark on the left and a space on the right."""
     texts = [*column.texts[:MOST_TEXTS], *heads]
     return max(NARROWEST, min(max(map(cell_len, texts), default=0) + 2, widest))
+
+
+def name_width(name: str) -> int:
+    """The least width in which a name is whole within three lines."""
+    pieces = _JOINT.split(name)
+    widths = range(max(map(cell_len, pieces)), cell_len(name) + 1)
+    return next((width for width in widths if len(_packed(pieces, width)) <= N_NAME_LINES), cell_len(name))
+
+
+@lru_cache(maxsize=1 << 12)
+def name_lines(name: str, width: int) -> tuple[str, ...]:
+    """A name in at most three lines so wide, parted at its joints; the middle of a longer one is left out."""
+    pieces = _JOINT.split(name)
+    if max(map(cell_len, pieces)) <= width and len(lines := _packed(pieces, width)) <= N_NAME_LINES:
+        return tuple(lines)
+    rest, lines = cut_middle(name, N_NAME_LINES * width).rstrip(), []
+    while rest:
+        line = set_cell_size(rest, min(width, cell_len(rest)))
+        lines.append(line)
+        rest = rest[max(len(line), 1) :]
+    return tuple(lines[:N_NAME_LINES])
+
+
+def _packed(pieces: Sequence[str], width: int) -> list[str]:
+    """Pieces in as few lines as they fit in."""
+    lines: list[str] = []
+    for piece in pieces:
+        if lines and cell_len(lines[-1]) + cell_len(piece) <= width:
+            lines[-1] += piece
+        else:
+            lines.append(piece)
+    return lines
+
+
+@lru_cache(maxsize=1 << 16)
+def cut_middle(text: str, width: int, n_shared: int = 0) -> str:
+    """The text in exactly so many cells; the middle of a longer one is left out, since names differ at their ends too, and the
+    last `n_shared` characters, that all names have in common."""
+    if width < 8 or cell_len(text) <= width or not text.isprintable() or not text.isascii():
+        return cut(text, width)
+    if n_shared and len(text) - n_shared >= width // 2:
+        return set_cell_size(cut_middle(text[: len(text) - n_shared], width - 1).rstrip() + "…", width)
+    tail = (width - 1) // 2
+    return f"{text[: width - 1 - tail]}…{text[len(text) - tail :]}"
 
 
 @lru_cache(maxsize=1 << 16)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from contextdb.checks.cases import check_cases, read_cases
 from contextdb.checks.rows import check_rows
@@ -78,6 +78,17 @@ class Problems:
     def of_level(self, level: Level | None) -> tuple[Problem, ...]:
         """The problems of one level; None: all of them."""
         return self.items if level is None else tuple(p for p in self.items if p.level == level)
+
+    def grouped(self, level: Level | None) -> tuple[Problem, ...]:
+        """One problem for all of a kind in a column, the first of them, with how many there are; the most frequent kinds first."""
+        groups: dict[tuple[Level, str, str | None, bool], list[Problem]] = {}
+        for problem in self.of_level(level):
+            groups.setdefault((problem.level, problem.rule, problem.column, problem.is_of_test_row), []).append(problem)
+        ordered = sorted(groups.values(), key=lambda group: (LEVELS.index(group[0].level), -len(group)))
+        return tuple(
+            group[0] if len(group) == 1 else replace(group[0], message=f"{len(group):,} like this: {group[0].message}")
+            for group in ordered
+        )
 
     @property
     def counts(self) -> dict[Level, int]:

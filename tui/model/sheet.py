@@ -21,8 +21,11 @@ from contextdb.errors import Fault, TableError, in_quotes, plural, shown
 from contextdb.tables.changes import Cells, Change, Edit
 from contextdb.tables.table import Table
 from tui.model.clipboard import format_tsv, parse_tsv, place_paste
+from tui.model.column_values import mends_of, renamed_value, replaced
+from tui.model.condition_form import undeclared
 from tui.model.find import Search, find, next_hit, replace_all
 from tui.model.selection import Block
+from tui.model.series import continued, tells_step
 from tui.model.shown import ShownTable
 from tui.model.views import Sort, sorted_rows
 
@@ -102,6 +105,42 @@ class Sheet(ShownTable):
         cells = ((r, c, self.text(r, source)) for r, c in self._cells(block) if c != source)
         return self._set(cells, f"Fill right {self._size(block)}")
 
+    def fill_series(self) -> Done:
+        """Go on with what the selected columns begin with: one text counts on by 1, two say the step. One cell alone goes on from
+        the cell above it."""
+        block = self.block
+        top = block.top - 1 if block.shape[0] == 1 and block.top else block.top
+        cells: list[tuple[int, int, str]] = []
+        for column in range(block.left, block.right):
+            texts = [self.text(row, column) for row in range(top, block.bottom)]
+            n_begun = 2 if len(texts) > 2 and tells_step(texts[0], texts[1]) else 1
+            more = continued(texts[:n_begun], len(texts) - n_begun)
+            cells += [(top + n_begun + at, column, text) for at, text in enumerate(more)]
+        if not cells:
+            return Done(notes=("Select the first cell and those below it that the series fills.",))
+        return self._set(cells, f"Fill a series of {len(cells)}")
+
+    def declare_value(self, text: str, is_new_row: bool = False) -> Done:
+        """Put a text into the cell of the cursor, or into a new row, and declare the values in it that the condition lacks."""
+        row, column = self.cursor
+        name, condition = self.table.columns[column].name, self.condition(column)
+        assert condition is not None, "only a condition has values"
+        values = condition.condition.domain.values or ()
+        new = undeclared(text, values)
+        declared = edits.set_condition(self.table, name, values=[*values, *new])
+        after = declared.apply(self.table)
+        if fault := edits.check_cell(after, name, text):
+            raise TableError(fault)
+        if is_new_row:
+            cell = edits.insert_rows(after, after.n_rows, [{name: text}])
+        else:
+            cell = edits.set_cells(after, [(int(self.view.rows[row]), name, text)])
+        edit = Edit(f"Add {', '.join(map(shown, new))} to the values of {shown(name)}", (*declared.changes, *cell.changes))
+        done = self._do(edit)
+        if is_new_row:
+            self._select_file_rows(self.table.n_rows - 1, 1)
+        return done
+
     def copy(self) -> str:
         """The selected cells as tab-separated text."""
         block = self.block
@@ -133,7 +172,31 @@ class Sheet(ShownTable):
         notes = (f"{plural(n_new, 'row')} added.",) if n_new else ()
         return replace(done, notes=notes, warnings=((cut,) if placed.n_columns_cut else ()) + done.warnings)
 
+    def type_below(self, text: str) -> Fault | None:
+        """Put a text into a new row behind the last one, in the column of the cursor; what is wrong with it as in `type_text`."""
+        if fault := self.check(text):
+            return fault
+        self.append_rows([{self.table.columns[self.selection.column].name: text}])
+        return None
+
+    def paste_below(self, text: str) -> Done:
+        """Put tab-separated text into new rows behind the last one, from the column of the cursor on."""
+        texts, names = parse_tsv(text), [c.name for c in self.table.columns[self.selection.column :]]
+        if not texts:
+            return Done(notes=("The clipboard is empty.",))
+        done = self.append_rows([dict(zip(names, row, strict=False)) for row in texts])
+        n_cut = max(max(map(len, texts)) - len(names), 0)
+        cut = f"{plural(n_cut, 'column')} left out: the sheet ends here. Add columns and paste again."
+        return replace(done, warnings=((cut,) if n_cut else ()) + done.warnings)
+
     # ---- edits of rows
+
+    def append_rows(self, texts: Sequence[Mapping[str, str]]) -> Done:
+        """Insert rows behind the last one of the file; they are then selected, in the column of the cursor."""
+        at = self.table.n_rows
+        done = self._do(edits.insert_rows(self.table, at, list(texts)))
+        self._select_file_rows(at, len(texts))
+        return done
 
     def insert_rows(self, n_rows: int = 1, below: bool = False, texts: Sequence[Mapping[str, str]] = ()) -> Done:
         """Insert rows above the selection, or below it, empty ones or with texts; they are then selected."""
@@ -161,7 +224,9 @@ class Sheet(ShownTable):
     def move_rows(self, down: int) -> Done:
         """Move the selected rows past the next shown row: down 1 or up -1. Not in a sorted view, whose order is not the file's."""
         if self.view.is_sorted:
-            raise TableError(Fault("the rows are shown sorted.", "the order of the file", "to show them as they are in the file"))
+            raise TableError(
+                Fault("the rows are shown sorted.", "the order of the file", "to show them as in the file: Alt+S, again")
+            )
         block, rows = self.block, self.selected_rows
         beside = block.top - 1 if down < 0 else block.bottom
         if not 0 <= beside < len(self.view):
@@ -218,6 +283,7 @@ class Sheet(ShownTable):
         """Go to the next cell that is found; gives how many there are."""
         hits = find(self.table, search, self.view.rows, [c.name for c in self.table.columns])
         if (place := next_hit(hits, self.cursor, is_backwards)) is not None:
+            self.columns_shown = self.columns_shown.revealed(self.table.columns[place[1]].name)
             self.go(*place)
         return int(hits.sum())
 
@@ -249,6 +315,28 @@ class Sheet(ShownTable):
         if not edit.changes:
             return Done(notes=(f"{in_quotes(search.text)} is not found.",))
         return self._do(edit)
+
+    # ---- a column as a whole
+
+    def mend_all(self, texts: Iterable[str] | None = None) -> Done:
+        """Mend every cell of the cursor's column that cannot be read and has a near text that can, or only those of some texts."""
+        column = self.selection.column
+        mends = mends_of(self, column, texts)
+        if not mends:
+            return Done(notes=("No cell of this column has a text that cannot be read and is near to one that can.",))
+        return self._do(replaced(self.table, self.table.columns[column].name, mends, "Mend"))
+
+    def replace_value(self, old: Iterable[str], new: str) -> Done:
+        """Put a text in place of others in every cell of the cursor's column."""
+        name = self.table.columns[self.selection.column].name
+        if fault := self.check(new):
+            raise TableError(fault)
+        return self._do(replaced(self.table, name, dict.fromkeys(old, new), f"Replace by {shown(new)}"))
+
+    def rename_value(self, old: str, new: str, keeps_old: bool = False) -> Done:
+        """Rename a value of the cursor's column in all its cells, and where it is declared, as one step of this table; where others
+        speak of the value see `Workspace.rename_value`."""
+        return self._do(renamed_value(self, self.selection.column, old, new, keeps_old))
 
     # ---- history
 

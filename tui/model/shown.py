@@ -25,11 +25,18 @@ from contextdb.tables.condition_column import ConditionColumn
 from contextdb.tables.nesting.links import nesting_faults
 from contextdb.tables.nesting.names import inner_name
 from contextdb.tables.table import Table
+from tui.model.alignment import indent_of, shared_end
 from tui.model.asked import Offered
+from tui.model.columns_shown import ColumnsShown
 from tui.model.fact_steps import FactSteps
 from tui.model.query_row import QueryRow
 from tui.model.selection import Block, Selection, Shape
 from tui.model.views import Filter, Sort, View, shown_rows
+
+SEEK_ROWS = 4096
+"""So many rows are looked through at once for a cell that fails."""
+NUMBER_JOBS = ("priority", "weight", "cooldown_s", "cooldown_turns")
+"""Columns of these jobs hold numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +70,10 @@ class ShownTable:
         self.sort: Sort | None = None
         self.filter = Filter()
         self.view = View.of(self.table)
+        self.columns_shown = ColumnsShown()
         self.version = 0
+        self._places: dict[str, tuple[TextColumn, int]] = {}
+        """For columns of numbers how far they are indented, for the assets how long their shared end is, and of which texts."""
         self._findings: NDArray[np.bool_] | None = None
         self._inner_faults: tuple[object, dict[str, Fault | None]] = (None, {})
         """The tables of the folder, and what is wrong with naming one in a row, by the text of the cell."""
@@ -126,6 +136,25 @@ class ShownTable:
         if name == table.asset_column:
             return self.inner_fault(text)
         return edits.check_cell(table, name, text)
+
+    def indent(self, column: int) -> int:
+        """How far the points of the numbers of a column are from the left; 0 for a column of no numbers."""
+        condition, texts = self.condition(column), self.table.columns[column]
+        if condition is not None and condition.condition.domain.type.is_numeric:
+            return self._place(texts, indent_of)
+        jobs = {name for job, name in self.table.settings.jobs if job in NUMBER_JOBS}
+        return self._place(texts, indent_of) if texts.name in jobs else 0
+
+    @property
+    def shared_end(self) -> int:
+        """How long the end is that the names of all assets have in common."""
+        return self._place(self.table.columns[self.asset_at], shared_end)
+
+    def _place(self, texts: TextColumn, of: Callable[[TextColumn], int]) -> int:
+        known = self._places.get(texts.name)
+        if known is None or known[0] is not texts:
+            known = self._places[texts.name] = texts, of(texts)
+        return known[1]
 
     def missing_output(self, column: int) -> Output | None:
         """The output that a column is, if its cells may not be empty."""
@@ -201,6 +230,34 @@ class ShownTable:
             fails[:, places[self.table.settings.when]] = self.query.excluded_by_rule(rows)
         return fails
 
+    def next_failing(self, is_backwards: bool = False) -> tuple[int, int] | None:
+        """The next cell, row by row and going round at the end, that does not accept its fact, or cannot be read where the test
+        row is empty; None where there is none."""
+        n_rows, n_columns = self.shape
+        here = self.cursor[0] * n_columns + self.cursor[1]
+        blocks = [(top, min(top + SEEK_ROWS, n_rows)) for top in range(0, n_rows, SEEK_ROWS)]
+        first = self.cursor[0] // SEEK_ROWS
+        ahead = [*blocks[first:], *blocks[: first + 1]] if not is_backwards else [*blocks[first::-1], *blocks[first:][::-1]]
+        for at, (top, bottom) in enumerate(ahead):
+            places = np.flatnonzero(self._wrong(top, bottom)) + top * n_columns
+            if at == 0:
+                places = places[places < here] if is_backwards else places[places > here]
+            if len(places):
+                place = int(places[-1] if is_backwards else places[0])
+                return place // n_columns, place % n_columns
+        return None
+
+    def _wrong(self, top: int, bottom: int) -> NDArray[np.bool_]:
+        if not self.query.is_empty:
+            return self.failing(top, bottom)
+        rows = self.view.rows[top:bottom]
+        wrong = np.zeros((len(rows), self.shape[1]), np.bool_)
+        for at, texts in enumerate(self.table.columns):
+            condition = self.condition(at)
+            if condition is not None and condition.faults:
+                wrong[:, at] = np.isin(texts.codes[rows], list(condition.faults))
+        return wrong
+
     def notes(self, row: int) -> dict[int, str]:
         """What is at the right of cells of a row of the file, by column: who is cast, how much of a table inside is valid."""
         found: dict[int, str] = {}
@@ -229,6 +286,24 @@ class ShownTable:
         """Whether a cell holds a text."""
         return bool(self.text(row, column).strip())
 
+    # ---- which columns are seen
+
+    @property
+    def hidden(self) -> tuple[bool, ...]:
+        """Whether each column is hidden."""
+        names = [c.name for c in self.table.columns]
+        return self.columns_shown.are_hidden(names, self.table.asset_column)
+
+    def show_columns(self, wanted: ColumnsShown) -> None:
+        """Hide, fold and freeze columns; the cursor leaves a column that is hidden."""
+        self.columns_shown = wanted
+        self._select(self.selection)
+
+    def hide_columns(self) -> None:
+        """Hide the selected columns, but never that of the assets."""
+        names = set(self.selected_columns) - {self.table.asset_column}
+        self.show_columns(replace(self.columns_shown, hidden=self.columns_shown.hidden | names))
+
     # ---- where one is
 
     def go(self, row: int, column: int, extend: bool = False) -> None:
@@ -240,6 +315,8 @@ class ShownTable:
         if self.view.place(file_row) is None:
             self.set_filter(Filter())
         names = [c.name for c in self.table.columns]
+        if column in names:
+            self.columns_shown = self.columns_shown.revealed(column)
         self.go(self.view.place(file_row) or 0, names.index(column) if column in names else self.selection.column)
 
     def move(self, down: int, right: int, extend: bool = False) -> None:
@@ -255,8 +332,24 @@ class ShownTable:
         self._select(change(self.selection, self.shape))
 
     def _select(self, selection: Selection) -> None:
-        self.selection = selection
+        self.selection = selection if self.columns_shown.is_plain else self._on_seen(selection)
         self.version += 1
+
+    def _on_seen(self, selection: Selection) -> Selection:
+        """A selection whose cursor, or the corner that moves, is on a column that is seen: the next one the way it went."""
+        is_wide = selection.far != (selection.row, selection.column)
+        column = selection.far[1] if is_wide else selection.column
+        hidden = self.hidden
+        if selection.kind in ("columns", "all") or column >= len(hidden) or not hidden[column]:
+            return selection
+        before = self.selection.far[1] if is_wide else self.selection.column
+        ahead, behind = range(column + 1, len(hidden)), range(column - 1, -1, -1)
+        ways = (behind, ahead) if column < before else (ahead, behind)
+        seen = next((at for way in ways for at in way if not hidden[at]), column)
+        far = (selection.far[0], seen)
+        if is_wide:
+            return replace(selection, far=far)
+        return replace(selection, column=seen, anchor=(selection.anchor[0], seen), far=far)
 
     # ---- the view
 
@@ -278,11 +371,19 @@ class ShownTable:
 
     def refresh(self) -> None:
         """Sort and filter again; the selection stays on its rows where they are still shown."""
-        rows = [self._file_row(place[0]) for place in self._corners()]
+        rows, chosen = [self._file_row(place[0]) for place in self._corners()], self._chosen()
         valid = self.query.valid if self.filter.is_valid else None
-        sort = self.sort if self.sort and any(c.name == self.sort.column for c in self.table.columns) else None
+        names = {c.name for c in self.table.columns}
+        sort = Sort.by([key for key in self.sort.keys if key.column in names]) if self.sort else None
+        self.filter = self.filter.of_columns(names)
         self.view = View.of(self.table, sort, shown_rows(self.table, self.filter, valid, self._findings))
         self._place_selection(rows)
+        if self.selection.kind in ("cells", "rows") and len(chosen) > 1 and not np.array_equal(chosen, self._chosen()):
+            self.go(*self.cursor)  # other rows would be selected than those that were
+
+    def _chosen(self) -> NDArray[np.int64]:
+        """The rows of the file that are selected, in the order of the file."""
+        return np.sort(self.view.rows[self.block.top : self.block.bottom])
 
     def set_fact(self, condition: str, text: str) -> Fault | None:
         """Write one fact of the test row; gives what is wrong with it. One that is computed cannot be written."""

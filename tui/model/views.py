@@ -7,15 +7,19 @@ last, then what cannot be read, both ways round. The sort is stable.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+import operator
+from collections.abc import Container, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Literal, TypeVar
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
 from contextdb.bitmask import Flags, Rows
-from contextdb.cells.sets import NumberSet, TagSet, ValueSet
+from contextdb.cells.sets import Cell, NumberSet, TagSet, ValueSet
 from contextdb.columns import TextColumn
 from contextdb.tables.changes import CameFrom
 from contextdb.tables.condition_column import ConditionColumn
@@ -31,6 +35,45 @@ class Sort:
 
     column: str
     is_descending: bool = False
+    then: Sort | None = None
+    """By what rows are sorted that this column does not tell apart."""
+
+    @property
+    def keys(self) -> tuple[Sort, ...]:
+        """This and what comes after it, the first one first."""
+        return (replace(self, then=None), *(self.then.keys if self.then is not None else ()))
+
+    @classmethod
+    def by(cls, keys: Sequence[Sort]) -> Sort | None:
+        """By some columns, the first one first; None for none."""
+        return replace(keys[0], then=cls.by(keys[1:])) if keys else None
+
+
+Compared = Literal["<", "<=", ">", ">=", "=", "!="]
+COMPARED: tuple[Compared, ...] = ("<=", ">=", "!=", "<", ">", "=")
+
+
+@dataclass(frozen=True, slots=True)
+class CellTest:
+    """What a cell must say to be shown: it accepts a number below or above one, or it is a text, or it is not."""
+
+    column: str
+    how: Compared
+    text: str
+
+    @classmethod
+    def read(cls, column: str, text: str) -> CellTest | None:
+        """A test as a person types it: "<3", ">= 2", "=Walk", "!= Walk", "not Walk"; None for a text to be looked for."""
+        said = text.strip()
+        if said.casefold().startswith("not "):
+            return cls(column, "!=", said[4:].strip())
+        how = next((sign for sign in COMPARED if said.startswith(sign)), None)
+        return None if how is None or not said[len(how) :].strip() else cls(column, how, said[len(how) :].strip())
+
+    @property
+    def said(self) -> str:
+        """The test as its chip says it."""
+        return f"{self.column} {'not' if self.how == '!=' else self.how} {self.text}"
 
 
 @dataclass(frozen=True)
@@ -43,6 +86,8 @@ class Filter:
     """For some columns a text that is in the cell, without regard to case."""
     cells: tuple[tuple[str, frozenset[str]], ...] = ()
     """For some columns the texts that the cell may be, exactly."""
+    tests: tuple[CellTest, ...] = ()
+    """What cells of some columns must say."""
     is_valid: bool = False
     """Only rows valid for the test context."""
     has_findings: bool = False
@@ -51,7 +96,37 @@ class Filter:
     @property
     def is_off(self) -> bool:
         """Whether every row is shown."""
-        return not (self.text or self.columns or self.cells or self.is_valid or self.has_findings)
+        return not (self.text or self.columns or self.cells or self.tests or self.is_valid or self.has_findings)
+
+    def of_columns(self, names: Container[str]) -> Filter:
+        """The filter without what it asks of columns that are gone."""
+        tests = tuple(test for test in self.tests if test.column in names)
+        return replace(self, columns=_kept(self.columns, names), cells=_kept(self.cells, names), tests=tests)
+
+    @property
+    def parts(self) -> list[tuple[str, Filter]]:
+        """What it asks for, part by part in words, each with the filter that is left without that part."""
+        found = [(f'"{self.text}"', replace(self, text=""))] if self.text else []
+        for at, (name, text) in enumerate(self.columns):
+            found.append((f'{name} has "{text}"', replace(self, columns=_without(self.columns, at))))
+        for at, (name, texts) in enumerate(self.cells):
+            said = " or ".join(sorted(text or "(empty)" for text in texts)[:3]) + (" or …" if len(texts) > 3 else "")
+            found.append((f"{name}: {said}", replace(self, cells=_without(self.cells, at))))
+        for at, test in enumerate(self.tests):
+            found.append((test.said, replace(self, tests=_without(self.tests, at))))
+        found += [("valid", replace(self, is_valid=False))] if self.is_valid else []
+        return found + ([("with problems", replace(self, has_findings=False))] if self.has_findings else [])
+
+
+Part = TypeVar("Part")
+
+
+def _kept(parts: tuple[tuple[str, Part], ...], names: Container[str]) -> tuple[tuple[str, Part], ...]:
+    return tuple(part for part in parts if part[0] in names)
+
+
+def _without(parts: tuple[Part, ...], at: int) -> tuple[Part, ...]:
+    return (*parts[:at], *parts[at + 1 :])
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +191,8 @@ def shown_rows(table: Table, wanted: Filter, valid: Flags | None = None, finding
     for name, texts in wanted.cells:
         column = table.text_column(name)
         shown &= _of_codes(column, np.array([t in texts for t in column.texts], np.bool_))
+    for test in wanted.tests:
+        shown &= _passes(table, test)
     if wanted.is_valid and valid is not None:
         shown &= valid
     if wanted.has_findings and findings is not None:
@@ -128,6 +205,41 @@ def _contains(column: TextColumn, text: str) -> Flags:
     return _of_codes(column, np.array([word in folded for folded in map(str.casefold, column.texts)], np.bool_))
 
 
+def _passes(table: Table, test: CellTest) -> Flags:
+    """Which rows pass a test. A cell passes a comparison when it accepts such a number and is not Any; other texts do not."""
+    column = table.text_column(test.column)
+    if test.how in ("=", "!="):
+        word = test.text.casefold()
+        is_text = _of_codes(column, np.array([folded.strip() == word for folded in map(str.casefold, column.texts)], np.bool_))
+        return is_text if test.how == "=" else ~is_text
+    bound = _number_in(test.text)
+    if bound is None:
+        return np.zeros(table.n_rows, np.bool_)
+    condition = next((c for c in table.conditions if c.texts is column), None)
+    ends = [_ends(text) for text in column.texts] if condition is None else [_accepted_ends(cell) for cell in condition.cells]
+    compare = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}[test.how]
+    low = test.how in ("<", "<=")
+    return _of_codes(column, np.array([end is not None and compare(end[0 if low else 1], bound) for end in ends], np.bool_))
+
+
+def _accepted_ends(cell: Cell) -> tuple[float, float] | None:
+    accepts = cell.accepts
+    return (accepts.spans[0][0], accepts.spans[-1][1]) if isinstance(accepts, NumberSet) and accepts.spans else None
+
+
+def _ends(text: str) -> tuple[float, float] | None:
+    number = _number_in(text)
+    return None if number is None else (number, number)
+
+
+def _number_in(text: str) -> float | None:
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return None if math.isnan(number) else number
+
+
 def _of_codes(column: TextColumn, said: Flags) -> Flags:
     return said[column.codes] if len(said) else np.zeros(column.n_rows, np.bool_)
 
@@ -136,14 +248,18 @@ def _of_codes(column: TextColumn, said: Flags) -> Flags:
 
 
 def sorted_rows(table: Table, sort: Sort) -> Rows:
-    """Every row in the natural order of a column: int64 [n_rows]."""
+    """Every row in the natural order of a column, and of those that come after it: int64 [n_rows]."""
     if not table.n_rows:
         return np.arange(0)
+    return np.asarray(np.lexsort([_order(table, key) for key in reversed(sort.keys)]), np.int64)
+
+
+def _order(table: Table, sort: Sort) -> NDArray[np.int64]:
+    """A number for each row by one column: lower ones come first."""
     ranks = _ranks(table, sort.column)
     order = -ranks.of_texts if sort.is_descending else ranks.of_texts
     order = order + ranks.is_last.astype(np.int64) * (2 * len(order) + 2)
-    codes = table.text_column(sort.column).codes
-    return np.asarray(np.argsort(order[codes], kind="stable"), np.int64)
+    return np.asarray(order[table.text_column(sort.column).codes], np.int64)
 
 
 @dataclass(frozen=True, eq=False)

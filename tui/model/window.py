@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from contextdb.cells.sets import Cell
 from contextdb.tables.condition_column import ConditionColumn
+from tui.model.alignment import indented
 from tui.model.shown import ShownTable
 
 Kind = Literal["text", "any", "failing", "fault"]
@@ -33,6 +36,8 @@ class WindowRow:
     """It only may be valid."""
     is_picked: bool = False
     """It is valid, and the table's policy may pick it."""
+    n_failing: int = 0
+    """How many of its cells do not accept their fact."""
 
     @property
     def mark(self) -> str:
@@ -58,7 +63,8 @@ class Window:
         if is_asked:
             query = sheet.query
             marks = (query.flags(bits)[rows].tolist() for bits in (query.bits, query.undecided, query.picked))
-            self.rows = [WindowRow(r.number, r.is_enabled, *said) for r, *said in zip(self.rows, *marks, strict=True)]
+            counts = self._failing.sum(axis=1).tolist() if self._failing is not None else [0] * self.n_rows
+            self.rows = [WindowRow(r.number, r.is_enabled, *said) for r, *said in zip(self.rows, *marks, counts, strict=True)]
         self._notes = [sheet.notes(row) for row in rows.tolist()] if sheet.query.has_notes else []
         self._columns: dict[int, list[tuple[str, Kind]]] = {}
 
@@ -69,6 +75,10 @@ class Window:
     def row(self, row: int) -> WindowRow:
         """A row of the view."""
         return self.rows[row - self.top]
+
+    def failing(self, row: int) -> list[int]:
+        """The columns whose cells in a row of the view do not accept their fact."""
+        return [] if self._failing is None else np.flatnonzero(self._failing[row - self.top]).tolist()
 
     def cell(self, row: int, column: int) -> tuple[str, Kind]:
         """The text of a cell, and how it is meant."""
@@ -85,7 +95,9 @@ class Window:
         condition = self._sheet.condition(column)
         codes = texts.codes[self._rows].tolist()
         kinds = {code: self._kind(column, condition, code) for code in set(codes)}
-        found = [(texts.texts[code], kinds[code]) for code in codes]
+        indent = self._sheet.indent(column)
+        said = {code: indented(texts.texts[code], indent) for code in kinds} if indent else texts.texts
+        found = [(said[code], kinds[code]) for code in codes]
         if condition is None and self._sheet.missing_output(column) is not None:
             is_missing = [self._sheet.is_missing(int(row), column) for row in self._rows]
             found = [(text, "fault" if wrong else kind) for (text, kind), wrong in zip(found, is_missing, strict=True)]

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from contextdb.disk import TABLE_SUFFIXES
-from contextdb.edits.renaming import renaming
-from contextdb.errors import Fault, FileError, Place, TableError, some
+from contextdb.edits.renaming import Renaming, renaming
+from contextdb.edits.renaming_values import value_renaming
+from contextdb.errors import ContextDBError, Fault, FileError, TableError, some
 from contextdb.tables.nesting.links import Neighbours
 from contextdb.tables.places import table_path
 from contextdb.tables.project import read_folder_schema, schema_for, table_files
 from contextdb.tables.table import Table
+from tui.model.beginning import Beginning, beginning, beginning_from
 from tui.model.session import Session
 
 
@@ -43,28 +44,41 @@ class Workspace:
     def __init__(self, path: str | Path | None = None) -> None:
         """Look at a folder, or at the folder of a table; without a path in tables/ or here.
 
+        Where there is no table yet, `first` is empty and `beginning` says what the path may become.
+
         Raises
         ------
         FileError, TableError, SchemaError
-            There is no such table or folder, it holds no table, or its contextdb.toml cannot be read.
+            The folder of the path does not exist, or its contextdb.toml cannot be read.
         """
+        self.sessions: dict[str, Session] = {}
+        self.beginning: Beginning | None = None
+        """How to begin, where the path is that of no table."""
         where = _found(path)
+        if isinstance(where, Beginning):
+            self.beginning, self.folder, self.first = where, where.folder, ""
+            self.files = _tables(self.folder)
+            return
         self.folder = where if where.is_dir() else schema_for(where)[0]
         self.files = _tables(self.folder)
-        self.sessions: dict[str, Session] = {}
         if where.is_dir():
             self.first = next(iter(self.files), "")
+            self.beginning = None if self.files else Beginning(self.folder)
         else:
             self.first = self._name_of(where)
-        if not self.files:
-            mend = "to write one: its first line names the columns"
-            raise FileError(Fault("the folder holds no table.", " or ".join(TABLE_SUFFIXES), mend, Place(str(self.folder))))
 
     def session(self, name: str) -> Session:
         """A table, opened when it is not yet; errors as of `Session`."""
         if name not in self.sessions:
             self.sessions[name] = Session(self.files[name])
         return self.sessions[name]
+
+    def begin_from(self, path: Path) -> bool:
+        """Begin with a file that is no table of ours, but can be imported; gives whether it can."""
+        self.beginning = beginning_from(path)
+        if self.beginning is not None:
+            self.first = ""
+        return self.beginning is not None
 
     def know_others(self, name: str) -> None:
         """Let a table whose rows refer to others know of those as they are being edited."""
@@ -109,6 +123,19 @@ class Workspace:
             A table that is to be written has unsaved edits; else as `contextdb.edits.renaming`. Nothing has changed then.
         """
         found = renaming(self.sessions[name].sheet.table, old, new, only_here)
+        return self._write_renaming(name, found, {old: new})
+
+    def rename_value(self, name: str, condition: str, old: str, new: str) -> tuple[str, ...]:
+        """Give a declared value of a condition another name in the files of the project; gives which were written.
+
+        Raises
+        ------
+        TableError, SchemaError, FileError
+            As of `rename`; else as `contextdb.edits.renaming_values`. Nothing has changed then.
+        """
+        return self._write_renaming(name, value_renaming(self.sessions[name].sheet.table, condition, old, new), {})
+
+    def _write_renaming(self, name: str, found: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
         paths = {file.path.resolve() for file in found.files}
         open_here = [one for one, session in self.sessions.items() if session.path.resolve() in paths or one == name]
         if waiting := [one for one in open_here if one in self.unsaved]:
@@ -119,7 +146,7 @@ class Workspace:
         found.write()
         for one in open_here:
             query = self.sessions[one].sheet.query
-            self.reopen(one).sheet.query.load({new if fact == old else fact: text for fact, text in query.texts.items()})
+            self.reopen(one).sheet.query.load({names.get(fact, fact): text for fact, text in query.texts.items()})
         return tuple(file.path.name for file in found.files)
 
     @property
@@ -152,10 +179,19 @@ def _of_disk(tables: Mapping[str, Table]) -> Mapping[str, Table]:
     return inner.base if isinstance(inner, OpenTables) else tables
 
 
-def _found(path: str | Path | None) -> Path:
+def _found(path: str | Path | None) -> Path | Beginning:
     if path is None:
         return next((folder for folder in FOLDERS if folder.is_dir() and _tables(folder)), Path())
-    return Path(path) if Path(path).is_dir() else table_path(str(path))
+    if Path(path).is_dir():
+        return Path(path)
+    try:
+        file = table_path(str(path))
+    except ContextDBError as error:
+        begun = beginning(Path(path), error)
+        if begun is None:
+            raise
+        return begun
+    return beginning(file) or file
 
 
 def _tables(folder: Path) -> dict[str, Path]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -17,15 +17,18 @@ from contextdb.cells.words import MARK
 from contextdb.columns import TextColumn
 from contextdb.errors import ContextDBError, ContextError, Fault, TableError, plural
 from tui.clipboard import Clipboard
-from tui.messages import Edited, RenameWanted, Told
+from tui.messages import Edited, RenameWanted, Told, ValueRenameWanted
 from tui.model.asked import Offered
+from tui.model.column_values import selection_said
+from tui.model.columns_shown import prefix_of
 from tui.model.find import PatternError, Search
 from tui.model.problems import findings_at_once
 from tui.model.sheet import Done, Sheet
-from tui.model.views import Filter, Sort
+from tui.model.views import CellTest, Filter, Sort
 from tui.panes.pane import Pane
+from tui.panes.why import WhyPane
 from tui.screens.ask import AskDialog
-from tui.widgets.bar import CellLine
+from tui.widgets.bar import Bar, CellLine, Item
 from tui.widgets.cell_editor import CellEditor
 from tui.widgets.find_bar import FilterBar, FindBar, SheetBar
 from tui.widgets.grid import Grid
@@ -41,12 +44,14 @@ class _Place:
     row: int = 0
     column: int = 0
     is_fact: bool = False
+    is_new: bool = False
+    """It is in the empty row below the last one."""
 
 
 class AssetsPane(Pane):
     """A table as a spreadsheet, with the test row at its foot."""
 
-    DEFAULT_CSS = "AssetsPane { layout: vertical; & Grid { height: 1fr; } }"
+    DEFAULT_CSS = "AssetsPane { layout: vertical; & Grid { height: 1fr; } & #chips { display: none; } }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f6", "back", "Back to the table", show=False)]
 
     def __init__(self, sheet: Sheet, clipboard: Clipboard) -> None:
@@ -55,9 +60,15 @@ class AssetsPane(Pane):
         self.clipboard = clipboard
         self._search = Search("")
         self._edited = _Place()
+        self._run: tuple[int, int, int] | None = None
+        """After Tab the cell that it went to, and the column where the run of Tabs began."""
+        self._typed_test: CellTest | None = None
+        """The test of the filter that is being typed, which the next letter changes."""
 
     def compose(self) -> ComposeResult:
         yield CellLine()
+        yield WhyPane()
+        yield Bar(id="chips")
         yield Grid(self.sheet)
         yield FilterBar()
         yield FindBar()
@@ -71,12 +82,21 @@ class AssetsPane(Pane):
         return self.query_one(Grid)
 
     @property
+    def why_pane(self) -> WhyPane:
+        """The pane beside the grid."""
+        return self.query_one(WhyPane)
+
+    @property
     def editor(self) -> CellEditor | None:
         """The editor that is open over a cell."""
         return next(iter(self.screen.query(CellEditor)), None)
 
     def show(self) -> None:
         """Show the sheet as it is now."""
+        chips = self.query_one("#chips", Bar)
+        parts = self.sheet.filter.parts
+        chips.display = bool(parts)
+        chips.show([Item(f"unfilter({at})", f"{said} ✕") for at, (said, _) in enumerate(parts)])
         self.grid.changed()
         self._show_cell()
 
@@ -101,17 +121,26 @@ class AssetsPane(Pane):
             parts.append(f"{sheet.query.said}{where}")
         if len(sheet.view) < sheet.table.n_rows:
             parts.append(f"{len(sheet.view):,} of {plural(sheet.table.n_rows, 'row')} shown")
+        if any(sheet.hidden):
+            parts.append(f"{plural(sum(sheet.hidden), 'column')} hidden")
         if sheet.sort is not None:
-            parts.append(f"sorted by {sheet.sort.column} {'▼' if sheet.sort.is_descending else '▲'}")
+            keys = (f"{key.column} {'▼' if key.is_descending else '▲'}" for key in sheet.sort.keys)
+            parts.append(f"sorted by {', '.join(keys)}")
         if block.n_cells > 1:
-            parts.append(f"{block.shape[0]:,} × {block.shape[1]:,} selected")
+            parts.append(f"{block.shape[0]:,} × {block.shape[1]:,} selected{selection_said(sheet)}")
         return " · ".join(parts)
+
+    @on(Bar.Pressed)
+    async def _chip_pressed(self, event: Bar.Pressed) -> None:
+        event.stop()
+        await self.run_action(event.command)
 
     # ---- the line of the cell
 
     @on(Grid.Moved)
     def _show_cell(self) -> None:
         sheet = self.sheet
+        self.why_pane.follow(sheet)
         row, column = sheet.cursor
         column = self.grid.field
         header, condition = sheet.header(column), sheet.fact_of(column)
@@ -120,6 +149,8 @@ class AssetsPane(Pane):
             fault = sheet.query.faults.get(name)
             about = " · ".join(filter(None, (f"computed: {header.how}" if header.how else "", about)))
             self.query_one(CellLine).show(f"test row · {name}", self.grid.cell_text(), _short(fault), about)
+        elif self.grid.is_in_new_row:
+            self.query_one(CellLine).show(f"new row · {name}", "", "", about or "type or paste here to add rows")
         elif len(sheet.view):
             place = f"row {sheet.row_number(row)} · {name}"
             said = sheet.said_of(int(sheet.view.rows[row])) or about
@@ -136,7 +167,7 @@ class AssetsPane(Pane):
             return
         row, column = self.sheet.cursor
         column = self.grid.field
-        self._edited = _Place(row, column, self.grid.is_in_test_row)
+        self._edited = _Place(row, column, self.grid.is_in_test_row, self.grid.is_in_new_row)
         columns = self.sheet.table.columns
         editor = CellEditor(
             self.sheet.fact_of(column),
@@ -183,7 +214,7 @@ class AssetsPane(Pane):
         event.stop()
         place, clicked = self._edited, self.sheet.selection
         is_elsewhere = (self.sheet.cursor[0], self.grid.field) != (place.row, place.column)
-        is_elsewhere = is_elsewhere or self.grid.is_in_test_row != place.is_fact
+        is_elsewhere = is_elsewhere or (self.grid.is_in_test_row, self.grid.is_in_new_row) != (place.is_fact, place.is_new)
         if place.is_fact:
             self.sheet.set_fact(self.sheet.header(place.column).name, event.text)
             self._close_editor()
@@ -195,17 +226,47 @@ class AssetsPane(Pane):
             self.sheet.go(place.row, place.column)
         if not self._enter(event.text, event.is_fill):
             return
+        if place.is_new:
+            self.grid.goes_to_new_row = not is_elsewhere and event.down > 0
         if is_elsewhere:
             self.sheet.select(lambda _, shape: clicked.within(shape))
-        elif not event.is_fill:
+        elif not event.is_fill and not (place.is_new and not event.text.strip()):
+            start, before = self._run_start(event), self.sheet.cursor[0]
             self.sheet.select(lambda s, shape: s.next_cell(event.down, event.right, shape))
+            if start is not None:
+                is_last = before == self.sheet.cursor[0] == len(self.sheet.view) - 1
+                self.sheet.go(self.sheet.cursor[0], start)
+                self.grid.goes_to_new_row = is_last or self.grid.goes_to_new_row
         self.grid.show_cursor()
+
+    def _run_start(self, event: CellEditor.Committed) -> int | None:
+        """The column that Enter goes back to after a run of Tabs in one row; None where there was no such run."""
+        row, column = self.sheet.cursor
+        run = self._run if self._run is not None and self._run[:2] == (row, column) else None
+        if event.is_tab and self.sheet.block.n_cells == 1:
+            self._run = row, column + 1, column if run is None else run[2]
+            return None
+        self._run = None
+        return run[2] if run is not None and event.down == 1 and self.sheet.block.n_cells == 1 else None
+
+    @on(CellEditor.Declared)
+    def _declare(self, event: CellEditor.Declared) -> None:
+        """Take a text with values that are declared with it."""
+        event.stop()
+        place = self._edited
+        self.sheet.go(place.row, place.column)
+        self._close_editor()
+        self._try(lambda: self.sheet.declare_value(event.text, place.is_new))
 
     def _enter(self, text: str, is_fill: bool) -> bool:
         """Put a text into the cell, or into all that are selected; one that is refused stays in the editor."""
-        if is_fill:
+        is_new = self._edited.is_new
+        if is_new and not text.strip():
+            self._close_editor()
+            return True
+        if is_fill and not is_new:
             done = self.sheet.fill(text)
-        elif fault := self.sheet.type_text(text):
+        elif fault := self.sheet.type_below(text) if is_new else self.sheet.type_text(text):
             if self.editor is not None:
                 self.editor.refuse(fault)
             return False
@@ -337,6 +398,128 @@ class AssetsPane(Pane):
             others = tuple(pair for pair in self.sheet.filter.cells if pair[0] != name)
             self._show_filtered(replace(self.sheet.filter, cells=(*others, (name, frozenset([text])))))
 
+    def action_values(self) -> None:
+        """What the cursor's column holds, and what to do with it."""
+        from tui.screens.column_values import ValuesAnswer, ValuesDialog
+
+        column = self.sheet.selection.column
+
+        def decided(answer: ValuesAnswer | None) -> None:
+            if answer is None:
+                return
+            if answer.act == "mend":
+                self._try(lambda: self.sheet.mend_all(answer.texts))
+            elif answer.act in ("only", "without"):
+                self._show_only(column, answer.texts, is_without=answer.act == "without")
+            else:
+                self._ask_value(answer.act == "rename", answer.texts)
+
+        self.app.push_screen(ValuesDialog(self.sheet, column), decided)
+
+    def _show_only(self, column: int, texts: Sequence[str], is_without: bool) -> None:
+        name, wanted = self.sheet.table.columns[column].name, self.sheet.filter
+        if is_without:
+            tests = tuple(CellTest(name, "!=", text) for text in texts)
+            self._show_filtered(replace(wanted, tests=tuple(dict.fromkeys((*wanted.tests, *tests)))))
+        else:
+            others = tuple(pair for pair in wanted.cells if pair[0] != name)
+            self._show_filtered(replace(wanted, cells=(*others, (name, frozenset(texts)))))
+
+    def _ask_value(self, is_rename: bool, texts: Sequence[str]) -> None:
+        """Ask for another name of a value, or for the text that replaces some."""
+        old = texts[0]
+        what = (
+            f"Another name for the value {old}, in every cell and where it is declared"
+            if is_rename
+            else "The text to write instead"
+        )
+
+        def named(text: str | None) -> None:
+            if text is None or text == old:
+                return
+            if is_rename:
+                name = self.sheet.table.columns[self.sheet.selection.column].name
+                self.post_message(ValueRenameWanted(name, old, text.strip()))
+            else:
+                self._try(lambda: self.sheet.replace_value(texts, text))
+
+        self.app.push_screen(AskDialog("Rename the value" if is_rename else "Replace everywhere", what, old, lambda _: ""), named)
+
+    def action_hide_columns(self) -> None:
+        """Hide the selected columns."""
+        self.sheet.hide_columns()
+        self._show_columns("Alt+J shows all columns, and brings hidden ones back.")
+
+    def action_show_columns(self) -> None:
+        """Show every column again."""
+        self.sheet.show_columns(replace(self.sheet.columns_shown, hidden=frozenset(), folded=frozenset()))
+        self._show_columns("Every column is shown.")
+
+    def action_fold(self) -> None:
+        """Fold the columns with the prefix of the cursor's to one, or open them again."""
+        name = self.sheet.table.columns[self.sheet.selection.column].name
+        prefix = prefix_of(name)
+        if prefix is None:
+            self.post_message(Told(f"{name} has no prefix: columns such as Defender.DepthChart are grouped by theirs.", "warning"))
+            return
+        self.sheet.show_columns(self.sheet.columns_shown.folded_at(name))
+        is_folded = prefix in self.sheet.columns_shown.folded
+        self._show_columns(f"The columns of {prefix} are {'folded' if is_folded else 'open again'}.")
+
+    def action_freeze(self) -> None:
+        """Let the columns up to the cursor's never scroll; only the assets where that is so already."""
+        name, now = self.sheet.table.columns[self.sheet.selection.column].name, self.sheet.columns_shown
+        frozen = None if now.frozen == name else name
+        self.sheet.show_columns(replace(now, frozen=frozen))
+        self._show_columns(f"The columns up to {frozen} do not scroll." if frozen else "Only the assets do not scroll.")
+
+    def action_columns(self) -> None:
+        """All columns in a list: go to one, hide, fold, freeze."""
+        from tui.screens.columns import ColumnsAnswer, ColumnsDialog
+
+        def decided(answer: ColumnsAnswer | None) -> None:
+            if answer is None:
+                return
+            self.sheet.show_columns(answer.shown)
+            if answer.column is not None:
+                self.go_to_column(answer.column)
+            self._show_columns("")
+
+        self.app.push_screen(ColumnsDialog(self.sheet), decided)
+
+    def go_to_column(self, name: str) -> None:
+        """Put the cursor on a column, which is shown if it was hidden."""
+        names = [c.name for c in self.sheet.table.columns]
+        self.sheet.show_columns(self.sheet.columns_shown.revealed(name))
+        self.grid.is_in_test_row = False
+        self.grid.changed()
+        self.grid.moving(lambda: self.sheet.go(self.sheet.cursor[0], names.index(name)))
+
+    def _show_columns(self, said: str) -> None:
+        self.show()
+        self.grid.post_message(Grid.Moved())
+        self.post_message(Told(said))
+
+    def action_unfilter(self, at: int = -1) -> None:
+        """Take one part off the filter; the last one unless another is said."""
+        parts = self.sheet.filter.parts
+        if not parts:
+            self.post_message(Told("Every row is shown."))
+        elif -len(parts) <= at < len(parts):
+            self.query_one(FilterBar).clear_text()
+            self._show_filtered(parts[at][1])
+
+    def action_sort_then(self) -> None:
+        """Sort rows that are alike by the cursor's column, too."""
+        name, keys = self.sheet.table.columns[self.sheet.selection.column].name, self.sheet.sort.keys if self.sheet.sort else ()
+        before = next((key for key in keys if key.column == name), None)
+        others = [key for key in keys if key.column != name]
+        if before is None or not before.is_descending:
+            others.append(Sort(name, before is not None))
+        self.sheet.set_sort(Sort.by(others))
+        self.show()
+        self.grid.post_message(Grid.Moved())
+
     def action_show_all(self) -> None:
         """Remove the filter."""
         self.query_one(FilterBar).clear()
@@ -348,9 +531,15 @@ class AssetsPane(Pane):
         if event.has_findings:
             self.sheet.set_findings(findings_at_once(self.sheet.table))
         name = self.sheet.table.columns[self.sheet.selection.column].name
-        columns = ((name, event.text),) if event.in_column and event.text else ()
+        test = CellTest.read(name, event.text) if event.in_column else None
+        columns = ((name, event.text),) if event.in_column and event.text and test is None else ()
         text = "" if event.in_column else event.text
-        self._show_filtered(Filter(text, columns, self.sheet.filter.cells, event.is_valid, event.has_findings))
+        now = self.sheet.filter
+        tests = now.tests if test is None else (*(one for one in now.tests if one is not self._typed_test), test)
+        if test is None and self._typed_test is not None:
+            tests = tuple(one for one in tests if one is not self._typed_test)
+        self._typed_test = test
+        self._show_filtered(Filter(text, columns, now.cells, tests, event.is_valid, event.has_findings))
 
     def _show_filtered(self, wanted: Filter) -> None:
         self.sheet.set_filter(wanted)
@@ -359,6 +548,9 @@ class AssetsPane(Pane):
 
     @on(SheetBar.Closed)
     def _bar_closed(self) -> None:
+        if self._typed_test is not None:  # it stays, and the next one is another
+            self._typed_test = None
+            self.query_one(FilterBar).clear_text()
         self.grid.focus()
 
     def action_sort_file(self) -> None:
@@ -376,15 +568,25 @@ class AssetsPane(Pane):
         self._try(sorted_file)
 
     def action_go_to(self) -> None:
-        """Ask for a row, by its number or its asset."""
-        dialog = AskDialog("Go to", "A row's number, or the beginning of an asset's name", "", self._check_place)
+        """Ask for a row, by its number or its asset, or for a column."""
+        question = "A row's number, or the beginning of the name of an asset or a column"
+        dialog = AskDialog("Go to", question, "", self._check_place)
         self.app.push_screen(dialog, self._went)
 
     def _check_place(self, text: str) -> str:
         if text.strip().isdigit():
             n_rows = self.sheet.table.n_rows
             return "" if 1 <= int(text) <= n_rows else f"The table has {plural(n_rows, 'row')}."
-        return "" if self._row_named(text) is not None else "No asset has such a name."
+        is_there = self._row_named(text) is not None or self._column_named(text) is not None
+        return "" if is_there else "No asset and no column has such a name."
+
+    def _column_named(self, text: str, is_whole: bool = False) -> str | None:
+        """The column of a name, or else whose name begins so, or has it in it."""
+        word, names = text.strip().casefold(), [c.name for c in self.sheet.table.columns]
+        if is_whole or not word:
+            return next((name for name in names if word and name.casefold() == word), None)
+        begins = (name for name in names if name.casefold().startswith(word))
+        return next(begins, next((name for name in names if word in name.casefold()), None))
 
     def _row_named(self, text: str) -> int | None:
         word = text.strip().casefold()
@@ -393,8 +595,13 @@ class AssetsPane(Pane):
         return next(beginning, next((row for name, row in names if word and word in name), None))
 
     def _went(self, text: str | None) -> None:
-        if text is not None:
-            row = int(text) - 1 if text.strip().isdigit() else self._row_named(text)
+        if text is None:
+            return
+        row = int(text) - 1 if text.strip().isdigit() else self._row_named(text)
+        column = self._column_named(text, is_whole=True) or (self._column_named(text) if row is None else None)
+        if column is not None:
+            self.go_to_column(column)
+        else:
             self.go_to(row or 0, None)
 
     def action_rename_column(self) -> None:

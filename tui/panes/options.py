@@ -41,7 +41,15 @@ WIDE = 120
 """From so many columns on the condition is next to the table's settings."""
 
 _BY_COLUMN = ("asset", *get_args(PlainJob))
-_FORM = {"min": "minimum", "max": "maximum", "unit": "unit", "values": "values", "mirror": "mirror", "description": "description"}
+_FORM = {
+    "min": "minimum",
+    "max": "maximum",
+    "unit": "unit",
+    "values": "values",
+    "mirror": "mirror",
+    "weight": "weight",
+    "description": "description",
+}
 """The keys of a condition that are typed, and the fields of the form that hold them."""
 
 
@@ -106,6 +114,8 @@ class OptionsPane(Pane):
             yield Field("Values", Input(compact=True, placeholder="none", id="condition-values"), meaning, "values")
             meaning = "For clips played mirrored: negate, none, or names that change places, such as Left = Right."
             yield Field("Mirror", Input(compact=True, placeholder="none", id="condition-mirror"), meaning, "mirror")
+            meaning = 'What a cell counts where the policy is "specific": 2 as much as two other cells, 0 nothing.'
+            yield Field("Weight", Input(compact=True, placeholder="1", id="condition-weight"), meaning, "weight")
             yield Field(
                 "Description",
                 Input(compact=True, placeholder="none", id="condition-description"),

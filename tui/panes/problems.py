@@ -20,7 +20,7 @@ from textual.widgets import Static
 from contextdb.errors import Fault
 from contextdb.findings import LEVELS, Finding, Level
 from contextdb.tables.table import Table
-from tui.messages import GoToCell, Told
+from tui.messages import Edited, GoToCell, Told
 from tui.model.coverage_run import is_quick
 from tui.model.problems import WORDS, Problem, Problems, cell_findings, is_checked_at_once, row_findings
 from tui.model.sheet import Sheet
@@ -46,6 +46,8 @@ class ProblemsPane(Pane):
         Binding("left_square_bracket", "turn(-1)", "Level before", show=False),
         Binding("right_square_bracket", "turn(1)", "Next level"),
         Binding("r", "check", "Recheck"),
+        Binding("g", "group", "Group"),
+        Binding("m", "mend", "Mend all like this"),
     ]
     DEFAULT_CSS = """
     ProblemsPane {
@@ -73,6 +75,8 @@ class ProblemsPane(Pane):
         self.sheet = sheet
         self.problems = Problems()
         self.level: Level | None = None
+        self.is_grouped = False
+        """One line stands for all problems of a kind in a column."""
         self._of: tuple[Table, dict[str, Fault]] | None = None
         """The table and the faults of the test row that the problems are of."""
         self._found: list[Finding] = []
@@ -148,7 +152,7 @@ class ProblemsPane(Pane):
     @property
     def lines(self) -> Sequence[Problem]:
         """The problems that the filter lets through."""
-        return self.problems.of_level(self.level)
+        return self.problems.grouped(self.level) if self.is_grouped else self.problems.of_level(self.level)
 
     def take_focus(self) -> None:
         """Give the keys to the list."""
@@ -164,6 +168,22 @@ class ProblemsPane(Pane):
     def action_turn(self, step: int) -> None:
         """Show the level beside."""
         self.action_filter((FILTERS.index(self.level) + step) % len(FILTERS))
+
+    def action_group(self) -> None:
+        """One line for each kind of problem in a column, or a line for each problem."""
+        self.is_grouped = not self.is_grouped
+        self._show_lines()
+
+    def action_mend(self) -> None:
+        """Mend every cell of the problem's column that cannot be read and is near to a text that can."""
+        lines, at = self.lines, self.query_one(LineList).index
+        problem = lines[at] if 0 <= at < len(lines) else None
+        names = [column.name for column in self.sheet.table.columns]
+        if problem is None or problem.row is None or problem.column not in names or problem.is_of_test_row:
+            self.post_message(Told("Only cells that cannot be read are mended here.", "warning"))
+            return
+        self.sheet.go(self.sheet.cursor[0], names.index(problem.column))
+        self.post_message(Edited(self.sheet.mend_all()))
 
     def action_check(self) -> None:
         """Check again."""

@@ -33,6 +33,7 @@ class TeamGrid(Grid):
         Binding("shift+tab", "move(0, -1, False)", show=False),
     ]
     has_test_row: ClassVar[bool] = False
+    has_new_row: ClassVar[bool] = False
 
     class Left(Message):
         """Esc was pressed with one cell selected."""

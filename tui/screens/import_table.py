@@ -96,8 +96,8 @@ class ImportDialog(Dialog[Import]):
     """
     keys_text = "Enter read · Tab complete · ↑↓ choose · Esc cancel"
 
-    def __init__(self, table: Table, folder: Path, text: str | None = None) -> None:
-        """`folder` is where paths start; `text` is imported instead of a file: what is on the clipboard."""
+    def __init__(self, table: Table, folder: Path, text: str | None = None, path: Path | None = None) -> None:
+        """`folder` is where paths start; `text` is imported instead of a file: what is on the clipboard. `path` is read at once."""
         super().__init__(classes="-wide -no-sheets")
         self.title_text = f"Import into {table.name}"
         self.table = table
@@ -109,7 +109,7 @@ class ImportDialog(Dialog[Import]):
         self.draft: Draft | None = None
         self.reason = ""
         """Why there is no draft."""
-        self.path: Path | None = None
+        self.path: Path | None = path
 
     def compose_body(self) -> ComposeResult:
         """The file and how it is read; then its columns."""
@@ -143,7 +143,10 @@ class ImportDialog(Dialog[Import]):
             self._read()
             return
         self.query_one("#import-path", Input).focus()
+        path = self.path
         self._show_names("")
+        if path is not None:
+            self._take(str(path.absolute()))
 
     # ---- which file
 

@@ -16,13 +16,14 @@ from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
 from contextdb.edits.renaming import Uses, uses_of
+from contextdb.edits.renaming_values import ValueUses, value_uses
 from contextdb.errors import ContextDBError, in_quotes, plural, some
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.clipboard import Clipboard
-from tui.commands import ASSETS, BY_ID, SCREEN, bindings
+from tui.commands import ASSETS, BY_ID, SCREEN, bindings, key_names
 from tui.editor import Editor
-from tui.messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, Told
+from tui.messages import Edited, FillGap, GoToCell, RenameWanted, SetContext, Told, ValueRenameWanted
 from tui.model.coverage_run import CoverageRun
 from tui.model.importing import Import
 from tui.model.new_table import make_table, name_fault
@@ -34,6 +35,7 @@ from tui.panes.options import OptionsPane
 from tui.panes.pane import Pane
 from tui.panes.priorities import PrioritiesPane
 from tui.panes.problems import ProblemsPane
+from tui.panes.why import WIDE
 from tui.screens.ask import AskDialog, ChooseDialog
 from tui.screens.asking import TestRow
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
@@ -54,6 +56,15 @@ class Answer(Protocol):
 
 
 TABS = ("assets", "options", "priorities", "coverage", "problems")
+CELL_MENU = (
+    "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "insert-row", "insert-below", "duplicate", "delete-rows",
+    "enable", "filter-same", "values", "nearest",
+)  # fmt: skip
+COLUMN_MENU = (
+    "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "mend-all", "rename-column", "add-column",
+    "column-left", "column-right", "delete-columns",
+)  # fmt: skip
+"""What the right button of the mouse offers."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
 
 
@@ -311,13 +322,41 @@ class MainScreen(Screen[None]):
 
     def action_import(self) -> None:
         """Bring rows in from another file."""
+        self._import()
+
+    def _import(self, text: str | None = None) -> None:
         from tui.screens.import_table import ImportDialog
 
         def chosen(answer: Import | None) -> None:
             if answer is not None:
-                self.apply(answer.edit, answer.notes)
+                self.take_import(answer)
 
-        self.app.push_screen(ImportDialog(self.session.sheet.table, self.workspace.folder), chosen)
+        self.app.push_screen(ImportDialog(self.session.sheet.table, self.workspace.folder, text), chosen)
+
+    def take_import(self, answer: Import) -> None:
+        """Put the rows of another file into the table, and fit the columns to them."""
+        self.apply(answer.edit, answer.notes)
+        self.assets.grid.forget_widths()
+
+    @on(Grid.MenuWanted)
+    def _menu(self, event: Grid.MenuWanted) -> None:
+        """What can be done with a column, or with cells."""
+        names = COLUMN_MENU if event.of_column else CELL_MENU
+        keys = {name: key_names(self.app.settings.keys.get(name, BY_ID[name].keys)) for name in names}
+        lines = [f"{BY_ID[name].label:<18}{keys[name][0] if keys[name] else ''}" for name in names]
+
+        def chosen(at: int | None) -> None:
+            if at is not None:
+                self.call_later(self.run_command, names[at])
+
+        sheet = self.session.sheet
+        title = sheet.table.columns[sheet.selection.column].name if event.of_column else "Cells"
+        self.app.push_screen(ChooseDialog(title, lines), chosen)
+
+    @on(Grid.ImportWanted)
+    def _import_text(self, event: Grid.ImportWanted) -> None:
+        """Ask how to read a table that was pasted into an empty one."""
+        self._import(text=event.text)
 
     def action_export(self) -> None:
         """Write the table for another program."""
@@ -363,6 +402,37 @@ class MainScreen(Screen[None]):
         title, about = f"Rename {old} to {new}", f"{old} is used by {uses.text}.\n{written}"
         self.app.push_screen(ChooseDialog(title, [*lines, "Cancel"], about=about), chosen)
 
+    @on(ValueRenameWanted)
+    def _rename_value(self, event: ValueRenameWanted) -> None:
+        """Rename a value; where others speak of it, ask whether they go along."""
+        sheet, old, new = self.session.sheet, event.old, event.new
+        condition = next((c.condition for c in sheet.table.conditions if c.condition.name == event.column), None)
+        is_declared = condition is not None and condition.is_declared and old in (condition.domain.values or ())
+        uses = value_uses(sheet.table, event.column, old) if is_declared else ValueUses()
+        if not uses.text:
+            self.try_to(lambda: self._edited(Edited(sheet.rename_value(old, new))))
+            return
+        lines = [
+            "Rename everywhere: in all that uses it, written to the files at once",
+            f"Only here: the cells of this table; {old} stays a value for others",
+            "Cancel",
+        ]
+
+        def chosen(at: int | None) -> None:
+            if at == 0:
+                self.try_to(lambda: self._rename_value_files(event))
+            elif at == 1:
+                self.try_to(lambda: self._edited(Edited(sheet.rename_value(old, new, keeps_old=True))))
+
+        named = f"\nTables: {', '.join(uses.tables)}." if uses.tables else ""
+        about = f"{old} of {event.column} is used by {uses.text}.{named}"
+        self.app.push_screen(ChooseDialog(f"Rename {old} to {new}", lines, about=about), chosen)
+
+    def _rename_value_files(self, event: ValueRenameWanted) -> None:
+        files = self.workspace.rename_value(self.table_name, event.column, event.old, event.new)
+        self.app.open_table(self.table_name)
+        self.app.say_renamed(f"Renamed {event.old} to {event.new} everywhere, in {some(files)}. To undo it, rename it back.")
+
     def _rename_files(self, old: str, new: str, only_here: bool) -> None:
         files = self.workspace.rename(self.table_name, old, new, only_here)
         self.app.open_table(self.table_name)
@@ -377,8 +447,15 @@ class MainScreen(Screen[None]):
         self.app.push_screen(Blueprints(sheet.table, sheet.selected_columns, sheet.selection.column), self._answered)
 
     def _answered(self, answer: Answer | None) -> None:
-        if answer is not None:
-            self.try_to(lambda: self.apply(answer.edit(self.session.sheet.table)))
+        """Make the edit; the cursor goes to the column that is new, so that the next one comes behind it."""
+        if answer is None:
+            return
+        sheet = self.session.sheet
+        before = {column.name for column in sheet.table.columns}
+        self.try_to(lambda: self.apply(answer.edit(sheet.table)))
+        new = [column.name for column in sheet.table.columns if column.name not in before]
+        if new:
+            self.assets.go_to_column(new[-1])
 
     def apply(self, edit: Edit, notes: Sequence[str] = ()) -> None:
         """Make an edit, show it and say what was done; what cannot be done is said."""
@@ -404,7 +481,15 @@ class MainScreen(Screen[None]):
         self.try_to(self.test_row.actors)
 
     def action_why(self) -> None:
-        """Why the row of the cursor is not valid, and which rows are nearest."""
+        """Why the row of the cursor is not valid: beside the table where there is room, else as `action_nearest`."""
+        pane = self.assets.why_pane
+        if self.tab == "assets" and (pane.is_open or self.size.width >= WIDE):
+            pane.turn(self.session.sheet)
+        else:
+            self.action_nearest()
+
+    def action_nearest(self) -> None:
+        """The row of the cursor cell by cell, and which rows are nearest, in a dialog."""
         self.test_row.why()
 
     def action_refresh(self) -> None:

@@ -23,7 +23,9 @@ from textual.widgets import Input
 from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import format_cell, parse_cell, reads
 from contextdb.errors import Fault, plural
+from contextdb.schema.sections import has_place
 from tui.model.chooser import Chooser, Offer, Row
+from tui.model.condition_form import undeclared
 from tui.model.layout import cut
 from tui.model.meaning import Meaning, meaning, mend_of
 from tui.model.number_forms import nudged, other_form
@@ -58,6 +60,14 @@ class CellEditor(Widget):
         right: int = 0
         is_fill: bool = False
         """Fill every selected cell."""
+        is_tab: bool = False
+        """It was taken by Tab."""
+
+    @dataclass
+    class Declared(Message):
+        """Take the text, and declare the values in it that there are not yet."""
+
+        text: str
 
     @dataclass
     class Cancelled(Message):
@@ -94,7 +104,7 @@ class CellEditor(Widget):
         self._refused: Fault | None = None
         self._mend = ""
         self._seen = "", -1
-        self._has_ticked = self._has_moved = self._is_done = self._is_ready = False
+        self._has_ticked = self._has_moved = self._is_done = self._is_ready = self._is_tab = False
         self._cell, self._screen = Region(0, 0, 20, 1), Size(80, 24)
         if open_list and self._chooser.has_list:
             self._open()
@@ -177,7 +187,8 @@ class CellEditor(Widget):
 
     def _hint(self) -> str:
         if self._refused is not None:
-            return "Ctrl+T accept · Esc cancel" if self._mend else "Esc leave"
+            adds = "Ctrl+N add the value · " if self._is_declarable() else ""
+            return f"{adds}Ctrl+T accept · Esc cancel" if self._mend else f"{adds}Esc leave"
         if self.is_list_open and self._offer.word is not None:
             return "Enter this value · Esc leave"
         if self.is_list_open and self._chooser.has_ticks:
@@ -256,6 +267,7 @@ class CellEditor(Widget):
             "nudge": self.is_numeric,
             "tick": is_open and self._chooser.has_ticks and self._offer.word is None,
             "sign": is_open and self._chooser.has_signs and not self.is_fact and self._offer.word is None,
+            "declare": self._is_declarable(),
             "take": bool(self._mend or self._meaning.fault or self._completes),
         }
         return can.get(action, True)
@@ -265,11 +277,41 @@ class CellEditor(Widget):
         if self._is_done:
             return
         text = self._finished()
-        if (fault := self._check(text)) is not None:
+        fault = self._check(text)
+        if fault is not None and self._is_begun():
+            self._pick(self._offer.rows[0])
+            text = self._finished()
+            fault = self._check(text)
+        if fault is not None:
             self.refuse(fault)
             return
         self._is_done = True
-        self.post_message(self.Committed(text, down, right, is_fill))
+        self.post_message(self.Committed(text, down, right, is_fill, self._is_tab))
+
+    def action_tab(self) -> None:
+        """Take the text and go right; Enter then goes back to where the run of such cells began."""
+        self._is_tab = True
+        self.action_commit(0, 1)
+        self._is_tab = False
+
+    def _is_begun(self) -> bool:
+        """Whether the word at the caret is the beginning of one value, and of no other."""
+        offer = self._offer
+        row = offer.rows[0] if len(offer.rows) == 1 and offer.word is not None else None
+        return row is not None and offer.word is not None and row.casefold().startswith(offer.word.name.casefold())
+
+    def action_declare(self) -> None:
+        """Take the text with its new values."""
+        if not self._is_done:
+            self._is_done = True
+            self.post_message(self.Declared(self.text.strip()))
+
+    def _is_declarable(self) -> bool:
+        """Whether a text that was refused says values that the condition could have, too."""
+        condition = self.condition
+        if self._refused is None or self.is_fact or condition is None or not has_place("values", condition.domain.kind):
+            return False
+        return bool(undeclared(self.text, condition.domain.values or ()))
 
     def _finished(self) -> str:
         """The text as it is taken: True for "t", and a condition without spaces round it."""

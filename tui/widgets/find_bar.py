@@ -166,7 +166,7 @@ class FilterBar(SheetBar):
     def compose(self) -> ComposeResult:
         with Horizontal():
             yield Static("Filter")
-            yield Input(compact=True, id="filter-text", placeholder="rows with this text")
+            yield Input(compact=True, id="filter-text", placeholder="rows with this text; in a column also <3, not Walk")
             yield Tick("this column", id="filter-column")
             yield Tick("valid", id="filter-valid")
             yield Tick("with problems", id="filter-problems")
@@ -178,6 +178,11 @@ class FilterBar(SheetBar):
         for box in self.query(Checkbox):
             box.value = False
         self._tell()
+
+    def clear_text(self) -> None:
+        """Take the text away, without a word: what it asked for stays, or has been taken off."""
+        with self.prevent(Input.Changed):
+            self.query_one(Input).value = ""
 
     def _tell(self) -> None:
         text = self.query_one(Input).value

@@ -18,6 +18,7 @@ from textual.message import Message
 from contextdb.errors import ContextDBError
 from tui.commands import BY_ID, GRID, JUMPS, bindings
 from tui.messages import Edited, Told
+from tui.model.clipboard import asks_how_to_read
 from tui.model.selection import Selection
 from tui.model.sheet import Done, Sheet
 from tui.model.views import Sort
@@ -64,6 +65,18 @@ class Grid(GridView, can_focus=True):
         """Nothing else says what was done."""
 
     @dataclass
+    class MenuWanted(Message):
+        """Show what can be done with what is under the mouse."""
+
+        of_column: bool
+
+    @dataclass
+    class ImportWanted(Message):
+        """Ask how to read a text that was pasted into an empty table."""
+
+        text: str
+
+    @dataclass
     class PasteWanted(Message):
         """Paste what the clipboard holds."""
 
@@ -79,8 +92,9 @@ class Grid(GridView, can_focus=True):
 
     # ---- moving
 
-    def moving(self, move: Callable[[], None]) -> None:
-        """Make a move and paint the lines that it touches."""
+    def moving(self, move: Callable[[], None], in_new_row: bool = False) -> None:
+        """Make a move and paint the lines that it touches; one within the empty row stays there, every other leaves it."""
+        self.goes_to_new_row = in_new_row
         before = self.sheet.block
         move()
         self.show_cursor()
@@ -101,12 +115,22 @@ class Grid(GridView, can_focus=True):
                 self.is_in_test_row = False
             return
         is_last = self.sheet.selection.row >= len(self.sheet.view) - 1
-        if down > 0 and is_last and not extend and self.has_test_row:
-            self.is_in_test_row = True
+        if down > 0 and is_last and not extend and self._go_below():
+            return
+        if self.is_in_new_row:
+            self.moving(lambda: self.sheet.move(0, right), in_new_row=not down)
             return
         if self.is_in_test_row and self._move_fields(right):
             return
         self.moving(lambda: self.sheet.move(down, right, extend and not self.is_in_test_row))
+
+    def _go_below(self) -> bool:
+        """From the last row to the empty one, and from there to the test row; gives whether there is one to go to."""
+        if self.has_new_row and not self.is_in_new_row:
+            self.moving(lambda: self.sheet.move(0, 0), in_new_row=True)
+        elif self.has_test_row:
+            self.is_in_test_row = True
+        return self.has_new_row or self.has_test_row
 
     def _move_fields(self, right: int) -> bool:
         """Move the cursor of the test row among the facts behind the last column, or onto the first of them; gives whether it
@@ -147,6 +171,16 @@ class Grid(GridView, can_focus=True):
 
         self.moving(move)
 
+    def action_next_failing(self, is_backwards: bool) -> None:
+        """To the next cell that fails for the test row, or cannot be read where that is empty."""
+        self.is_in_test_row = False
+        place = self.sheet.next_failing(is_backwards)
+        if place is None:
+            what = "No cell that is shown cannot be read" if self.sheet.query.is_empty else "No cell that is shown fails"
+            self.post_message(Told(f"{what}."))
+        else:
+            self.moving(lambda: self.sheet.go(*place))
+
     def action_select_rows(self) -> None:
         self._select(lambda s: s.rows(self.sheet.shape))
 
@@ -167,8 +201,13 @@ class Grid(GridView, can_focus=True):
         else:
             self.moving(lambda: self.sheet.go(*self.sheet.cursor))
 
+    def watch_goes_to_new_row(self) -> None:
+        if self.is_mounted:
+            self.refresh()
+
     def watch_is_in_test_row(self) -> None:
         if self.is_mounted:
+            self.goes_to_new_row = False
             if not self.is_in_test_row:
                 self._extra = None
             elif not self._is_condition():
@@ -196,8 +235,13 @@ class Grid(GridView, can_focus=True):
         assert verb is not None
         if self.is_in_test_row and BY_ID[name].group in ("Edit", "Rows"):
             self.post_message(Told("The cursor is in the test row. F6 goes back to the table.", "warning"))
+        elif self.is_in_new_row and BY_ID[name].group in ("Edit", "Rows"):
+            self._say_new_row()
         else:
             self._do(lambda: verb(self.sheet))
+
+    def _say_new_row(self) -> None:
+        self.post_message(Told("The cursor is below the last row. Type or paste there to make a new row; Up goes back.", "warning"))
 
     def _do(self, verb: Callable[[], Done]) -> None:
         try:
@@ -209,8 +253,8 @@ class Grid(GridView, can_focus=True):
 
     def action_insert_rows(self, below: bool) -> None:
         """As many rows as are selected."""
-        n_rows = max(self.sheet.block.shape[0], 1) if len(self.sheet.view) else 1
-        self.is_in_test_row = False  # what is typed next is meant for the new row
+        n_rows = max(self.sheet.block.shape[0], 1) if len(self.sheet.view) and not self.is_in_new_row else 1
+        self.is_in_test_row = self.goes_to_new_row = False  # what is typed next is meant for the new row
         self._do(lambda: self.sheet.insert_rows(n_rows, below))
 
     def action_undo(self, is_redo: bool) -> None:
@@ -241,6 +285,8 @@ class Grid(GridView, can_focus=True):
         if self.is_in_test_row:
             fact = self.sheet.fact_of(self.field)
             return "" if fact is None else self.sheet.query.text(fact.name)
+        if self.is_in_new_row:
+            return ""
         return self.sheet.text(row, column) if len(self.sheet.view) else ""
 
     def _want_edit(self, text: str, is_typing: bool = False, opens_list: bool = False) -> None:
@@ -249,7 +295,7 @@ class Grid(GridView, can_focus=True):
             self.post_message(Told(f"Only conditions have a fact to test with.{more}", "warning"))
         elif self.is_in_test_row and (why := self._why_computed()):
             self.post_message(Told(why, "warning"))
-        elif not self.is_in_test_row and not len(self.sheet.view):
+        elif not self.is_in_test_row and not len(self.sheet.view) and not self.has_new_row:
             self.post_message(Told("There is no row here. Ctrl+N makes one.", "warning"))
         else:
             self.show_cursor()
@@ -263,6 +309,8 @@ class Grid(GridView, can_focus=True):
     def action_clear(self) -> None:
         if self.is_in_test_row:
             self.set_fact("")
+        elif self.is_in_new_row:
+            self._say_new_row()
         else:
             self._do(self.sheet.clear)
 
@@ -280,12 +328,18 @@ class Grid(GridView, can_focus=True):
         return "" if fact is None else self.sheet.query.wanted.why_computed(fact.name)
 
     def action_copy(self) -> None:
+        if self.is_in_new_row:
+            self._say_new_row()
+            return
         self.post_message(self.CopyWanted(self.cell_text() if self.is_in_test_row else self.sheet.copy()))
 
     def action_cut(self) -> None:
         if self.is_in_test_row:
             self.action_copy()
             self.set_fact("")
+            return
+        if self.is_in_new_row:
+            self._say_new_row()
             return
 
         def cut() -> Done:
@@ -302,6 +356,11 @@ class Grid(GridView, can_focus=True):
         """Put a text of the clipboard over the selection, or into the fact of the test row."""
         if self.is_in_test_row:
             self.set_fact(text.splitlines()[0].split("\t")[0] if text.strip() else "")
+        elif asks_how_to_read(text, self.sheet.table):
+            self.post_message(self.ImportWanted(text))
+        elif self.is_in_new_row:
+            self._do(lambda: self.sheet.paste_below(text))
+            self.goes_to_new_row = False
         else:
             self._do(lambda: self.sheet.paste(text))
 
@@ -336,6 +395,9 @@ class Grid(GridView, can_focus=True):
         if event.button == 1:
             event.stop()
             self._pointer.press(event)
+        elif event.button == 3:
+            event.stop()
+            self.post_message(self.MenuWanted(self._pointer.point(event)))
 
     def on_mouse_move(self, event: events.MouseMove) -> None:
         self._pointer.move(event)

@@ -5,8 +5,9 @@ Only what is seen is read and painted, so that a line costs the same in a table 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 from rich.cells import cell_len
 from rich.segment import Segment
@@ -14,14 +15,20 @@ from rich.style import Style
 from textual.strip import Strip
 
 from contextdb.errors import plural
-from tui.model.layout import Layout, cut
+from tui.model.layout import Layout, cut, cut_middle, name_lines
 from tui.model.selection import Block
 from tui.model.shown import Header, ShownTable
 from tui.model.window import MARKS, PICKED, Window
 
-N_HEADERS = 3
 LOWEST = 8
 """In a window of fewer lines only the names of the columns stand over the rows."""
+LOW, ROOMY = 12, 20
+"""In a window of fewer lines than the first names are not wrapped. In one of fewer than the second, wrapped names leave one line
+for the type, or for what the fact of the test row leaves."""
+AT_LEFT, AT_RIGHT = "«", "»"
+"""Stand at an edge of the window behind which cells of the row fail."""
+HIDES = "║"
+"""Stands behind a column after which others are hidden."""
 UP, DOWN, UNSORTED = "▲", "▼", "↕"
 COMPUTED = "="
 """Stands before a fact of the test row that is computed from others."""
@@ -34,9 +41,13 @@ StyleOf = Callable[[str, str], Style]
 """The style of a ground and of what is on it: `style("cursor", "text")`."""
 
 
-def n_headers(height: int) -> int:
-    """How many lines stand over the rows in a window so high."""
-    return N_HEADERS if height >= LOWEST else 1
+@lru_cache(maxsize=256)
+def header_lines(height: int, n_names: int, is_wrapped: bool = False) -> tuple[str, ...]:
+    """What the lines over the rows say in a window so high, where the longest name takes `n_names` lines."""
+    if height < LOWEST:
+        return ("name",)
+    says = ("both",) if is_wrapped and (height < LOW or (n_names > 1 and height < ROOMY)) else ("kind", "leaves")
+    return (*["name"] * (n_names if height >= LOW else 1), *says)
 
 
 @dataclass(frozen=True)
@@ -52,6 +63,13 @@ class Look:
     is_in_test_row: bool
     has_focus: bool
     has_test_row: bool = True
+    is_in_new_row: bool = False
+    """The cursor is in the empty row below the last one."""
+    has_new_row: bool = False
+    is_wrapped: bool = False
+    """Columns are as narrow as their cells allow, and names are wrapped."""
+    n_names: int = 1
+    """How many lines the longest name over a column takes."""
     field: int | None = None
     """The column of the test row that the cursor is in, where that is not the sheet's: fields behind its last column count on."""
 
@@ -63,7 +81,22 @@ class Look:
     @property
     def n_headers(self) -> int:
         """How many lines stand over the rows."""
-        return n_headers(self.height)
+        return len(self.header_lines)
+
+    @property
+    def header_lines(self) -> tuple[str, ...]:
+        """What each of the lines over the rows says."""
+        return header_lines(self.height, self.n_names, self.is_wrapped)
+
+    @property
+    def sort_line(self) -> int:
+        """The line of the header with the signs to sort by."""
+        return self.n_name_lines if self.is_wrapped and self.n_headers > 1 else 0
+
+    @property
+    def n_name_lines(self) -> int:
+        """How many of the lines over the rows are for names."""
+        return self.header_lines.count("name")
 
     @property
     def n_body(self) -> int:
@@ -96,6 +129,8 @@ class Painter:
         if y == look.foot:
             return self._test_line(look)
         row = look.top + y - look.n_headers
+        if row == len(self.sheet.view) and look.has_new_row:
+            return self._new_line(look)
         if row >= len(self.sheet.view):
             return self._empty_line(row, look)
         return self._body_line(row, look)
@@ -103,8 +138,10 @@ class Painter:
     # ---- headers
 
     def _header_line(self, y: int, look: Look) -> Strip:
-        ground = ("header", "header-kind", "header-leaves")[y]
-        texts = (self._name, self._kind, self._leaves)[y]
+        lines = look.header_lines
+        says, is_last = lines[y], y == len(lines) - 1
+        ground = "header" if says == "name" and len(lines) > 1 else "header-leaves" if is_last else "header-kind"
+        ground = "header" if len(lines) == 1 else ground
         block = self.sheet.block
         gutter = ("#".rjust(look.layout.gutter - 3) + "   ") if y == 0 else " " * look.layout.gutter
 
@@ -113,24 +150,46 @@ class Painter:
                 column == look.field if look.is_in_test_row and look.field is not None else block.left <= column < block.right
             )
             chosen = "header-chosen" if is_chosen else ground
-            yield from texts(column, look.layout.widths[column], chosen)
+            width, sign = look.layout.widths[column], self._sign(column) if y == look.sort_line else ""
+            if says == "name":
+                yield from self._name(column, width, chosen, y, look)
+            elif says == "leaves" or (says == "both" and self._is_asked(column)):
+                yield from self._leaves(column, width - 2 * bool(sign), chosen)
+            else:
+                yield from self._kind(column, width - 2 * bool(sign), chosen)
+            if sign:
+                yield Segment(" " + sign, self.style(chosen, "muted" if sign == UNSORTED else "name"))
 
-        return self._joined(Segment(gutter, self.style(ground, "muted")), cell, look, ground)
+        return self._joined([Segment(gutter, self.style(ground, "muted"))], cell, look, ground)
 
-    def _name(self, column: int, width: int, ground: str) -> Iterator[Segment]:
+    def _sign(self, column: int) -> str:
+        """How the rows are sorted by a column; empty for a fact that is none."""
         header, sort = self._header(column), self.sheet.sort
         if header.is_extra:
-            yield Segment(" " + cut(header.name, width - 1), self.style(ground, "muted"))
-            return
-        sign = UNSORTED
+            return ""
         if sort is not None and sort.column == header.name:
-            sign = DOWN if sort.is_descending else UP
-        yield Segment(" " + cut(header.name, width - 3), self.style(ground, "name"))
-        yield Segment(" " + sign, self.style(ground, "muted" if sign == UNSORTED else "name"))
+            return DOWN if sort.is_descending else UP
+        return UNSORTED
+
+    def _name(self, column: int, width: int, ground: str, y: int, look: Look) -> Iterator[Segment]:
+        """Line `y` of a name; a short one stands in the last of the lines."""
+        header = self._header(column)
+        room = width - 1 - 2 * (y == look.sort_line and not header.is_extra)
+        text = header.name
+        if look.n_name_lines > 1:
+            lines = name_lines(header.name, width - 1)
+            at = y - (look.n_name_lines - len(lines))
+            text = lines[at] if at >= 0 else ""
+        yield Segment(" " + cut_middle(text, room), self.style(ground, "muted" if header.is_extra else "name"))
+
+    def _is_asked(self, column: int) -> bool:
+        header = self._header(column)
+        return header.fault is not None or header.leaves is not None or header.n_actors > 0 or header.is_extra
 
     def _kind(self, column: int, width: int, ground: str) -> Iterator[Segment]:
         header = self._header(column)
         kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
+        kind = kind if cell_len(kind) < width else header.unit or header.kind
         yield Segment(" " + cut(kind, width - 1), self.style(ground, "muted"))
 
     def _leaves(self, column: int, width: int, ground: str) -> Iterator[Segment]:
@@ -139,6 +198,7 @@ class Painter:
             yield Segment("!" + cut("cannot be read", width - 1), self.style(ground, "fault"))
             return
         text = "" if header.leaves is None else f"leaves {header.leaves:,}"
+        text = text if len(text) < width else text.replace("leaves ", "→ ")
         text = plural(header.n_actors, "actor") if header.n_actors else "no column" if header.is_extra else text
         yield Segment(" " + cut(text, width - 1), self.style(ground, "muted"))
 
@@ -153,7 +213,8 @@ class Painter:
         window = self._window_at(row, look)
         seen, block, ground = window.row(row), self._block(look), self._ground(row, window)
         asset = self.sheet.asset_at
-        cursor = None if look.is_in_test_row or self.sheet.cursor[0] != row else self.sheet.cursor[1]
+        is_away = look.is_in_test_row or look.is_in_new_row
+        cursor = None if is_away or self.sheet.cursor[0] != row else self.sheet.cursor[1]
 
         n_columns = len(self.sheet.table.columns)
 
@@ -170,16 +231,21 @@ class Painter:
                 under = "selected"
             note, width = window.note(row, column), look.layout.widths[column] - 1
             mark = OPENS if note is not None and column == asset and kind == "text" else MARKS[kind]
+            n_shared = self.sheet.shared_end if column == asset else None
             room = width - cell_len(note) - 1 if note else width
             if note and room >= min(cell_len(text), LEAST_BESIDE):
-                yield Segment(mark + cut(text, room), self.style(under, meant))
+                yield Segment(mark + _shortened(text, room, n_shared), self.style(under, meant))
                 yield Segment(f" {note}", self.style(under, meant if column == cursor else "valid" if seen.is_valid else "muted"))
             else:
-                yield Segment(mark + cut(text, width), self.style(under, meant))
+                yield Segment(mark + _shortened(text, width, n_shared), self.style(under, meant))
 
-        number = f"{seen.number:>{look.layout.gutter - 3}} {seen.mark} "
+        number = f"{seen.number:>{look.layout.gutter - 3}}"
         style = self.style("gutter", "valid" if seen.is_valid else "name" if cursor is not None else "muted")
-        return self._joined(Segment(number, style), cell, look, ground)
+        if seen.mark != " " or not seen.n_failing:
+            return self._joined([Segment(f"{number} {seen.mark} ", style)], cell, look, ground)
+        count = MARKS["failing"] + (str(seen.n_failing) if seen.n_failing < 10 else "+")
+        gutter = [Segment(number, style), Segment(f"{count} ", self.style("gutter", "failing"))]
+        return self._joined(gutter, cell, look, ground, window.failing(row))
 
     def _window_at(self, row: int, look: Look) -> Window:
         if self._window is None or not self._window.holds(row):
@@ -194,7 +260,22 @@ class Painter:
 
     def _block(self, look: Look) -> Block | None:
         block = self.sheet.block
-        return None if block.n_cells <= 1 or look.is_in_test_row else block
+        return None if block.n_cells <= 1 or look.is_in_test_row or look.is_in_new_row else block
+
+    def _new_line(self, look: Look) -> Strip:
+        """The row below the last one, which takes what is typed or pasted."""
+        asset, n_rows = self.sheet.asset_at, len(self.sheet.view)
+        hint = "new row" if n_rows or not self.sheet.table.n_rows else "no row passes the filter"
+
+        def cell(column: int) -> Iterator[Segment]:
+            is_cursor = look.is_in_new_row and column == self.sheet.cursor[1]
+            ground = "row" if not is_cursor else "cursor" if look.has_focus else "cursor-away"
+            text = hint if column == asset and (look.is_in_new_row or not n_rows) else ""
+            said = "on-cursor" if is_cursor and look.has_focus else "muted"
+            yield Segment(" " + cut(text, look.layout.widths[column] - 1), self.style(ground, said))
+
+        gutter = "+".rjust(look.layout.gutter - 3) + "   "
+        return self._joined([Segment(gutter, self.style("gutter", "muted"))], cell, look, "row")
 
     def _empty_line(self, row: int, look: Look) -> Strip:
         text = ""
@@ -215,7 +296,7 @@ class Painter:
             ground = ("cursor" if look.has_focus else "cursor-away") if is_cursor else "test"
             is_lit = is_cursor and look.has_focus
             if column == asset:
-                yield Segment(" " + cut(self._said(), width - 1), self.style(ground, "on-cursor" if is_lit else "name"))
+                yield Segment(" " + cut(self._said(width - 1), width - 1), self.style(ground, "on-cursor" if is_lit else "name"))
                 return
             name = condition.name if condition is not None else ""
             is_cast, is_computed = query.role_of(name) is not None, query.is_computed(name)
@@ -226,31 +307,59 @@ class Painter:
             yield Segment(mark + cut(text, width - 1), self.style(ground, "on-cursor" if is_lit else meant))
 
         gutter = "?".rjust(look.layout.gutter - 3) + "   "
-        return self._joined(Segment(gutter, self.style("test", "name")), cell, look, "test")
+        return self._joined([Segment(gutter, self.style("test", "name"))], cell, look, "test")
 
-    def _said(self) -> str:
+    def _said(self, width: int) -> str:
         query = self.sheet.query
         if query.is_empty:
             return "test row"
         may_be = f", {query.n_undecided:,} may be" if query.n_undecided else ""
-        return f"{query.n_valid - query.n_undecided:,} of {plural(self.sheet.table.n_rows, 'row')} valid{may_be}"
+        of = f"{query.n_valid - query.n_undecided:,} of"
+        said = f"{of} {plural(self.sheet.table.n_rows, 'row')} valid{may_be}"
+        return said if cell_len(said) <= width else f"{of} {self.sheet.table.n_rows:,} valid"
 
     # ---- parts
 
-    def _joined(self, gutter: Segment, cell: Callable[[int], Iterator[Segment]], look: Look, ground: str) -> Strip:
-        """The gutter, the frozen columns and those that are scrolled, each followed by its separator."""
+    def _joined(
+        self,
+        gutter: list[Segment],
+        cell: Callable[[int], Iterator[Segment]],
+        look: Look,
+        ground: str,
+        failing: Collection[int] = (),
+    ) -> Strip:
+        """The gutter, the frozen columns and those that are scrolled, each followed by its separator; an arrow stands at an edge
+        behind which columns fail."""
         layout = look.layout
-        bar = Segment("│", self.style(ground, "line"))
-        line = [gutter]
+        bar, double = Segment("│", self.style(ground, "line")), Segment(HIDES, self.style(ground, "muted"))
+        hides = layout.hides
+        line = list(gutter)
         for column in range(layout.n_frozen):
-            line += [*cell(column), bar]
+            if layout.widths[column]:
+                line += [*cell(column), double if column in hides else bar]
         moving: list[Segment] = []
         columns = layout.visible(look.left)
         for column in columns:
-            moving += [*cell(column), bar]
+            if layout.widths[column]:
+                moving += [*cell(column), double if column in hides else bar]
         start = look.left - (layout.starts[columns.start] - layout.frozen) if len(columns) else 0
+        if any(layout.n_frozen <= column < columns.start + (start > 0) for column in failing):
+            line[-1] = _ending(line[-1], AT_LEFT, self.style(ground, "failing"))
         line += _from(moving, start)
-        return Strip(line).adjust_cell_length(layout.width, self.style(ground, "text"))
+        if not any(column >= columns.stop for column in failing):
+            return Strip(line).adjust_cell_length(layout.width, self.style(ground, "text"))
+        inner = Strip(line).adjust_cell_length(layout.width - 1, self.style(ground, "text"))
+        return Strip([*inner, Segment(AT_RIGHT, self.style(ground, "failing"))], layout.width)
+
+
+def _ending(segment: Segment, sign: str, style: Style) -> Segment:
+    """A separator as an arrow; a longer segment as it is."""
+    return Segment(sign, style) if segment.cell_length == 1 else segment
+
+
+def _shortened(text: str, width: int, n_shared: int | None) -> str:
+    """A text in so many cells; the name of an asset loses its middle, and the end that all have in common."""
+    return cut(text, width) if n_shared is None else cut_middle(text, width, n_shared)
 
 
 def _from(segments: list[Segment], start: int) -> list[Segment]:

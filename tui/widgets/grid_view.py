@@ -5,6 +5,7 @@ Only what is seen is read and painted: see `tui.widgets.grid_paint`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from rich.cells import cell_len
@@ -14,9 +15,10 @@ from textual.reactive import reactive
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout
+from tui.model.alignment import MOST_ALIGNED, indented
+from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
-from tui.widgets.grid_paint import Look, Painter, n_headers
+from tui.widgets.grid_paint import Look, Painter
 
 GROUNDS = (
     "row", "row-valid", "row-picked", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test",
@@ -65,6 +67,10 @@ class GridView(ScrollView, inherit_bindings=False):
     has_test_row: ClassVar[bool] = True
     is_in_test_row = reactive(False)
     """Whether the cursor is in the test row."""
+    has_new_row: ClassVar[bool] = True
+    """Whether an empty row stands below the last one, to type or paste a new one."""
+    goes_to_new_row = reactive(False)
+    """Whether the cursor went to that row; where no row is shown it is there anyhow."""
 
     def __init__(self, sheet: Sheet) -> None:
         super().__init__()
@@ -72,10 +78,15 @@ class GridView(ScrollView, inherit_bindings=False):
         self._painter = Painter(sheet, self._style)
         self._styles: dict[tuple[str, str], Style] = {}
         self._widths: dict[str, int] = {}
+        """The widths that a person gave to columns."""
+        self._own_widths: dict[str, tuple[int, int]] = {}
+        """For the other columns the width with the name in one line, and with the name wrapped."""
+        self._names = (False, 1)
+        """Whether names are wrapped, and how many lines the longest one takes."""
         self._layout: Layout | None = None
         self._laid_out = sheet.table
         """The table that the layout is of: a step may have made another one before the screen is reported."""
-        self._said_shape = (-1, -1)
+        self._said_shape = (-1, -1, -1)
         self._fields: tuple[str, ...] = ()
         """The fields of the test row behind the columns, that the layout is of."""
         self._extra: int | None = None
@@ -85,8 +96,14 @@ class GridView(ScrollView, inherit_bindings=False):
         self.sheet = sheet
         self._painter = Painter(sheet, self._style)
         self._widths.clear()
-        self.is_in_test_row = False
+        self._own_widths.clear()
+        self.is_in_test_row = self.goes_to_new_row = False
         self.changed()
+
+    @property
+    def is_in_new_row(self) -> bool:
+        """Whether the cursor is in the empty row below the last one."""
+        return self.has_new_row and not self.is_in_test_row and (self.goes_to_new_row or not len(self.sheet.view))
 
     @property
     def field(self) -> int:
@@ -107,14 +124,23 @@ class GridView(ScrollView, inherit_bindings=False):
         self._painter.changed()
         self._layout = None
         self._fit()
-        self.show_cursor()
+        self.show_cursor(is_after_edit=True)
         self.refresh()
+
+    def forget_widths(self) -> None:
+        """Fit the columns again that nobody gave a width: their texts are others now."""
+        self._own_widths.clear()
+        self.changed()
 
     def refit(self) -> None:
         """Make room where something new is beside cells; no column becomes narrower."""
         for at, column in enumerate(self.sheet.table.columns):
+            beside = min(self._beside(at), WIDEST)
             if column.name in self._widths:
-                self._widths[column.name] = max(self._widths[column.name], min(self._beside(at), WIDEST))
+                self._widths[column.name] = max(self._widths[column.name], beside)
+            elif column.name in self._own_widths:
+                wide, narrow = self._own_widths[column.name]
+                self._own_widths[column.name] = max(wide, beside), max(narrow, beside)
 
     def autofit(self) -> None:
         """Make each column as wide as its texts and its name."""
@@ -139,25 +165,58 @@ class GridView(ScrollView, inherit_bindings=False):
         is_same = self._laid_out is self.sheet.table and self._fields == fields
         if self._layout is None or self._layout.width != self.window.width or not is_same:
             self._laid_out, self._fields = self.sheet.table, fields
-            names = [c.name for c in self.sheet.table.columns]
-            widths = [self._width(at, name) for at, name in enumerate((*names, *fields))]
-            n_frozen = names.index(self.sheet.table.asset_column) + 1
-            self._layout = layout(widths, n_frozen if n_frozen <= 3 else 0, self.sheet.table.n_rows, self.window.width)
+            self._layout, is_wrapped, n_names = self._laid(fields)
+            self._names = is_wrapped, n_names
         return self._layout
+
+    def _laid(self, fields: Sequence[str]) -> tuple[Layout, bool, int]:
+        """Where the columns stand; whether names are wrapped, since not all were seen else; how many lines the longest takes."""
+        names = [*(c.name for c in self.sheet.table.columns), *fields]
+        hidden, asset = self.sheet.hidden, self.sheet.table.asset_column
+        n_frozen = self.sheet.columns_shown.n_frozen([c.name for c in self.sheet.table.columns], asset)
+
+        def made(is_wrapped: bool) -> Layout:
+            widths = [0 if at < len(hidden) and hidden[at] else self._width(at, name, is_wrapped) for at, name in enumerate(names)]
+            return layout(widths, n_frozen, self.sheet.table.n_rows, self.window.width)
+
+        plain = made(False)
+        if plain.total <= self.window.width:
+            return plain, False, 1
+        wrapped = made(True)
+        lines = (len(name_lines(name, width - 1)) for name, width in zip(names, wrapped.widths, strict=True) if width)
+        return wrapped, True, max(lines, default=1)
 
     @property
     def look(self) -> Look:
         """Where the grid is at present."""
         x, y = self.scroll_offset
         height, is_in_test_row = self.window.height, self.is_in_test_row
-        return Look(self.grid_layout, height, x, y, is_in_test_row, self.has_focus, self.has_test_row, self.field)
+        made = self.grid_layout
+        return Look(
+            made,
+            height,
+            x,
+            y,
+            is_in_test_row,
+            self.has_focus,
+            self.has_test_row,
+            self.is_in_new_row,
+            self.has_new_row,
+            *self._names,
+            self.field,
+        )
 
     def cell_region(self) -> Region:
         """Where the cell of the cursor is on the screen, without its mark."""
-        look, row, column = self.look, self.sheet.cursor[0], self.field
+        look, row, column = self.look, self._cursor_row, self.field
         y = look.foot if self.is_in_test_row else look.n_headers + row - look.top
         x = look.layout.place(column, look.left)
         return Region(self.content_region.x + x + 1, self.content_region.y + y, look.layout.widths[column] - 1, 1)
+
+    @property
+    def _cursor_row(self) -> int:
+        """The row of the view that the cursor is in; behind the last one for the empty row."""
+        return len(self.sheet.view) if self.is_in_new_row else self.sheet.cursor[0]
 
     def render_line(self, y: int) -> Strip:
         return self._painter.line(y, self.look)
@@ -166,18 +225,38 @@ class GridView(ScrollView, inherit_bindings=False):
         self._styles.clear()
         super().notify_style_update()
 
-    def _width(self, at: int, name: str) -> int:
-        if name not in self._widths:
-            self._widths[name] = self._fitted(at, WIDEST if name == self.sheet.table.asset_column else COMPACT)
-        return self._widths[name]
+    def _width(self, at: int, name: str, is_wrapped: bool) -> int:
+        if name in self._widths:
+            return self._widths[name]
+        if name not in self._own_widths:
+            self._own_widths[name] = self._width_of(at, name)
+        return self._own_widths[name][is_wrapped]
+
+    def _width_of(self, at: int, name: str) -> tuple[int, int]:
+        """How wide a column is at first: with its name in one line, and with its name wrapped."""
+        widest = WIDEST if name == self.sheet.table.asset_column else COMPACT
+        header = self.sheet.header(at)
+        wrapped = max(min(name_width(name), COMPACT) + 1, len(header.kind) + 3)
+        if header.is_extra:
+            wide = self._fitted(at, widest)
+            return wide, min(wide, max(wrapped, len("no column") + 1))
+        cells = max(self._fitted_cells(at, [], widest), self._beside(at))
+        kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
+        wide = min(max(cells, min(max(cell_len(name) + 4, cell_len(kind) + 2), widest)), WIDEST)
+        return wide, min(wide, max(wrapped, cells))
 
     def _fitted(self, at: int, widest: int) -> int:
         header = self.sheet.header(at)
         kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
         if header.is_extra:
             return min(max(len("no column"), cell_len(header.name), cell_len(kind)) + 2, widest)
-        fitted = fitted_width(self.sheet.table.columns[at], [header.name + " ↕", kind], widest)
+        fitted = self._fitted_cells(at, [header.name + " ↕", kind], widest)
         return min(max(fitted, self._beside(at)), WIDEST)
+
+    def _fitted_cells(self, at: int, heads: Sequence[str], widest: int) -> int:
+        indent, column = self.sheet.indent(at), self.sheet.table.columns[at]
+        aligned = [indented(text, indent) for text in column.texts[:MOST_ALIGNED]] if indent else []
+        return fitted_width(column, [*heads, *aligned], widest)
 
     def _beside(self, at: int) -> int:
         """How wide a column must be for what is at the right of its cells: the actors of a role, the rows of inner tables."""
@@ -191,6 +270,13 @@ class GridView(ScrollView, inherit_bindings=False):
             return longest + len(" 000 of 000 rows") + 1
         return longest + max(cell_len(str(actor.get("name", ""))) for actor in query.actors[role]) + 3
 
+    def _kept_in_sight(self, row: int, column: int) -> tuple[int, int]:
+        """The cursor, where the far corner of the selection is not seen, so that a paste of many rows does not carry one away."""
+        look, here = self.look, self.sheet.cursor
+        columns = {*range(look.layout.n_frozen), *look.layout.visible(look.left)}
+        is_seen = look.top <= row < look.top + max(look.n_body, 1) and column in columns
+        return (row, column) if is_seen else here
+
     def _style(self, ground: str, meant: str) -> Style:
         if (ground, meant) not in self._styles:
             under = self.get_component_rich_style(f"grid--{ground}")
@@ -202,14 +288,14 @@ class GridView(ScrollView, inherit_bindings=False):
 
     def _fit(self) -> None:
         rows, total = len(self.sheet.view), self.grid_layout.extent
-        if self._said_shape != (rows, total):
-            self._said_shape = (rows, total)
-            self.virtual_size = Size(total, rows + n_headers(self.window.height) + self.has_test_row)
+        if self._said_shape != (rows, total, self.look.n_headers):
+            self._said_shape = (rows, total, self.look.n_headers)
+            self.virtual_size = Size(total, rows + self.has_new_row + self.look.n_headers + self.has_test_row)
 
     def on_resize(self) -> None:
         self._layout = None
         self._fit()
-        self.show_cursor()
+        self.show_cursor(is_after_edit=True)
 
     def on_focus(self) -> None:
         self.refresh()
@@ -217,11 +303,16 @@ class GridView(ScrollView, inherit_bindings=False):
     def on_blur(self) -> None:
         self.refresh()
 
-    def show_cursor(self) -> None:
-        """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again."""
+    def show_cursor(self, is_after_edit: bool = False) -> None:
+        """Scroll so that the cursor, or the corner that Shift moves, is seen; behind another tab once it is seen again. After an
+        edit of many cells it is enough that one of the two is seen."""
         if not self.size:
             return
         look, (row, column) = self.look, self.sheet.selection.far if not self.is_in_test_row else (0, self.field)
+        row = self._cursor_row if self.is_in_new_row else row
+        is_wide = self.sheet.selection.far != self.sheet.cursor
+        if is_after_edit and is_wide and not (self.is_in_test_row or self.is_in_new_row):
+            row, column = self._kept_in_sight(row, column)
         top = min(max(look.top, row - max(look.n_body, 1) + 1), row) if not self.is_in_test_row else look.top
         left = look.layout.scroll_to(column, look.left) if look.layout.widths else 0
         if (top, left) != (look.top, look.left):

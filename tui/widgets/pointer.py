@@ -35,7 +35,7 @@ class Pointed(Protocol):
         """The app around it."""
         ...
 
-    def moving(self, move: Callable[[], None]) -> None:
+    def moving(self, move: Callable[[], None], in_new_row: bool = False) -> None:
         """Move the cursor, and show what has changed."""
 
     def go_to_field(self, column: int) -> None:
@@ -99,6 +99,9 @@ class Pointer:
             grid.is_in_test_row = True
             grid.moving(lambda: grid.go_to_field(column))
             grid.refresh()
+        elif look.has_new_row and look.top + event.y - look.n_headers == len(grid.sheet.view):
+            grid.is_in_test_row = False
+            grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0], column), in_new_row=True)
         elif self._is_cell_line(event.y, look):
             grid.is_in_test_row = False
             grid.moving(lambda: grid.sheet.go(row, column, event.shift))
@@ -108,6 +111,19 @@ class Pointer:
             if event.x < look.layout.gutter:
                 grid.action_select_rows()
             self._begin("rows" if event.x < look.layout.gutter else "cells")
+
+    def point(self, event: events.MouseDown) -> bool:
+        """The right button goes down: go there, unless it is selected already; gives whether a column was meant."""
+        grid, look = self.grid, self.grid.look
+        grid.focus()
+        row, column = self._place_at(event.x, event.y)
+        is_header = event.y < look.n_headers
+        n_columns, block = grid.sheet.shape[1], grid.sheet.block
+        if column < n_columns and (is_header or self._is_cell_line(event.y, look)) and event.y != look.foot:
+            grid.is_in_test_row = False
+            if not (block.holds(row, column) or (is_header and block.left <= column < block.right)):
+                grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0] if is_header else row, column))
+        return is_header
 
     def move(self, event: events.MouseMove) -> None:
         """The mouse moves with its button down."""
@@ -164,7 +180,7 @@ class Pointer:
         elif column >= grid.sheet.shape[1]:
             grid.is_in_test_row = True
             grid.moving(lambda: grid.go_to_field(column))
-        elif event.y == 0 and event.x >= look.layout.place(column, look.left) + look.layout.widths[column] - 2:
+        elif event.y == look.sort_line and event.x >= look.layout.place(column, look.left) + look.layout.widths[column] - 2:
             grid.sort_by(column)
         else:
             grid.is_in_test_row = False
@@ -214,4 +230,5 @@ class Pointer:
 
     def _is_cell_line(self, y: int, look: Look) -> bool:
         """Whether cells are on a line of the window: those of a row, or of the test row."""
-        return y == look.foot or (y >= look.n_headers and look.top + y - look.n_headers < len(self.grid.sheet.view))
+        n_rows = len(self.grid.sheet.view) + look.has_new_row
+        return y == look.foot or (y >= look.n_headers and look.top + y - look.n_headers < n_rows)

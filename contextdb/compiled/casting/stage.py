@@ -13,7 +13,7 @@ Source: Hall, "On representatives of subsets", J. London Math. Soc. 10, 1935.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import or_
 
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_whole
 from contextdb.cells.facts import Context, Fact, Unknown, check_mode, require_context
+from contextdb.cells.hysteresis import widened_fact
 from contextdb.cells.mirroring import in_mirror, kept_facts, mirrored_facts
 from contextdb.compiled.casting.assigning import Chosen, Holds, Part, best, every
 from contextdb.compiled.casting.facts import Actor, Actors, Ask, Offer, mirrored_offers, read_offers
@@ -147,6 +148,8 @@ class Stage:
         found = self.answer(some_bits, all_bits, ((some_bits, self),), self.compiled.answering)
         if self.compiled.mirroring:
             found.with_mirrored(self.mirrored)
+        if self.compiled.widening:
+            found.with_widened(self.widened)
         if self.compiled.is_soft:
             found.with_penalties(lambda: self.penalties(found))
         return found
@@ -154,6 +157,17 @@ class Stage:
     def answer(self, bits: int, always: int, stages: Stages, table: Answering) -> CastMatches:
         """An answer of some rows, with the castings of several."""
         return CastMatches(bits, always, tuple((rows, stage) for rows, stage in stages if isinstance(stage, Stage)), table)
+
+    def widened(self) -> CastMatches:
+        """The answer with the plain facts widened; those of actors are as they are."""
+        conditions, unknown = self.compiled.conditions, self.unknown
+        facts = {at: widened_fact(fact, conditions[at]) for at, fact in self.plain_facts.items()}
+        plain = {at: self.compiled.condition_bits(at, fact, unknown) for at, fact in facts.items()}
+        found = replace(self, plain_facts=facts).matches(plain)
+        del found._widened  # nothing is widened twice
+        if self.compiled.mirroring:
+            found.with_mirrored(lambda: self.mirrored().widened)
+        return found
 
     def mirrored(self) -> CastMatches:
         """The answer with the facts of the context and of the actors as a mirror shows them. The actors stay who they are, and as

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from contextdb.cells.arguments import require_many_of
-from contextdb.errors import plural
+from contextdb.errors import MotionError, plural
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses
+from contextdb.motion.clips.feet import footfalls_of
+from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 
@@ -32,6 +33,8 @@ FEWEST_FRAMES = 3
 """Two frames give one velocity, one frame none."""
 FAR_FROM_GROUND = 0.25
 """Of the body's size: so far above or below the ground no foot stands."""
+LONGEST_FLIGHT_S = 2.0
+"""No jump takes longer."""
 LYING = 0.65
 """A body whose extent upwards is less than this part of its largest lies."""
 LYING_SHARE = 0.5
@@ -93,6 +96,8 @@ class Measures:
         How far the hips move between these.
     n_unmoved, unmoved_frame : int, int
         How many frames hold zeros only, and the first of these.
+    never_down : bool
+        Whether no foot is ever down, in a clip of more than `LONGEST_FLIGHT_S`.
     bones : mapping of str to float
         The median distance of each joint below the hips from its parent, in metres, where there is one.
     """
@@ -109,6 +114,7 @@ class Measures:
     farthest_m: float = 0.0
     n_unmoved: int = 0
     unmoved_frame: int = 0
+    never_down: bool = False
     bones: Mapping[str, float] | None = None
 
     @property
@@ -156,6 +162,7 @@ def measure(clip: Clip) -> Measures:
         farthest_m=step,
         n_unmoved=len(zeros),
         unmoved_frame=int(zeros[0]) if len(zeros) else 0,
+        never_down=_is_never_down(clip),
         bones={clip.skeleton.names[joint]: length for joint, length in zip(joints[1:], lengths, strict=True) if length > 0.0},
     )
 
@@ -226,6 +233,8 @@ def _rules(of: Measures, usual: Shape | None) -> Iterator[tuple[str, Told]]:
         yield "lying", _lying(of)
     elif abs(of.lowest) > FAR_FROM_GROUND * of.size_m and of.n_unmoved < of.n_frames:
         yield "off-ground", _off_ground(of)
+    if of.never_down and of.lying < LYING_SHARE:
+        yield "no-footfalls", _no_footfalls(of)
     difference = None if usual is None else _difference(_shape(of.bones or {}, usual), usual)
     if difference is not None and difference > OTHER_SHAPE:
         found = f"{100.0 * difference:.0f} % of the body's length is distributed differently from the other clips."
@@ -325,12 +334,33 @@ def _off_ground(of: Measures) -> Told:
     }
 
 
+def _no_footfalls(of: Measures) -> Told:
+    found = f"neither foot is ever on the ground, in {of.n_frames * of.frame_time_s:.3g} s."
+    return {
+        "found": found,
+        "expected": "a foot that rests on the ground now and then",
+        "mend": "[features.NAME] feet, or marks Contact.Left and Contact.Right, or nothing where the body flies or slides",
+        "measure": 0.0,
+    }
+
+
 def _metres(length_m: float) -> str:
     """A length for people: three digits, and never 0 where it is none."""
     return f"{length_m:,.0f} m" if length_m >= 100.0 else f"{length_m:.3g} m"
 
 
 # ---- measures
+
+
+def _is_never_down(clip: Clip) -> bool:
+    """Whether a clip is long, has feet, and none of them ever rests."""
+    if clip.duration_s < LONGEST_FLIGHT_S:
+        return False
+    try:
+        falls = footfalls_of(poses_of(clip))
+    except MotionError:
+        return False
+    return not any(len(falls.down[foot]) for foot in falls.feet)
 
 
 def _body(skeleton: Skeleton) -> list[int]:

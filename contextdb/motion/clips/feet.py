@@ -9,23 +9,25 @@ down or up, how long is it till the next transition, and what fraction of the wa
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_kind, require_number, require_pair, require_text
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.contacts import ground_points, stances
+from contextdb.motion.clips.foot_bones import UNDECLARED, Foot, FootBones
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.skeleton import Skeleton, sided_pairs
 
-FOOT_WORDS = ("foot", "ankle")
-SHORTEST_S = 0.07
-"""A foot that rests or leaves the ground for less is taken not to: noise."""
+ContactMark = Sequence[tuple[float, float, bool]]
+"""Stretches of seconds that are marked by hand, each with whether the foot is down in it."""
+ContactMarks = tuple[ContactMark | None, ContactMark | None]
+"""Those of the left and of the right foot; None of a foot without."""
+NO_MARKS: ContactMarks = (None, None)
 LONGEST_STEP_S = 1.5
 """A foot that stays down, or up, for longer stands and takes no step."""
 
@@ -80,18 +82,16 @@ class Footfalls:
         return self.down[foot]
 
 
-def footfalls(clip: Clip, feet: tuple[str, str] | None = None, *, slowest_mps: float = 0.2, highest_m: float = 0.15) -> Footfalls:
-    """Find when each foot of a clip is down: where it is slow and low, for at least 0.07 s.
+def footfalls(clip: Clip, feet: tuple[str, str] | None = None, *, slowest_mps: float | None = None) -> Footfalls:
+    """Find when each foot of a clip is down: where its heel or its toe rests on the ground, for at least 0.07 s.
 
     Parameters
     ----------
     clip : Clip
     feet : (left bone, right bone), optional
-        Default: the sided bones whose names hold "foot" or "ankle".
-    slowest_mps : float
-        A foot that moves faster, from frame to frame, is up.
-    highest_m : float
-        A foot higher above its lowest place in the clip is up.
+        Default: the sided bones whose names hold "foot" or "ankle", else the ends of the legs.
+    slowest_mps : float, optional
+        A heel or toe that moves faster is up. Default: 12 % of its top speed within half a second, from 0.25 to 0.8.
 
     Raises
     ------
@@ -103,31 +103,57 @@ def footfalls(clip: Clip, feet: tuple[str, str] | None = None, *, slowest_mps: f
     require_kind(clip, Clip, "clip", "a Clip")
     if feet is not None:
         require_pair(feet, "feet", "the names of two bones, left and right")
-    slowest_mps, highest_m = require_number(slowest_mps, "slowest_mps"), require_number(highest_m, "highest_m")
-    bones = feet_of(clip.skeleton) if feet is None else feet
-    return footfalls_of(poses_of(clip), bones, slowest_mps=slowest_mps, highest_m=highest_m)
+    limit = None if slowest_mps is None else require_number(slowest_mps, "slowest_mps")
+    return footfalls_of(poses_of(clip), FootBones(feet), slowest_mps=limit)
 
 
 def footfalls_of(
-    poses: Poses, feet: tuple[str, str] | None = None, *, slowest_mps: float = 0.2, highest_m: float = 0.15
+    poses: Poses, bones: FootBones = UNDECLARED, marks: ContactMarks = NO_MARKS, *, slowest_mps: float | None = None
 ) -> Footfalls:
-    """As `footfalls`, of poses in the world."""
-    bones = feet_of(poses.skeleton) if feet is None else feet
-    joints = [poses.skeleton.index(bone) for bone in bones]
-    if poses.n_frames == 0:
-        return Footfalls(0.0, {bone: np.zeros((0, 2)) for bone in bones})
-    places, frame_time_s = poses.positions[:, joints], 1.0 / poses.rate
-    found = {bone: _intervals(places[:, i], frame_time_s, slowest_mps, highest_m) for i, bone in enumerate(bones)}
-    return Footfalls((poses.n_frames - 1) * frame_time_s, found)
+    """As `footfalls`, of poses in the world. Of a foot that has marks these count, and nothing is looked for."""
+    feet = bones.found_in(poses.skeleton)
+    left, right = (ground_points(poses, foot) for foot in feet)
+    return _with_marks(feet, stances((left, right), poses.rate, slowest_mps), marks, max(0, poses.n_frames - 1) / poses.rate)
 
 
-def feet_of(skeleton: Skeleton) -> tuple[str, str]:
-    """The sided bones, left first, whose names hold "foot" or "ankle"; a MotionError asks for them when there are none."""
-    pairs = sided_pairs(skeleton.names)
-    found = next((pair for word in FOOT_WORDS for pair in pairs if word in pair[0].casefold()), None)
-    if found is None:
-        raise MotionError(Fault("no pair of bones is named like feet.", f"feet=(left, right), of {some(skeleton.names)}"))
-    return found
+def flat_feet_of(poses: Poses, bones: FootBones = UNDECLARED, marks: ContactMarks = NO_MARKS) -> Footfalls:
+    """When each foot stands flat, heel and toe on the ground, so that it can be held there; marks are those of the footfalls."""
+    feet = bones.found_in(poses.skeleton)
+    left, right = (ground_points(poses, foot) for foot in feet)
+    return _with_marks(feet, stances((left, right), poses.rate, flat=True), marks, max(0, poses.n_frames - 1) / poses.rate)
+
+
+def _with_marks(feet: tuple[Foot, Foot], found: tuple[Floats, Floats], marks: ContactMarks, duration_s: float) -> Footfalls:
+    """The footfalls that are found, or marked."""
+    down = {
+        foot.bone: intervals if mark is None else marked(mark, duration_s)
+        for foot, intervals, mark in zip(feet, found, marks, strict=True)
+    }
+    return Footfalls(duration_s, down)
+
+
+def rounds_of(marks: ContactMarks, n_rounds: int, duration_s: float) -> ContactMarks:
+    """The marks of a clip that plays several times, one behind the other."""
+    left, right = (
+        mark
+        and [(a + i * duration_s, min(b, duration_s) + i * duration_s, is_down) for i in range(n_rounds) for a, b, is_down in mark]
+        for mark in marks
+    )
+    return left, right
+
+
+def marked(mark: ContactMark, duration_s: float) -> Floats:
+    """The intervals [n, 2] in which a foot is down by its marks, within a clip: where one says so and none says that it is up."""
+    edges = sorted({0.0, duration_s, *(float(np.clip(t, 0.0, duration_s)) for begin, end, _ in mark for t in (begin, end))})
+    down: list[list[float]] = []
+    for begin, end in pairwise(edges):
+        said = [is_down for first, last, is_down in mark if first <= (begin + end) / 2.0 <= last]
+        if said and all(said):
+            if down and down[-1][1] == begin:
+                down[-1][1] = end
+            else:
+                down.append([begin, end])
+    return np.array(down, np.float64).reshape(-1, 2)
 
 
 def phases(falls: Footfalls, times_s: Floats) -> Floats:
@@ -206,25 +232,3 @@ def _phase_in(state: _State, typical_s: float, times_s: Floats) -> Floats:
         return np.stack((np.zeros(len(times_s)), np.broadcast_to(sign * (after - ahead), len(times_s))), axis=-1)
     angles = np.pi * since / full_s
     return sign * np.stack((np.sin(angles), np.cos(angles)), axis=-1)
-
-
-def _intervals(places: Floats, frame_time_s: float, slowest_mps: float, highest_m: float) -> Floats:
-    """The intervals of seconds [n, 2] in which a foot that takes these places [F, 3] is down."""
-    if len(places) < 2:
-        return np.zeros((1, 2))
-    is_low = places[:, 1] - places[:, 1].min() <= highest_m
-    is_slow = np.linalg.norm(np.diff(places, axis=0), axis=-1) <= slowest_mps * frame_time_s
-    is_down = is_slow & is_low[1:] & is_low[:-1]
-    shortest = SHORTEST_S / frame_time_s
-    for first, after in _spans(~is_down):
-        if first > 0 and after < len(is_down) and after - first < shortest:
-            is_down[first:after] = True
-    n = len(is_down)  # a stance that the clip's ends cut may be short
-    found = [(first, after) for first, after in _spans(is_down) if after - first >= shortest or first == 0 or after == n]
-    return np.array(found, np.float64).reshape(-1, 2) * frame_time_s
-
-
-def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Where each run of True begins, and the index behind its end."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

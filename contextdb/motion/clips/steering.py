@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from functools import lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,7 +30,9 @@ STANDING_MPS = 0.1
 
 Ground = tuple[float, float]
 Number = TypeVar("Number", float, Floats)
-"""Formulas of springs serve one body, and many in arrays."""
+"""Formulas of springs serve one body at one moment or at many, and many bodies in arrays."""
+At = Any
+"""What is the same at all moments: a number, or an array that goes with the moments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +86,18 @@ class Steered:
             turn_rate=turn_rate,
         )
 
+    def _path(self, times_s: Floats, wanted: Ground, facing: float | None) -> tuple[Floats, Floats]:
+        """Where the body is at some moments, [T, 2], and its headings, [T]: `moved` for all moments at once."""
+        damping = 2.0 * math.log(2.0) / self.velocity_halflife_s
+        left = np.exp(-damping * times_s)
+        places = np.empty((len(times_s), 2))
+        for axis in (0, 1):
+            own = self.position[axis], self.velocity[axis], self.acceleration[axis]
+            places[:, axis] = placed_along(*own, wanted[axis], damping, left, times_s)
+        damping = 2.0 * math.log(2.0) / self.heading_halflife_s
+        apart = self._apart(self._facing(wanted) if facing is None else facing)
+        return places, heading_of(self.heading, self.turn_rate, apart, damping, np.exp(-damping * times_s), times_s)
+
     def _along(self, axis: int, dt_s: float, wanted: float) -> tuple[float, float, float]:
         """Position, velocity and acceleration on one axis."""
         damping = 2.0 * math.log(2.0) / self.velocity_halflife_s
@@ -92,8 +107,11 @@ class Steered:
     def _turned(self, dt_s: float, wanted: float) -> tuple[float, float]:
         """Heading and turn rate, on the shorter way to a heading."""
         damping = 2.0 * math.log(2.0) / self.heading_halflife_s
-        apart = -math.remainder(wanted - self.heading, 2.0 * math.pi)
-        return turned(self.heading, self.turn_rate, apart, damping, math.exp(-damping * dt_s), dt_s)
+        return turned(self.heading, self.turn_rate, self._apart(wanted), damping, math.exp(-damping * dt_s), dt_s)
+
+    def _apart(self, wanted: float) -> float:
+        """How far the heading is past another, on the shorter way."""
+        return -math.remainder(wanted - self.heading, 2.0 * math.pi)
 
     def _facing(self, wanted: Ground) -> float:
         return math.atan2(*wanted) if math.hypot(*wanted) >= STANDING_MPS else self.heading
@@ -105,16 +123,29 @@ def moved_along(
     """Position, velocity and acceleration after a time; `left` is exp(-damping x time)."""
     apart = velocity - wanted
     drift = acceleration + apart * damping
-    moved = left * (-drift / damping**2 - (apart + drift * dt_s) / damping)
-    moved += drift / damping**2 + apart / damping + wanted * dt_s + position
+    moved = placed_along(position, velocity, acceleration, wanted, damping, left, dt_s)
     return moved, left * (apart + drift * dt_s) + wanted, left * (acceleration - drift * damping * dt_s)
+
+
+def placed_along(position: At, velocity: At, acceleration: At, wanted: At, damping: At, left: Number, dt_s: Number) -> Number:
+    """The position alone."""
+    apart = velocity - wanted
+    drift = acceleration + apart * damping
+    moved: Number = left * (-drift / damping**2 - (apart + drift * dt_s) / damping)
+    moved += drift / damping**2 + apart / damping + wanted * dt_s + position
+    return moved
 
 
 def turned(heading: Number, turn_rate: Number, apart: Number, damping: Number, left: Number, dt_s: Number) -> tuple[Number, Number]:
     """Heading and turn rate after a time; `apart` is how far the heading is past the one that is asked for."""
     drift = turn_rate + apart * damping
-    goal = heading - apart
-    return goal + left * (apart + drift * dt_s), left * (turn_rate - drift * damping * dt_s)
+    return heading_of(heading, turn_rate, apart, damping, left, dt_s), left * (turn_rate - drift * damping * dt_s)
+
+
+def heading_of(heading: At, turn_rate: At, apart: At, damping: At, left: Number, dt_s: Number) -> Number:
+    """The heading alone."""
+    found: Number = heading - apart + left * (apart + (turn_rate + apart * damping) * dt_s)
+    return found
 
 
 def steered_path(
@@ -149,7 +180,17 @@ def steered_path(
     if facing is not None:
         require_real(facing, "facing")
     rate, reach_s = require_real(rate, "rate", LEAST_RATE, MOST_RATE), require_real(reach_s, "reach_s", 0.0, MOST_REACH_S)
-    future = [past[-1]._moved(i / rate, wanted, facing) for i in range(1, math.ceil(reach_s * rate) + 1)]
-    bodies = [*past, *future]
-    headings: Floats = np.unwrap([body.heading for body in bodies])
-    return Trajectory(rate, np.array([body.position for body in bodies]), headings, len(past) - 1)
+    times_s = _times_s(rate, math.ceil(reach_s * rate))
+    positions, headings = past[-1]._path(times_s, wanted, facing)
+    positions = np.concatenate(([body.position for body in past], positions))
+    headings = np.concatenate(([body.heading for body in past], headings))
+    is_unwrapped = (np.abs(headings[1:] - headings[:-1]) < math.pi).all()
+    return Trajectory(rate, positions, headings if is_unwrapped else np.unwrap(headings), len(past) - 1)
+
+
+@lru_cache(64)
+def _times_s(rate: float, n: int) -> Floats:
+    """The moments of n frames ahead."""
+    times_s = np.arange(1, n + 1) / rate
+    times_s.flags.writeable = False
+    return times_s

@@ -113,7 +113,7 @@ class Channel:
     relative_to : str, optional
         The bone that stands instead of the body.
     feet : (left bone, right bone), optional
-        Whose footfalls a phase is of. Default: the sided bones whose names hold "foot" or "ankle".
+        Whose footfalls a phase is of. Default: those of the schema, else the ones that are found.
     function : str, optional
         The name of a custom channel's function; see `FeatureSchema.with_functions`.
     size : int

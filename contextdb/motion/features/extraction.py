@@ -1,4 +1,4 @@
-"""Compute features: from clips for a database, and from a pose and a wished path for a query. One code path for both.
+"""Compute features: from clips for a database, and from a pose and a wished path for a query.
 
 F frames at the schema's rate, N features, in the schema's units (m, m/s, rad/s, unit vectors) and not yet normalised.
 """
@@ -15,30 +15,22 @@ from contextdb.cells.arguments import require_kind, require_whole
 from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, nearest, plural, some
 from contextdb.motion.clips import mirror, own_axes, quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.feet import feet_of, footfalls_of, phases
+from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, footfalls_of, phases, rounds_of
+from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.looping import three_rounds
+from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.clips.trajectory import (
-    PathPoints,
-    Trajectory,
-    after_seconds,
-    along_path,
-    heading_vectors,
-    rates_of_change,
-    root_trajectory,
-    to_own_frame,
-)
+from contextdb.motion.clips.trajectory import Trajectory, after_seconds, along_path, rates_of_change, root_trajectory, to_own_frame
 from contextdb.motion.features.channels import DEFAULT_AXIS, Channel
+from contextdb.motion.features.path_features import point_features, write_paths
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 
 Features = NDArray[np.float32]
 
 FARTHEST_M = 1e6
 LARGEST_CUSTOM = 1e12
-SLOW_MPS = 0.3
-"""A body that is slower moves in no clear direction: its direction to velocity shrinks evenly to 0, 0 at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +54,9 @@ class ClipFeatures:
     root: Features
 
 
-def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, looping: bool = False) -> ClipFeatures:
+def clip_features(
+    clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, looping: bool = False, contacts: ContactMarks = NO_MARKS
+) -> ClipFeatures:
     """The features of every frame of a clip, resampled to the schema's rate, and the body's path.
 
     Parameters
@@ -73,6 +67,8 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, 
         Take the clip in a mirror, left and right bones exchanged by the schema's `mirror`.
     looping : bool
         The clip continues at its start when it ends: its path continues too, and does not run out straight.
+    contacts : (left, right)
+        When each foot of the clip is down, as marks say it: see `Markup.contacts_of`. Default: this is found.
 
     Raises
     ------
@@ -96,11 +92,12 @@ def clip_features(clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, 
         poses = mirror.mirrored(poses, schema.mirror)
     path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
     root = np.column_stack((path.positions, path.headings)).astype(np.float32)
-    own = slice(None)
+    own, marks = slice(None), (contacts[1], contacts[0]) if mirrored else contacts
     if looping:
+        marks = rounds_of(marks, 3, (poses.n_frames - 1) / poses.rate)
         poses, own = three_rounds(poses, path)
         path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
-    blocks = [_channel_features(channel, poses, path, schema, clip)[own] for channel in schema.channels]
+    blocks = [_channel_features(channel, poses, path, schema, clip.name, marks)[own] for channel in schema.channels]
     features = np.concatenate(blocks, axis=1).astype(np.float32)
     return ClipFeatures(clip.name, mirrored, features, root)
 
@@ -162,24 +159,35 @@ def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajector
         found = f"the query has shape {np.shape(query)}, and the path {plural(n_frames, 'frame')} and its present at {wanted.now}."
         raise QueryError(Fault(found, f"a query of {schema.n_features} features, and a path that holds its present"))
     changed = np.array(query, np.float32)
-    frames = np.array([wanted.now])
-    for channel in schema.channels:
-        if channel.type == "trajectory":
-            changed[schema.slices[channel.name]] = _trajectory_features(channel, wanted, frames)[0]
+    write_paths(schema, changed[None], ManyTrajectories(wanted.rate, wanted.positions[None], wanted.headings[None], wanted.now))
     return changed
 
 
-def _channel_features(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: Clip) -> Floats:
+def _channel_features(
+    channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: str, marks: ContactMarks
+) -> Floats:
     match channel.type:
         case "trajectory":
-            return _trajectory_features(channel, path, np.arange(poses.n_frames))
+            return trajectory_features(channel, path, np.arange(poses.n_frames))
         case "phase":
-            found = phases(footfalls_of(poses, channel.feet), np.arange(poses.n_frames) / poses.rate)
+            found = phases(footfalls_of(poses, schema.foot_bones(channel.feet), marks), np.arange(poses.n_frames) / poses.rate)
         case "custom":
-            found = _custom_features(channel, poses, path, schema.functions, clip.name)
+            found = _custom_features(channel, poses, path, schema.functions, clip)
         case _:
             found = _bone_features(channel, poses, path)
     return found if not channel.at else np.concatenate([_moved(found, seconds * poses.rate) for seconds in channel.at], axis=1)
+
+
+def block_of(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema) -> Floats:
+    """A channel's features of every frame of some poses and their path: [F, features of the channel]."""
+    return _channel_features(channel, poses, path, schema, schema.name, NO_MARKS)
+
+
+def require_features(skeleton: Skeleton, schema: FeatureSchema) -> None:
+    """Raise MotionError where the features of a skeleton's poses cannot be computed."""
+    faults = list(_faults(skeleton, schema, False))
+    if faults:
+        raise MotionError(*faults)
 
 
 def _moved(values: Floats, frames: float) -> Floats:
@@ -249,36 +257,13 @@ def _in_body(vectors: Floats, headings: Floats) -> Floats:
 # ---- the path
 
 
-def _trajectory_features(channel: Channel, path: Trajectory, frames: Ints) -> Floats:
+def trajectory_features(channel: Channel, path: Trajectory, frames: Ints) -> Floats:
     """A trajectory channel's features at some frames of a path: [frames, features of the channel]."""
-    at = frames.astype(np.float64)
+    at, origins, headings = frames.astype(np.float64), path.positions[frames], path.headings[frames]
     points = [after_seconds(path, at, seconds) for seconds in channel.at] + [
         along_path(path, at, metres) for metres in channel.along
     ]
-    return np.concatenate([point_features(channel, path, frames, point) for point in points], axis=1)
-
-
-def point_features(channel: Channel, path: Trajectory, frames: Ints, points: PathPoints) -> Floats:
-    """What a channel says of one point for each of some frames of a path."""
-    headings = path.headings[frames]
-    match channel.what:
-        case "position":
-            return to_own_frame(points.positions - path.positions[frames], headings)
-        case "direction":
-            return heading_vectors(points.headings - headings)
-        case "velocity":
-            return to_own_frame(points.velocities, headings)
-        case "direction_to_velocity":
-            return _direction_to_velocity(points)
-        case _:
-            return np.asarray(np.linalg.norm(points.velocities, axis=-1, keepdims=True))
-
-
-def _direction_to_velocity(points: PathPoints) -> Floats:
-    """The facing as seen by one who looks where the body moves: [N, 2], of length 1 from `SLOW_MPS` on and shorter below."""
-    speeds = np.linalg.norm(points.velocities, axis=-1, keepdims=True)
-    moving = to_own_frame(points.velocities / np.maximum(speeds, SLOW_MPS), points.headings)
-    return np.asarray(moving * np.array([-1.0, 1.0]))
+    return np.concatenate([point_features(channel.what, origins, headings, point) for point in points], axis=1)
 
 
 # ---- functions of others
@@ -315,7 +300,7 @@ def _faults(skeleton: Skeleton, schema: FeatureSchema, mirrored: bool) -> Iterat
     """Why a skeleton's features cannot be computed."""
     yield from schema.bone_faults(skeleton)
     for channel in schema.channels:
-        if channel.type == "phase" and channel.feet is None:
+        if channel.type == "phase" and channel.feet is None and schema.feet is None:
             yield from _feet_faults(skeleton)
         if channel.type == "custom" and channel.function not in schema.functions:
             yield _no_function(channel, schema)

@@ -12,7 +12,8 @@ from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.trajectory import Trajectory
-from contextdb.motion.features.extraction import Features, point_features
+from contextdb.motion.features.extraction import Features
+from contextdb.motion.features.path_features import write_paths
 from contextdb.motion.features.schema import FeatureSchema
 
 
@@ -46,11 +47,5 @@ def with_paths(schema: FeatureSchema, queries: ArrayLike, wanted: ManyTrajectori
             f"the queries have shape {changed.shape}, and there {'is' if len(paths) == 1 else 'are'} {plural(len(paths), 'path')}."
         )
         raise QueryError(Fault(found, f"a path for each query of {plural(schema.n_features, 'feature')}"))
-    present = Trajectory(paths.rate, paths.positions[:, paths.now], paths.headings[:, paths.now])
-    every = np.arange(len(paths))
-    for channel in schema.channels:
-        if channel.type == "trajectory":
-            points = [paths.after_seconds(seconds) for seconds in channel.at] + [paths.along(metres) for metres in channel.along]
-            blocks = [point_features(channel, present, every, point) for point in points]
-            changed[:, schema.slices[channel.name]] = np.concatenate(blocks, axis=1)
+    write_paths(schema, changed, paths)
     return changed

@@ -15,12 +15,13 @@ import numpy as np
 from contextdb.cells.arguments import require_mapping, require_text
 from contextdb.errors import Fault, SchemaError, in_quotes, nearest, shown, some
 from contextdb.files.toml_text import as_toml, what
+from contextdb.motion.clips.foot_bones import FootBones, Pair
 from contextdb.motion.clips.mirror import Pairs, pattern_fault
 from contextdb.motion.clips.poses import Poses
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.trajectory import Trajectory
-from contextdb.motion.features.channels import Channel, check_together, is_pair, read_channel, read_pair
+from contextdb.motion.features.channels import Channel, What, check_together, is_pair, read_channel, read_pair
 from contextdb.motion.reading import Mapped, Section
 
 __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
@@ -28,10 +29,15 @@ __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
 CustomFunction = Callable[[Poses, Trajectory], Floats]
 """Makes the features of a custom channel, [F, size], of a body's poses and its path, both F frames at the schema's rate."""
 
-SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror")
+PathChannels = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[What | None, slice], ...]]
+
+SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror", "feet", "heels", "toes")
 MOST_RATE = 1000.0
+ABOUT_S = 0.5
+"""How fast a path goes is the mean of about so many seconds."""
 MOST_SMOOTH_S = 2.0
 A_FACING = 'the left and the right bone, such as ["LeftUpLeg", "RightUpLeg"]'
+A_FOOT = 'the left and the right bone, such as ["LeftFoot", "RightFoot"]'
 A_MIRROR = 'pairs of a left and a right bone, such as [["Left*", "Right*"]]'
 
 
@@ -54,6 +60,8 @@ class FeatureSchema:
         nothing in time. Default: 0, the facing as it is.
     mirror : tuple of (left, right)
         Pairs of bones that change places when a clip is mirrored; a `*` on both sides matches the same rest of the name.
+    feet, heels, toes : (left bone, right bone), optional
+        What touches the ground. Default: feet by their names, the toes below them, and heels worked out from both.
     functions : mapping of name to function
         What custom channels are computed by. Not compared, and not part of contextdb.toml: see `with_functions`.
     """
@@ -65,6 +73,9 @@ class FeatureSchema:
     facing: tuple[str, str] | None = None
     facing_smooth_s: float = 0.0
     mirror: Pairs = ()
+    feet: Pair | None = None
+    heels: Pair | None = None
+    toes: Pair | None = None
     functions: Mapping[str, CustomFunction] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
@@ -83,6 +94,32 @@ class FeatureSchema:
         stops = np.cumsum([channel.n_features for channel in self.channels]).tolist()
         return {channel.name: slice(stop - channel.n_features, stop) for channel, stop in zip(self.channels, stops, strict=True)}
 
+    @cached_property
+    def path_points(self) -> tuple[PathChannels, ...]:
+        """Where the trajectory channels look: seconds or metres, and what each channel that looks there says, with its slice."""
+        found: dict[tuple[tuple[float, ...], tuple[float, ...]], list[tuple[What | None, slice]]] = {}
+        for channel in self.channels:
+            if channel.type == "trajectory":
+                found.setdefault((channel.at, channel.along), []).append((channel.what, self.slices[channel.name]))
+        return tuple((at, along, tuple(channels)) for (at, along), channels in found.items())
+
+    @cached_property
+    def speed_features(self) -> tuple[slice, float] | None:
+        """Which features say how fast a path goes, and what their length is divided by for metres a second; None where none do."""
+        for kind in ("position", "velocity", "speed"):
+            size = 1 if kind == "speed" else 2
+            points = [
+                (seconds, self.slices[channel.name].start + i * size)
+                for channel in self.channels
+                if channel.type == "trajectory" and channel.what == kind
+                for i, seconds in enumerate(channel.at)
+                if seconds > 0.0 or kind != "position"
+            ]
+            if points:
+                seconds, start = min(points, key=lambda point: abs(point[0] - ABOUT_S))
+                return slice(start, start + size), seconds if kind == "position" else 1.0
+        return None
+
     @property
     def weights(self) -> Floats:
         """Each channel's weight: float64 [channels]."""
@@ -91,8 +128,13 @@ class FeatureSchema:
     @property
     def bones(self) -> tuple[str, ...]:
         """Every bone that the channels, `root` and `facing` name, once."""
-        named = [bone for channel in self.channels for bone in channel.bones] + [self.root, *(self.facing or ())]
+        named = [bone for channel in self.channels for bone in channel.bones] + [self.root]
+        named += [bone for pair in (self.facing, self.feet, self.heels, self.toes) for bone in pair or ()]
         return tuple(dict.fromkeys(bone for bone in named if bone is not None))
+
+    def foot_bones(self, feet: Pair | None = None) -> FootBones:
+        """The declared bones of the feet; with `feet` of these, which then are what touches the ground."""
+        return FootBones(self.feet, self.heels, self.toes) if feet in (None, self.feet) else FootBones(feet)
 
     def bone_faults(self, skeleton: Skeleton) -> list[Fault]:
         """What is wrong with using the schema on a skeleton: a fault for each bone that it lacks, with the nearest one."""
@@ -152,9 +194,10 @@ def _read_schema(
     facing = read_pair(section, "facing", A_FACING) if "facing" in mapping else None
     smooth_s = _read_smooth(section) if "facing_smooth_s" in mapping else 0.0
     mirror = _read_mirror(section) if "mirror" in mapping else ()
+    feet, heels, toes = (read_pair(section, key, A_FOOT) if key in mapping else None for key in ("feet", "heels", "toes"))
     if faults or rate is None or smooth_s is None:
         return None
-    return cls(name, rate, tuple(channels), root, facing, smooth_s, mirror)
+    return cls(name, rate, tuple(channels), root, facing, smooth_s, mirror, feet, heels, toes)
 
 
 def _read_rate(section: Section) -> float | None:

@@ -21,7 +21,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.markup.marks import Mark, Marks
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.markup.reserved import MOST_SECONDS, ReservedTag
+from contextdb.motion.markup.reserved import CONTACTS, MOST_SECONDS, ReservedTag
 from contextdb.motion.markup.spans import TOLERANCE_S, Span
 from contextdb.motion.ranges import check_ranges
 from contextdb.motion.reading import as_number
@@ -171,7 +171,7 @@ def _stretches(about: _Asset, times: list[float], length: int) -> Iterator[_Stre
             yield _Stretch(max(entry, first + 1), stop, int(Mark.PAST_ENTRY))  # a zone between two frames still has an entry
 
 
-_NOT_OF_FRAMES = (ReservedTag.LOOPING, *_WARPS)
+_NOT_OF_FRAMES = (ReservedTag.LOOPING, *CONTACTS, *_WARPS)
 
 
 def _clip_end(about: _Asset, times: list[float], length: int, end_s: float) -> Iterator[_Stretch]:

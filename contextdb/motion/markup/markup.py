@@ -29,9 +29,10 @@ from contextdb import disk
 from contextdb.cells.arguments import require_many, require_path, require_text
 from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plural
 from contextdb.motion.clips.bvh_words import number_fault
+from contextdb.motion.clips.feet import ContactMark, ContactMarks
 from contextdb.motion.markup import file as markup_file
 from contextdb.motion.markup.file import Row
-from contextdb.motion.markup.reserved import VALUE_RULES, ReservedTag, reserved_of
+from contextdb.motion.markup.reserved import CONTACTS, VALUE_RULES, ReservedTag, reserved_of
 from contextdb.motion.markup.span_faults import SECONDS, conflicts, faults_alone, faults_together, listed
 from contextdb.motion.markup.spans import TOLERANCE_S, WILDCARD, Span, fits
 
@@ -103,6 +104,11 @@ class Markup:
     def is_looping(self, asset: str) -> bool:
         """Whether an asset continues at its start when it ends."""
         return any(reserved_of(span.tag) is ReservedTag.LOOPING for span in self.spans_of(asset))
+
+    def contacts_of(self, asset: str) -> ContactMarks:
+        """The marks of both feet of an asset, left first; None of a foot without. Where some name the asset, those with a pattern
+        do not count."""
+        return _contacts(self.spans_of(asset), CONTACTS[0]), _contacts(self.spans_of(asset), CONTACTS[1])
 
     def conflicts_of(self, asset: str) -> list[Fault]:
         """Where patterns that all fit an asset say different things of one frame, so that none can be followed."""
@@ -192,6 +198,12 @@ class Markup:
         found = f"the span from {span.from_s:g} to {span.to_s:g} is between two frames and contains none."
         near = round(span.from_s * rate) / rate
         return Fault(found, f"times with a frame between them, at {rate:g} frames a second", f"{near:g}", self._place(i, "from"))
+
+
+def _contacts(spans: Sequence[Span], tag: ReservedTag) -> ContactMark | None:
+    marks = [span for span in spans if span.tag == tag]
+    strongest = [span for span in marks if not span.is_pattern] or marks
+    return tuple((span.from_s, span.to_s, span.value != 0.0) for span in strongest) or None
 
 
 def _fitting(text: str, assets: Collection[str]) -> list[str]:

@@ -37,6 +37,12 @@ class ReservedTag(StrEnum):
     COST_MODIFIER = "CostModifier"
     ROOT_MOTION_WEIGHT = "RootMotionWeight"
     LOOPING = "Looping"
+    CONTACT_LEFT = "Contact.Left"
+    CONTACT_RIGHT = "Contact.Right"
+
+
+CONTACTS = (ReservedTag.CONTACT_LEFT, ReservedTag.CONTACT_RIGHT)
+"""When the left and the right foot are down."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +59,9 @@ VALUE_RULES = {
     ReservedTag.NEXT_NATURAL_ONLY: ValueRule("the length of the entry zone in seconds, such as 0.2", 0.0, MOST_SECONDS, False),
     ReservedTag.COST_MODIFIER: ValueRule("what is added to the cost, such as 0.5 or -0.5", -MOST_COST, MOST_COST),
     ReservedTag.ROOT_MOTION_WEIGHT: ValueRule("how much of the movement comes from the animation, from 0 to 1", 0.0, 1.0),
+    **dict.fromkeys(
+        CONTACTS, ValueRule("1 where the foot is down, which no value means too, or 0 where it is up", 0.0, 1.0, False)
+    ),
 }
 """The tags that take a value; all others take none."""
 

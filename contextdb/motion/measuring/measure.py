@@ -62,9 +62,10 @@ def measure(
     databases : mapping of str to MotionDatabase, optional
         Says how much of them is used, and what their markup keeps from playing. Default: of the banks how much is used.
     settings : PoseSettings, optional
-        How the poses of the session are made.
+        How the poses of the session are made. Where the session does not say where the game had the body, the root follows the
+        animation.
     rate : float, optional
-        Poses a second; needed for a sequence of `Pose` without a session.
+        Of a sequence of `Pose` without a session: how many a second has. Default: the rate of the banks.
     bodies : float array, shape (T, 3), optional
         Where the game had the body: x, z and heading. Default: what the session says.
     wanted : float array, shape (T, 2), optional
@@ -124,15 +125,22 @@ def _shown(given: object, banks: Banks | None, poses: OfPoses | None, settings: 
     if not isinstance(given, Trace):
         if poses is not None:
             raise ContextError(Fault("poses go with a session, and none is given.", "a Trace, or the path of one"))
-        return _of_poses(given, rate)
+        return _of_poses(given, _rate_of(banks) if rate is None else rate)
     decisions = list(given.brief())
     session = shown.of_decisions(decisions)
     if poses is not None:
         return shown.with_poses(session, _of_poses(poses, session.rate if rate is None else rate))
     if not banks or not decisions:
         return session
-    made = _made(decisions, banks, PoseSettings() if settings is None else settings)
-    return session if made is None else shown.with_poses(session, shown.of_poses(made, 1.0))
+    made = poses_of(decisions, banks, PoseSettings() if settings is None else settings)
+    return shown.with_poses(session, shown.of_poses(made, session.rate))
+
+
+def _rate_of(banks: Banks | None) -> float | None:
+    """The frames that a second of the clips has."""
+    if not banks:
+        return None
+    return banks.rate if isinstance(banks, PoseBank) else next(iter(banks.values())).rate
 
 
 def _of_poses(given: object, rate: float | None) -> Shown:
@@ -148,8 +156,11 @@ def _of_poses(given: object, rate: float | None) -> Shown:
     return shown.of_poses(listed, require_real(rate, "rate", LEAST_RATE, MOST_RATE))
 
 
-def _made(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings) -> list[Pose] | None:
-    """The poses of a session, made again; None where its root mode needs a body that it does not say."""
+def poses_of(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings) -> list[Pose]:
+    """The poses of a session, made again; by the animation's own root where the session does not say where the body was.
+
+    Raises MotionError where the banks have no poses of what plays.
+    """
     if settings.root != "animation" and any(decision.body is None for decision in decisions):
         settings = replace(settings, root="animation")
     stream = PoseStream(banks, settings)

@@ -122,7 +122,7 @@ def raw_skate(clips: Clips | None) -> dict[str, object]:
     names = ("skate_raw_cm_s", "skate_raw_m_min", "skate_weighted_raw_cm_s", "skate_ratio_raw")
     if clips is None:
         return dict.fromkeys(names, NO_BANKS)
-    parts = [part for raw in clips.distinct if len(raw.bank.feet) for part in raw.slides()]
+    parts = [part for raw in clips.distinct if len(raw.bank.feet) for part in raw.slides]
     if not parts:
         return dict.fromkeys(names, NO_FEET)
     slides = formulas.Slides.joined(parts)

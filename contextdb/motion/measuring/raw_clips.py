@@ -6,8 +6,8 @@ N frames of one bank, J joints, K feet.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -36,9 +36,13 @@ class At:
 
 @dataclass(frozen=True, eq=False)
 class RawClips:
-    """The clips of one bank, each joint in the world of its clip."""
+    """The clips of one bank, each joint in the world of its clip; what was once computed is kept.
+
+    `of_steps` are the accelerations by the number of frames of a step.
+    """
 
     bank: PoseBank
+    of_steps: dict[int, list[Floats]] = field(default_factory=dict)
 
     @cached_property
     def numbers(self) -> dict[tuple[str, bool], int]:
@@ -79,9 +83,12 @@ class RawClips:
     def accelerations(self, step_s: float) -> list[Floats]:
         """The accelerations of all joints over steps of about some time, clip by clip."""
         step = max(1, round(step_s * self.bank.rate))
-        every = (self.positions[frames] for frames in self.recorded())
-        return [accelerations(each, np.arange(len(each)) / self.bank.rate, step) for each in every]
+        if step not in self.of_steps:
+            every = (self.positions[frames] for frames in self.recorded())
+            self.of_steps[step] = [accelerations(each, np.arange(len(each)) / self.bank.rate, step) for each in every]
+        return self.of_steps[step]
 
+    @cached_property
     def slides(self) -> list[Slides]:
         """How the feet move, clip by clip."""
         feet = self.feet
@@ -138,7 +145,7 @@ class Clips:
     def of(cls, banks: Banks) -> Clips:
         """Of what a pose stream takes."""
         named = {"": banks} if isinstance(banks, PoseBank) else banks
-        return cls({name: RawClips(bank) for name, bank in named.items()})
+        return cls({name: raw_of(bank) for name, bank in named.items()})
 
     def find(self, at: At) -> tuple[RawClips, int] | None:
         """The clips that an asset is among, and its range there; None where there is no such asset."""
@@ -156,6 +163,12 @@ class Clips:
             if not any(set(clips.bank.assets) <= set(other.bank.assets) for other in kept):
                 kept.append(clips)
         return kept
+
+
+@lru_cache(maxsize=4)
+def raw_of(bank: PoseBank) -> RawClips:
+    """The clips of a bank; those of the last banks are kept, as many sessions are measured with the same."""
+    return RawClips(bank)
 
 
 def toe_of(skeleton: Skeleton, foot: str) -> int:

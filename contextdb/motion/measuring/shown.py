@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.errors import Fault, MotionError, plural
-from contextdb.motion.clips.feet import feet_of
+from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.measuring.raw_clips import At, Clips, toe_of

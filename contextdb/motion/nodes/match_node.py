@@ -23,7 +23,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_kind
+from contextdb.cells.arguments import require_kind, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes
 from contextdb.motion.arguments import Valid
 from contextdb.motion.clips.quaternions import Floats
@@ -36,8 +36,10 @@ from contextdb.motion.reading import as_number
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import Hit, MotionDatabase
 from contextdb.motion.search.filtering import Penalties, Tags
+from contextdb.motion.selection.decision import Action, Decision
+from contextdb.motion.selection.ongoing import playing_at
 from contextdb.motion.selection.playhead import Playhead
-from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.selection.root_motion import RootMotion, between
 
 
 class MatchOptions(TypedDict, total=False):
@@ -88,6 +90,8 @@ class MatchPlay:
         The range that plays.
     time_s : float
         Seconds since the entry.
+    since_s : float
+        Those before the last `advance`.
     """
 
     hit: Hit
@@ -96,6 +100,7 @@ class MatchPlay:
     path: WarpedPath
     playhead: Playhead
     time_s: float = 0.0
+    since_s: float = 0.0
 
     @property
     def entry_s(self) -> float:
@@ -119,10 +124,25 @@ class MatchPlay:
 
     def advance(self, dt_s: float) -> RootMotion:
         """Play on for some seconds, and say where the body is then; at the end it stays."""
-        self.time_s += _seconds(dt_s, "the time step")
+        dt_s = _seconds(dt_s, "the time step")
+        self.since_s = self.time_s
+        self.time_s += dt_s
         if self.time_s > self.duration_s - TOLERANCE_S:
             self.time_s = self.duration_s
         return self.at(self.time_s)
+
+    def decision(self, database: str = "") -> Decision:
+        """What plays now, for `PoseStream.update`; after each `advance`. `database` is its name, where a stream has several banks.
+
+        Its root weight is 0, for the game has the body on the warped path; its root motion is that path's, for the root mode
+        "animation". Raises ContextError where `database` is no text.
+        """
+        head, time_s = self.playhead, self.entry_s + self.time_s
+        playing = playing_at(require_text(database, "database"), head, head.frame_at(time_s), time_s)
+        motion = between(self.at(self.since_s), self.at(self.time_s))
+        action = Action.JUMP if self.since_s == 0.0 else Action.CONTINUE
+        why = f"plays {playing.asset} on to its target"
+        return Decision(0, self.time_s, action, why, False, playing, None, root_motion=motion, root_weight=0.0)
 
     def at(self, time_s: float) -> RootMotion:
         """Where the body is some seconds after the entry, seen from where it was then; behind the end, as there."""

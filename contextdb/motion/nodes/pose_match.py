@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from contextdb.cells.arguments import require_kind, require_many, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
 from contextdb.motion.arguments import HasAssets, Valid
-from contextdb.motion.clips.feet import feet_of
+from contextdb.motion.clips.foot_bones import feet_of
 from contextdb.motion.clips.mirror import Pairs
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton, sided_pairs

@@ -26,13 +26,15 @@ from contextdb.errors import Fault, MotionError, Place, in_quotes, nearest, plur
 from contextdb.motion.clips import mirror as mirrors
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
-from contextdb.motion.clips.feet import feet_of, footfalls_of
+from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, flat_feet_of
 from contextdb.motion.clips.poses import Poses, forward_kinematics, local_poses, resampled
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.clips.trajectory import root_trajectory
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
+from contextdb.motion.output.legs import leg_of, steps_of
+from contextdb.motion.output.travel import travels
 
 Flags = NDArray[np.bool_]
 Singles = NDArray[np.float32]
@@ -68,6 +70,22 @@ class Sample:
     root_velocity: Place3
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Moment:
+    """A moment of a clip to be shown.
+
+    Rotations [J, 4] and positions [M, 3]; where the clip has the body; how fast it goes to the left and ahead of its mean facing,
+    and how far it is turned from that; which feet are down; the nearest frame.
+    """
+
+    rotations: Floats
+    positions: Floats
+    root: Place3
+    travel: Place3
+    contacts: Flags
+    frame: int
+
+
 @dataclass(frozen=True, eq=False)
 class PoseBank:
     """Poses of clips. Made by `build`, or opened by `open_poses`.
@@ -90,7 +108,7 @@ class PoseBank:
     feet : tuple of str
         Left and right; empty where no bones are named like feet.
     contacts : bool array, shape (N, len(feet))
-        Whether each foot is down in the clip.
+        Whether each foot is down in the clip: stands flat, so that it can be held where it is, or is marked.
     """
 
     skeleton: Skeleton
@@ -127,7 +145,7 @@ class PoseBank:
         mirror : bool or collection of str
             Whether all clips, or those of these names, are there a second time with left and right exchanged.
         markup : Markup, optional
-            Says which clips loop.
+            Says which clips loop, and when feet are down where that is not to be found.
 
         Raises
         ------
@@ -156,7 +174,8 @@ class PoseBank:
             both = mirror if isinstance(mirror, bool) else clip.name in mirror
             try:
                 loops = markup is not None and markup.is_looping(clip.name)
-                parts += [_Part.of(clip, schema, side, loops) for side in ((False, True) if both else (False,))]
+                marks = NO_MARKS if markup is None else markup.contacts_of(clip.name)
+                parts += [_Part.of(clip, schema, side, loops, marks) for side in ((False, True) if both else (False,))]
             except MotionError as error:
                 faults += [fault.at(Place(clip.name)) for fault in error.faults]
         if not parts and not faults:
@@ -201,24 +220,39 @@ class PoseBank:
 
     def sample_of(self, range_number: int, time_s: float) -> Sample:
         """As `sample`, of a range's number, without a look at the arguments."""
-        kernels = loops()
         low, high, share = self._between(range_number, time_s)
-        rotations, positions = np.empty((self.n_joints, 4)), np.empty((len(self.moving), 3))
+        rotations, positions = self._pose(low, high, share)
         spins, velocities = np.empty((self.n_joints, 3)), np.empty((len(self.moving), 3))
-        kernels.sample(self.rotations, self.positions, low, high, share, rotations, positions)
-        kernels.slopes(self.rotations, self.positions, low, high, self.rate, spins, velocities)
+        loops().slopes(self.rotations, self.positions, low, high, self.rate, spins, velocities)
         return Sample(rotations, positions, spins, velocities, self._root_velocity(low, high, share))
+
+    def moment_of(self, range_number: int, time_s: float) -> Moment:
+        """What a range is at a moment."""
+        low, high, share = self._between(range_number, time_s)
+        rotations, positions = self._pose(low, high, share)
+        (x, z, heading, left, ahead, sway), (to_x, to_z, to_heading, to_left, to_ahead, to_sway) = self._ways[[low, high]].tolist()
+        root = x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)
+        travel = left + share * (to_left - left), ahead + share * (to_ahead - ahead), sway + share * (to_sway - sway)
+        near = high if share >= 0.5 else low
+        return Moment(rotations, positions, root, travel, np.asarray(self.contacts[near]), near)
 
     def root_at(self, range_number: int, time_s: float) -> Place3:
         """Where the clip itself has the body at a moment of a range."""
-        low, high, share = self._between(range_number, time_s)
-        (x, z, heading), (to_x, to_z, to_heading) = self.root[low].tolist(), self.root[high].tolist()
-        return x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)
+        return self.moment_of(range_number, time_s).root
 
     def contacts_at(self, range_number: int, time_s: float) -> Flags:
         """Which feet are down at a moment of a range: in the nearest frame."""
-        low, high, share = self._between(range_number, time_s)
-        return np.asarray(self.contacts[high if share >= 0.5 else low])
+        return self.moment_of(range_number, time_s).contacts
+
+    def travel_at(self, range_number: int, time_s: float) -> Place3:
+        """How fast the clip goes about a moment: metres a second to the left and ahead of its mean facing, and how far it is
+        turned from that then."""
+        return self.moment_of(range_number, time_s).travel
+
+    def steps_at(self, frame: int) -> list[list[float]]:
+        """How far each foot is through its swing in a frame, 0 to 1, and where it comes down, left and ahead of the body."""
+        step: list[list[float]] = self._steps[frame].tolist()
+        return step
 
     def translations(self, positions: Floats) -> Floats:
         """Each joint against its parent [J, 3], of the positions [M, 3] of those that have some of their own."""
@@ -227,18 +261,60 @@ class PoseBank:
         return found
 
     @cached_property
+    def _steps(self) -> Floats:
+        if not self.feet:
+            return np.zeros((self.n_frames, 0, 3))
+        legs = ((leg_of(self.skeleton, foot), foot) for foot in self.feet)
+        toes = [self._places_of(self.skeleton.index(foot) if leg is None else leg.toe) for leg, foot in legs]
+        return steps_of(self.root, np.stack(toes, axis=1), self.contacts, self._spans)
+
+    def _places_of(self, joint: int) -> Floats:
+        """Where a joint is against the root in each frame: [N, 3]."""
+        rotations, found = np.tile([1.0, 0.0, 0.0, 0.0], (self.n_frames, 1)), np.zeros((self.n_frames, 3))
+        for each in (*reversed(self.skeleton.ancestors(joint)), joint):
+            row = self.places[each]
+            own = self.positions[:, row] if row >= 0 else self.skeleton.offsets[each]
+            found = found + quaternions.rotate(rotations, np.broadcast_to(own, found.shape))
+            rotations = quaternions.multiply(rotations, self.rotations[:, each].astype(np.float64))
+        return found
+
+    @cached_property
+    def places(self) -> Ints:
+        """Which row of positions [M, 3] is each joint's, -1 where it keeps its offset: int64 [J]."""
+        found = np.full(self.n_joints, -1)
+        found[self.moving] = np.arange(len(self.moving))
+        return found
+
+    @cached_property
+    def _ways(self) -> Floats:
+        """Root and travel of each frame: [N, 6]."""
+        return np.column_stack((self.root, travels(self.root, self.starts, self.stops, self.looping, self.rate)))
+
+    @cached_property
+    def _spans(self) -> list[tuple[int, int, bool]]:
+        """First frame, steps to the last and whether it loops, of each range."""
+        steps = (self.stops - self.starts - 1).tolist()
+        return list(zip(self.starts.tolist(), steps, self.looping.tolist(), strict=True))
+
+    @cached_property
     def _ranges(self) -> dict[tuple[str, bool], int]:
         return {(asset, bool(side)): i for i, (asset, side) in enumerate(zip(self.assets, self.mirrored.tolist(), strict=True))}
 
     def _between(self, range_number: int, time_s: float) -> tuple[int, int, float]:
         """The two frames about a moment, and the share of the second."""
-        start, n_steps = int(self.starts[range_number]), int(self.stops[range_number] - self.starts[range_number]) - 1
+        start, n_steps, is_looping = self._spans[range_number]
         frame = time_s * self.rate
-        if self.looping[range_number] and n_steps > 0 and not 0.0 <= frame <= n_steps:
+        if is_looping and n_steps > 0 and not 0.0 <= frame <= n_steps:
             frame %= n_steps
         frame = min(max(frame, 0.0), float(n_steps))
         low = min(int(frame), max(n_steps - 1, 0))
         return start + low, start + min(low + 1, n_steps), frame - low
+
+    def _pose(self, low: int, high: int, share: float) -> tuple[Floats, Floats]:
+        """Rotations [J, 4] and positions [M, 3] between two frames."""
+        rotations, positions = np.empty((self.n_joints, 4)), np.empty((len(self.moving), 3))
+        loops().sample(self.rotations, self.positions, low, high, share, rotations, positions)
+        return rotations, positions
 
     def _root_velocity(self, low: int, high: int, share: float) -> Place3:
         x, z, heading = self.root[low].tolist()
@@ -270,7 +346,7 @@ class _Part:
     contacts: Flags
 
     @classmethod
-    def of(cls, clip: Clip, schema: FeatureSchema, is_mirrored: bool, is_looping: bool) -> _Part:
+    def of(cls, clip: Clip, schema: FeatureSchema, is_mirrored: bool, is_looping: bool, marks: ContactMarks) -> _Part:
         with np.errstate(all="ignore"):  # numbers too large become infinite or NaN, and are refused below
             local = resampled(local_poses(clip), schema.rate)
             if is_mirrored:
@@ -285,16 +361,16 @@ class _Part:
         rotations, positions = local.rotations, local.positions.copy()
         above = poses.skeleton.ancestors(poses.skeleton.hips)
         rotations[:, above], positions[:, above] = [1.0, 0.0, 0.0, 0.0], 0.0
-        tops = _tops(poses.skeleton)
+        tops = tops_of(poses.skeleton)
         back = quaternions.about_axis("y", -root[:, 2])[:, None]
         ground = np.stack((root[:, 0], np.zeros(len(root)), root[:, 1]), axis=-1)[:, None]
         positions[:, tops] = quaternions.rotate(back, poses.positions[:, tops] - ground)
         rotations[:, tops] = quaternions.multiply(back, poses.rotations[:, tops])
-        feet, contacts = _contacts(poses)
+        feet, contacts = _contacts(poses, schema, (marks[1], marks[0]) if is_mirrored else marks)
         return cls(clip.name, is_mirrored, is_looping, _rig(clip), rotations, positions, root, feet, contacts)
 
 
-def _tops(skeleton: Skeleton) -> list[int]:
+def tops_of(skeleton: Skeleton) -> list[int]:
     """The joints that hang on the root: the first, or those below the joints above the hips."""
     above = {-1, *skeleton.ancestors(skeleton.hips)}
     return [joint for joint, parent in enumerate(skeleton.parents.tolist()) if parent in above and joint not in above]
@@ -311,13 +387,13 @@ def _rig(clip: Clip) -> Skeleton:
     return replace(clip.skeleton, offsets=offsets, end_sites=ends)
 
 
-def _contacts(poses: Poses) -> tuple[tuple[str, ...], Flags]:
+def _contacts(poses: Poses, schema: FeatureSchema, marks: ContactMarks) -> tuple[tuple[str, ...], Flags]:
     """The feet, and in which frames each is down."""
     try:
-        feet = feet_of(poses.skeleton)
+        falls = flat_feet_of(poses, schema.foot_bones(), marks)
     except MotionError:
         return (), np.zeros((poses.n_frames, 0), np.bool_)
-    falls = footfalls_of(poses, feet)
+    feet = falls.feet
     frames = np.arange(poses.n_frames) / poses.rate
     down = [[(a - 1e-9 <= frames) & (frames <= b + 1e-9) for a, b in falls.down[foot].tolist()] for foot in feet]
     none = np.zeros(poses.n_frames, np.bool_)
@@ -342,7 +418,7 @@ def _faults(clip: Clip, rig: Skeleton, seen: set[str]) -> Iterator[Fault]:
 def _joined(parts: list[_Part], rate: float) -> PoseBank:
     rig = parts[0].rig
     away = [np.abs(part.positions - rig.offsets).max(axis=(0, 2)) for part in parts if not part.is_mirrored]
-    moving = sorted({*_tops(rig), *np.flatnonzero(np.max(away, axis=0) > SAME_M).tolist()})
+    moving = sorted({*tops_of(rig), *np.flatnonzero(np.max(away, axis=0) > SAME_M).tolist()})
     stops = np.cumsum([len(part.root) for part in parts])
     return PoseBank(
         rig,

@@ -222,6 +222,43 @@ def fade_turns(left, spins, reach, share, slope, braking, playing, playing_spins
             to_spins[j, i] = spin[i] + under[i]
 
 
+# ---- alignment
+
+
+@compiled
+def align(parents, tops, places, spine, left, turn, rotations, positions):
+    """Turn the joints that hang on the root, `tops`, about the vertical, and joint by joint of the spine a part of it back.
+
+    `places` says where the tops are in `positions` [M, 3]; of the turn `left` is left after each joint of the spine, which hang on
+    each other. Rotations and positions are changed.
+    """
+    first = parents[spine[0]]
+    above = (1.0, 0.0, 0.0, 0.0)
+    while first >= 0:
+        q = rotations[first]
+        above = _product((q[0], q[1], q[2], q[3]), above)
+        first = parents[first]
+    whole = (math.cos(0.5 * turn), 0.0, math.sin(0.5 * turn), 0.0)
+    for k in range(tops.shape[0]):
+        q, p = rotations[tops[k]], positions[places[k]]
+        turned = _product(whole, (q[0], q[1], q[2], q[3]))
+        moved = _turned(whole, (p[0], p[1], p[2]))
+        for i in range(4):
+            rotations[tops[k], i] = turned[i]
+        for i in range(3):
+            positions[places[k], i] = moved[i]
+    under = _product(whole, above)
+    for k in range(spine.shape[0]):
+        q = rotations[spine[k]]
+        above = _product(above, (q[0], q[1], q[2], q[3]))
+        angle = 0.5 * turn * left[k]
+        turned = _product((math.cos(angle), 0.0, math.sin(angle), 0.0), above)
+        own = _product(_inverse(under), turned)
+        under = turned
+        for i in range(4):
+            rotations[spine[k], i] = own[i]
+
+
 # ---- placing
 
 
@@ -246,6 +283,30 @@ def place(parents, translations, rotations, x, z, heading, to_positions, to_worl
 
 
 # ---- legs
+
+
+@compiled
+def heights(parents, offsets, places, rotations, positions, joints, to_heights):
+    """How high some joints are over the root.
+
+    `places` says which row of `positions` [M, 3] is each joint's; below 0 it keeps its offset.
+    """
+    for k in range(joints.shape[0]):
+        j = joints[k]
+        x = (0.0, 0.0, 0.0)
+        while j >= 0:
+            if places[j] >= 0:
+                p = positions[places[j]]
+                t = (p[0], p[1], p[2])
+            else:
+                p = offsets[j]
+                t = (p[0], p[1], p[2])
+            x = (x[0] + t[0], x[1] + t[1], x[2] + t[2])
+            j = parents[j]
+            if j >= 0:
+                q = rotations[j]
+                x = _turned((q[0], q[1], q[2], q[3]), x)
+        to_heights[k] = x[1]
 
 
 @compiled
@@ -315,6 +376,39 @@ def bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
     third = _product(_inverse(new_knee), (foot[0], foot[1], foot[2], foot[3]))
     for i in range(4):
         rotations[hip, i], rotations[knee, i], rotations[ankle, i] = first[i], second[i], third[i]
+
+
+@compiled
+def too_high(positions, leg, toe, place, along_x, along_z, straight):
+    """By how much a hip is too high for its leg to bring its toe to a place: below 0 where it reaches farther.
+
+    A leg reaches as far as it does now, or as with a knee that is `straight`.
+    """
+    a, b, c, t = positions[leg[0]], positions[leg[1]], positions[leg[2]], positions[toe]
+    tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
+    way = _turned(tilt, (t[0] - c[0], t[1] - c[1], t[2] - c[2]))
+    upper, lower = _length((b[0] - a[0], b[1] - a[1], b[2] - a[2])), _length((c[0] - b[0], c[1] - b[1], c[2] - b[2]))
+    now = _length((c[0] - a[0], c[1] - a[1], c[2] - a[2]))
+    reach = max(now, math.sqrt(upper * upper + lower * lower - 2.0 * upper * lower * math.cos(straight)))
+    x, y, z = place[0] - way[0] - a[0], a[1] - place[1] + way[1], place[2] - way[2] - a[2]
+    return y - math.sqrt(max(reach * reach - x * x - z * z, 0.0))
+
+
+@compiled
+def stand(parents, positions, world, leg, toe, place, along_x, along_z, straight, rotations):
+    """Bend a leg so that its toe comes to a place, its foot turned by the slope of the ground, which rises along x and z."""
+    ankle = leg[2]
+    tilt = _arc((0.0, 1.0, 0.0), (-along_x, 1.0, -along_z))
+    foot = world[ankle]
+    turned = _product(tilt, (foot[0], foot[1], foot[2], foot[3]))
+    for i in range(4):
+        world[ankle, i] = turned[i]
+    a, t = positions[ankle], positions[toe]
+    way = _turned(tilt, (t[0] - a[0], t[1] - a[1], t[2] - a[2]))
+    shin = world[leg[1]]
+    ahead = (shin[1], shin[2], shin[3]) if toe == ankle else way
+    target = (place[0] - way[0], place[1] - way[1], place[2] - way[2])
+    bend_leg(parents, positions, world, leg, target, ahead, straight, rotations)
 
 
 IS_COMPILED = hasattr(sample, "stats")

@@ -10,7 +10,7 @@ Source: D. Bollo, "Inertialization", GDC 2018; D. Holden, "Spring-It-On", 2021; 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,7 +49,7 @@ class Spring:
             offsets = kept(offsets, tick.left, tick.entered)
         rotations = np.empty_like(posture.rotations)
         kernels.turn_by(offsets.turns, posture.rotations, rotations)
-        return replace(posture, rotations=rotations, positions=posture.positions + offsets.shifts), offsets
+        return Posture(rotations, posture.positions + offsets.shifts, posture.root), offsets
 
 
 def decayed(offsets: Offsets, halflife_s: float, dt_s: float) -> Offsets:

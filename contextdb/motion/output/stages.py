@@ -1,6 +1,6 @@
 """The stages between what plays and the pose that is shown. Each is a small function of a posture and a state of its own.
 
-    clip ─► joints (spring or dead blending) ─► root (animation, code or both; its spring) ─► feet (lock) ─► Posture
+    clip ─► joints (spring or dead blending) ─► root (animation, code or both; its spring) ─► alignment ─► feet ─► Posture
 
 A stage takes the posture so far, what happened in this tick and its state, and gives the posture and its next state. It changes
 nothing in place, so that old states stay good for a rollback. J joints, M of them with positions of their own.
@@ -9,6 +9,7 @@ nothing in place, so that old states stay good for a rollback. J joints, M of th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,14 +17,31 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import Flags, Place3, Sample
 from contextdb.motion.selection.root_motion import RootMotion
 
+Ground = Callable[[float, float], tuple[float, tuple[float, float, float]] | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Warp:
+    """How a body is bent to the way it is to go: its hips and legs turned against its root, its steps so many times as long, and
+    how both change a second."""
+
+    turn: float = 0.0
+    turn_speed: float = 0.0
+    stride: float = 1.0
+    stride_speed: float = 0.0
+
+
+UNWARPED = Warp()
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Posture:
-    """A pose in the making: rotations [J, 4] and positions [M, 3], and where the root is: x, z and heading."""
+    """A pose in the making: rotations [J, 4] and positions [M, 3], where the root is: x, z and heading, and how it is warped."""
 
     rotations: Floats
     positions: Floats
     root: Place3
+    warp: Warp = UNWARPED
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,10 +55,22 @@ class Tick:
         Where what plays has a seam: the moment that would have been shown, and the one that is shown instead. None without a seam.
     root_motion : RootMotion
         How the clip moved the body since the last update.
+    is_ahead : bool
+        Whether it is already the movement of what is entered at the seam, as where something else has decided meanwhile.
     root_weight : float
         How much of its movement is to come from the clip.
     body : (x, z, heading) or None
         Where the game has the body.
+    velocity : (x, z) or None
+        How fast the game moves it over the ground.
+    travel : (left, ahead, sway)
+        How fast what plays goes, to the left and ahead of its mean facing; and by how much the root is turned from that.
+    warp : Warp
+        That of the pose before.
+    ground : function or None
+        Of a place, x and z: the height of the ground and its normal; None where it is flat.
+    steps : sequence of (share, left, ahead)
+        How far each foot is through its swing in the clip, and where it comes down; empty without a ground.
     clip : Posture
         What plays, as the clip has it.
     contacts : bool array, shape (n feet,)
@@ -51,8 +81,14 @@ class Tick:
     left: Sample | None
     entered: Sample | None
     root_motion: RootMotion
+    is_ahead: bool
     root_weight: float
     body: Place3 | None
+    velocity: tuple[float, float] | None
+    travel: Place3
+    warp: Warp
+    ground: Ground | None
+    steps: Sequence[Sequence[float]]
     clip: Posture
     contacts: Flags
 
@@ -74,8 +110,7 @@ def damping(halflife_s: float) -> float:
 
 def decayed(offset: Place3, speed: Place3, y: float, dt_s: float) -> tuple[Place3, Place3]:
     """An offset of three numbers and its change a second some time later: x = e^{-yt} (x0 + (v0 + x0 y) t)."""
-    fade = math.exp(-y * dt_s)
-    pushed = [v + x * y for x, v in zip(offset, speed, strict=True)]
-    a, b, c = (fade * (x + p * dt_s) for x, p in zip(offset, pushed, strict=True))
-    d, e, f = (fade * (v - p * y * dt_s) for v, p in zip(speed, pushed, strict=True))
-    return (a, b, c), (d, e, f)
+    (a, b, c), (d, e, f) = offset, speed
+    fade, p, q, r = math.exp(-y * dt_s), d + a * y, e + b * y, f + c * y
+    faded = fade * (a + p * dt_s), fade * (b + q * dt_s), fade * (c + r * dt_s)
+    return faded, (fade * (d - p * y * dt_s), fade * (e - q * y * dt_s), fade * (f - r * y * dt_s))

@@ -7,7 +7,7 @@ decisions give the same poses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,13 +18,19 @@ from contextdb.errors import ContextError, Fault, MotionError, in_quotes, neares
 from contextdb.motion.clips.ground_place import A_BODY, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
-from contextdb.motion.output.bank import Flags, Place3, PoseBank, Sample, loops
+from contextdb.motion.output.bank import Flags, Moment, Place3, PoseBank, Sample, loops
+from contextdb.motion.output.ground import A_GROUND
+from contextdb.motion.output.root import rotation_share
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import Posture, Tick
+from contextdb.motion.output.stages import UNWARPED, Ground, Posture, Tick, Warp
 from contextdb.motion.selection.decision import Action, Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION
 
 DEFAULT_SETTINGS = PoseSettings()
+NOWHERE: Place3 = (0.0, 0.0, 0.0)
+NO_STEPS: Sequence[Sequence[float]] = ()
+NEAR_S = 0.1
+"""What is shown goes on where it is not farther from where it should be than this."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -71,6 +77,10 @@ class PoseState:
     clip: Posture | None = None
     stages: tuple[object, ...] = ()
     play_rate: float = 1.0
+    clip_rate: float = 1.0
+    warp: Warp = UNWARPED
+    body: Place3 | None = None
+    velocity: tuple[float, float] | None = None
 
 
 class PoseStream:
@@ -103,6 +113,16 @@ class PoseStream:
         self._stages = stages_of(settings, self._rig)
 
     @property
+    def banks(self) -> PoseBank | Mapping[str, PoseBank]:
+        """The pose bank, or those of the databases by their names."""
+        return self._only or self._banks
+
+    @property
+    def rig(self) -> PoseBank:
+        """A bank of the rig that the poses are of, such as for `write_poses`."""
+        return self._rig
+
+    @property
     def state(self) -> PoseState:
         """Where the stream is, to come back to with `restore`."""
         return self._state
@@ -117,17 +137,25 @@ class PoseStream:
             raise ContextError(Fault("the state is of a stream of other settings or of another rig.", "a state of this stream"))
         self._state = state
 
-    def update(self, decision: Decision, dt: float, body: Steered | tuple[float, float, float] | None = None) -> Pose:
+    def update(
+        self,
+        decision: Decision,
+        dt: float,
+        body: Steered | tuple[float, float, float] | None = None,
+        ground: Ground | None = None,
+    ) -> Pose:
         """The pose after a decision.
 
         Parameters
         ----------
         decision : Decision
-            What `Controller.update` gave for this tick.
+            What `Controller.update` gave for this tick, or `MatchPlay.decision`: what one shows after the other is blended too.
         dt : float
             Seconds since the last update, as the controller had them.
         body : Steered or (x, z, heading), optional
-            Where the game has the body now; the root modes "code" and "mixed" need it.
+            Where the game has the body now; every root mode but "animation" needs it.
+        ground : function, optional
+            Of x and z: the height of the ground in metres and its normal, (nx, ny, nz), or None where it is flat.
 
         Raises
         ------
@@ -138,15 +166,27 @@ class PoseStream:
         """
         require_kind(decision, Decision, "decision", "a Decision")
         dt = require_real(dt, "dt", 0.0)
+        if ground is not None and not callable(ground):
+            raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
         place = self._place_of(body)
+        velocity = _velocity(body, place, dt, self._state)
+        decision, is_ahead = self._joined(decision, dt)
         state, playing = self._state, decision.playing
-        if playing is None:
-            clip, sample = state.clip or self._rest(), None
+        moment, bank = None, self._rig
+        if playing is not None:
+            bank, number = self._find(playing)
+            moment = bank.moment_of(number, playing.time_s)
+        if moment is None:
+            clip, contacts, travel = state.clip or self._rest(), np.zeros(len(bank.feet), np.bool_), NOWHERE
         else:
-            clip, sample = self._posture(playing)
-        left, entered = self._seam(decision, sample)
-        contacts = self._contacts(playing)
-        tick = Tick(dt, left, entered, decision.root_motion, decision.root_weight, place, clip, contacts)
+            clip, contacts = Posture(moment.rotations, moment.positions, moment.root), moment.contacts
+            travel = _travel(moment, decision, self.settings)
+        left, entered = self._seam(decision)
+        left, entered = _at_rate(left, state.clip_rate), _at_rate(entered, decision.play_rate)
+        motion, weight, steps = decision.root_motion, decision.root_weight, NO_STEPS
+        if ground is not None:
+            steps = bank.steps_at(moment.frame) if moment is not None else [(0.0, 0.0, 0.0)] * len(bank.feet)
+        tick = Tick(dt, left, entered, motion, is_ahead, weight, place, velocity, travel, state.warp, ground, steps, clip, contacts)
         posture = clip
         begun = state.stages or tuple(stage.begin(clip, place) for stage in self._stages)
         after = []
@@ -154,14 +194,26 @@ class PoseStream:
             posture, own = stage.apply(posture, tick if state.stages else _first(tick), own)
             after.append(own)
         rate = _play_rate(decision, state, dt)
-        self._state = PoseState(self.settings, playing or state.playing, clip, tuple(after), rate)
+        warp, place = posture.warp, place or state.body
+        stages, clip_rate = tuple(after), decision.play_rate
+        self._state = PoseState(self.settings, playing or state.playing, clip, stages, rate, clip_rate, warp, place, velocity)
         return self._placed(posture, decision, rate, contacts)
 
-    def _posture(self, playing: Playing) -> tuple[Posture, Sample]:
-        """The clip's own pose and place."""
-        bank, number = self._find(playing)
-        sample = bank.sample_of(number, playing.time_s)
-        return Posture(sample.rotations, sample.positions, bank.root_at(number, playing.time_s)), sample
+    def _joined(self, decision: Decision, dt_s: float) -> tuple[Decision, bool]:
+        """The decision, as a jump from what was shown where it goes on from something else: another one has decided meanwhile; and
+        whether its movement is then that of what it plays."""
+        shown, playing = self._state.playing, decision.playing
+        if shown is None or playing is None:
+            return decision, False
+        is_seam = decision.action in (Action.JUMP, Action.START)
+        on = decision.before if is_seam else playing
+        if on is not None and (on.database, on.asset, on.mirrored) == (shown.database, shown.asset, shown.mirrored):
+            ahead_s = on.time_s - shown.time_s
+            if decision.action is Action.LOOP or -NEAR_S <= ahead_s <= dt_s * self._state.clip_rate + NEAR_S:
+                return decision, False
+        moved = replace(shown, time_s=shown.time_s + dt_s * self._state.clip_rate)
+        is_ahead = not is_seam or decision.before is None
+        return replace(decision, action=decision.action if is_seam else Action.JUMP, before=moved), is_ahead
 
     def _rest(self) -> Posture:
         """The rig at rest, for a character that has not played anything yet."""
@@ -169,14 +221,14 @@ class PoseStream:
         rotations[:, 0] = 1.0
         return Posture(rotations, self._rig.skeleton.offsets[self._rig.moving], (0.0, 0.0, 0.0))
 
-    def _seam(self, decision: Decision, sample: Sample | None) -> tuple[Sample | None, Sample | None]:
+    def _seam(self, decision: Decision) -> tuple[Sample | None, Sample | None]:
         """Where what plays jumps, or goes over the end of a loop: what would have been shown, and what is shown instead."""
         before, playing = decision.before or self._state.playing, decision.playing
         if playing is None or before is None or self._state.playing is None:
             return None, None
         if decision.action in (Action.JUMP, Action.START):
-            bank, number = self._find(before)
-            return bank.sample_of(number, before.time_s), sample
+            (bank, number), (to_bank, to_number) = self._find(before), self._find(playing)
+            return bank.sample_of(number, before.time_s), to_bank.sample_of(to_number, playing.time_s)
         if decision.action is Action.LOOP:
             bank, number = self._find(playing)
             end_s = bank.last_s(number)
@@ -190,13 +242,6 @@ class PoseStream:
         loops().place(rig.skeleton.parents, translations, posture.rotations, *posture.root, positions, world)
         is_forced = is_jump and decision.continuing_cost is None
         return Pose(playing, is_jump, is_forced, posture.root, posture.rotations, translations, positions, contacts, rate)
-
-    def _contacts(self, playing: Playing | None) -> Flags:
-        """Which feet are down in the clip; none where nothing plays."""
-        if playing is None:
-            return np.zeros(len(self._rig.feet), np.bool_)
-        bank, number = self._find(playing)
-        return bank.contacts_at(number, playing.time_s)
 
     def _find(self, playing: Playing) -> tuple[PoseBank, int]:
         """The bank of what plays, and its range there."""
@@ -232,9 +277,33 @@ def _checked(banks: object) -> dict[Any, PoseBank]:
     return named
 
 
+def _travel(moment: Moment, decision: Decision, settings: PoseSettings) -> Place3:
+    """How fast what plays goes at its rate, and how far the root sways with it."""
+    left, ahead, sway = moment.travel
+    return decision.play_rate * left, decision.play_rate * ahead, sway * rotation_share(settings, decision.root_weight)
+
+
+def _at_rate(sample: Sample | None, rate: float) -> Sample | None:
+    """A moment of a clip that plays at a rate: all in it changes so many times as fast."""
+    if sample is None or rate == 1.0:
+        return sample
+    left, ahead, turn = sample.root_velocity
+    velocity = (rate * left, rate * ahead, rate * turn)
+    return replace(sample, spins=rate * sample.spins, velocities=rate * sample.velocities, root_velocity=velocity)
+
+
 def _first(tick: Tick) -> Tick:
     """The first tick of a character: it appears where it is, and has not moved."""
     return replace(tick, dt_s=0.0, left=None, entered=None, root_motion=NO_MOTION)
+
+
+def _velocity(body: object, place: Place3 | None, dt_s: float, state: PoseState) -> tuple[float, float] | None:
+    """How fast the game moves the body: as it says itself, else by how far it came since the last update."""
+    if isinstance(body, Steered):
+        return body.velocity
+    if place is None or state.body is None or dt_s <= 0.0:
+        return state.velocity
+    return (place[0] - state.body[0]) / dt_s, (place[1] - state.body[1]) / dt_s
 
 
 def _play_rate(decision: Decision, state: PoseState, dt_s: float) -> float:

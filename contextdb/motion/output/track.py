@@ -41,9 +41,9 @@ def clip_of_poses(poses: Sequence[Pose], bank: PoseBank, rate: float, *, name: s
     ContextError
         An argument of another type.
     """
-    listed, rig = _checked(poses, bank, rate), bank.skeleton
+    listed, rig = checked_poses(poses, bank, rate), bank.skeleton
     placed = sorted({0, *bank.moving.tolist()})
-    rotations, translations = _stacked(listed, rig)
+    rotations, translations = local_tracks(listed, rig)
     angles = np.rad2deg(quaternions.to_euler(AXES, rotations))
     columns: list[Floats] = []
     for joint in range(rig.n_joints):
@@ -71,7 +71,7 @@ def pose_arrays(poses: Sequence[Pose], bank: PoseBank, rate: float) -> dict[str,
     ContextError
         An argument of another type.
     """
-    listed, rig = _checked(poses, bank, rate), bank.skeleton
+    listed, rig = checked_poses(poses, bank, rate), bank.skeleton
     playing = [pose.playing for pose in listed]
     return {
         "positions": np.array([pose.positions for pose in listed], np.float32).reshape(-1, rig.n_joints, 3),
@@ -87,14 +87,15 @@ def pose_arrays(poses: Sequence[Pose], bank: PoseBank, rate: float) -> dict[str,
     }
 
 
-def _checked(poses: object, bank: object, rate: object) -> list[Pose]:
+def checked_poses(poses: object, bank: object, rate: object) -> list[Pose]:
+    """Poses, refused where they or what goes with them are of another type."""
     require_kind(bank, PoseBank, "bank", "a PoseBank")
     require_real(rate, "rate", LEAST_RATE, MOST_RATE)
     return require_many_of(poses, Pose, "poses", "a list of Pose")
 
 
-def _stacked(poses: list[Pose], rig: Skeleton) -> tuple[Floats, Floats]:
-    """Local rotations [T, J, 4] and translations [T, J, 3], the first joint's in the world."""
+def local_tracks(poses: list[Pose], rig: Skeleton) -> tuple[Floats, Floats]:
+    """Local rotations of poses [T, J, 4] and translations [T, J, 3], the first joint's in the world."""
     rotations = np.array([pose.rotations for pose in poses], np.float64).reshape(-1, rig.n_joints, 4)
     translations = np.array([pose.translations for pose in poses], np.float64).reshape(-1, rig.n_joints, 3)
     roots = np.array([pose.root for pose in poses], np.float64).reshape(-1, 3)

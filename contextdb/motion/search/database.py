@@ -31,6 +31,7 @@ from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest,
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Currents, Flags, Valid, ValidForMany, ValidRanges
 from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.feet import NO_MARKS
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.features.extraction import ClipFeatures, clip_features
@@ -507,7 +508,7 @@ def parts_of(
 ) -> list[ClipFeatures]:
     """The features of each clip, and of those to be mirrored once more mirrored; the faults of all clips together.
 
-    Clips that loop by the markup go on at their ends.
+    Clips that loop by the markup go on at their ends, and feet that it marks are down just then.
     """
     parts = []
     faults: list[Fault] = []
@@ -525,7 +526,8 @@ def parts_of(
         try:
             looping = markup is not None and markup.is_looping(clip.name)
             ways = (False, True) if is_mirrored else (False,)
-            parts += [clip_features(clip, schema, mirrored=way, looping=looping) for way in ways]
+            marks = NO_MARKS if markup is None else markup.contacts_of(clip.name)
+            parts += [clip_features(clip, schema, mirrored=way, looping=looping, contacts=marks) for way in ways]
         except MotionError as error:
             faults.extend(error.faults)
     if faults:

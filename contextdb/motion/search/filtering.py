@@ -6,8 +6,8 @@ belong to which range, and what a filter says of each kind of frame, is worked o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
 from typing import Any, TypedDict, cast
 
 import numpy as np
@@ -97,7 +97,11 @@ class FilterMaker:
         """What the masks of n searches mean, read once, to be given to searches as `valid`."""
         ranges, biases = self._ranges_of_many(valid, n)
         all_biases = [self._range_biases] * n if biases is None else biases
-        return [ValidRanges(ranges[i if len(ranges) > 1 else 0], all_biases[i if len(all_biases) > 1 else 0]) for i in range(n)]
+        wide = _widened_of_each(valid)
+        return [
+            ValidRanges(ranges[i if len(ranges) > 1 else 0], all_biases[i if len(all_biases) > 1 else 0], wide and partial(wide, i))
+            for i in range(n)
+        ]
 
     def _ranges_of_many(self, valid: ValidForMany | None, n: int) -> tuple[Flags, Floats | None]:
         """Which ranges may play in each of n searches, bool [n, R], and the biases of ranges, float64 [n, R], None where they are
@@ -204,3 +208,23 @@ class FilterMaker:
         for i, asset in enumerate(self.assets):
             found.setdefault(asset, []).append(i)
         return found
+
+
+def _widened_of_each(valid: ValidForMany | None) -> Callable[[int], Valid | None] | None:
+    """What gives the answer for what plays already, of one of many; None where masks are no answers, or nothing widens them."""
+    if valid is None or isinstance(valid, np.ndarray):
+        return None
+    if not arguments.is_one_for_each(valid):
+        one = cast("Valid", valid)
+        return (lambda i: arguments.widened_of(one)) if _widens(one) else None
+    answers = cast("Sequence[Any]", valid)
+    if hasattr(answers, "lists"):
+        return (lambda i: arguments.widened_of(answers[i])) if _widens(answers) else None
+    return (lambda i: arguments.widened_of(answers[i])) if any(map(_widens, answers)) else None
+
+
+def _widens(valid: object) -> bool:
+    """Whether an answer, or many of one table, may be another one for what plays already."""
+    if isinstance(valid, ValidRanges):
+        return valid.widened is not None
+    return bool(getattr(valid, "is_widening", hasattr(valid, "widened")))

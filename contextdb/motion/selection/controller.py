@@ -4,7 +4,7 @@ At each update the playing animation moves on. A search follows when one is due 
 plays is no longer valid, loaded or among the databases of the moment. What would play on takes part in the search as the continuing
 pose, with its bias; some frames are not candidates because of what plays and what was played (see
 `contextdb.motion.selection.history`). When nothing is found, the character plays on, or holds the last frame of a clip that has
-ended.
+ended. What is no longer valid may play on for a while too: see `contextdb.motion.selection.guards`.
 
 A controller reads no clock and draws no random number of its own: the same calls give the same decisions.
 
@@ -15,6 +15,7 @@ DoNotChoose, NextNaturalOnly and root motion weight of EA's talk.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
@@ -35,12 +36,14 @@ from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
+from contextdb.motion.selection.guards import Held
 from contextdb.motion.selection.history import remembered
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.ongoing import Ongoing
+from contextdb.motion.selection.play_rate import eased, play_rate
 from contextdb.motion.selection.root_motion import NO_MOTION
 from contextdb.motion.selection.selector import Selector
-from contextdb.motion.selection.step import Step
+from contextdb.motion.selection.step import Outcome, Step
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.selection.worked_out import WorkedOut
@@ -50,7 +53,7 @@ Clock = Callable[[], float]
 
 @dataclass(frozen=True, slots=True)
 class Asking:
-    """Half an update: what is to be searched, and why; `wanted` is None where nothing is."""
+    """Half an update: what is to be searched, and why; `wanted` is None where nothing is. `held` is the guard that saw to that."""
 
     step: Step
     cause: Trigger | None
@@ -59,6 +62,7 @@ class Asking:
     force: bool = False
     interrupt: bool = False
     body: GroundPlace | None = None
+    held: Held = Held.NOTHING
 
     @property
     def query(self) -> Floats:
@@ -125,10 +129,16 @@ class Controller:
 
     def _ongoing(self, dt_s: float) -> Ongoing | None:
         """What plays, moved on; the last is kept, for an update mostly follows what was asked of `upcoming`."""
-        asked = (self._state.playing, self.selector, self.settings.rate, dt_s)
+        asked = (self._state.playing, self.selector, self.settings.rate, dt_s * self._state.play_rate)
         if self._moved is None or self._moved[0] != asked:
             self._moved = asked, Ongoing.of(*asked)
         return self._moved[1]
+
+    def copy(self) -> Controller:
+        """Another controller that stands where this one does, with the same selector and settings, and no recorder."""
+        copied = Controller(self.selector, self.settings, rng=deepcopy(self._rng), clock=self._clock)
+        copied._state = self._state
+        return copied
 
     @property
     def state(self) -> ControllerState:
@@ -169,13 +179,14 @@ class Controller:
             The pose at the end of this update, see `upcoming`, and the wished trajectory; in the schema's units.
         valid, tags, bias, penalties, among
             What may play, as for `Selector.search`. That an asset is no longer valid, or its database not among those of the
-            moment, forces a search; that its tags do not fit lets it play on.
+            moment, forces a search; that its tags do not fit lets it play on. The settings' guards may delay the jump out of an
+            asset that is no longer valid.
         context : mapping of str to object, optional
             The facts of the moment, for the recorder alone.
         force : bool
-            Search now, though no search is due. What plays may win.
+            Search now, though no search is due. What plays may win, and guards hold.
         interrupt : bool
-            Search now, and leave what plays if anything else may.
+            Search now, and leave what plays if anything else may; no guard holds it.
         body : Steered or (x, z, heading), optional
             Where the game has the body, for the recorder alone: `motion.measure` compares it with where the poses are.
 
@@ -208,8 +219,11 @@ class Controller:
         dt_s = _seconds(dt_s)
         step = Step.of(self.selector, self.settings, self._state, dt_s, query, asked, self._ongoing(dt_s))
         cause = step.trigger(force, interrupt)
+        held = step.held(cause)
+        if held:
+            cause = None
         wanted = None if cause is None else step.wanted(cause)
-        return Asking(step, cause, wanted, context, force, interrupt, body)
+        return Asking(step, cause, wanted, context, force, interrupt, body, held)
 
     def answer(self, asking: Asking, choice: Choice | None = None, search_us: float = 0.0) -> Decision:
         """The second half: decide by what the selector chose, None where nothing was to be searched."""
@@ -229,7 +243,7 @@ class Controller:
         filters: tuple[tuple[str, Filter], ...] = ()
         if cause is None or wanted is None or choice is None:
             assert step.ongoing is not None, "without anything playing there is a cause to search"
-            outcome = step.unsearched(step.ongoing)
+            outcome = step.unsearched(step.ongoing, asking.held)
         else:
             outcome = step.searched(cause, wanted, choice, self._rng)
             filters = self._filters(wanted)
@@ -253,6 +267,8 @@ class Controller:
             root_motion=NO_MOTION if step.ongoing is None else step.ongoing.move.motion,
             root_weight=self._root_weight(outcome.playing),
             body=asking.body,
+            held=str(outcome.held),
+            play_rate=self._play_rate(step, outcome),
             filters=filters,
             inputs=self._inputs(asking),
         )
@@ -265,7 +281,10 @@ class Controller:
             if self.settings.variation is not None:
                 recent = self.settings.variation.remember(recent, playing.asset)
         since_s = 0.0 if decision.searched else state.since_search_s + step.dt_s
-        return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent)
+        waiting_since_s = state.waiting_since_s if decision.held not in ("", Held.HYSTERESIS) else None
+        if decision.held == Held.COST_BAR and waiting_since_s is None:
+            waiting_since_s = step.now_s
+        return ControllerState(state.tick + 1, step.now_s, playing, since_s, history, recent, decision.play_rate, waiting_since_s)
 
     @property
     def _n_candidates(self) -> int:
@@ -291,6 +310,16 @@ class Controller:
 
     def _root_weight(self, playing: Playing | None) -> float:
         return 1.0 if playing is None else self.selector.databases[playing.database].marks.root_weight(playing.frame)
+
+    def _play_rate(self, step: Step, outcome: Outcome) -> float:
+        """How fast what plays goes on."""
+        playing = outcome.playing
+        if playing is None or outcome.action is Action.HOLD:
+            return 1.0
+        limits = self.settings.min_play_rate, self.settings.max_play_rate
+        wanted = play_rate(self.selector.databases[playing.database], playing.frame, step.query, limits)
+        is_new = outcome.action in (Action.START, Action.JUMP)
+        return wanted if is_new else eased(self._state.play_rate, wanted, step.dt_s)
 
     def checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""

@@ -26,6 +26,10 @@ class ControllerState:
         What was played within the last seconds.
     recent : tuple of str
         The assets of the last changes, as far as variation remembers them.
+    play_rate : float
+        Seconds of the clip that pass in a second.
+    waiting_since_s : float, optional
+        Since when a forced jump over the cost bar waits, in seconds of play; None when none does.
     rng : object
         Where the random generator is; None without one.
     """
@@ -36,4 +40,6 @@ class ControllerState:
     since_search_s: float = 0.0
     history: tuple[Played, ...] = ()
     recent: tuple[str, ...] = ()
+    play_rate: float = 1.0
+    waiting_since_s: float | None = None
     rng: object = None

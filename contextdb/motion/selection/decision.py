@@ -92,6 +92,11 @@ class Decision:
         How much of its movement is to come from the animation, from 0 to 1; the rest is the game's.
     body : (x, z, heading) or None
         Where the game had the body, as it was given.
+    held : str
+        What let an asset that is no longer valid play on: "next natural", "until natural", "cost bar" or "hysteresis"; empty when
+        nothing had to.
+    play_rate : float
+        Seconds of the clip that pass in a second, from here to the next update.
     filters : tuple of (database name, Filter)
         What could be chosen from in each database that was, or could have been, searched; empty without a search, and where no
         candidates are asked for.
@@ -116,6 +121,8 @@ class Decision:
     root_motion: RootMotion = NO_MOTION
     root_weight: float = 1.0
     body: GroundPlace | None = None
+    held: str = ""
+    play_rate: float = 1.0
     filters: tuple[tuple[str, Filter], ...] = field(default=(), compare=False, repr=False)
     inputs: Inputs | None = field(default=None, compare=False, repr=False)
 

@@ -47,6 +47,13 @@ class RootMotion:
 NO_MOTION = RootMotion()
 
 
+def between(body: RootMotion, later: RootMotion) -> RootMotion:
+    """The movement that leads from one place of a body to a later one, both seen from the same place."""
+    sin, cos = math.sin(body.turn_rad), math.cos(body.turn_rad)
+    left, ahead = later.left_m - body.left_m, later.ahead_m - body.ahead_m
+    return RootMotion(cos * left - sin * ahead, sin * left + cos * ahead, later.turn_rad - body.turn_rad)
+
+
 def motion_between(path: Features, from_frame: float, to_frame: float) -> RootMotion:
     """The movement of a path [n, 3], x and z in metres and heading in radians, from one frame to another; both may be fractions."""
     x, z, heading = _at(path, from_frame)

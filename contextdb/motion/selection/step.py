@@ -5,23 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 
+from contextdb.motion.arguments import ValidRanges, widened_of
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.markup.left_out import Skip
+from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.search.database import Hit
-from contextdb.motion.selection import trigger
-from contextdb.motion.selection.asked import Asked
+from contextdb.motion.selection import guards, trigger
+from contextdb.motion.selection.asked import Asked, OfValid
 from contextdb.motion.selection.choice import Choice, Reason
 from contextdb.motion.selection.continuing import continuing_cost
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Playing
+from contextdb.motion.selection.guards import Held
 from contextdb.motion.selection.history import Played, ended_skip, history_skips, playing_skips, remembered
 from contextdb.motion.selection.ongoing import Ongoing, playing_at
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 from contextdb.motion.selection.selector import Selector
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
+
+
+class Standing(Enum):
+    """Whether the playing asset is valid: as it is, by hysteresis alone, or not."""
+
+    VALID = auto()
+    WIDENED = auto()
+    NOT_VALID = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +45,7 @@ class Outcome:
     cost: float | None = None
     continuing_cost: float | None = None
     choice: Choice | None = None
+    held: Held = Held.NOTHING
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +60,7 @@ class Step:
     asked: Asked
     ongoing: Ongoing | None
     history: tuple[Played, ...]
+    standing: Standing
 
     @classmethod
     def of(
@@ -64,7 +77,8 @@ class Step:
         now_s, for_s = state.time_s + dt_s, settings.history_s
         name, spans = ("", ()) if ongoing is None else (ongoing.database, ongoing.move.spans)
         history = remembered(state.history, name, spans, now_s, for_s)
-        return cls(selector, settings, state, dt_s, query, asked, ongoing, history)
+        standing = Standing.NOT_VALID if ongoing is None else _standing(ongoing, asked)
+        return cls(selector, settings, state, dt_s, query, asked, ongoing, history, standing)
 
     @property
     def now_s(self) -> float:
@@ -81,26 +95,37 @@ class Step:
         """Seconds until the next search is due."""
         return self.settings.search_every_s - self.state.since_search_s - self.dt_s
 
+    @property
+    def waited_s(self) -> float:
+        """For how long a forced jump over the cost bar has waited."""
+        since_s = self.state.waiting_since_s
+        return 0.0 if since_s is None else self.now_s - since_s
+
     # ---- whether to search
 
     def trigger(self, force: bool, interrupt: bool) -> Trigger | None:
         """Why to search now; None not to."""
         if self.ongoing is None:
             return Trigger.NOTHING_PLAYS if self.state.playing is None else Trigger.LOST
-        is_valid = self._is_valid(self.ongoing)
         if self.ongoing.move.is_ended:
             return Trigger.ENDED
         if self.ongoing.database not in self.selector.among(self.asked.among):
             return Trigger.NOT_AMONG
-        if not is_valid:
+        if interrupt:
+            return Trigger.INTERRUPTED
+        if self.standing is Standing.NOT_VALID:
             return Trigger.NOT_VALID
-        if interrupt or force:
-            return Trigger.INTERRUPTED if interrupt else Trigger.FORCED
+        if force:
+            return Trigger.FORCED
         return Trigger.DUE if self.due_s <= TOLERANCE_S else None
 
-    def _is_valid(self, ongoing: Ongoing) -> bool:
-        """Whether the playing asset is still valid."""
-        return bool(ongoing.head.database.filter(**self.asked.of(ongoing.database)).ranges[ongoing.head.range])
+    def held(self, cause: Trigger | None) -> Held:
+        """Which guard lets play on what is no longer valid, without a search."""
+        if cause is None and self.standing is Standing.WIDENED:
+            return Held.HYSTERESIS
+        if cause is not Trigger.NOT_VALID or self.ongoing is None:
+            return Held.NOTHING
+        return guards.held_without_search(self.ongoing, self.settings)
 
     # ---- what to leave out
 
@@ -111,7 +136,21 @@ class Step:
             return replace(self.asked, skip=skip)
         name, frame = self.ongoing.database, self.ongoing.move.frame
         current = (name, frame) if cause.may_continue else None
-        return replace(self.asked, current=current, skip={**skip, name: [*self._skips(self.ongoing), *skip.get(name, ())]})
+        skips = [*self._skips(self.ongoing), *skip.get(name, ())]
+        if current is None or self.standing is not Standing.WIDENED:
+            return replace(self.asked, current=current, skip={**skip, name: skips})
+        head = self.ongoing.head
+        alone = Skip(head.start, head.stop, LeftOut.NOT_VALID)
+        return replace(self.asked, current=current, skip={**skip, name: [alone, *skips]}, valid=self._widened_for(self.ongoing))
+
+    def _widened_for(self, ongoing: Ongoing) -> OfValid:
+        """What may play, and with it the range that plays, with what its widened row costs."""
+        valid = {name: self.asked.of(name)["valid"] for name in self.selector.databases}
+        own, at, database = valid[ongoing.database], ongoing.head.range, ongoing.head.database
+        exact, wide = database.filter(own), database.filter(widened_of(own))
+        flags, biases = exact.ranges.copy(), exact.range_biases.copy()
+        flags[at], biases[at] = True, wide.range_biases[at]
+        return {**{name: each for name, each in valid.items() if each is not None}, ongoing.database: ValidRanges(flags, biases)}
 
     def _skips(self, ongoing: Ongoing) -> Sequence[Skip]:
         head, frame = ongoing.head, ongoing.move.frame
@@ -121,9 +160,13 @@ class Step:
 
     # ---- what comes of it
 
-    def unsearched(self, ongoing: Ongoing) -> Outcome:
+    def unsearched(self, ongoing: Ongoing, held: Held) -> Outcome:
         """What plays, plays on."""
-        return Outcome(_onward(ongoing), trigger.not_due(self.due_s), ongoing.playing)
+        if held is Held.HYSTERESIS:
+            why = trigger.by_hysteresis(trigger.not_due(self.due_s), ongoing.playing)
+        else:
+            why = trigger.held(ongoing.playing, held.told) if held else trigger.not_due(self.due_s)
+        return Outcome(_onward(ongoing), why, ongoing.playing, held=held)
 
     def searched(self, cause: Trigger, asked: Asked, choice: Choice, rng: Rng | None) -> Outcome:
         """What is made of the selector's choice: to play on, to jump, or, when nothing is found, to make do with what there is."""
@@ -135,9 +178,19 @@ class Step:
             assert self.ongoing is not None, "only what plays can play on"
             assert continuing is not None, "a frame that wins has a cost"
             why = trigger.continued(cause, self.ongoing.playing, continuing, choice.hit.cost)
-            return Outcome(_onward(self.ongoing), why, self.ongoing.playing, continuing, continuing, choice)
+            held = Held.HYSTERESIS if self.standing is Standing.WIDENED else Held.NOTHING
+            if held:
+                why = trigger.by_hysteresis(why, self.ongoing.playing)
+            return Outcome(_onward(self.ongoing), why, self.ongoing.playing, continuing, continuing, choice, held)
         playing = self._playing(choice, hit)
         why = trigger.jumped(cause, self.before, playing, hit.cost, choice, continuing)
+        bar = self.settings.bar_of(self.selector.databases[playing.database])
+        if cause is Trigger.NOT_VALID and self.ongoing is not None and hit.cost > bar:
+            left_s = self.settings.grace_s - self.waited_s
+            if left_s > TOLERANCE_S:
+                why = trigger.waiting(self.ongoing.playing, playing, hit.cost, bar, left_s)
+                return Outcome(_onward(self.ongoing), why, self.ongoing.playing, choice=choice, held=Held.COST_BAR)
+            why = trigger.last_resort(why, bar, self.waited_s)
         action = Action.START if self.state.playing is None else Action.JUMP
         return Outcome(action, why, playing, hit.cost, continuing, choice)
 
@@ -173,6 +226,16 @@ class Step:
         name = str(choice.database)
         head = Playhead.of(self.selector.databases[name], hit.range, self.settings.rate)
         return playing_at(name, head, hit.frame, (hit.frame - head.start) / head.rate)
+
+
+def _standing(ongoing: Ongoing, asked: Asked) -> Standing:
+    """Whether the playing asset is still valid. A mask that does not fit is refused here, also where nothing hangs on it."""
+    database, at, given = ongoing.head.database, ongoing.head.range, asked.of(ongoing.database)
+    if database.filter(**given).ranges[at]:
+        return Standing.VALID
+    wide = widened_of(given["valid"])
+    is_widened = wide is not None and database.filter(wide).ranges[at]
+    return Standing.WIDENED if is_widened else Standing.NOT_VALID
 
 
 def _onward(ongoing: Ongoing) -> Action:

@@ -15,8 +15,8 @@ class Trigger(StrEnum):
     LOST = "{asset} is no longer loaded"
     ENDED = "{asset} has ended"
     NOT_AMONG = "{database} is not among the databases of the moment"
-    NOT_VALID = "{asset} is not valid any more"
     INTERRUPTED = "{asset} was interrupted"
+    NOT_VALID = "{asset} is not valid any more"
     FORCED = "A search was forced"
     DUE = "A search was due"
 
@@ -46,6 +46,27 @@ def jumped(
     if continuing is not None:
         told += f", playing on {continuing:.4g}"
     return f"{told}."
+
+
+def last_resort(why: str, bar: float, waited_s: float) -> str:
+    """What is said when a forced jump over the bar has waited long enough."""
+    return f"{why.removesuffix('.')}; over the bar {bar:g}, but the last resort after {waited_s:.2f} s."
+
+
+def held(before: Playing, told: str) -> str:
+    """What is said when an asset that is not valid plays on without a search."""
+    return f"{Trigger.NOT_VALID.told(before)}, but plays on {told}."
+
+
+def by_hysteresis(why: str, before: Playing) -> str:
+    """The same of an asset that hysteresis alone keeps valid."""
+    return f"{why.removesuffix('.')}; {before.asset} is valid by hysteresis alone."
+
+
+def waiting(before: Playing, playing: Playing, cost: float, bar: float, left_s: float) -> str:
+    """What is said when a forced jump over the bar waits."""
+    told = f"{Trigger.NOT_VALID.told(before)}: {playing.asset} at {playing.time_s:.2f} s costs {cost:.4g}, over the bar {bar:g}"
+    return f"{told}, so {before.asset} plays on, at most {left_s:.2f} s more."
 
 
 def continued(trigger: Trigger, before: Playing, cost: float, best: float) -> str:

@@ -16,6 +16,7 @@ from contextdb.files.toml_text import as_toml
 from contextdb.motion.clips import bvh, mirror
 from contextdb.motion.clips import clip as clips
 from contextdb.motion.clips.doubts import Measures, measure
+from contextdb.motion.clips.feet import NO_MARKS, ContactMarks
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.features.extraction import ClipFeatures, clip_features
 from contextdb.motion.features.schema import FeatureSchema
@@ -35,6 +36,7 @@ class ClipFile:
     settings: DatabaseSettings
     schema: FeatureSchema
     is_looping: bool = False
+    contacts: ContactMarks = NO_MARKS
 
     @property
     def asset(self) -> str:
@@ -49,8 +51,11 @@ class ClipFile:
     def keys(self, content: bytes) -> list[str]:
         """For each range the key of its features."""
         unit, up = self.settings.metres_per_unit, self.settings.up
-        loops = self.is_looping
-        return [key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side, looping=loops) for side in self.sides]
+        loops, marks = self.is_looping, self.contacts
+        return [
+            key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side, looping=loops, contacts=marks)
+            for side in self.sides
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +80,8 @@ def clip_files(
     file: str | None = None,
     markup: Markup | None = None,
 ) -> list[ClipFile]:
-    """The clips of a database in the order of their paths; with `assets` those of these names alone. The markup says which loop.
+    """The clips of a database in the order of their paths; with `assets` those of these names alone. The markup says which loop,
+    and when feet are down.
 
     Raises
     ------
@@ -91,7 +97,8 @@ def clip_files(
     if faults:
         raise MotionError(*faults)
     loops = {path.stem for path in wanted if markup is not None and markup.is_looping(path.stem)}
-    return [ClipFile(path, settings, schema, path.stem in loops) for path in wanted]
+    marks = {path.stem: NO_MARKS if markup is None else markup.contacts_of(path.stem) for path in wanted}
+    return [ClipFile(path, settings, schema, path.stem in loops, marks[path.stem]) for path in wanted]
 
 
 def _paths(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[Path]:
@@ -147,7 +154,9 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
         mend = "to export it again, or take it out of the folder"
         raise MotionError(Fault("the clip has no frame (Frames: 0).", accepted, mend, Place(str(file.path))))
     measures = measure(clip)
-    computed = [clip_features(clip, file.schema, mirrored=side, looping=file.is_looping) for side in file.sides]
+    computed = [
+        clip_features(clip, file.schema, mirrored=side, looping=file.is_looping, contacts=file.contacts) for side in file.sides
+    ]
     if cache is not None:
         for key, part in zip(keys, computed, strict=True):
             cache.write(file.settings.name, key, part, measures)

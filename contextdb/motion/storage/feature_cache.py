@@ -27,11 +27,12 @@ from contextdb.errors import ArtefactError, FileError
 from contextdb.files.tensors import SUFFIX, FileKind, Tensors, digest_of, read_tensors, to_bytes
 from contextdb.motion.clips.clip import Up
 from contextdb.motion.clips.doubts import Measures
+from contextdb.motion.clips.feet import NO_MARKS, ContactMarks
 from contextdb.motion.features.extraction import ClipFeatures
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.features.schema_dict import unweighted
 
-EXTRACTION = 1
+EXTRACTION = 2
 """The version of what features are made of a clip: one more whenever the same clip would give other features."""
 
 CLIP_FEATURES = FileKind(
@@ -42,7 +43,16 @@ FOLDER_SUFFIX = ".features"
 _ENTRY = re.compile(r"[0-9a-f]{32}\.safetensors|(?:\.contextdb-[0-9a-f]{8}-)?[0-9a-f]{16}\.tmp")
 
 
-def key_of(content: bytes, schema: FeatureSchema, *, metres_per_unit: float, up: Up, mirrored: bool, looping: bool) -> str:
+def key_of(
+    content: bytes,
+    schema: FeatureSchema,
+    *,
+    metres_per_unit: float,
+    up: Up,
+    mirrored: bool,
+    looping: bool,
+    contacts: ContactMarks = NO_MARKS,
+) -> str:
     """The key of a clip's features, from the bytes of its file and all else that they depend on."""
     about = {
         "extraction": EXTRACTION,
@@ -51,6 +61,7 @@ def key_of(content: bytes, schema: FeatureSchema, *, metres_per_unit: float, up:
         "up": up,
         "mirrored": mirrored,
         "looping": looping,
+        "contacts": contacts if any(channel.type == "phase" for channel in schema.channels) else NO_MARKS,
     }
     digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
     digest.update(content)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from contextdb.console import printable
 from contextdb.errors import plural
@@ -12,10 +12,12 @@ from contextdb.motion.trace.session_diff import SessionDiff
 from contextdb.motion.trace.stats import GAINS, SessionStats
 from contextdb.motion.trace.text_table import WIDTH, Column, table_lines
 from contextdb.motion.trace.what_if import WhatIf
-from contextdb.motion.trace.why_not import Change, WhyNot
+from contextdb.motion.trace.why_not import WhyNot
+from contextdb.motion.trace.winning_changes import Change, ChangePart
 
 MOST_NAMES = 12
 MOST_CHOICES = 20
+LABEL = 12
 
 
 def why_lines(told: WhyNot, width: int = WIDTH) -> Iterator[str]:
@@ -33,27 +35,27 @@ def why_lines(told: WhyNot, width: int = WIDTH) -> Iterator[str]:
     yield from ("", "what would have to change", "")
     if not told.changes:
         yield "no single change of a cell, a mark, a bias or a weight"
-        return
-    changes = told.changes
-    yield from table_lines(
-        [
-            Column("change", [each.kind for each in changes], is_key=True),
-            Column("of", [each.what for each in changes], is_key=True),
-            Column("to", [_to(each) for each in changes]),
-            Column("wins", ["yes" if each.wins else "not enough" for each in changes]),
-        ],
-        width,
-    )
+    yield from _labelled([("wins" if each.wins else "not enough", _change_text(each)) for each in told.changes], width)
 
 
-def _to(change: Change) -> str:
-    return change.to if isinstance(change.to, str) else f"{change.to:.6g}"
+def _change_text(change: Change) -> str:
+    return " and ".join(_part_text(part) for part in change.parts)
+
+
+def _part_text(part: ChangePart) -> str:
+    if part.to == "without":
+        return f"without the {part.kind} {part.what}"
+    return f"{part.kind} {part.what} = {part.to if isinstance(part.to, str) else f'{part.to:.6g}'}"
 
 
 def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
     """The figures of a session."""
-    gain = "" if told.gain_median is None else f"median {told.gain_median:.0%}, {told.gain_small_share:.0%} under 20 %"
-    spread = ", ".join(f"{n} up to {high:.0%}" for n, high in zip(told.gains, GAINS, strict=True) if n) if told.gains else ""
+    gain = (
+        ""
+        if told.gain_median is None
+        else f"median {_percent(told.gain_median)}, {_percent(told.gain_small_share or 0.0)} under 20 %"
+    )
+    spread = ", ".join(f"{n} up to {_percent(high)}" for n, high in zip(told.gains, GAINS, strict=True) if n) if told.gains else ""
     used = "" if told.frames_used_share is None else f", {100.0 * told.frames_used_share:.2g} % of the frames"
     rows = [
         ("jumps", f"{told.jumps:,} in {told.seconds:.2f} s, {told.jumps_per_s:.2f} a second; {told.forced_jumps:,} forced"),
@@ -67,10 +69,18 @@ def stats_lines(told: SessionStats, width: int = WIDTH) -> Iterator[str]:
         more = f" and {len(never) - MOST_NAMES} more" if len(never) > MOST_NAMES else ""
         names = ", ".join(never[:MOST_NAMES])
         rows.append(("never used", f"{len(never):,}: {names}{more}" if never else "none"))
+    yield from _labelled([(label, text) for label, text in rows if text], width)
+
+
+def _labelled(rows: Iterable[tuple[str, str]], width: int) -> Iterator[str]:
+    """Texts in lines, each behind its label."""
     for label, text in rows:
-        if text:
-            lines = _wrapped(text, width - 12) or [""]
-            yield from (f"{label if i == 0 else '':<12}{line}" for i, line in enumerate(lines))
+        lines = _wrapped(text, width - LABEL)
+        yield from (f"{label if i == 0 else '':<{LABEL}}{line}" for i, line in enumerate(lines))
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def what_if_lines(told: WhatIf, width: int = WIDTH) -> Iterator[str]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, TypedDict, overload
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_place
@@ -22,7 +23,7 @@ from contextdb.motion.selection.decision import Decision
 from contextdb.motion.selection.selector import Entry
 from contextdb.motion.trace.filter_rows import is_recorded
 from contextdb.motion.trace.other_filters import asked_of_table, moved_to, with_biases
-from contextdb.motion.trace.reasked_decision import ReaskedDecision
+from contextdb.motion.trace.reasked_decision import ReaskedDecision, chosen_of
 from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Edited, Stock, require_name
 from contextdb.motion.trace.why_not import WhyNot, why_not
@@ -114,7 +115,14 @@ class Reasked(Sequence[ReaskedDecision]):
             for each in decision.choice.searches
         )
         searches = {name: self._search(name, decision, chosen) for name, chosen in decision.filters}
-        return ReaskedDecision(decision, entries, searches, self.stock)
+        was = chosen_of(decision.choice, self._starts)
+        return ReaskedDecision(decision, entries, searches, self.stock, was)
+
+    @cached_property
+    def _starts(self) -> dict[str, Sequence[int]]:
+        """Where the ranges of the recorded databases started."""
+        same = {name: each.starts.tolist() for name, each in self.databases.items() if name not in self.changed}
+        return {**{name: about["starts"] for name, about in self.about.items() if "starts" in about}, **same}
 
     def _why_not_asked(self, decision: Decision) -> str:
         return "" if decision.choice is None else why_not_asked(decision, self.about, self.databases, self.changed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,6 +22,9 @@ from contextdb.motion.trace.reasked_search import ReaskedSearch
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.views import role_of
 
+Chosen = tuple[str, str | None, int] | None
+"""A database, an asset of it and a frame, counted from the start of the asset's range; None for nothing."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReaskedDecision:
@@ -37,12 +40,15 @@ class ReaskedDecision:
         All that could be searched, in order; empty for an update without a search.
     stock : Stock
         Where the tables are.
+    was : Chosen
+        The recorded choice.
     """
 
     decision: Decision
     entries: tuple[Entry, ...]
     searches: Mapping[str, ReaskedSearch]
     stock: Stock
+    was: Chosen = None
 
     @cached_property
     def choice(self) -> Choice | None:
@@ -77,7 +83,8 @@ class ReaskedDecision:
     @property
     def is_changed(self) -> bool:
         """Whether another frame is chosen than the recorded choice."""
-        return _told(self.choice, self.searches) != _told(self.decision.choice, self.searches)
+        starts = {name: search.database.starts.tolist() for name, search in self.searched.items()}
+        return chosen_of(self.choice, starts) != self.was
 
     @property
     def is_other_asset(self) -> bool:
@@ -132,13 +139,12 @@ class ReaskedDecision:
         return int(np.searchsorted(self._free, total, side="left")) + 1
 
 
-def _told(choice: Choice | None, searches: Mapping[str, ReaskedSearch]) -> object:
-    """Which frame a choice means, seen from its range, so that a database with other ranges before it is no change."""
+def chosen_of(choice: Choice | None, starts: Mapping[str, Sequence[int]]) -> Chosen:
+    """Which frame a choice means, counted from the start of its range, so that other ranges before it are no change."""
     if choice is None or choice.database is None:
         return None
     hit = choice.hit
-    start = int(searches[choice.database].database.starts[hit.range]) if choice.database in searches else 0
-    return choice.database, hit.asset, hit.frame - start
+    return choice.database, hit.asset, hit.frame - starts[choice.database][hit.range]
 
 
 def _asset(choice: Choice | None) -> str | None:

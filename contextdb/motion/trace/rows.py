@@ -38,9 +38,10 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 """What the markup says of a frame of a database."""
 Events = dict[tuple[str, int], tuple[str, ...]]
 
-TIMINGS, FILTERS, INPUTS, BODY = "search_us", "filters", "inputs", ("body_x", "body_z", "body_heading")
-OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY)
-"""The columns that a file may lack: another recording has other timings, and older versions kept no filters, inputs and bodies."""
+TIMINGS, FILTERS, INPUTS, HELD, PLAY_RATE = "search_us", "filters", "inputs", "held", "play_rate"
+BODY = ("body_x", "body_z", "body_heading")
+OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY, HELD, PLAY_RATE)
+"""The columns that a file may lack: another recording has other timings, and older versions kept none of the others."""
 
 
 def columns() -> dict[str, PolarsType]:
@@ -91,6 +92,8 @@ def columns() -> dict[str, PolarsType]:
         "root_motion": pl.Struct({"left_m": number, "ahead_m": number, "turn_rad": number}),
         "root_weight": number,
         **dict.fromkeys(BODY, number),
+        HELD: text,
+        PLAY_RATE: number,
         FILTERS: filter_type(),
         INPUTS: text,
         TIMINGS: number,
@@ -120,6 +123,8 @@ def row_of(decision: Decision, events_of: EventsOf) -> Row:
         "root_motion": {"left_m": float(move.left_m), "ahead_m": float(move.ahead_m), "turn_rad": float(move.turn_rad)},
         "root_weight": float(decision.root_weight),
         **dict(zip(BODY, (None, None, None) if decision.body is None else map(float, decision.body), strict=True)),
+        HELD: str(decision.held),
+        PLAY_RATE: float(decision.play_rate),
         FILTERS: [filter_row(_text(name), chosen) for name, chosen in decision.filters],
         INPUTS: None if decision.inputs is None else inputs_json(decision.inputs),
         TIMINGS: _number(decision.search_us),
@@ -249,6 +254,8 @@ def decision_of(row: Row) -> Decision:
         root_motion=RootMotion(*(float(row["root_motion"][key]) for key in ("left_m", "ahead_m", "turn_rad"))),
         root_weight=float(row["root_weight"]),
         body=_body(row),
+        held=row.get(HELD) or "",
+        play_rate=1.0 if row.get(PLAY_RATE) is None else float(row[PLAY_RATE]),
         filters=tuple((_known(each["database"]), filter_of(each)) for each in row.get(FILTERS) or ()),
         inputs=None if row.get(INPUTS) is None else inputs_of(row[INPUTS]),
     )

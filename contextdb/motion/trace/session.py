@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, Unpack, overload
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_path, require_place, require_text
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ArtefactError, Fault, MotionError, Place, in_quotes, plural
+from contextdb.errors import ArtefactError, ContextDBError, Fault, MotionError, Place, in_quotes, plural
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Decision
@@ -180,10 +180,12 @@ class Trace(Sequence[Decision]):
     def what_if(self, project: object = None, **changes: Unpack[Changes]) -> WhatIf:
         """How many recorded searches choose otherwise with changes, and the measures of the session run again in closed loop.
 
-        The parameters are those of `reasked`, and so is what it raises.
+        The parameters are those of `reasked`, and so is what it raises. Before is the session with the databases that it was
+        recorded with, where `use` was given these, or they recorded it; else with those of the project.
         """
         stock = Stock(self._databases) if project is None else Stock.of(project, self.about)
-        return what_if(Reasked(self, self.about, stock, {}), Reasked(self, self.about, stock, changes))
+        recorded = Stock(self._databases) if set(self.about) <= set(self._databases) else stock
+        return what_if(Reasked(self, self.about, recorded, {}), Reasked(self, self.about, stock, changes))
 
     def stats(self) -> SessionStats:
         """The session in figures."""
@@ -276,7 +278,7 @@ class Trace(Sequence[Decision]):
     def _decision_of(self, row: Row, place: int) -> Decision:
         try:
             decision = decision_of(row)
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError, ContextDBError) as error:
             raise _refused(f"row {place} holds no decision ({type(error).__name__}).", self._file) from error
         return self._with_candidates(decision)
 

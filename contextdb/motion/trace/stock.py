@@ -11,6 +11,7 @@ from os import PathLike
 from typing import Any, Protocol, runtime_checkable
 
 from contextdb.cells.arguments import require_kind, require_mapping
+from contextdb.cells.conditions import Condition
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.building import open_or_build
@@ -41,9 +42,12 @@ class Asked(Protocol):
     @property
     def leaves(self) -> Sequence[str]: ...
 
+    @property
+    def asked(self) -> Mapping[str, Condition]: ...
+
     def query(self, context: Any, *, unknown: Any) -> Any: ...
 
-    def explain(self, context: Any, *, unknown: Any) -> Iterable[Any]: ...
+    def explain(self, context: Any, *, unknown: Any) -> Any: ...
 
 
 @runtime_checkable

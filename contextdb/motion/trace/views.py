@@ -84,6 +84,8 @@ def _spells(decisions: Iterable[Decision]) -> list[tuple[Decision, float]]:
 
 
 def _changes(decision: Decision, last: Decision) -> bool:
+    if decision.held != last.held:
+        return True
     if decision.action is Action.CONTINUE:
         return last.action in STEADY
     return decision.action not in STEADY or decision.action is not last.action
@@ -101,7 +103,7 @@ def _session_columns(spells: Sequence[tuple[Decision, float]], assets: Column) -
     yield Column("tick", [f"{first.tick:,}" for first in firsts], is_number=True, is_key=True)
     yield Column("time s", [seconds(first.time_s) for first in firsts], is_number=True)
     yield Column("search", [cause_of(first) for first in firsts])
-    yield Column("", [str(first.action) for first in firsts])
+    yield Column("", [_action(first) for first in firsts])
     if len(set(filter(None, databases))) > 1:
         yield Column("database", [shortened(database, MOST_DATABASE) for database in databases])
     yield assets
@@ -113,6 +115,11 @@ def _session_columns(spells: Sequence[tuple[Decision, float]], assets: Column) -
 
 def _asset(playing: Playing | None) -> str:
     return "" if playing is None else playing.asset + (" (mirrored)" if playing.mirrored else "")
+
+
+def _action(decision: Decision) -> str:
+    """What the update did, and the guard that saw to it."""
+    return f"{decision.action} ({decision.held})" if decision.held else str(decision.action)
 
 
 def cause_of(decision: Decision) -> str:
@@ -177,15 +184,19 @@ def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]
     for what, cost, of in (("cost", decision.cost, playing), ("playing on", decision.continuing_cost, before)):
         if cost is not None:
             yield what, cost_text(cost) + _parts_text(decision, of)
+    if decision.held:
+        yield "held by", decision.held
     if playing is not None and events.get((playing.database, playing.frame)):
         yield "events", ", ".join(events[playing.database, playing.frame])
     if move != NO_MOTION or decision.root_weight != 1.0:
         turn = math.degrees(move.turn_rad)
         yield "moved", f"{move.ahead_m:.3f} m ahead, {move.left_m:.3f} m left, turned {turn:.1f}°; weight {decision.root_weight:g}"
+    if decision.play_rate != 1.0:
+        yield "play rate", f"{decision.play_rate:.2f}"
     if decision.search_us is not None:
         yield "search", f"{decision.search_us:,.0f} µs"
     if decision.context:
-        yield "context", ", ".join(f"{key} = {_fact_text(value)}" for key, value in decision.context.items())
+        yield "context", ", ".join(f"{key} = {fact_text(value)}" for key, value in decision.context.items())
 
 
 def _playing_text(playing: Playing | None) -> str:
@@ -203,7 +214,8 @@ def _parts_text(decision: Decision, playing: Playing | None) -> str:
     return ""
 
 
-def _fact_text(value: object) -> str:
+def fact_text(value: object) -> str:
+    """A fact as people write it."""
     if isinstance(value, (list, tuple, set, frozenset)):
         return " ".join(f"+{tag}" for tag in sorted(map(str, value))) or "no tags"
     return "missing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from contextdb.console import progress
 from contextdb.errors import Fault, MotionError
 from contextdb.motion.arguments import ValidRanges
 from contextdb.motion.clips.quaternions import Floats
@@ -85,7 +86,7 @@ def what_if(recorded: Reasked, changed: Reasked) -> WhatIf:
 
     Raises MotionError where the session does not say how its updates were made.
     """
-    asked = [each for each in changed if each.choice is not None]
+    asked = [each for each in progress(changed, "asking again") if each.choice is not None]
     others = tuple(
         ChangedChoice(each.decision.tick, each.decision.time_s, _asset(each.decision.choice), _asset(each.choice))
         for each in asked
@@ -119,7 +120,7 @@ def run_again(asked: Reasked) -> list[Decision]:
             )
         )
     runner = _Runner.of(asked, decisions)
-    return [runner.update(each) for each in decisions]
+    return [runner.update(each) for each in progress(decisions, "running the session again")]
 
 
 @dataclass(eq=False)

@@ -13,7 +13,7 @@ def _key(keys: str, action: str, label: str, show: bool = False) -> Binding:
 KEYS: list[BindingType] = [
     _key("enter", "enter", "OK", show=True),
     _key("shift+enter", "commit(-1, 0)", "OK, go up"),
-    _key("tab", "commit(0, 1)", "OK, go right"),
+    _key("tab", "tab", "OK, go right"),
     _key("shift+tab", "commit(0, -1)", "OK, go left"),
     _key("ctrl+j,ctrl+enter", "fill", "Fill the selection", show=True),
     _key("escape", "cancel", "Cancel", show=True),
@@ -34,4 +34,5 @@ KEYS: list[BindingType] = [
     _key("plus", "sign('+')", "Has"),
     _key("minus", "sign('-')", "Has not"),
     _key("ctrl+t", "take", "Accept suggestion", show=True),
+    _key("ctrl+n", "declare", "Add the value", show=True),
 ]

@@ -1,0 +1,95 @@
+"""Show the bones of clips as a tree, with their channels and heights, and which are found as hips, spine, head, feet and toes.
+
+Files of one rig are shown together. The settings of [features.NAME] and [databases.NAME] name bones as they are listed here.
+
+  contextdb motion bones clips/walk.bvh
+  contextdb motion bones clips/*.bvh --json
+  contextdb motion bones robot.bvh --metres-per-unit 1 --up z
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from contextdb.console import ExitCode, aligned, output, printable
+from contextdb.errors import plural
+from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip, load_clips
+from contextdb.motion.clips.rig import Rig
+from contextdb.report.render_json import as_json
+
+HEADER = ("bone", "channels", "height m", "found as", "mirrored to")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files")
+    parser.add_argument(
+        "--metres-per-unit", metavar="M", type=_unit, default=CENTIMETRE, help="the unit of the files (default: 0.01, a centimetre)"
+    )
+    parser.add_argument("--up", choices=UPS, default="y", help="the axis that points up (default: y)")
+    parser.add_argument("--json", action="store_true", help="print a JSON document instead of trees")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Show the rigs of some files."""
+    clips = load_clips(arguments.files, metres_per_unit=arguments.metres_per_unit, up=arguments.up)
+    rigs: dict[tuple[object, ...], list[int]] = {}
+    for i, clip in enumerate(clips):
+        key = (clip.skeleton.names, tuple(clip.skeleton.parents.tolist()), clip.skeleton.channels)
+        rigs.setdefault(key, []).append(i)
+    found = [([str(arguments.files[i]) for i in members], clips[members[0]]) for members in rigs.values()]
+    with output():
+        if arguments.json:
+            print(as_json({"format": 1, "rigs": [_document(files, clip) for files, clip in found]}), end="")
+        else:
+            print("\n\n".join("\n".join(_lines(files, clip)) for files, clip in found))
+    return ExitCode.OK
+
+
+def _lines(files: list[str], clip: Clip) -> Iterator[str]:
+    rig = Rig.of(clip)
+    more = f" and {plural(len(files) - 1, 'other file')}" if len(files) > 1 else ""
+    size = f"{rig.height_m:.3g} m tall" if clip.n_frames else "no frame"
+    yield printable(f"{files[0]}{more}: {plural(rig.skeleton.n_joints, 'bone')}, {size}, {clip.rate:.4g} frames a second")
+    rows = [HEADER]
+    for joint, name in enumerate(rig.skeleton.names):
+        height = f"{rig.heights_m[joint]:.3f}" if rig.heights_m else ""
+        tree = f"{'  ' * int(rig.skeleton.depths[joint])}{printable(name)}"
+        n_channels = str(len(rig.skeleton.channels[joint]))
+        rows.append((tree, n_channels, height, ", ".join(rig.roles(name)), printable(rig.partner(name) or "")))
+    yield from (line.rstrip() for line in aligned(rows, right=(1, 2)))
+    missing = [what for what, names in (("feet", rig.feet), ("toes", rig.toes), ("mirror pairs", rig.mirror)) if not names]
+    if missing:
+        yield f"not found: {', '.join(missing)}; [features.NAME] can declare feet, heels, toes, facing and mirror"
+
+
+def _document(files: list[str], clip: Clip) -> dict[str, object]:
+    rig = Rig.of(clip)
+    skeleton = rig.skeleton
+    bones = [
+        {
+            "bone": name,
+            "parent": None if parent < 0 else skeleton.names[parent],
+            "depth": int(skeleton.depths[joint]),
+            "channels": list(skeleton.channels[joint]),
+            "offset_m": [round(x * clip.metres_per_unit, 6) for x in skeleton.offsets[joint].tolist()],
+            "height_m": round(rig.heights_m[joint], 6) if rig.heights_m else None,
+            "found_as": rig.roles(name),
+            "mirrored_to": rig.partner(name),
+        }
+        for joint, (name, parent) in enumerate(zip(skeleton.names, skeleton.parents.tolist(), strict=True))
+    ]
+    found = {"hips": rig.hips, "spine": rig.spine, "head": rig.head, "feet": rig.feet, "heels": rig.heels, "toes": rig.toes}
+    sides = {"facing": rig.facing, "mirror": [list(pair) for pair in rig.mirror]}
+    return {"files": files, "rate": clip.rate, "height_m": round(rig.height_m, 6), **found, **sides, "bones": bones}
+
+
+def _unit(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-9 <= value <= 1e9:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a unit. Accepted: metres, such as 0.01 for centimetres.')
+    return value

@@ -1,0 +1,139 @@
+"""Find what is wrong with clips, markup and motion settings: bones that lack, other units and axes, jumps, idle markup.
+
+Every clip is read as a build reads it. Where no motion database is declared, all clips below the folder are checked. Exits
+with 1 if there are findings at the level of --fail-on, with 2 if there is no such folder. What looks wrong and may be right is a
+warning, such as a body of 170 m.
+
+  contextdb motion check game/
+  contextdb motion check clips/          clips that no project names yet
+  contextdb motion check game/ --json
+  contextdb motion check game/ --fail-on error --format github
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from contextdb import report
+from contextdb.commands import add_format_arguments
+from contextdb.commands.progress import building_bar
+from contextdb.console import ExitCode, output, terminal_width, wants_colour
+from contextdb.errors import ContextDBError, Fault, Place, plural
+from contextdb.findings import LEVELS, Finding
+from contextdb.motion.storage.building import CACHE_FOLDER
+from contextdb.motion.storage.checking import check_clips, check_motion
+from contextdb.motion.storage.config import MotionConfig
+from contextdb.report.results import CheckReport
+from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
+from contextdb.tables.table import leaf_assets
+
+FORMATS = ("text", "json", "github", "junit", "markdown")
+
+
+@dataclass(frozen=True, slots=True)
+class MotionReport(CheckReport):
+    """What was found, and of each database how many clips can be used; "" is the database of clips that are in none."""
+
+    n_clips: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def summary(self) -> str:
+        """How much was checked, and how many findings of each level there are."""
+        said = CheckReport((), self.findings).summary.partition(": ")[2]
+        if self.n_clips.keys() == {""}:
+            return f"{plural(self.n_clips[''], 'clip')} checked: {said}"
+        databases, clips = plural(len(self.n_clips), "database"), plural(sum(self.n_clips.values()), "clip")
+        return f"{databases} and {clips} checked: {said}"
+
+    def condensed(self) -> MotionReport:
+        """The report for people: what many clips have in common is told of the first, with how many others have it."""
+        alike: dict[tuple[str, ...], list[Finding]] = {}
+        for i, finding in enumerate(self.findings):
+            mend = finding.message.partition(" Expected: ")[2]
+            alike.setdefault((finding.rule, mend) if mend else (finding.rule, mend, str(i)), []).append(finding)
+        return replace(self, findings=tuple(_of_all(findings) for findings in alike.values()))
+
+    def to_json(self) -> dict[str, object]:
+        """The JSON document."""
+        databases = [{"database": name or None, "clips": n_clips} for name, n_clips in self.n_clips.items()]
+        return {"format": 1, "findings": [finding.to_json() for finding in self.findings], "databases": databases}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    parser.add_argument("path", metavar="PATH", help=f"a folder of tables, or its {SCHEMA_FILE}")
+    add_format_arguments(parser, FORMATS)
+    parser.add_argument(
+        "--fail-on",
+        metavar="LEVEL",
+        choices=("error", "warning", "none"),
+        default="warning",
+        help="the lowest level that fails: error, warning or none (default: warning)",
+    )
+    parser.add_argument("--all", action="store_true", help="print every finding, not the first few of each kind")
+    parser.add_argument("--no-cache", action="store_true", help="compute every clip, and cache nothing")
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Check the motion of a folder."""
+    found = check_path(arguments.path, cache=not arguments.no_cache)
+    failing = LEVELS[: LEVELS.index(arguments.fail_on) + 1] if arguments.fail_on != "none" else ()
+    is_for_people = arguments.format in ("text", "markdown") and not arguments.all
+    text = report.render(
+        arguments.format,
+        found.condensed() if is_for_people else found,
+        colour=wants_colour(sys.stdout),
+        width=terminal_width(),
+        shows_all=arguments.all,
+        failing=failing,
+    )
+    with output():
+        print(text, end="")
+    return ExitCode.FOUND if any(f.level in failing for f in found.findings) else ExitCode.OK
+
+
+def check_path(path: str, *, cache: bool = True) -> MotionReport:
+    """Check the motion of a folder; settings that cannot be read are findings too.
+
+    Raises
+    ------
+    FileError
+        There is no such folder.
+    """
+    folder = folder_of(Path(path))
+    if not (folder / SCHEMA_FILE).exists() and (clips := sorted(folder.rglob("*.bvh"))):
+        return _of_clips(clips)
+    try:
+        project = Project.load(folder, strict=False)
+        config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
+    except ContextDBError as error:
+        return MotionReport((), tuple(_as_findings(error.faults)))
+    if not config.databases:
+        accepted = 'a section such as [databases.jog] with features and clips = "clips/*.bvh"'
+        none = Fault("no motion database is declared.", accepted, place=Place(str(folder / SCHEMA_FILE)), rule="no-databases")
+        found = _of_clips(sorted(folder.rglob("*.bvh")))
+        return replace(found, findings=(Finding.of(none), *found.findings))
+    assets = {name: leaf_assets(table) for name, table in project.tables.items()}
+    with building_bar() as progress:
+        checked = check_motion(config, folder, assets, progress, cache=CACHE_FOLDER if cache else None)
+    return MotionReport((), checked.findings, checked.n_clips)
+
+
+def _of_clips(paths: list[Path]) -> MotionReport:
+    """The report on clips that no database names."""
+    with building_bar() as progress:
+        checked = check_clips(paths, progress)
+    return MotionReport((), checked.findings, checked.n_clips)
+
+
+def _of_all(findings: list[Finding]) -> Finding:
+    first, *others = findings
+    return replace(first, message=f"{first.message} ({plural(len(others), 'other clip')} likewise.)") if others else first
+
+
+def _as_findings(faults: Iterable[object]) -> list[Finding]:
+    return [Finding.of(fault if isinstance(fault, Fault) else Fault(str(fault))) for fault in faults]

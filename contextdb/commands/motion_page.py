@@ -1,0 +1,108 @@
+"""Sessions as a page, or as the comment of a review: what `contextdb motion replay --html` and `--markdown` give."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from contextdb.commands.motion_build_command import MotionProject
+from contextdb.disk import path_in_quotes, write_atomic
+from contextdb.errors import Fault, FileError, MotionError, Place
+from contextdb.motion import MotionDatabase, PoseBank, PoseSettings, measure, open_or_build_poses
+from contextdb.motion.trace.session import Trace
+from contextdb.report import session_html, session_markdown
+from contextdb.report.measure_results import SessionMeasures
+from contextdb.report.session_data import SessionView
+from contextdb.report.session_view import view_of
+
+SUFFIX = ".html"
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A session with the databases and the poses of its project.
+
+    Attributes
+    ----------
+    file : str
+    trace : Trace
+    folder : str
+        Its project.
+    databases : mapping of name to MotionDatabase
+        Those that are what was recorded.
+    """
+
+    file: str
+    trace: Trace
+    folder: str
+    databases: Mapping[str, MotionDatabase]
+
+    @cached_property
+    def project(self) -> MotionProject:
+        """What the project says of motion."""
+        return MotionProject.load(self.folder)
+
+    @cached_property
+    def banks(self) -> dict[str, PoseBank]:
+        """The poses of the databases."""
+        names = [name for name in self.trace.about if name in self.project.config.databases]
+        if not names:
+            found = "its poses cannot be made: the project has none of its databases."
+            raise MotionError(Fault(found, "--project FOLDER with the project that it was recorded with", place=Place(self.file)))
+        return open_or_build_poses(self.project.config, self.project.folder, self.project.assets, names=names)
+
+    @property
+    def settings(self) -> PoseSettings:
+        """How its poses are made."""
+        said = [str(about["controller"]) for about in self.trace.about.values() if "controller" in about]
+        return self.project.config.output_of(said[0] if said else "")
+
+    @cached_property
+    def measured(self) -> SessionMeasures:
+        """Its measures."""
+        found = measure(self.trace, self.banks, databases=self.databases or None, settings=self.settings)
+        return SessionMeasures(self.file, found, {}, ())
+
+    def view(self) -> SessionView:
+        """What the page shows."""
+        rows = {label: (value, raw) for label, value, raw, _ in self.measured.rows()}
+        reasked = self.trace.reasked(self.databases) if self.databases else None
+        return view_of(os.path.basename(self.file), self.trace, self.banks, self.settings, reasked, rows)
+
+
+def page_file(name: str) -> Path:
+    """Where a page is to be written, refused before the work where it could only be refused after."""
+    path, place = Path(name), Place(name)
+    if path.suffix != SUFFIX:
+        raise FileError(Fault("a page cannot be written to such a file.", f"a name that ends in {SUFFIX}", place=place))
+    if not os.path.isdir(path.parent):
+        found = f"there is no folder {path_in_quotes(path.parent)}."
+        raise FileError(Fault(found, "an existing folder", place=place, rule="no-such-path"))
+    return path
+
+
+def write_page(out: Path, sessions: Sequence[Played]) -> None:
+    """Write the page of a session, or of two side by side."""
+    write_atomic(out, session_html.render([each.view() for each in sessions], parting=parting_of(sessions)).encode())
+
+
+def comment_of(sessions: Sequence[Played], page: str | None) -> str:
+    """The comment on a session, or on two."""
+    lists = [list(each.trace.brief()) for each in sessions]
+    return session_markdown.render([each.measured for each in sessions], lists, parting_of(sessions), page)
+
+
+def parting_of(sessions: Sequence[Played]) -> str:
+    """Where two sessions part, in a sentence or two; "" of one."""
+    if len(sessions) < 2:
+        return ""
+    one, other = sessions
+    told = one.trace.diff(other.trace)
+    if told.parting is None:
+        return "Both play the same." if not told.longer else "Both play the same as long as both last."
+    where, names = told.parting, [os.path.basename(each.file) for each in sessions]
+    plays = f"{names[0]} plays {where.one or 'nothing'}, {names[1]} {where.other or 'nothing'}"
+    return f"They part at {where.time_s:.2f} s: {plays}. Of {told.updates:,} updates, {told.other_assets:,} play another asset."

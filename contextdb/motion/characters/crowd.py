@@ -1,0 +1,216 @@
+"""A crowd of characters: each plays what it plays alone, and what can be worked out for all at once is.
+
+Bodies and paths are computed in arrays, each table is asked once with all contexts, and each database is searched once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from contextdb.cells.arguments import require_kind, require_many_of, require_mapping, require_real
+from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
+from contextdb.motion.arguments import HasAssets
+from contextdb.motion.characters import tables as asking
+from contextdb.motion.characters.character import Character, CharacterState, Step, Updated
+from contextdb.motion.characters.paths import MOST_TURN_RAD, ahead_s, back_s, shares_left
+from contextdb.motion.characters.tables import Facts, Table
+from contextdb.motion.clips.many_paths import ManyTrajectories
+from contextdb.motion.clips.many_steered import ManySteered, steered_paths
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.features.extraction import with_path
+from contextdb.motion.features.many_queries import with_paths
+from contextdb.motion.selection.asked import OfValid
+from contextdb.motion.selection.controller_group import ControllerGroup
+
+FactsOfMany = Mapping[str, Any] | Sequence[Facts]
+
+
+class Crowd(Sequence[Character]):
+    """Characters in order, updated together: a sequence, with whose numbers sticks and facts go.
+
+    Parameters
+    ----------
+    characters : iterable of Character
+        Each once. `character.copy()` makes more of one.
+
+    Raises
+    ------
+    MotionError
+        The same character twice.
+    """
+
+    def __init__(self, characters: Iterable[Character] = ()) -> None:
+        self._characters: list[Character] = []
+        for character in require_many_of(characters, Character, "characters", "a list of Character"):
+            self.add(character)
+
+    def add(self, character: Character) -> None:
+        """Take one more, as the last. Raises MotionError for one that is there, ContextError for what is none."""
+        require_kind(character, Character, "character", "a Character")
+        if any(own is character or own.controller is character.controller for own in self):
+            raise MotionError(Fault("the crowd has this character already.", "one of its own, such as character.copy()"))
+        self._characters.append(character)
+
+    def remove(self, character: Character) -> None:
+        """Let one go; those after it move up by one."""
+        kept = [own for own in self if own is not character]
+        if len(kept) == len(self):
+            raise MotionError(Fault("the crowd does not have this character.", "one that was added"))
+        self._characters = kept
+
+    @overload
+    def __getitem__(self, i: int) -> Character: ...
+
+    @overload
+    def __getitem__(self, i: slice) -> list[Character]: ...
+
+    def __getitem__(self, i: int | slice) -> Character | list[Character]:
+        return self._characters[i]
+
+    def __len__(self) -> int:
+        return len(self._characters)
+
+    def __iter__(self) -> Iterator[Character]:
+        return iter(self._characters)
+
+    def __repr__(self) -> str:
+        return f"<Crowd: {plural(len(self), 'character')}>"
+
+    @property
+    def states(self) -> list[CharacterState]:
+        """Where each is, to come back to with `restore`."""
+        return [character.state for character in self]
+
+    def restore(self, states: Sequence[CharacterState]) -> None:
+        """Go on from the states of as many characters."""
+        states = require_many_of(states, CharacterState, "states", "a list of CharacterState, what `states` gives")
+        if len(states) != len(self):
+            raise MotionError(Fault(f"{plural(len(states), 'state')} for {plural(len(self), 'character')}.", "one for each"))
+        for character, state in zip(self, states, strict=True):
+            character.restore(state)
+
+    def update(
+        self, dt: float, sticks: ArrayLike, facts: FactsOfMany | None = None, facing: ArrayLike | None = None
+    ) -> list[Updated]:
+        """Update every character as `Character.update` does; what each gave, in order.
+
+        Parameters
+        ----------
+        dt : float
+            Seconds since the last update, for all.
+        sticks : float array, shape (Q, 2)
+            The velocities over the ground that are asked for, x and z in m/s.
+        facts : mapping of str to fact or list of Q facts, or sequence of Q mappings, optional
+            What the game knows: what is no list, tuple or array is the same for all.
+        facing : float array, shape (Q,), optional
+            The headings that are asked for, radians. Default: where the bodies go.
+
+        Raises
+        ------
+        ContextDBError
+            As `Character.update`. All then stand where they stood.
+        """
+        dt = require_real(dt, "dt", 0.0)
+        if not len(self):
+            return []
+        bodies = ManySteered.of([character.body for character in self]).moved(dt, sticks, facing)
+        wanted = np.asarray(sticks, np.float64)
+        headings = None if facing is None else np.asarray(facing, np.float64)
+        given = _facts_of_each(facts, len(self))
+        steps = []
+        for i, (character, (x, z)) in enumerate(zip(self, wanted.tolist(), strict=True)):
+            heading = None if headings is None else float(headings[i])
+            steps.append(character.step_of(dt, (x, z), given[i], heading, bodies[i]))
+        group = ControllerGroup(character.controller for character in self)
+        queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
+        valid = self._valid(steps)
+        before = self.states
+        decisions = group.update(
+            dt, queries, valid, contexts=[step.facts or None for step in steps], body=[step.body for step in steps]
+        )
+        try:
+            together = zip(self, steps, paths, decisions, before, strict=True)
+            return [each.answer(step, path, decision, state.controller) for each, step, path, decision, state in together]
+        except Exception:
+            self.restore(before)
+            raise
+
+    def _queries(
+        self, dt: float, group: ControllerGroup, steps: list[Step], bodies: ManySteered, sticks: Floats, facing: Floats | None
+    ) -> tuple[Floats, list[Trajectory]]:
+        """The query of each, and its wished path."""
+        schema = self[0].schema
+        if any(character.schema is not schema and character.schema != schema for character in self):
+            raise MotionError(Fault("the characters have different features.", "characters of one feature schema"))
+        features = np.asarray(group.poses(dt))
+        for i, character in enumerate(self):
+            if character.pose is not None or character.playing is None:
+                features[i] = character.features(dt, steps[i].body)
+        halflife_s = float(bodies.velocity_halflives_s.max())
+        reach = ahead_s(schema, min(map(math.hypot, *sticks.T.tolist())), halflife_s)
+        steered = steered_paths([bodies], sticks, facing, reach_s=reach, rate=schema.rate)
+        if back_s(schema):
+            paths = [each.wished(step, steered[i]) for i, (each, step) in enumerate(zip(self, steps, strict=True))]
+            return np.array([with_path(schema, own, path) for own, path in zip(features, paths, strict=True)]), paths
+        wished = _paths_from(np.array([step.place for step in steps]), steered)
+        return with_paths(schema, features, wished).astype(np.float64), [wished[i] for i in range(len(self))]
+
+    def _valid(self, steps: list[Step]) -> Any:
+        """What may play of each, every table asked once with the facts of all who have it."""
+        users: dict[tuple[int, str], list[int]] = {}
+        table_of: dict[int, Table] = {}
+        for i, character in enumerate(self):
+            for table in asking.each_of(character.tables):
+                table_of[id(table)] = table
+                users.setdefault((id(table), character.unknown), []).append(i)
+        answers: list[dict[int, HasAssets]] = [{} for _ in self]
+        for (key, unknown), numbers in users.items():
+            for i, found in zip(numbers, _answers(table_of[key], [steps[i].facts for i in numbers], unknown), strict=True):
+                answers[i][key] = found
+        first = self[0].tables
+        if isinstance(first, dict) and all(character.tables == first for character in self):
+            return {database: [each[id(table)] for each in answers] for database, table in first.items()}
+        valid: list[OfValid | None] = [asking.valid_of(each.tables, found) for each, found in zip(self, answers, strict=True)]
+        return valid
+
+
+def _answers(table: Table, facts: Sequence[Facts], unknown: Any) -> Iterable[HasAssets]:
+    """A table's answer to each of some contexts."""
+    if asking.answers_many(table):
+        columns = {name: [each.get(name) for each in facts] for name in table.asked}
+        return table.query_many(columns, unknown=unknown)
+    return [asking.answer(table, each, unknown) for each in facts]
+
+
+def _facts_of_each(facts: object, n: int) -> list[Facts]:
+    """The facts of each of n characters, as mappings."""
+    if facts is None:
+        return [{}] * n
+    if isinstance(facts, (list, tuple)):
+        if len(facts) != n:
+            raise ContextError(Fault(f"{plural(len(facts), 'mapping')} of facts for {plural(n, 'character')}.", "one for each"))
+        return [require_mapping(each, "one of facts", "a mapping of names to facts") for each in facts]
+    columns: dict[str, list[object]] = {}
+    for name, given in require_mapping(facts, "facts", "a mapping of names to facts, or a list of them").items():
+        values = given.tolist() if isinstance(given, np.ndarray) else given
+        columns[name] = list(values) if isinstance(values, (list, tuple)) else [values] * n
+        if len(columns[name]) != n:
+            found = f"{in_quotes(str(name))} has {plural(len(columns[name]), 'fact')} for {plural(n, 'character')}."
+            raise ContextError(Fault(found, "one for all, or a list of one for each"))
+    return [{name: values[i] for name, values in columns.items()} for i in range(n)]
+
+
+def _paths_from(places: Floats, paths: ManyTrajectories) -> ManyTrajectories:
+    """Each path from where its character is; see `path_from`."""
+    apart = places[:, :2] - paths.positions[:, paths.now]
+    turned = places[:, 2] - paths.headings[:, paths.now]
+    turned = np.clip(turned - math.tau * np.rint(turned / math.tau), -MOST_TURN_RAD, MOST_TURN_RAD)
+    left = shares_left(paths.headings.shape[1], paths.now, paths.rate)
+    positions = paths.positions + left[None, :, None] * apart[:, None]
+    return ManyTrajectories(paths.rate, positions, paths.headings + left * turned[:, None], paths.now)

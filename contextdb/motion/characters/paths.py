@@ -1,0 +1,121 @@
+"""The path of a character: how much of it a search must know, where it was, and how it comes to the path of the game's body.
+
+The animation is rarely where the game has the body. A search that is told only the body's path never hears of that; told where the
+root really is, it prefers frames that lead back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from contextdb.cells.arguments import require_kind, require_real
+from contextdb.errors import ContextError, Fault
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.output.bank import Place3
+from contextdb.motion.selection.root_motion import RootMotion
+
+RETURN_HALFLIFE_S = 0.27
+"""How fast a character is wished to come to the path of the body; as fast as a body follows a stick."""
+MOST_TURN_RAD = math.radians(45.0)
+"""A character that faces farther away than this is told to be so far away: few clips turn more at once, and where none does, a path
+that asks for all of it makes the search jump to and fro."""
+SETTLED_HALFLIVES = 15.0
+"""After so many half-lives a body goes straight on, and so does a path beyond its end."""
+LEAST_BACK_S = 2.0
+A_PLACE = "x and z in metres and a heading in radians"
+
+
+def ahead_s(schema: FeatureSchema, speed_mps: float, halflife_s: float) -> float:
+    """How many seconds of the way ahead a search must be given; behind them the way goes straight on."""
+    seconds, metres = _points(schema)
+    needed = max((0.0, *seconds))
+    if metres:
+        settled = SETTLED_HALFLIVES * halflife_s
+        needed = max(needed, min(settled, max(metres) / speed_mps) if speed_mps > 0.0 else settled)
+    return needed + 1.0 / schema.rate
+
+
+def back_s(schema: FeatureSchema) -> float:
+    """How many seconds of the way back a search must be given; 0 where no feature looks back."""
+    seconds, metres = _points(schema)
+    back = max((0.0, *(-second for second in seconds)))
+    return max(back, LEAST_BACK_S) if min((0.0, *metres)) < 0.0 else back
+
+
+def _points(schema: FeatureSchema) -> tuple[list[float], list[float]]:
+    """The seconds and the metres at which the trajectory channels look at the path."""
+    seconds: list[float] = []
+    metres: list[float] = []
+    for channel in schema.channels:
+        if channel.type == "trajectory":
+            seconds += channel.at
+            metres += channel.along
+    return seconds, metres
+
+
+def path_from(root: Sequence[float], path: Trajectory, *, halflife_s: float = RETURN_HALFLIFE_S) -> Trajectory:
+    """The path that a character is wished to take which is not where the game has the body: from its root to the body's path.
+
+    What lies between the two decays as a critically damped spring does, without a step in place or velocity. Headings are at most
+    45 degrees apart.
+
+    Parameters
+    ----------
+    root : (x, z, heading)
+        Where the character is: metres and radians, such as `Pose.root`.
+    path : Trajectory
+        The path of the body over the ground; its frame `now` is where the body is, such as `steered_path` gives it.
+    halflife_s : float
+
+    Raises
+    ------
+    ContextError
+        `root` is no place, `path` is none, or `halflife_s` is no number above 0.
+    """
+    require_kind(path, Trajectory, "path", "a Trajectory, such as steered_path gives")
+    require_real(halflife_s, "halflife_s", 0.001, 60.0)
+    return path_from_place(place_of(root, "root"), path, halflife_s)
+
+
+def path_from_place(place: Place3, path: Trajectory, halflife_s: float = RETURN_HALFLIFE_S) -> Trajectory:
+    """The same, unchecked."""
+    x, z = path.positions[path.now].tolist()
+    apart = np.array([place[0] - x, place[1] - z])
+    turned = math.remainder(place[2] - float(path.headings[path.now]), math.tau)
+    turned = min(max(turned, -MOST_TURN_RAD), MOST_TURN_RAD)
+    if not turned and not apart.any():
+        return path
+    left = shares_left(len(path.headings), path.now, path.rate, halflife_s)
+    return Trajectory(path.rate, path.positions + left[:, None] * apart, path.headings + left * turned, path.now)
+
+
+def shares_left(n_frames: int, now: int, rate: float, halflife_s: float = RETURN_HALFLIFE_S) -> Floats:
+    """What is left of a difference at each frame of a path: all of it up to the present, then (1 + y t) e^{-y t}."""
+    y_t = 2.0 * math.log(2.0) / halflife_s * np.maximum(np.arange(n_frames) - now, 0) / rate
+    return np.asarray((1.0 + y_t) * np.exp(-y_t))
+
+
+def place_of(place: object, what: str) -> Place3:
+    """A place as three numbers; raises ContextError for anything else."""
+    if not isinstance(place, (tuple, list, np.ndarray)) or len(place) != 3:
+        raise ContextError(Fault(f"{what} is {place!r}.", A_PLACE))
+    x, z, heading = (require_real(each, what) for each in place)
+    return x, z, heading
+
+
+def apart_of(place: Place3, body: Place3) -> RootMotion:
+    """A place as the body sees it: metres to its left and ahead, and a turn."""
+    x, z = place[0] - body[0], place[1] - body[1]
+    sin, cos = math.sin(body[2]), math.cos(body[2])
+    return RootMotion(cos * x - sin * z, sin * x + cos * z, math.remainder(place[2] - body[2], math.tau))
+
+
+def place_beside(body: Place3, apart: RootMotion) -> Place3:
+    """The place that the body sees so."""
+    found = RootMotion(*body).then(apart)
+    return found.left_m, found.ahead_m, found.turn_rad

@@ -1,0 +1,77 @@
+"""Legs of a rig, and where their feet come down next.
+
+For each frame of a bank and each foot: how far the foot is through its swing, from 0 where it is down to 1 where it comes down, and
+where it will come down, seen from the body in that frame. A foot that comes down no more in its clip ends where the clip leaves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints, Skeleton
+from contextdb.motion.clips.trajectory import to_own_frame
+from contextdb.motion.output.travel import laps_about
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Leg:
+    """Hip, knee and ankle [3], and the joint that stands: the toe, or the ankle."""
+
+    joints: Ints
+    toe: int
+
+
+def leg_of(rig: Skeleton, foot: str) -> Leg | None:
+    """The leg of a foot; None where it has no hip and knee of its own."""
+    ankle = rig.index(foot)
+    above = rig.ancestors(ankle)
+    if len(above) < 3:
+        return None
+    below = [joint for joint in range(rig.n_joints) if rig.parents[joint] == ankle]
+    toes = [joint for joint in below if "toe" in rig.names[joint].casefold() or "ball" in rig.names[joint].casefold()]
+    return Leg(np.array([above[1], above[0], ankle], np.int64), (toes or [ankle])[0])
+
+
+def steps_of(root: NDArray[np.floating], toes: Floats, contacts: Flags, spans: Sequence[tuple[int, int, bool]]) -> Floats:
+    """Share of the swing, and metres to the left and ahead to where the foot comes down: float64 [N, n feet, 3].
+
+    `root` [N, 3], `toes` against it [N, n feet, 3], which feet are down [N, n feet], and the first frame of each range, its
+    steps to the last, and whether it loops.
+    """
+    found = np.zeros(toes.shape)
+    for start, n_steps, loops in spans:
+        part = slice(start, start + n_steps + 1)
+        for foot in range(toes.shape[1]):
+            found[part, foot] = _steps(np.asarray(root[part], np.float64), toes[part, foot], contacts[part, foot], loops)
+    return found
+
+
+def _steps(root: Floats, toes: Floats, is_down: Flags, loops: bool) -> Floats:
+    """Of one foot in one range: [n, 3]."""
+    n, laps = len(root), int(loops and len(root) > 1)
+    path, period = laps_about(root, laps), max(len(root) - 1, 1)
+    frames = np.arange(len(path))
+    around = frames % period if laps else frames
+    down = is_down[around]
+    sin, cos = np.sin(path[:, 2]), np.cos(path[:, 2])
+    left, ahead = toes[around, 0], toes[around, 2]
+    places = path[:, :2] + np.column_stack((cos * left + sin * ahead, cos * ahead - sin * left))
+    last = np.maximum.accumulate(np.where(down, frames, 0))
+    following = np.minimum.accumulate(np.where(down, frames, len(path) - 1)[::-1])[::-1]
+    shares = (frames - last) / np.maximum(following - last, 1)
+    own = slice(laps * period, laps * period + n)
+    ways = to_own_frame(places[following[own]] - path[own, :2], path[own, 2])
+    return np.column_stack((np.where(down[own], 0.0, shares[own]), ways))
+
+
+def eased(share: float) -> float:
+    """From 0 to 1 without a step in the change: 3 s² - 2 s³."""
+    share = min(max(share, 0.0), 1.0)
+    return share * share * (3.0 - 2.0 * share)

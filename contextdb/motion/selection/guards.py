@@ -1,0 +1,48 @@
+"""What lets an asset play on that is no longer valid, so that a character is not thrown into the first frame that is.
+
+The jump out of such an asset is forced: playing on does not compete with it, whatever it costs. Three guards hold it back.
+
+- NextNaturalOnly: while such a frame plays, nothing is searched; the jump waits for the end of the span or of a round of a loop.
+- Until natural, a setting: an asset that does not loop plays on to its end.
+- Cost bar, on unless it is set otherwise: a jump that costs more waits. The search goes on at each update, and the first jump under
+  the bar is taken. After the grace time the bar counts no longer: the best jump is taken, as the last resort, and `why` says so.
+
+An interruption passes all guards, and so does the end of a clip: then nothing can play on.
+
+Before that, an asset may be valid by hysteresis alone: its row's cells accept the facts when they are widened by what the
+conditions declare. It then competes in searches as any that plays, but no other frame of it may be entered.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from contextdb.motion.markup.marks import Mark
+
+if TYPE_CHECKING:
+    from contextdb.motion.selection.controller_settings import ControllerSettings
+    from contextdb.motion.selection.ongoing import Ongoing
+
+
+class Held(StrEnum):
+    """Which guard let an asset play on, as `Decision.held` tells it."""
+
+    NOTHING = ""
+    NEXT_NATURAL = "next natural"
+    UNTIL_NATURAL = "until natural"
+    COST_BAR = "cost bar"
+    HYSTERESIS = "hysteresis"
+
+    @property
+    def told(self) -> str:
+        """What lets it play on without a search, in words."""
+        return "while its NextNaturalOnly span lasts" if self is Held.NEXT_NATURAL else "to its natural end"
+
+
+def held_without_search(ongoing: Ongoing, settings: ControllerSettings) -> Held:
+    """Which guard lets an asset that is not valid play on, whatever else there is."""
+    head, move = ongoing.head, ongoing.move
+    if head.database.marks.mark_of(move.frame) & Mark.NEXT_NATURAL and not move.n_loops:
+        return Held.NEXT_NATURAL
+    return Held.UNTIL_NATURAL if settings.until_natural and not head.is_looping else Held.NOTHING

@@ -1,0 +1,148 @@
+"""Columns that are hidden, folded to a group, or frozen: what is seen, where the cursor goes, and that the file stays as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from terminal import press, said, screen_text, with_editor
+
+from tui.model.columns_shown import ColumnsShown, prefix_of
+from tui.model.layout import layout
+
+NAMES = ["Asset", "Defender.Depth", "Defender.Facing", "gait", "Catcher.Depth", "Defender.Late"]
+RAW = ",".join(NAMES) + "\na,CB,True,Walk,1,x\nb,FS,Any,Run,2,y\n"
+
+
+def seen(shown: ColumnsShown) -> list[str]:
+    return [name for name, is_hidden in zip(NAMES, shown.are_hidden(NAMES, "Asset"), strict=True) if not is_hidden]
+
+
+def test_a_folded_group_shows_its_first_column_only():
+    folded = ColumnsShown().folded_at("Defender.Facing")
+    assert seen(folded) == ["Asset", "Defender.Depth", "gait", "Catcher.Depth"]
+    assert folded.folded_at("Defender.Depth") == ColumnsShown()
+    assert ColumnsShown().folded_at("gait") == ColumnsShown()
+
+
+def test_where_the_first_of_a_group_is_hidden_the_next_one_is_seen():
+    shown = ColumnsShown(frozenset(["Defender.Depth"]), frozenset(["Defender."]))
+    assert seen(shown) == ["Asset", "Defender.Facing", "gait", "Catcher.Depth"]
+
+
+def test_a_hidden_column_is_revealed_and_the_assets_are_never_hidden():
+    shown = ColumnsShown().turned("gait").turned("Asset")
+    assert "gait" not in seen(shown)
+    assert "Asset" in seen(shown)
+    assert seen(shown.revealed("gait")) == NAMES
+
+
+def test_columns_are_frozen_up_to_one_or_up_to_the_assets():
+    assert ColumnsShown().n_frozen(NAMES, "Asset") == 1
+    assert ColumnsShown(frozen="gait").n_frozen(NAMES, "Asset") == 4
+    assert ColumnsShown(frozen="gone").n_frozen(NAMES, "Asset") == 1
+
+
+@pytest.mark.parametrize(("name", "prefix"), [("Defender.Depth", "Defender."), ("gait", None), ("a.b.c", "a.")])
+def test_the_prefix_of_a_column_ends_with_its_first_point(name, prefix):
+    assert prefix_of(name) == prefix
+
+
+@given(st.lists(st.sampled_from([0, 8, 20]), min_size=1, max_size=15), st.integers(30, 120), st.data())
+def test_a_hidden_column_takes_no_place_and_none_is_found_there(widths, width, data):
+    made = layout([10, *widths], 1, 9, width)
+    shown = [at for at, w in enumerate(made.widths) if w]
+    column = data.draw(st.sampled_from(shown))
+    scroll = made.scroll_to(column, 0)
+    assert made.total == made.gutter + sum(made.widths[at] + 1 for at in shown)
+    first = max(made.place(column, scroll), made.gutter + (made.frozen if column >= made.n_frozen else 0))
+    if first < width:
+        assert made.column_at(first, scroll) == column
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "t.csv"
+    file.write_text(RAW)
+    return file
+
+
+def test_the_cursor_goes_over_hidden_columns_both_ways(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "shift+right", "alt+0")
+        sheet, columns = app.main.session.sheet, []
+        for key in ("home", "right", "left", "end", "left", "left"):
+            await press(pilot, key)
+            columns.append(sheet.cursor[1])
+        return columns, app.main.assets.summary(), sheet.is_modified
+
+    columns, summary, is_modified = with_editor(path, script)
+    assert columns == [0, 3, 0, 5, 4, 3]
+    assert "2 columns hidden" in summary
+    assert not is_modified
+
+
+def test_a_group_is_folded_by_the_palettes_command_and_a_double_line_says_so(path):
+    async def script(app, pilot):
+        await press(pilot, "right")
+        await app.main.run_command("fold")
+        await press(pilot)
+        return said(app), screen_text(app)
+
+    told, screen = with_editor(path, script, (120, 24))
+    assert told == "The columns of Defender. are folded."
+    assert "║" in screen
+    assert "Facing" not in screen
+
+
+def test_finding_a_text_in_a_hidden_column_shows_it(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "right", "right", "alt+0", "ctrl+f", *"Run", "enter", "escape")
+        sheet = app.main.session.sheet
+        return sheet.cursor, any(sheet.hidden)
+
+    assert with_editor(path, script) == ((1, 3), False)
+
+
+def test_going_to_a_column_by_its_name_shows_it(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "right", "right", "alt+0", "home", "ctrl+g", *"gai", "enter")
+        sheet = app.main.session.sheet
+        return sheet.cursor, any(sheet.hidden)
+
+    assert with_editor(path, script) == ((0, 3), False)
+
+
+def test_the_list_of_columns_hides_freezes_and_goes(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "alt+j", "space", "f", "down", "enter")
+        sheet = app.main.session.sheet
+        return sheet.columns_shown, sheet.cursor
+
+    shown, cursor = with_editor(path, script, (120, 30))
+    assert shown == ColumnsShown(frozenset(["Defender.Depth"]), frozen="Defender.Facing")
+    assert cursor == (0, 3)
+
+
+def test_frozen_columns_stay_where_the_others_scroll(path):
+    async def script(app, pilot):
+        await press(pilot, "right")
+        await app.main.run_command("freeze")
+        await press(pilot, "end")
+        return screen_text(app), app.main.assets.grid.look.layout.n_frozen
+
+    screen, n_frozen = with_editor(path, script, (44, 24))
+    assert n_frozen == 2
+    assert "CB" in screen
+
+
+def test_problems_go_to_a_hidden_column_and_show_it(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "right", "right", "alt+0", "home")
+        app.main.assets.go_to(1, "gait")
+        await press(pilot)
+        return app.main.session.sheet.cursor
+
+    assert with_editor(path, script) == (1, 3)

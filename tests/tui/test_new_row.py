@@ -1,0 +1,104 @@
+"""The empty row below the last one: it takes what is typed and pasted, and no other row is changed from there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from terminal import press, said, screen_text, with_editor
+
+RAW = "Asset,hit\nwalk,True\nrun,Any\n"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "t.csv"
+    file.write_text(RAW)
+    return file
+
+
+def rows_after(path: Path, *keys: str) -> list[list[str]]:
+    async def script(app, pilot):
+        await press(pilot, *keys)
+        table = app.main.session.sheet.table
+        return [list(row) for row in zip(*(c.to_list() for c in table.columns), strict=True)]
+
+    return with_editor(path, script)
+
+
+BEFORE = [["walk", "True"], ["run", "Any"]]
+
+
+def test_what_is_typed_there_makes_a_row_and_enter_goes_on_to_the_next(path):
+    keys = ["down", "down", *"jog", "enter", *"dash", "enter"]
+    assert rows_after(path, *keys) == [*BEFORE, ["jog", ""], ["dash", ""]]
+
+
+def test_tab_goes_on_in_the_new_row(path):
+    assert rows_after(path, "down", "down", *"jog", "tab", "t", "enter") == [*BEFORE, ["jog", "True"]]
+
+
+def test_a_text_that_cannot_be_read_makes_no_row(path):
+    assert rows_after(path, "right", "down", "down", *"maybe", "enter", "escape") == BEFORE
+
+
+@pytest.mark.parametrize("key", ["delete", "ctrl+k", "ctrl+d", "ctrl+x", "ctrl+b", "ctrl+e", "alt+m"])
+def test_no_key_there_changes_the_last_row(path, key):
+    assert rows_after(path, "down", "down", key) == BEFORE
+
+
+def test_a_paste_there_is_appended(path):
+    async def script(app, pilot):
+        await press(pilot, "down", "down")
+        app.main.assets.grid.paste("jog\tTrue\ndash\tFalse\n")
+        await press(pilot)
+        return app.main.session.sheet.table.assets, app.main.session.sheet.cursor
+
+    assets, cursor = with_editor(path, script)
+    assert list(assets) == ["walk", "run", "jog", "dash"]
+    assert cursor == (2, 0)
+
+
+def test_down_goes_through_it_to_the_test_row_and_up_comes_back(path):
+    async def script(app, pilot):
+        grid, seen = app.main.assets.grid, []
+        for key in ("down", "down", "down", "up", "down", "up"):
+            await press(pilot, key)
+            seen.append("test" if grid.is_in_test_row else "new" if grid.is_in_new_row else grid.sheet.cursor[0])
+        return seen
+
+    assert with_editor(path, script) == [1, "new", "test", 1, "new", 1]
+
+
+def test_it_is_seen_and_named(path):
+    async def script(app, pilot):
+        await press(pilot, "down", "down")
+        return screen_text(app)
+
+    screen = with_editor(path, script)
+    assert "new row · Asset" in screen
+    assert "+    new row" in screen
+    assert "type or paste here to add rows" in screen
+
+
+def test_a_click_goes_there(path):
+    async def script(app, pilot):
+        grid = app.main.assets.grid
+        await pilot.click(grid, offset=(6, grid.look.n_headers + 2))
+        await press(pilot, *"jog", "enter")
+        return list(app.main.session.sheet.table.assets)
+
+    assert with_editor(path, script) == ["walk", "run", "jog"]
+
+
+def test_one_step_takes_the_row_back(path):
+    assert rows_after(path, "down", "down", *"jog", "enter", "ctrl+z") == BEFORE
+
+
+def test_a_row_that_is_typed_while_rows_are_filtered_is_shown(path):
+    async def script(app, pilot):
+        await press(pilot, "alt+e", "down", *"jog", "enter")
+        sheet = app.main.session.sheet
+        return [sheet.text(row, 0) for row in range(len(sheet.view))], said(app)
+
+    assert with_editor(path, script)[0] == ["walk", "jog"]

@@ -1,0 +1,75 @@
+"""The side pane Why: the row of the cursor against the test row, cell by cell, beside the table. It follows the cursor."""
+
+from __future__ import annotations
+
+from textual.app import ComposeResult
+from textual.containers import VerticalScroll
+from textual.content import Content
+from textual.widgets import Static
+
+from tui.model.shown import ShownTable
+from tui.model.why import CellWhy, RowWhy, why_row
+from tui.screens.nearest import STATES, row_state
+
+WIDE = 140
+"""The pane stands beside the table on screens of so many columns; on others F12 opens a dialog."""
+NO_FACTS = "The test row is empty: F6 goes there, F9 loads a context."
+
+
+class WhyPane(VerticalScroll, can_focus=False):
+    """Why the row of the cursor is valid, or not."""
+
+    DEFAULT_CSS = """
+    WhyPane {
+        dock: right; width: 46; display: none; padding: 0 1; background: $surface; border-left: solid $panel;
+        scrollbar-size-vertical: 1;
+        &.-open { display: block; }
+        & > Static { height: auto; }
+    }
+    """
+
+    def compose(self) -> ComposeResult:
+        yield Static()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it is seen."""
+        return self.has_class("-open")
+
+    def turn(self, sheet: ShownTable) -> None:
+        """Open it, or close it."""
+        self.toggle_class("-open")
+        self.follow(sheet)
+
+    def follow(self, sheet: ShownTable) -> None:
+        """Show the row of the cursor."""
+        if not self.is_open:
+            return
+        if sheet.query.is_empty or not len(sheet.view):
+            said = Content(NO_FACTS if sheet.query.is_empty else "No row is shown.")
+        else:
+            said = _said(why_row(sheet.query, sheet.table, int(sheet.view.rows[sheet.cursor[0]])))
+        self.query_one(Static).update(said)
+
+
+def _said(why: RowWhy) -> Content:
+    """A row in full: the cells that matter first, those that hold in few words."""
+    lines = [Content.styled(row_state(why), "bold"), Content("")]
+    for cell in why.cells:
+        if cell.is_wrong or cell.state == "open":
+            lines += _told(cell)
+    holds = [cell.column for cell in why.cells if cell.state == "holds"]
+    missing = [cell.column for cell in why.cells if cell.state == "not given"]
+    lines += [Content.styled(f"✓ {', '.join(holds)}", "$text-muted"), Content("")] if holds else []
+    lines += [Content.styled(f"not given: {', '.join(missing)}", "$text-muted"), Content("")] if missing else []
+    lines.append(Content.styled("F12 closes · Shift+F12 nearest rows, correct", "$text-muted"))
+    return Content("\n").join(lines)
+
+
+def _told(cell: CellWhy) -> list[Content]:
+    sign, tone = STATES[cell.state]
+    lines = [Content.styled(f"{sign.split()[0]} {cell.column}", f"$text-{tone}" if tone else "")]
+    lines.append(Content(f"  is {cell.fact or '–'}; the cell says {cell.cell or 'Any'}"))
+    if cell.mend is not None:
+        lines.append(Content.styled(f"  {cell.mend} would accept it", "$text-accent"))
+    return [*lines, Content("")]

@@ -1,0 +1,103 @@
+"""The dialog Columns: every column with its type and what it holds; go to one, hide, fold and freeze."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from tui.model.columns_shown import ColumnsShown
+from tui.model.shown import ShownTable
+from tui.screens.dialog import Dialog
+from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+
+@dataclass(frozen=True)
+class ColumnsAnswer:
+    """Which columns are to be seen, and the one to go to."""
+
+    shown: ColumnsShown
+    column: str | None = None
+
+
+class ColumnsDialog(Dialog[ColumnsAnswer]):
+    """Every column, one a line."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "hide", "Hide", show=False),
+        Binding("g", "fold", "Fold", show=False),
+        Binding("f", "freeze", "Freeze", show=False),
+    ]
+    DEFAULT_CSS = """
+    ColumnsDialog {
+        & > #dialog { width: 110; height: 92%; }
+        & > #dialog > #dialog-body { height: 1fr; }
+        & LineList { height: 1fr; }
+    }
+    """
+    title_text = "Columns"
+    keys_text = "Enter go there · Space hide · G fold the group · F freeze · Esc"
+
+    def __init__(self, sheet: ShownTable) -> None:
+        super().__init__()
+        self.sheet = sheet
+        self.shown = sheet.columns_shown
+        self.names = [column.name for column in sheet.table.columns]
+
+    def compose_body(self) -> ComposeResult:
+        """The columns."""
+        told = [ListColumn("Type", 16), ListColumn("Texts", 7, 0, True), ListColumn("Unread", 6, 0, True), ListColumn("", 10, 1)]
+        yield LineList([ListColumn("", 3), ListColumn("Column", 24, 1), *told])
+
+    def on_mount(self) -> None:
+        """Stand on the column of the cursor."""
+        lines = self.query_one(LineList)
+        lines.show(len(self.names), self._line, self.sheet.selection.column)
+        lines.focus()
+
+    def _line(self, at: int) -> Sequence[ListCell]:
+        header, condition, texts = self.sheet.header(at), self.sheet.condition(at), self.sheet.table.columns[at]
+        is_hidden = self.shown.are_hidden(self.names, self.sheet.table.asset_column)[at]
+        is_frozen = at < self.shown.n_frozen(self.names, self.sheet.table.asset_column)
+        n_wrong = len(condition.faults) if condition is not None else 0
+        tone = "muted" if is_hidden else ""
+        kind = f"{header.kind} · {header.unit}" if header.unit else header.kind
+        sign = "–" if is_hidden else "▐" if is_frozen else ""
+        about = condition.condition.description if condition is not None else ""
+        wrong: ListCell = (f"{n_wrong:,}", "error") if n_wrong else ""
+        return sign, (header.name, tone), (kind, "muted"), f"{len(texts.texts):,}", wrong, (about, "muted")
+
+    @property
+    def _here(self) -> str:
+        return self.names[self.query_one(LineList).index]
+
+    def _show(self, shown: ColumnsShown) -> None:
+        self.shown = shown
+        self.query_one(LineList).refresh()
+
+    def action_hide(self) -> None:
+        """Hide a column, or show it again."""
+        names, asset = self.names, self.sheet.table.asset_column
+        is_hidden = self.shown.are_hidden(names, asset)[names.index(self._here)]
+        self._show(self.shown.revealed(self._here) if is_hidden else self.shown.turned(self._here))
+        self.query_one(LineList).action_move(1)
+
+    def action_fold(self) -> None:
+        """Fold a group, or open it."""
+        self._show(self.shown.folded_at(self._here))
+
+    def action_freeze(self) -> None:
+        """Freeze up to a column; only the assets where that is so."""
+        self._show(replace(self.shown, frozen=None if self.shown.frozen == self._here else self._here))
+
+    @on(LineList.Chosen)
+    def _chosen(self) -> None:
+        self.dismiss(ColumnsAnswer(self.shown, self._here))
+
+    def action_cancel(self) -> None:
+        """Take what was hidden, and stay."""
+        self.dismiss(ColumnsAnswer(self.shown))

@@ -147,6 +147,18 @@ def test_rows_of_inner_tables_count_by_their_own_assets(tmp_path: Path):
     assert found.without == pytest.approx(0.15)
 
 
+def test_rules_of_rows_count_and_change_sides_in_a_mirror(tmp_path: Path):
+    (tmp_path / "contextdb.toml").write_text(
+        '[tables.moves]\nwhen = "When"\n[conditions.turn]\ntype = "number"\nmin = -2.0\nmax = 2.0\nmirror = "negate"\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "moves.csv").write_text("Asset,turn,When\na,Any,turn > 1\nb,..0,\n", encoding="utf-8")
+    found = clip_contexts(cdb.load(tmp_path / "moves.csv"), mirrored=["a"])
+    assert found.method == "exact"
+    names = {("".join(sorted(plain)), "".join(sorted(mirrored))): share for (plain, mirrored), share in told(found).items()}
+    assert names == pytest.approx({("a", ""): 0.25, ("b", "a"): 0.25, ("b", ""): 0.25})
+
+
 def test_contexts_of_one_side_are_not_the_same_in_a_mirror():
     columns = {"Asset": ["left", "right", "ahead"], "to": ["10..180", "-180..-10", "-10..10"]}
     table = cdb.Table.from_columns(columns, schema={"to": {"type": "angle"}})

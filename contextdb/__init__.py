@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from contextdb.compiled.table import CompiledTable
     from contextdb.console import __version__ as __version__
     from contextdb.covering import CoverageReport, Gap, coverage
+    from contextdb.covering.motion import ProjectMotion, TableMotion, motion_coverage
     from contextdb.errors import (
         ArtefactError,
         CellError,
@@ -64,6 +65,7 @@ _HOMES = {
     "compiled.table": "CompiledTable",
     "console": "__version__",
     "covering": "CoverageReport Gap coverage",
+    "covering.motion": "ProjectMotion TableMotion motion_coverage",
     "errors": "ArtefactError CellError ContextDBError ContextError Fault FileError NoSuchFact NoSuchOutput"
     " NoSuchPlace NoSuchTable Place PolicyError SchemaError TableError WrongType",
     "findings": "Finding",
@@ -104,6 +106,9 @@ __all__ = [  # noqa: RUF022
     "coverage",
     "CoverageReport",
     "Gap",
+    "motion_coverage",
+    "ProjectMotion",
+    "TableMotion",
     "Explanation",
     "RowExplanation",
     "Failure",

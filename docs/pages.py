@@ -1,4 +1,4 @@
-"""Take the pictures of the coverage page in docs/pages/, with any Chromium on the PATH: once as wide as a desk, once as a phone.
+"""Take the pictures of the coverage pages in docs/pages/, with any Chromium on the PATH: once as wide as a desk, once as a phone.
 
     python docs/pages.py
 
@@ -13,11 +13,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+from contextdb.motion import write_made_clips
+
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).parent / "pages"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 SIZES = {"coverage-desk.png": (1200, 1100), "coverage-phone.png": (390, 844)}
 """Width and height in pixels."""
+MOTION_SIZES = {"motion-coverage-desk.png": (1200, 1150), "motion-coverage-phone.png": (390, 844)}
 LEAST_WINDOW_PX = 500
 """Chromium opens no narrower window; a narrower page stands in a frame."""
 
@@ -28,6 +31,14 @@ def write_page(folder: Path) -> Path:
     command = [sys.executable, "-m", "contextdb", "coverage", "tables", "--format", "html", "-o", "coverage.html"]
     subprocess.run(command, cwd=folder, check=True)
     return folder / "coverage.html"
+
+
+def write_motion_page(folder: Path) -> Path:
+    """The page of motion coverage of the sample clips."""
+    write_made_clips(folder / "tables" / "clips")
+    command = [sys.executable, "-m", "contextdb", "motion", "coverage", "tables", "--format", "html", "-o", "motion.html"]
+    subprocess.run(command, cwd=folder, check=True)
+    return folder / "motion.html"
 
 
 def take(browser: str, page: Path, picture: Path, width: int, height: int) -> None:
@@ -51,6 +62,9 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         page = write_page(Path(folder))
         for name, (width, height) in SIZES.items():
+            take(browser, page, FOLDER / name, width, height)
+        page = write_motion_page(Path(folder))
+        for name, (width, height) in MOTION_SIZES.items():
             take(browser, page, FOLDER / name, width, height)
     return 0
 

@@ -33,6 +33,8 @@ RULES: dict[str, Rule] = {
             "cells.arguments",
             "commands.evaluate_command",
             "commands.import_command",
+            "commands.motion_page",
+            "commands.motion_replay_command",
             "commands.motion_run_command",
             "disk",
             "tables.places",

@@ -44,9 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="a folder of tables, one table, or the name of a table")
     add_format_arguments(parser, formats("coverage"))
     parser.add_argument("-o", "--output", metavar="FILE", help="write the report to a file")
-    parser.add_argument("--fail-under", type=_percent, metavar="PCT", help="fail if the covered percentage of any table is lower")
+    parser.add_argument("--fail-under", type=percent, metavar="PCT", help="fail if the covered percentage of any table is lower")
     parser.add_argument("--baseline", metavar="FILE", help="compare with the JSON of an earlier run")
-    parser.add_argument("--max-drop", type=_percent, metavar="PCT", help="how many points a table may fall below the baseline")
+    parser.add_argument("--max-drop", type=percent, metavar="PCT", help="how many points a table may fall below the baseline")
     parser.add_argument(
         "--gone", action="append", default=[], metavar="TABLE", help="a table of the baseline that is missing or empty on purpose"
     )
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples", type=_count, metavar="N", help=f"contexts to sample (default: {SAMPLES:,}, fewer above 500 conditions)"
     )
-    coverage_telemetry.add_arguments(parser, _percent)
+    coverage_telemetry.add_arguments(parser, percent)
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -270,7 +270,7 @@ def _read_baseline(file: str) -> dict[str, Earlier]:
     return read_baseline(text, file)
 
 
-def _percent(text: str) -> float:
+def percent(text: str) -> float:
     """A percentage as a share."""
     try:
         percent = float(text.removesuffix("%"))

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
     parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files")
     parser.add_argument(
-        "--metres-per-unit", metavar="M", type=_unit, default=CENTIMETRE, help="the unit of the files (default: 0.01, a centimetre)"
+        "--metres-per-unit", metavar="M", type=_unit, default=CENTIMETRE, help="the unit of the files in metres (default: 0.01)"
     )
     parser.add_argument("--up", choices=UPS, default="y", help="the axis that points up (default: y)")
     parser.add_argument("--json", action="store_true", help="print a JSON document instead of trees")

@@ -19,6 +19,7 @@ COMMANDS = {
     "search": "the best frames of one database, with what each channel adds to their cost",
     "select": "which database of a selector wins, with which frame, and why",
     "run": "steer a character along a recorded stick, and record what it decides",
+    "coverage": "which movements have no clip, in which contexts, and what to capture next",
     "probe": "drive a character over the contexts of its tables by itself, and measure how well it moves",
     "measure": "how good the motion of a session is, beside the clips that it is made of",
     "replay": "what was decided in a recorded session, and why",

@@ -70,9 +70,9 @@ def log_of(label: str, is_long: bool) -> Bar | None:
 
 
 @contextmanager
-def building_bar() -> Iterator[Callable[[int, int, str], None]]:
-    """The progress of building motion databases, by clips."""
-    with bar("building", is_long=True) as tell:
+def building_bar(label: str = "building") -> Iterator[Callable[[int, int, str], None]]:
+    """The progress of building motion databases, or of other work on them, by clips."""
+    with bar(label, is_long=True) as tell:
         is_terminal = sys.stderr.isatty()
 
         def tell_clip(done: int, total: int, clip: str) -> None:

@@ -39,8 +39,11 @@ from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import ReservedTag
 from contextdb.motion.markup.spans import Span
+from contextdb.motion.measuring.coverage import ClipContexts, ClipFrames, ContextCoverage, MotionCoverage, ToCapture, coverage
 from contextdb.motion.measuring.measure import measure
 from contextdb.motion.measuring.measures import Measures
+from contextdb.motion.measuring.near_clips import Near
+from contextdb.motion.measuring.transition_names import Transitions
 from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
@@ -95,9 +98,12 @@ __all__ = [
     "CharacterState",
     "Choice",
     "Clip",
+    "ClipContexts",
     "ClipError",
     "ClipFeatures",
     "ClipFinding",
+    "ClipFrames",
+    "ContextCoverage",
     "Controller",
     "ControllerGroup",
     "ControllerSettings",
@@ -129,8 +135,10 @@ __all__ = [
     "Measures",
     "Moment",
     "MotionConfig",
+    "MotionCoverage",
     "MotionDatabase",
     "MotionError",
+    "Near",
     "Normalisation",
     "Parting",
     "Playing",
@@ -162,8 +170,10 @@ __all__ = [
     "Steered",
     "TagFilter",
     "Target",
+    "ToCapture",
     "Trace",
     "Trajectory",
+    "Transitions",
     "Updated",
     "Variation",
     "WarpShare",
@@ -175,6 +185,7 @@ __all__ = [
     "build_databases",
     "clip_features",
     "clip_of_poses",
+    "coverage",
     "descriptions",
     "doubts_of",
     "features_of",

@@ -28,6 +28,11 @@ RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
     ("measures", "json"): ("render_json", ()),
     ("measures", "junit"): ("measure_junit", ()),
     ("measures", "markdown"): ("measure_markdown", ()),
+    ("motion coverage", "text"): ("motion_coverage_text", ("colour", "width", "shows_all")),
+    ("motion coverage", "json"): ("render_json", ()),
+    ("motion coverage", "markdown"): ("motion_coverage_markdown", ()),
+    ("motion coverage", "html"): ("motion_coverage_html", ()),
+    ("motion coverage", "junit"): ("motion_coverage_junit", ()),
 }
 """For each subject and format the module that renders it and the options that it takes."""
 ERRORS: tuple[Level, ...] = ("error",)

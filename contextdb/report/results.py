@@ -16,7 +16,7 @@ from contextdb.console import printable
 from contextdb.errors import plural, row_name
 from contextdb.findings import LEVELS, Finding, Level, worst
 
-Subject = Literal["check", "coverage", "measures"]
+Subject = Literal["check", "coverage", "measures", "motion coverage"]
 """What a report is about."""
 
 Block = tuple[Level, str, tuple[Finding, ...]]

@@ -1,0 +1,232 @@
+"""Motion coverage of a project: what the clips of each table have of motion, in each of the contexts that the table tells apart.
+
+Table coverage says which contexts have no valid row; this says which movements the clips of the valid rows lack. Contexts without a
+valid clip are left to table coverage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from contextdb.cells.arguments import require_kind, require_mapping
+from contextdb.covering.clip_contexts import TableContexts, asked_axes, clip_contexts, is_axis
+from contextdb.covering.space import require_counts
+from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
+from contextdb.motion.measuring.coverage import ContextCoverage, MotionCoverage, coverage
+from contextdb.motion.measuring.moves import DIRECTION, MAPS, SPEED, TURN
+from contextdb.motion.measuring.near_clips import NEAR_COST
+from contextdb.motion.measuring.transition_names import PATTERN
+from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.storage.building import open_or_build
+from contextdb.motion.storage.clip_files import unmatched
+from contextdb.motion.storage.config import MotionConfig
+from contextdb.tables.project import Project
+from contextdb.tables.table import Table, leaf_assets
+
+MOST_CONTEXTS = 50
+"""So many contexts of a table are in the JSON, the largest shares first."""
+DATABASES = "a mapping of names to MotionDatabase"
+Tell = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class TableMotion:
+    """The motion coverage of one table, or of the databases that have none.
+
+    Attributes
+    ----------
+    coverage : MotionCoverage
+    contexts : TableContexts or None
+        How its contexts were found; None without a table.
+    axes : mapping of str to str
+        The conditions that say which speeds, turns and directions are asked for.
+    without_clip : tuple of str
+        Assets of the table that no database has a clip of.
+    """
+
+    coverage: MotionCoverage
+    contexts: TableContexts | None = None
+    axes: Mapping[str, str] = field(default_factory=dict)
+    without_clip: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The table's name, or those of the databases that have none."""
+        return self.coverage.table if self.coverage.table is not None else ", ".join(self.coverage.databases)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether shares of contexts are exact."""
+        return self.contexts is None or self.contexts.method == "exact"
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain data."""
+        found, contexts = self.coverage, self.contexts
+        return {
+            "table": found.table,
+            "databases": list(found.databases),
+            "clips": len(found.clips),
+            "frames": found.n_frames,
+            "mirrored": found.is_mirrored,
+            "covered": found.covered,
+            "contexts": {
+                "method": "exact" if contexts is None else contexts.method,
+                "samples": 0 if contexts is None else contexts.n_samples,
+                "why_drawn": "" if contexts is None else contexts.why,
+                "different": len(found.contexts),
+                "without_clip": 0.0 if contexts is None else contexts.without,
+                "not_mirrored": [] if contexts is None else list(contexts.not_mirrored),
+                "asked_by": dict(self.axes),
+                "items": [_context_json(each) for each in found.contexts[:MOST_CONTEXTS]],
+            },
+            "maps": {name: self._map_json(name) for name in MAPS},
+            "to_capture": [each.to_json() for each in found.to_capture],
+            "never_valid": list(found.never_valid),
+            "dead_frames": [{"asset": clip.asset, "dead": clip.n_dead, "frames": clip.n_frames} for clip in found.dead],
+            "near": [near.to_json() for near in found.near],
+            "transitions": found.transitions.to_json(),
+            "rows_without_clip": list(self.without_clip),
+        }
+
+    def _map_json(self, name: str) -> dict[str, object]:
+        found = self.coverage
+        parts: dict[str, Mapping[str, Any]] = {
+            "frames": found.frames,
+            "filled": found.filled_shares,
+            "wanted": found.wanted_shares,
+            "holes": found.hole_shares,
+        }
+        return {part: of[name].tolist() for part, of in parts.items()}
+
+
+def _context_json(each: ContextCoverage) -> dict[str, object]:
+    contexts = each.contexts
+    return {
+        "id": contexts.id,
+        "share": contexts.share,
+        "cells": dict(contexts.cells),
+        "assets": sorted(contexts.assets),
+        "mirrored": sorted(contexts.mirrored),
+        "covered": each.covered,
+        "wanted": each.n_wanted,
+        "holes": each.n_holes,
+        "maps": {name: {"frames": each.frames[name].tolist(), "holes": each.holes[name].astype(int).tolist()} for name in MAPS},
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectMotion:
+    """The motion coverage of a project: of each table with clips, then of the databases without a table.
+
+    `unlisted` are the clips that no table has a row for, though a database that they fit names one.
+    """
+
+    tables: tuple[TableMotion, ...]
+    unlisted: tuple[str, ...]
+
+
+def motion_coverage(
+    project: Project,
+    databases: Mapping[str, MotionDatabase] | None = None,
+    *,
+    axes: Mapping[str, str] | None = None,
+    pattern: str = PATTERN,
+    near_cost: float = NEAR_COST,
+    seed: int = 0,
+    progress: Tell | None = None,
+) -> ProjectMotion:
+    """Measure where in speed, turn and direction the clips of a project have nothing, for all contexts of its tables.
+
+    Parameters
+    ----------
+    project : Project
+    databases : mapping of str to MotionDatabase, optional
+        Its databases, by name. Default: the saved ones that are up to date are opened, the others built.
+    axes : mapping of str to str, optional
+        For "speed" (m/s), "turn" (degrees a second) and "direction" (degrees, of movement against facing) the condition that says
+        what is asked for. Default: the number conditions named "speed" and "turn" that have min and max.
+    pattern : str
+        How clips of transitions are named.
+    near_cost : float
+        Clips that lie within this cost of another are told.
+    seed : int
+        Of contexts that have to be drawn.
+    progress : function of (done, total, clip name), optional
+
+    Raises
+    ------
+    MotionError, FileError, SchemaError
+        What building the databases raises; also when none is declared.
+    ContextError
+        An argument of another type, or a condition of `axes` that no table with clips has.
+    """
+    require_kind(project, Project, "project", "a Project")
+    require_counts(seed=seed)
+    config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
+    assets = {name: leaf_assets(table) for name, table in project.tables.items()}
+    built = (
+        open_or_build(config, project.folder, assets, progress)
+        if databases is None
+        else dict(require_mapping(databases, "databases", DATABASES))
+    )
+    missing, unlisted = unmatched(config.databases.values(), project.folder, assets)
+    groups: dict[str | None, dict[str, MotionDatabase]] = {}
+    for name, settings in config.databases.items():
+        if name in built:
+            groups.setdefault(settings.table, {})[name] = built[name]
+    tables = {name: table for name, table in project.tables.items() if name in groups}
+    asked = _axes(tables, axes)
+    options: dict[str, Any] = {"pattern": pattern, "near_cost": near_cost, "progress": progress}
+    found = [
+        _of_table(table, groups[name], asked[name], tuple(missing.get(name, ())), seed, options) for name, table in tables.items()
+    ]
+    if None in groups:
+        found.append(TableMotion(coverage(groups[None], **options)))
+    return ProjectMotion(tuple(found), tuple(unlisted))
+
+
+def _of_table(
+    table: Table,
+    databases: Mapping[str, MotionDatabase],
+    axes: Mapping[str, str],
+    missing: tuple[str, ...],
+    seed: int,
+    options: Mapping[str, Any],
+) -> TableMotion:
+    clips = {asset for database in databases.values() for asset in database.assets}
+    mirrored = {
+        asset
+        for database in databases.values()
+        for asset, is_mirrored in zip(database.assets, database.mirrored.tolist(), strict=True)
+        if is_mirrored
+    }
+    contexts = clip_contexts(table, clips, mirrored, axes=axes, seed=seed)
+    found = coverage(databases, contexts.contexts, table=table.name, never_valid=contexts.never_valid, **options)
+    return TableMotion(found, contexts, axes, missing)
+
+
+def _axes(tables: Mapping[str, Table], axes: Mapping[str, str] | None) -> dict[str, dict[str, str]]:
+    """For each table the conditions that say what is asked for."""
+    named = {name: asked_axes(table) for name, table in tables.items()}
+    for axis, condition in require_mapping(axes or {}, "axes", 'a mapping such as {"speed": "wanted_speed"}').items():
+        if axis not in (SPEED, TURN, DIRECTION):
+            raise ContextError(Fault(f"nothing is measured that is called {in_quotes(str(axis))}.", some((SPEED, TURN, DIRECTION))))
+        has = set(_having(tables, condition))
+        if not has:
+            known = sorted({c.condition.name for t in tables.values() for c in t.flat().conditions if is_axis(c.condition)})
+            near = nearest(str(condition), known)
+            found = f"no table with clips has a condition {in_quotes(str(condition))} of numbers with min and max."
+            accepted = some(known) or "none: no condition is an angle, or a number with min and max"
+            raise ContextError(Fault(found, accepted, in_quotes(near) if near else ""))
+        for name in has:
+            named[name][axis] = condition
+    return named
+
+
+def _having(tables: Mapping[str, Table], condition: str) -> Iterator[str]:
+    """The tables that have such a condition of a name."""
+    for name, table in tables.items():
+        if any(c.condition.name == condition and is_axis(c.condition) for c in table.flat().conditions):
+            yield name

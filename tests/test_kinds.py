@@ -27,6 +27,7 @@ OTHER_WORDS = {
     "contextdb/files/parquet.py": "sorts of files",
     "contextdb/commands/coverage_command.py": "formats of reports",
     "contextdb/commands/motion_check_command.py": "formats of reports",
+    "contextdb/commands/motion_coverage_command.py": "formats of reports",
     "contextdb/edits/renaming_values.py": "tokens",
     "tui/widgets/grid_paint.py": "looks of cells",
 }

@@ -100,13 +100,15 @@ UNITS: dict[str, tuple[str, ...]] = {
 def of_played(name: str, condition: Condition) -> tuple[OfPlayed, object] | None:
     """How a condition of that name is answered from what plays, and what it is before anything plays; None for any other name,
     and for a condition of another type or unit."""
-    kind, unit = condition.domain.kind, condition.unit.strip()
+    type_, unit = condition.domain.type, condition.unit.strip()
+    is_bool = type_.fixed == (False, True)
+    is_number = type_.is_decimal and not (type_.is_whole or type_.is_circular)
     foot = next((i for i, each in enumerate(FEET) if name in (each + DOWN, each + UNTIL)), None)
     if foot is not None and name.endswith(DOWN):
-        return (lambda played: played.is_down(foot), False) if kind == "bool" else None
+        return (lambda played: played.is_down(foot), False) if is_bool else None
     if name.startswith(TAG) and len(name) > len(TAG):
-        return (lambda played: played.has_tag(name.removeprefix(TAG)), False) if kind == "bool" else None
-    if kind != "number" or unit not in UNITS.get(UNTIL if foot is not None else name, ()):
+        return (lambda played: played.has_tag(name.removeprefix(TAG)), False) if is_bool else None
+    if not is_number or unit not in UNITS.get(UNTIL if foot is not None else name, ()):
         return None
     if foot is not None:
         return lambda played: played.until_down_s(foot), MOST_S

@@ -49,6 +49,8 @@ from contextdb.motion.output.bank import PoseBank, Sample
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
+from contextdb.motion.preparing.clip_facts import ClipFacts, Spread
+from contextdb.motion.preparing.describing import Described, describe
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
 from contextdb.motion.search.filters import Biases
@@ -96,6 +98,7 @@ __all__ = [
     "Choice",
     "Clip",
     "ClipError",
+    "ClipFacts",
     "ClipFeatures",
     "ClipFinding",
     "Controller",
@@ -106,6 +109,7 @@ __all__ = [
     "CustomFunction",
     "DatabaseSettings",
     "Decision",
+    "Described",
     "Description",
     "Entry",
     "FeatureSchema",
@@ -158,6 +162,7 @@ __all__ = [
     "Skeleton",
     "Skip",
     "Span",
+    "Spread",
     "Status",
     "Steered",
     "TagFilter",
@@ -175,6 +180,7 @@ __all__ = [
     "build_databases",
     "clip_features",
     "clip_of_poses",
+    "describe",
     "descriptions",
     "doubts_of",
     "features_of",

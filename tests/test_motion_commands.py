@@ -150,6 +150,7 @@ def test_the_group_lists_its_commands(arguments: list[str]):
         "measure",
         "replay",
         "describe",
+        "prepare",
     ]
     assert run("motion") == Result(2, "", result.out)
     assert run("help", "motion") == result

@@ -20,6 +20,8 @@ from contextdb.motion.storage.clip_files import paths_of
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.tables.project import SCHEMA_FILE, read_folder_schema
 
+MARKUP = "marks.csv"
+"""The markup of a folder of clips."""
 LEAST_USUAL_M, MOST_USUAL_M = 0.9, 2.6
 """How tall a body is, in a unit that may be right."""
 
@@ -82,7 +84,7 @@ def clips_of(path: str, metres_per_unit: float | None, up: Up | None) -> FolderC
     found = FolderClips(folder)
     if (folder / SCHEMA_FILE).is_file():
         schema = read_folder_schema(folder)
-        found.config = MotionConfig.from_dict(schema.motion, tables=list(schema.tables), file=schema.file)
+        found.config = MotionConfig.from_dict(schema.motion, file=schema.file)
     files = _files(found, metres_per_unit, up)
     if not files:
         raise FileError(Fault("there is no BVH file in this folder or below it.", "*.bvh", place=Place(str(folder))))

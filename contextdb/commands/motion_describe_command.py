@@ -21,7 +21,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from contextdb.commands.motion_clips import FolderClips, add_clip_arguments, below, clips_of, progress_of
+from contextdb.commands.motion_clips import MARKUP, FolderClips, add_clip_arguments, below, clips_of, progress_of
 from contextdb.commands.motion_describe_table import ASSET, DescribedTable, filled_table, new_table
 from contextdb.console import ExitCode, output, printable
 from contextdb.errors import ContextDBError, Fault, plural, some
@@ -92,7 +92,8 @@ def _motion(found: FolderClips, table: Path) -> Sections | None:
     paths = below(found.paths, folder)
     if paths is None:
         return None
-    return motion_sections(by_rig(found.clips, paths), table.stem)
+    markup = below([found.folder / MARKUP], folder) if (found.folder / MARKUP).is_file() else None
+    return motion_sections(by_rig(found.clips, paths), table.stem, markup[0] if markup else None)
 
 
 def _tell(found: FolderClips, made: DescribedTable | None, is_playable: bool, arguments: argparse.Namespace) -> None:

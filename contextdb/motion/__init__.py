@@ -51,6 +51,7 @@ from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
 from contextdb.motion.preparing.clip_facts import ClipFacts, Spread
 from contextdb.motion.preparing.describing import Described, describe
+from contextdb.motion.preparing.proposals import Proposal, prepare
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
 from contextdb.motion.search.filters import Biases
@@ -145,6 +146,7 @@ __all__ = [
     "PoseState",
     "PoseStream",
     "Poses",
+    "Proposal",
     "QueryError",
     "Reasked",
     "ReaskedDecision",
@@ -206,6 +208,7 @@ __all__ = [
     "pose_schema",
     "poses_of",
     "poses_path",
+    "prepare",
     "query_from",
     "query_from_pose",
     "resampled",

@@ -25,6 +25,7 @@ from contextdb.commands.motion_clips import MARKUP, FolderClips, add_clip_argume
 from contextdb.commands.motion_describe_table import ASSET, DescribedTable, filled_table, new_table
 from contextdb.console import ExitCode, output, printable
 from contextdb.errors import ContextDBError, Fault, plural, some
+from contextdb.files.toml_text import as_toml
 from contextdb.motion.preparing.describing import COLUMNS, Described, Sections, by_rig, describe, mirror_of, motion_sections
 from contextdb.report.render_json import as_json
 from contextdb.tables.project import schema_for
@@ -105,6 +106,10 @@ def _tell(found: FolderClips, made: DescribedTable | None, is_playable: bool, ar
         lines.append(
             f"no database is declared: the clips are not in {made.folder if made else ''} or below it. "
             "Expected: a table in the folder of the clips, or above it."
+        )
+    if arguments.out and made is not None and not made.is_used:
+        lines.append(
+            f"no database of {made.toml_path} holds the rows of this table: table = {as_toml(made.table.name)} makes one do so."
         )
     for line in lines:
         print(printable(f"contextdb: {line}"), file=sys.stderr)

@@ -72,6 +72,12 @@ class DescribedTable:
         """The contextdb.toml."""
         return self.folder / SCHEMA_FILE
 
+    @property
+    def is_used(self) -> bool:
+        """Whether a database holds its rows, or none is declared."""
+        databases = self.table.schema.databases.values()
+        return not databases or any(part.get("table") == self.table.name for part in databases)
+
     def write(self) -> None:
         """Write the table and contextdb.toml in one step: both or neither; what says all of it already is not touched."""
         new = new_source(self.path, self.table.columns, self.table.source, self.table.origin).raw

@@ -209,3 +209,10 @@ def test_progress_tells_of_each_clip():
 )
 def test_patterns_fit_the_clips_of_a_rig_and_no_others(own: list[str], others: set[str], patterns: list[str]):
     assert patterns_of(own, others) == patterns
+
+
+def test_a_clip_that_is_too_far_away_is_refused():
+    walk = motion.make_clip("walk").clip
+    for call in (motion.describe, motion.prepare):
+        with pytest.raises(ContextDBError, match="too far away"):
+            call([replace(walk, values=walk.values * 1e300)])

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from contextdb.errors import MotionError
+from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.feet import Footfalls, footfalls_of
 from contextdb.motion.clips.poses import Poses, poses_of
@@ -29,6 +29,7 @@ NORMAL = "normal"
 USUAL_STEP_S = 1.0
 """Of a step with each foot, where none is seen."""
 LEAST_STEP_S, MOST_STEP_S = 0.4, 2.0
+FARTHEST_M = 1e9
 STANDING_MPS = 0.25
 """A body that goes slower stands."""
 SLOW_SHARE = 0.3
@@ -149,6 +150,7 @@ def facts_of(clip: Clip, common: Iterable[str] = ()) -> ClipFacts:
     """What a clip of one frame or more shows; `common` are words of its name that say nothing of its style."""
     poses = poses_of(clip)
     path = root_trajectory(poses)
+    require_finite(clip, poses)
     falls = falls_of(poses)
     step_s = step_of(falls)
     moments = Moments.of(path, step_s)
@@ -170,6 +172,13 @@ def facts_of(clip: Clip, common: Iterable[str] = ()) -> ClipFacts:
         ends[1],
         step_s,
     )
+
+
+def require_finite(clip: Clip, poses: Poses) -> None:
+    """Raise MotionError when the joints of a clip are too far away to be measured."""
+    if not np.isfinite(poses.positions).all() or np.abs(poses.positions).max(initial=0.0) > FARTHEST_M:
+        found = f"the clip {in_quotes(clip.name)} has joints too far away to be measured."
+        raise MotionError(Fault(found, f"places within {FARTHEST_M:g} m"))
 
 
 def falls_of(poses: Poses) -> Footfalls | None:

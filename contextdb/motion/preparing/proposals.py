@@ -29,7 +29,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
-from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, step_of
+from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
 
 Kind = Literal["contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "duplicates"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -109,6 +109,7 @@ class Look:
     def at(cls, clip: Clip) -> Look:
         """Look at a clip of one frame or more."""
         poses = poses_of(clip)
+        require_finite(clip, poses)
         return cls(clip, poses, root_trajectory(poses), falls_of(poses))
 
     @cached_property

@@ -69,6 +69,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/casting.py
 	$(PY) benchmarks/reload.py
 	$(PY) benchmarks/live_link.py
+	$(PY) benchmarks/prepare.py
 	$(PY) benchmarks/c_header.py
 	$(PY) benchmarks/search.py
 	$(PY) benchmarks/crowd.py

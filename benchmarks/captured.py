@@ -67,17 +67,22 @@ RATE = 30.0
 
 def load() -> Frames:
     """The 27 features of feet, hips and the way ahead, of every clip there is."""
-    clips = list(_captured())
-    name = "captured clips" if clips else "made clips (no captured ones: set CONTEXTDB_MOCAP)"
-    clips = clips or [made.clip for made in motion.made_clips()]
-    schemas = [_schema(clip) for clip in clips]
-    blocks = [motion.features_of(clip, schema) for clip, schema in zip(clips, schemas, strict=True)]
+    found = clips()
+    name = "captured clips" if found else "made clips (no captured ones: set CONTEXTDB_MOCAP)"
+    found = found or [made.clip for made in motion.made_clips()]
+    schemas = [_schema(clip) for clip in found]
+    blocks = [motion.features_of(clip, schema) for clip, schema in zip(found, schemas, strict=True)]
     normalisation = Normalisation.of(blocks, schemas[0])
     scale = np.concatenate([np.full(c.n_features, np.sqrt(c.weight)) for c in schemas[0].channels])
     stops = np.cumsum([len(block) for block in blocks])
     starts = stops - [len(block) for block in blocks]
     features = np.concatenate([normalisation.apply(block) * scale for block in blocks]).astype(np.float32)
     return Frames(name, features, starts, stops)
+
+
+def clips() -> list[Clip]:
+    """All captured clips; none where there are none."""
+    return list(_captured())
 
 
 def _captured() -> Iterator[Clip]:

@@ -35,7 +35,7 @@ COMMANDS = {
     "compile": "write the compiled file for the game",
     "live": "what a running game asks its tables, and what it picks",
     "verify": "whether files are as contextdb wrote them",
-    "motion": "motion databases: bones, check, build, search, select, run, replay",
+    "motion": "motion databases: bones, check, build, search, select, run, replay, describe, prepare",
     "demo": "a tour of the sample tables",
 }
 

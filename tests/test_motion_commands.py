@@ -150,12 +150,16 @@ def test_the_group_lists_its_commands(arguments: list[str]):
         "probe",
         "measure",
         "replay",
+        "describe",
+        "prepare",
     ]
     assert run("motion") == Result(2, "", result.out)
     assert run("help", "motion") == result
 
 
-@pytest.mark.parametrize("command", ["bones", "check", "build", "search", "select", "run", "probe", "measure", "replay"])
+@pytest.mark.parametrize(
+    "command", ["bones", "check", "build", "search", "select", "run", "probe", "measure", "replay", "describe"]
+)
 @pytest.mark.parametrize("width", [60, 100])
 def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("COLUMNS", str(width))

@@ -1,6 +1,8 @@
 """Motion matching over the valid assets: databases from clips, a search with its costs, a choice of databases, recorded sessions.
 
   contextdb motion bones game/clips/walk.bvh
+  contextdb motion describe game/clips --out game/moves.csv
+  contextdb motion prepare game/
   contextdb motion check game/
   contextdb motion build game/
   contextdb motion search game/ loco --query walk@1.5 --speed 1.3
@@ -23,4 +25,6 @@ COMMANDS = {
     "probe": "drive a character over the contexts of its tables by itself, and measure how well it moves",
     "measure": "how good the motion of a session is, beside the clips that it is made of",
     "replay": "what was decided in a recorded session, and why",
+    "describe": "a table from clips: gait, speed, direction, turn and style of each",
+    "prepare": "markup proposed for clips, as a diff: contacts, loops, ends, noise, starts, turns, duplicates",
 }

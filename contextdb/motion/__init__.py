@@ -52,6 +52,9 @@ from contextdb.motion.output.bank import PoseBank, Sample
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
+from contextdb.motion.preparing.clip_facts import ClipFacts, Spread
+from contextdb.motion.preparing.describing import Described, describe
+from contextdb.motion.preparing.proposals import Proposal, prepare
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.search.database import Hit, MotionDatabase, build_databases
 from contextdb.motion.search.filters import Biases
@@ -100,6 +103,7 @@ __all__ = [
     "Clip",
     "ClipContexts",
     "ClipError",
+    "ClipFacts",
     "ClipFeatures",
     "ClipFinding",
     "ClipFrames",
@@ -112,6 +116,7 @@ __all__ = [
     "CustomFunction",
     "DatabaseSettings",
     "Decision",
+    "Described",
     "Description",
     "Entry",
     "FeatureSchema",
@@ -149,6 +154,7 @@ __all__ = [
     "PoseState",
     "PoseStream",
     "Poses",
+    "Proposal",
     "QueryError",
     "Reasked",
     "ReaskedDecision",
@@ -166,6 +172,7 @@ __all__ = [
     "Skeleton",
     "Skip",
     "Span",
+    "Spread",
     "Status",
     "Steered",
     "TagFilter",
@@ -186,6 +193,7 @@ __all__ = [
     "clip_features",
     "clip_of_poses",
     "coverage",
+    "describe",
     "descriptions",
     "doubts_of",
     "features_of",
@@ -211,6 +219,7 @@ __all__ = [
     "pose_schema",
     "poses_of",
     "poses_path",
+    "prepare",
     "query_from",
     "query_from_pose",
     "resampled",

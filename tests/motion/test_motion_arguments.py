@@ -51,6 +51,16 @@ POSED = [motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1)]
 PLAYER = motion.Character(motion.Controller(motion.Selector([motion.Entry("only", BUILT)])), SCHEMA, None, motion.PoseStream(BANK))
 Call = Callable[[object], object]
 CALLS: dict[str, Call] = {
+    "describe(clips)": lambda x: motion.describe(x),
+    "describe(clips), one": lambda x: motion.describe([x]),
+    "describe(mirrored)": lambda x: motion.describe([CLIP], mirrored=x),
+    "describe(progress)": lambda x: x is Odd or motion.describe([CLIP], progress=x),
+    "prepare(clips)": lambda x: motion.prepare(x),
+    "prepare(clips), one": lambda x: motion.prepare([x]),
+    "prepare(markup)": lambda x: motion.prepare([CLIP], x),
+    "prepare(kinds)": lambda x: motion.prepare([CLIP], kinds=x),
+    "prepare(kinds), one": lambda x: motion.prepare([CLIP], kinds=[x]),
+    "prepare(progress)": lambda x: x is Odd or motion.prepare([CLIP], progress=x),
     "load_bvh(path)": lambda x: motion.load_bvh(x),
     "load_bvh(metres_per_unit)": lambda x: motion.parse_bvh("", "a", metres_per_unit=x),
     "load_clips(paths)": lambda x: motion.load_clips(x),

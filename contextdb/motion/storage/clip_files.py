@@ -88,7 +88,7 @@ def clip_files(
     MotionError
         No file fits the pattern, or two of the files have one name; `file` is that of the settings in messages.
     """
-    paths = _paths(settings, folder, file)
+    paths = paths_of(settings, folder, file)
     if not paths:
         found = f"[databases.{settings.name}] no file fits clips = {as_toml(settings.clips)}."
         raise MotionError(Fault(found, place=Place(file), rule="file"))
@@ -101,7 +101,8 @@ def clip_files(
     return [ClipFile(path, settings, schema, path.stem in loops, marks[path.stem]) for path in wanted]
 
 
-def _paths(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[Path]:
+def paths_of(settings: DatabaseSettings, folder: Path, file: str | None = None) -> list[Path]:
+    """The files that fit the pattern of a database, sorted; a MotionError where it is none."""
     try:
         return sorted(folder.glob(settings.clips))
     except (ValueError, NotImplementedError):
@@ -120,7 +121,7 @@ def unmatched(
     found: set[str] = set()
     held: set[str] = set()
     for settings in databases:
-        names = {path.stem for path in _paths(settings, folder)}
+        names = {path.stem for path in paths_of(settings, folder)}
         found |= names
         if settings.table is not None:
             clips.setdefault(settings.table, set()).update(names)

@@ -1,0 +1,233 @@
+"""Propose markup for clips, as a diff that can be reviewed, edited, applied and taken back: each mark with its reason and measure.
+
+Proposed are contacts of the feet, loops and the cuts that would make one, standing ends that are not to be entered, noise that is
+left out, starts and turns that play as a whole, and near-duplicates. What the markup says already stays as it is, and nothing is
+proposed beside it. The diff fits the folder: `patch -p1` applies it there, and `patch -p1 -R` takes it back.
+
+Exits with 1 if something is proposed that is not written, or a clip could not be read.
+
+  contextdb motion prepare game/
+  contextdb motion prepare game/ --only loops --only starts
+  contextdb motion prepare game/ --write
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import difflib
+import io
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from contextdb.commands.motion_clips import MARKUP, FolderClips, add_clip_arguments, below, clips_of, progress_of
+from contextdb.console import ExitCode, output, printable
+from contextdb.disk import read_bytes
+from contextdb.disk.together import NewFile, write_together
+from contextdb.errors import Fault, FileError, Place, plural
+from contextdb.motion.clips.clip import Clip
+from contextdb.motion.markup.file import COLUMNS, text_of
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.preparing.proposals import KINDS, Proposal, prepare
+from contextdb.motion.storage.clip_files import paths_of
+from contextdb.report.render_json import as_json
+from contextdb.schema.toml_edit import set_key
+from contextdb.tables.project import SCHEMA_FILE
+
+BOM = "\ufeff"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of the command."""
+    add_clip_arguments(parser)
+    told = f"propose only this: {', '.join(KINDS)}; may be repeated"
+    parser.add_argument("--only", metavar="KIND", choices=KINDS, action="append", help=told)
+    parser.add_argument("--write", action="store_true", help="write the marks into the markup file")
+    parser.add_argument("--json", action="store_true", help="print a JSON document instead of a diff")
+
+
+@dataclass
+class Change:
+    """A file as it is, and as it is proposed to be."""
+
+    path: Path
+    was: bytes | None
+    old: str
+    new: str
+
+    @property
+    def data(self) -> bytes:
+        """What is written."""
+        return self.new.encode()
+
+
+@dataclass
+class MarkupFile:
+    """A markup file, and the clips that it is about."""
+
+    path: Path
+    clips: list[Clip] = field(default_factory=list)
+    databases: list[str] = field(default_factory=list)
+    """The databases that do not name it yet."""
+
+
+def run(arguments: argparse.Namespace) -> ExitCode:
+    """Propose markup, and write it where that is asked for."""
+    found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up)
+    proposals, changes = [], []
+    named: dict[str, str] = {}
+    done = 0
+    with progress_of("preparing") as tell:
+        for file in _markup_files(found):
+
+            def told(i: int, _total: int, name: str, before: int = done) -> None:
+                tell(before + i, len(found.clips), name)
+
+            old, was = _text(file.path)
+            markup = Markup.parse(old, str(file.path)) if old else Markup()
+            own = prepare(file.clips, markup, kinds=arguments.only, progress=told)
+            done += len(file.clips)
+            proposals += own
+            marks = [each for each in own if each.tag is not None]
+            if marks:
+                changes.append(Change(file.path, was, old, with_marks(old, marks)))
+                Markup.parse(changes[-1].new, str(file.path))
+                named |= dict.fromkeys(file.databases, file.path.relative_to(found.folder).as_posix())
+    changes += _settings(found.folder, named)
+    if (
+        arguments.write
+        and changes
+        and not write_together(found.folder, [NewFile(each.path, each.data, each.was) for each in changes])
+    ):
+        fault = Fault("a file was changed by somebody else in this moment.", mend="to do the same once more")
+        raise FileError(fault.at(Place(str(changes[0].path))))
+    _report(found, proposals, changes, arguments)
+    is_open = bool(changes) and not arguments.write
+    return ExitCode.FOUND if is_open or found.left_out else ExitCode.OK
+
+
+def _markup_files(found: FolderClips) -> list[MarkupFile]:
+    """The markup file of each clip: that of the first database that holds it, else one beside the clips."""
+    at = dict(zip(found.paths, found.clips, strict=True))
+    if not found.config.databases:
+        return [MarkupFile(found.folder / MARKUP, list(found.clips))]
+    files: dict[Path, MarkupFile] = {}
+    for name, settings in found.config.databases.items():
+        paths = paths_of(settings, found.folder, found.config.file)
+        own = [at.pop(path) for path in paths if path in at]
+        if not paths:
+            continue
+        path = found.folder / settings.markup if settings.markup is not None else paths[0].parent / MARKUP
+        file = files.setdefault(path, MarkupFile(path))
+        file.clips += own
+        file.databases += [] if settings.markup is not None else [name]
+    return list(files.values())
+
+
+def _text(path: Path) -> tuple[str, bytes | None]:
+    if not os.path.exists(path):
+        return "", None
+    raw = read_bytes(path)
+    return (BOM if raw.startswith(BOM.encode()) else "") + text_of(raw, str(path)), raw
+
+
+def with_marks(text: str, marks: Sequence[Proposal]) -> str:
+    """The text of a markup file with some marks behind its own lines, in the order of its columns."""
+    end = "\r\n" if "\r\n" in text else "\n"
+    header = next((line for line in text.removeprefix(BOM).splitlines() if line.strip()), "")
+    columns = [name.strip().casefold() for name in next(csv.reader([header]))] if header else list(COLUMNS)
+    start = text if header else f"{','.join(COLUMNS)}{end}"
+    added = io.StringIO()
+    writer = csv.writer(added, lineterminator=end)
+    for mark in marks:
+        fields = {"asset": mark.asset, "tag": str(mark.tag), "from": _number(mark.from_s), "to": _number(mark.to_s)}
+        fields["value"] = _number(mark.value)
+        writer.writerow([fields[column] for column in columns])
+    return f"{start}{'' if start.endswith(end) else end}{added.getvalue()}"
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}".rstrip("0").rstrip(".")
+
+
+def _settings(folder: Path, named: dict[str, str]) -> list[Change]:
+    """What contextdb.toml becomes so that databases name their markup."""
+    if not named:
+        return []
+    path = folder / SCHEMA_FILE
+    raw = read_bytes(path)
+    old = raw.decode()
+    new = old.removeprefix(BOM)
+    for database, file in named.items():
+        new = set_key(new, ("databases", database, "markup"), file)
+    return [Change(path, raw, old, (BOM if old.startswith(BOM) else "") + new)]
+
+
+# ---- what is printed
+
+
+def _report(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence[Change], arguments: argparse.Namespace) -> None:
+    for line in [*found.notes, *(f"left out: {message}" for message in found.left_out)]:
+        print(printable(f"contextdb: {line}"), file=sys.stderr)
+    n_marks = sum(each.tag is not None for each in proposals)
+    with output():
+        if arguments.json:
+            print(as_json(_document(found, proposals, changes, arguments.write)), end="")
+        elif proposals:
+            print("\n".join(map(printable, _reasons(proposals))))
+            print("".join(_diff(change, found.folder) for change in changes), end="")
+    where = " and ".join(str(change.path) for change in changes)
+    if arguments.write and changes:
+        print(printable(f"contextdb: {plural(n_marks, 'mark')} written to {where}."), file=sys.stderr)
+    elif not n_marks:
+        print("contextdb: nothing to propose.", file=sys.stderr)
+
+
+def _reasons(proposals: Sequence[Proposal]) -> Iterator[str]:
+    """Each proposal with its reason; the contacts of a foot together."""
+    together: dict[tuple[str, str | None], list[Proposal]] = {}
+    for i, each in enumerate(proposals):
+        key = (each.asset, each.tag) if each.kind == "contacts" else (each.asset, f"{each.tag} {i}")
+        together.setdefault(key, []).append(each)
+    for (asset, _), own in together.items():
+        first = own[0]
+        if first.kind == "contacts":
+            yield f"# {asset}: {first.tag}: {plural(len(own), 'stance')}, {sum(each.measure for each in own):.2f} s"
+        else:
+            what = "cut" if first.tag is None else first.tag
+            yield f"# {asset}: {what} {_span(first)}: {first.reason}"
+
+
+def _span(each: Proposal) -> str:
+    if each.from_s is None and each.to_s is None:
+        return "all of it"
+    start = "the start" if each.from_s is None else f"{each.from_s:g} s"
+    return f"from {start} to {'the end' if each.to_s is None else f'{each.to_s:g} s'}"
+
+
+def _diff(change: Change, folder: Path) -> str:
+    """The change as `patch` reads it."""
+    name = (below([change.path], folder) or [str(change.path)])[0]
+    before = "/dev/null" if change.was is None else f"a/{name}"
+    old, new = change.old.splitlines(keepends=True), change.new.splitlines(keepends=True)
+    return "".join(map(_line, difflib.unified_diff(old, new, before, f"b/{name}")))
+
+
+def _line(line: str) -> str:
+    body = line.rstrip("\r\n")
+    end = line[len(body) :]
+    return f"{printable(body)}{end}" if end else f"{printable(body)}\n\\ No newline at end of file\n"
+
+
+def _document(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence[Change], is_written: bool) -> dict[str, object]:
+    return {
+        "format": 1,
+        "written": is_written and bool(changes),
+        "proposals": [each.to_json() for each in proposals],
+        "files": [{"file": str(change.path), "diff": _diff(change, found.folder)} for change in changes],
+        "left_out": found.left_out,
+        "notes": found.notes,
+    }

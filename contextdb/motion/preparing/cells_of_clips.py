@@ -1,0 +1,199 @@
+"""The cells of clips: for each column the values for which a clip is the right one beside the others of its kind.
+
+Clips of one rig, gait and style are told apart by direction, then by turn, then by speed. Each of these columns cuts all its values
+among the clips that are left, at the middle between two neighbours and a little beyond it: so for each context there is a clip, and
+between two clips there are both. A clip that passes through many values, such as a start, keeps its own.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeVar
+
+from contextdb.motion.preparing.clip_facts import NORMAL, ClipFacts, Spread
+
+Key = TypeVar("Key", bound=Hashable)
+
+ANY = "Any"
+CONDITIONS = ("gait", "speed", "direction", "turn", "style")
+OUTPUTS = ("duration_s", "start", "end")
+BEYOND = 0.15
+"""How far a cell reaches beyond the middle between two clips, of the way between them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How a number is told apart: clips nearer than `bin_width` are of one kind; a cell reaches beyond the middle by so
+    much at least and at most."""
+
+    bin_width: float
+    least_beyond: float
+    most_beyond: float
+    digits: int
+    is_circular: bool = False
+    is_signed: bool = True
+
+
+SPEED = Scale(0.25, 0.05, 0.3, 2, is_signed=False)
+DIRECTION = Scale(45.0, 3.0, 10.0, 0, is_circular=True)
+TURN = Scale(25.0, 3.0, 10.0, 0)
+Interval = tuple[float | None, float | None]
+"""From and to; None is open."""
+
+
+def cells_of(facts: Sequence[ClipFacts], rigs: Sequence[Hashable], mirrored: bool = False) -> list[dict[str, str]]:
+    """For each clip the cells of its row, conditions and outputs.
+
+    Parameters
+    ----------
+    facts : sequence of ClipFacts
+    rigs : sequence
+        Of each clip what its rig is called: clips of different rigs are not told apart.
+    mirrored : bool
+        Whether every clip plays mirrored too, so that a turn to the left serves one to the right.
+    """
+    found = [{**dict.fromkeys(CONDITIONS, ANY), "gait": " ".join(each.gaits), **_outputs(each)} for each in facts]
+    groups = _grouped(range(len(facts)), lambda i: (rigs[i], facts[i].gait, facts[i].style))
+    for members in groups.values():
+        moving = [i for i in members if facts[i].direction_deg is not None]
+        kinds = _cut(found, "direction", moving, {i: facts[i].direction_deg for i in moving}, DIRECTION, mirrored)
+        kinds += [[i for i in members if facts[i].direction_deg is None]]
+        for kind in kinds:
+            for alike in _cut(found, "turn", kind, {i: facts[i].turn_dps for i in kind}, TURN, mirrored):
+                _cut(found, "speed", alike, {i: facts[i].speed_mps for i in alike}, SPEED, mirrored)
+    for i, style in _styles(facts, rigs).items():
+        found[i]["style"] = style
+    return found
+
+
+def _outputs(facts: ClipFacts) -> dict[str, str]:
+    return {"duration_s": f"{facts.duration_s:g}", "start": facts.start, "end": facts.end}
+
+
+def _grouped(members: Iterable[int], key: Callable[[int], Key]) -> dict[Key, list[int]]:
+    found = defaultdict[Key, list[int]](list)
+    for i in members:
+        found[key(i)].append(i)
+    return dict(found)
+
+
+# ---- style
+
+
+def _styles(facts: Sequence[ClipFacts], rigs: Sequence[Hashable]) -> dict[int, str]:
+    """The styles of each clip: its own; of a normal clip also those of its rig that have no clip of its gait."""
+    styles = sorted({each.style for each in facts})
+    if len(styles) == 1:
+        return {}
+    of_rig = defaultdict[Hashable, set[str]](set)
+    has = set[tuple[Hashable, str, str]]()
+    for rig, each in zip(rigs, facts, strict=True):
+        of_rig[rig].add(each.style)
+        has |= {(rig, gait, each.style) for gait in each.gaits}
+    found = {}
+    for i, each in enumerate(facts):
+        also = {style for style in of_rig[rigs[i]] if each.style == NORMAL and (rigs[i], each.gait, style) not in has}
+        own = [style for style in styles if style in {each.style, *also}]
+        others = [style for style in styles if style not in own]
+        found[i] = " ".join(own) if len(own) <= len(others) + 1 else " ".join(("not", *others)) if others else ANY
+    return found
+
+
+# ---- numbers
+
+
+def _cut(
+    found: Sequence[dict[str, str]],
+    column: str,
+    members: Sequence[int],
+    spreads: Mapping[int, Spread | None],
+    scale: Scale,
+    mirrored: bool,
+) -> list[list[int]]:
+    """Give some clips their cells in a column; the clips that the column does not tell apart, together."""
+    known = {i: spread for i in members if (spread := spreads[i]) is not None}
+    steady = {i: spread for i, spread in known.items() if spread.width <= 2.0 * scale.bin_width} or known
+    bins = _grouped(steady, lambda i: _bin(steady[i].middle, scale))
+    spread_of = {at: _joined([steady[i] for i in each]) for at, each in bins.items()}
+    if mirrored and scale.is_signed:
+        for spread in list(spread_of.values()):
+            spread_of.setdefault(_bin(-spread.middle, scale), Spread(-spread.high, -spread.middle, -spread.low))
+    intervals = _intervals(spread_of, scale)
+    for at, each in bins.items():
+        for i in each:
+            found[i][column] = _text(intervals[at], scale)
+    passing = [i for i in known if i not in steady]
+    for i in passing:
+        found[i][column] = _text(_own(known[i], scale), scale)
+    return [*(each for each in bins.values()), *([passing] if passing else [])]
+
+
+def _bin(value: float, scale: Scale) -> int:
+    """The kind of a value; the same distance to both sides of 0."""
+    at = int(abs(value) / scale.bin_width + 0.5) * (1 if value >= 0.0 else -1)
+    n_bins = round(360.0 / scale.bin_width)
+    return abs(at) if scale.is_circular and 2 * abs(at) == n_bins else at
+
+
+def _joined(spreads: Sequence[Spread]) -> Spread:
+    """The middles of some clips of one kind: the least, their mean, and the largest."""
+    middles = [spread.middle for spread in spreads]
+    if max(middles) - min(middles) > 180.0:  # both sides of straight back
+        middles = [middle % 360.0 for middle in middles]
+    return Spread(min(middles), sum(middles) / len(middles), max(middles))
+
+
+def _intervals(spreads: Mapping[int, Spread], scale: Scale) -> dict[int, Interval]:
+    """From where to where each kind is right: together all values, and a little twice."""
+    kinds = sorted(spreads, key=lambda at: spreads[at].middle)
+    if len(kinds) < 2:
+        return dict.fromkeys(kinds, (None, None))
+    lower: dict[int, float | None] = {kinds[0]: None}
+    upper: dict[int, float | None] = {kinds[-1]: None}
+    for a, b in pairwise(kinds):
+        upper[a], lower[b] = _between(spreads[a], spreads[b], 0.0, scale)
+    if scale.is_circular:
+        upper[kinds[-1]], beyond = _between(spreads[kinds[-1]], spreads[kinds[0]], 360.0, scale)
+        lower[kinds[0]] = beyond - 360.0
+    return {at: (lower[at], upper[at]) for at in kinds}
+
+
+def _between(a: Spread, b: Spread, round_: float, scale: Scale) -> tuple[float, float]:
+    """Where the lower of two neighbours ends and the higher, so many degrees round, begins: behind and before the middle between
+    them, and never before the last clip of a kind."""
+    least, middle = scale.least_beyond, (a.middle + b.middle + round_) / 2.0
+    beyond = min(max(least, BEYOND * (b.middle + round_ - a.middle)), scale.most_beyond)
+    return max(middle + beyond, a.high + least), min(middle - beyond, b.low + round_ - least)
+
+
+def _own(spread: Spread, scale: Scale) -> Interval:
+    """What a clip passes through, and a little more."""
+    beyond = min(max(scale.least_beyond, BEYOND * spread.width), scale.most_beyond)
+    low, high = spread.low - beyond, spread.high + beyond
+    if scale.is_circular:
+        return (None, None) if high - low >= 360.0 else (low, high)
+    if not scale.is_signed:
+        return (None if low <= beyond else low), high
+    return low, high
+
+
+def _text(interval: Interval, scale: Scale) -> str:
+    low, high = interval
+    if low is None and high is None:
+        return ANY
+    if scale.is_circular and low is not None and high is not None:
+        return f"{_number(_wrapped(low), scale)}..{_number(_wrapped(high), scale)}"
+    if low is None:
+        return f"<={_number(high or 0.0, scale)}"
+    return f">={_number(low, scale)}" if high is None else f"{_number(low, scale)}..{_number(high, scale)}"
+
+
+def _wrapped(degrees: float) -> float:
+    return (degrees + 180.0) % 360.0 - 180.0
+
+
+def _number(value: float, scale: Scale) -> str:
+    return f"{round(value, scale.digits) + 0.0:g}"

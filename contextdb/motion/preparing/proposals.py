@@ -1,0 +1,450 @@
+"""Markup proposed for clips: contacts, loops, standing ends, noise, starts, turns, near-duplicates; each with reason and measure.
+
+    clip ─► Look: poses against the body's own place, path, feet ─► proposals of each kind ─► less what the markup says already
+
+What is proposed depends on the clip alone; a mark of the same tag that holds any of the same frames, a pattern's too, takes its
+place. So a second run on its own result proposes nothing. F frames, J joints; metres, y up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.cells.arguments import require_callable, require_kind, require_many, require_many_of
+from contextdb.errors import ContextError, Fault, MotionError, in_quotes, nearest, some
+from contextdb.motion.clips import quaternions
+from contextdb.motion.clips.clip import Clip
+from contextdb.motion.clips.contacts import spans_of
+from contextdb.motion.clips.feet import Footfalls
+from contextdb.motion.clips.poses import Poses, poses_of
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
+from contextdb.motion.markup.markup import Markup
+from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
+from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
+
+Kind = Literal["contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "duplicates"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+LOOP_M, LOOP_MPS = 0.03, 0.3
+"""A clip loops where its joints are so near at both ends, and so alike in speed: root mean squares."""
+LOOP_SHARE = 0.15
+"""Of the body's speed: so unlike may these speeds be, where that is more."""
+LEAST_LOOP_S = 0.5
+FEWEST_TO_CUT = 6
+MOST_FRAMES = 400
+"""So many frames of a clip are compared with each other for a cut."""
+LEAST_TAIL_S = 0.4
+NEAR_STANDING_S = 0.1
+"""So much of a stand before a start is part of it."""
+AT_SPEED = 0.9
+"""Of its middle speed: a start is over."""
+ENTRY_S = 0.2
+"""The entry zone of a start and of a turn."""
+BENDING_DPS, TURNING_DPS, LEAST_TURN_DEG, LONGEST_TURN_S = 25.0, 50.0, 60.0, 3.0
+"""A turn begins and ends at the first rate, and comes to the second."""
+STEADY_DPS = 30.0
+"""A clip whose middle turn is faster turns all the time, and is no turn to be played as a whole."""
+SPIKE_MPS, SPIKE = 8.0, 4.0
+"""A joint that moves so fast between two frames, and so many times faster than before and behind, is noise."""
+END_SHARE = 0.1
+"""Noise so near an end of a clip cuts that end off."""
+ALIKE_M, ALIKE_S = 0.02, 0.05
+"""Clips are near-duplicates whose joints are on the mean so near at the same share of the clip, and whose lengths differ by such a
+share."""
+N_SAMPLES = 24
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A mark that is proposed, or a cut of the clip's file, which is no mark.
+
+    Attributes
+    ----------
+    asset : str
+    kind : str
+        One of `KINDS`.
+    tag : str or None
+        None for a cut.
+    from_s, to_s : float or None
+        Seconds since the clip's start; None is its start or its end.
+    value : float or None
+    reason : str
+    measure : float
+        The number that the reason is about.
+    """
+
+    asset: str
+    kind: Kind
+    tag: str | None
+    from_s: float | None
+    to_s: float | None
+    value: float | None
+    reason: str
+    measure: float
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain data."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A clip as it is looked at."""
+
+    clip: Clip
+    poses: Poses
+    path: Trajectory
+    falls: Footfalls | None
+
+    @classmethod
+    def at(cls, clip: Clip) -> Look:
+        """Look at a clip of one frame or more."""
+        poses = poses_of(clip)
+        require_finite(clip, poses)
+        return cls(clip, poses, root_trajectory(poses), falls_of(poses))
+
+    @cached_property
+    def own(self) -> Floats:
+        """Where the joints are against the body's place on the ground and its heading: [F, J, 3]."""
+        origin = np.stack((self.path.positions[:, 0], np.zeros(self.poses.n_frames), self.path.positions[:, 1]), axis=-1)
+        half = -self.path.headings / 2.0
+        turn = np.stack((np.cos(half), np.zeros_like(half), np.sin(half), np.zeros_like(half)), axis=-1)
+        return quaternions.rotate(turn[:, None, :], self.poses.positions - origin[:, None])
+
+    @cached_property
+    def own_speeds(self) -> Floats:
+        """How fast they move there: [F, J, 3]."""
+        if self.poses.n_frames < 3:
+            return np.zeros_like(self.own)
+        return np.asarray(np.gradient(self.own, 1.0 / self.poses.rate, axis=0, edge_order=2))
+
+    @cached_property
+    def speeds(self) -> Floats:
+        """How fast the body goes over the ground about each frame, over a fifth of a second: [F]."""
+        n, last = max(1, round(ENDS_S * self.poses.rate / 2.0)), self.poses.n_frames - 1
+        at = np.arange(last + 1)
+        before, behind = np.maximum(at - n, 0), np.minimum(at + n, last)
+        moved = np.linalg.norm(self.path.positions[behind] - self.path.positions[before], axis=-1)
+        return np.asarray(moved * self.poses.rate / np.maximum(behind - before, 1))
+
+    @cached_property
+    def moments(self) -> Moments:
+        """The clip step by step."""
+        return Moments.of(self.path, step_of(self.falls))
+
+    @property
+    def rate(self) -> float:
+        """Frames a second."""
+        return self.poses.rate
+
+    @property
+    def stands_mps(self) -> float:
+        """Slower than this it stands."""
+        return min(STANDING_MPS, SLOW_SHARE * self.usual_mps)
+
+    @property
+    def loop_mps(self) -> float:
+        """How alike in speed its ends must be for it to loop: the faster a body goes, the faster its limbs change."""
+        return max(LOOP_MPS, LOOP_SHARE * self.usual_mps)
+
+    @property
+    def usual_mps(self) -> float:
+        """The middle speed."""
+        return float(np.median(self.moments.speeds))
+
+    def said(self, kind: Kind, tag: str | None, first: int | None, last: int | None, reason: str, measure: float) -> Proposal:
+        """A proposal about frames from `first` to `last`."""
+        begin, end = (None if frame is None else round(frame / self.rate, 3) for frame in (first, last))
+        value = None
+        if tag == ReservedTag.NEXT_NATURAL_ONLY and begin is not None and end is not None:
+            value = min(ENTRY_S, math.floor(100.0 * (end - begin)) / 100.0)  # no longer than the span
+        return Proposal(self.clip.name, kind, tag, begin, end, value, reason, round(measure, 4))
+
+
+def prepare(
+    clips: Sequence[Clip],
+    markup: Markup | None = None,
+    *,
+    kinds: Sequence[str] | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> list[Proposal]:
+    """Propose marks for clips.
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        Each with at least one frame.
+    markup : Markup, optional
+        What is said already: nothing is proposed where it has a mark of the same tag.
+    kinds : sequence of str, optional
+        Of "contacts", "loops", "cuts", "tails", "noise", "starts", "turns" and "duplicates" those that are wanted. Default: all.
+    progress : function, optional
+        Called with the number of clips that are done, of all clips, and the name of the next.
+
+    Returns
+    -------
+    list of Proposal
+        By clip, in their order. A cut has no tag: it says where the file would have to be cut for the clip to loop.
+
+    Raises
+    ------
+    MotionError
+        A clip has no frame.
+    ContextError
+        An argument is wrong, or there is no such kind.
+    """
+    clips = require_many_of(clips, Clip, "clips", "a list of Clip")
+    if markup is not None:
+        require_kind(markup, Markup, "markup", "a Markup")
+    if progress is not None:
+        require_callable(progress, "progress")
+    wanted = _wanted(kinds)
+    if faults := [Fault(f"the clip {in_quotes(clip.name)} has no frame.", "at least one") for clip in clips if not clip.n_frames]:
+        raise MotionError(*faults)
+    found = defaultdict[str, list[Proposal]](list)
+    shapes: list[tuple[Clip, Floats]] = []
+    for i, clip in enumerate(clips):
+        if progress is not None:
+            progress(i, len(clips), clip.name)
+        look = Look.at(clip)
+        found[clip.name] += [each for kind in KINDS if kind in wanted and kind in _OF_ONE for each in _OF_ONE[kind](look)]
+        if "duplicates" in wanted:
+            shapes.append((clip, _shape(look)))
+    for each in _duplicates(shapes):
+        found[each.asset].append(each)
+    known = markup or Markup()
+    return [each for clip in dict.fromkeys(clip.name for clip in clips) for each in found[clip] if not _is_said(each, known)]
+
+
+def _wanted(kinds: Sequence[str] | None) -> set[str]:
+    if kinds is None:
+        return set(KINDS)
+    wanted = list(require_many(kinds, "kinds", "a list of kinds"))
+    for kind in wanted:
+        if not isinstance(kind, str) or kind not in KINDS:
+            near = nearest(str(kind), KINDS)
+            found = f"there is no kind {in_quotes(str(kind))}."
+            raise ContextError(Fault(found, some(KINDS, len(KINDS)), in_quotes(near) if near else ""))
+    return set(wanted)
+
+
+def _is_said(proposal: Proposal, markup: Markup) -> bool:
+    """Whether the markup has a mark of the same tag where one is proposed; of a foot, anywhere."""
+    first, last = proposal.from_s or 0.0, math.inf if proposal.to_s is None else proposal.to_s
+    stronger = {ReservedTag.EXCLUDED} if proposal.tag == ReservedTag.DO_NOT_CHOOSE else set()
+    tags = {ReservedTag.LOOPING} if proposal.kind == "cuts" else {proposal.tag, *stronger}
+    spans = [span for span in markup.spans_of(proposal.asset) if span.tag in tags]
+    if proposal.tag in CONTACTS or proposal.kind == "cuts":
+        return bool(spans)
+    return any(span.from_s <= last and first <= span.to_s for span in spans)
+
+
+# ---- feet
+
+
+def _contacts(look: Look) -> Iterator[Proposal]:
+    """When the feet are down."""
+    if look.falls is None:
+        return
+    for foot, tag in zip(look.falls.feet, CONTACTS, strict=True):
+        for begin, end in look.falls.down[foot].tolist():
+            reason = f"{foot} rests for {end - begin:.2f} s"
+            yield look.said("contacts", tag, round(begin * look.rate), round(end * look.rate), reason, end - begin)
+
+
+# ---- loops
+
+
+def _loops(look: Look) -> Iterator[Proposal]:
+    """A clip whose last pose is its first."""
+    if look.clip.duration_s >= LEAST_LOOP_S:
+        apart_m, apart_mps = _apart(look, 0, -1)
+        if apart_m <= LOOP_M and apart_mps <= look.loop_mps:
+            reason = f"its ends are {100.0 * apart_m:.1f} cm and {apart_mps:.2f} m/s apart"
+            yield look.said("loops", ReservedTag.LOOPING, None, None, reason, apart_m)
+
+
+def _cuts(look: Look) -> Iterator[Proposal]:
+    """The longest part of a clip that loops, where the whole does not."""
+    if any(_loops(look)) or look.usual_mps < STANDING_MPS or look.poses.n_frames < FEWEST_TO_CUT:
+        return
+    n = look.poses.n_frames
+    at = np.arange(2, n - 2, max(1, math.ceil(n / MOST_FRAMES)))
+    n_joints = look.poses.skeleton.n_joints
+    ahead, back = (_one_sided(look, at, side) for side in (1, -1))
+    apart_mps = _distances(ahead, back, n_joints + 1)
+    pose = look.own[at].reshape(len(at), -1)
+    fits = (_distances(pose, pose, n_joints) <= LOOP_M) & (apart_mps <= look.loop_mps)
+    long_enough = (at[None, :] - at[:, None]) >= max(LEAST_LOOP_S, 0.8 * step_of(look.falls)) * look.rate
+    first, last = np.nonzero(fits & long_enough)
+    if not len(first):
+        return
+    best = int(np.argmax(at[last] - at[first]))
+    i, j = int(at[first[best]]), int(at[last[best]])
+    apart_m, mps = _apart(look, i, j)[0], float(apart_mps[first[best], last[best]])
+    reason = f"these {(j - i) / look.rate:.2f} s loop: their ends are {100.0 * apart_m:.1f} cm and {mps:.2f} m/s apart"
+    yield look.said("cuts", None, i, j, reason, apart_m)
+
+
+def _apart(look: Look, i: int, j: int) -> tuple[float, float]:
+    """How far two poses are apart, and their speeds: root mean squares over joints."""
+    metres = np.linalg.norm(look.own[i] - look.own[j], axis=-1)
+    root = _root_speeds(look)
+    mps = np.concatenate((np.linalg.norm(look.own_speeds[i] - look.own_speeds[j], axis=-1), [np.linalg.norm(root[i] - root[j])]))
+    return float(np.sqrt(np.mean(metres**2))), float(np.sqrt(np.mean(mps**2)))
+
+
+def _root_speeds(look: Look) -> Floats:
+    """How fast the body goes about each frame, as one column: [F, 1]."""
+    return look.speeds[:, None]
+
+
+def _one_sided(look: Look, at: NDArray[np.int64], side: int) -> Floats:
+    """How fast joints and body go at some frames, as far as the frames ahead (1) or behind (-1) show: [N, J * 3 + 1]."""
+    moved = 2.0 * look.own[at + side] - 1.5 * look.own[at] - 0.5 * look.own[at + 2 * side]
+    n = max(1, round(ENDS_S * look.rate / 2.0))
+    other = np.clip(at + side * n, 0, look.poses.n_frames - 1)
+    root = np.linalg.norm(look.path.positions[other] - look.path.positions[at], axis=-1) / np.abs(other - at)
+    return np.concatenate(((side * moved).reshape(len(at), -1), root[:, None]), axis=1) * look.rate
+
+
+def _distances(some: Floats, others: Floats, n_joints: int) -> Floats:
+    """Root mean squares over joints of the distances of some rows [N, D] from others [M, D]: [N, M]."""
+    squares, other_squares = (some**2).sum(axis=1), (others**2).sum(axis=1)
+    apart = squares[:, None] + other_squares[None, :] - 2.0 * some @ others.T
+    return np.asarray(np.sqrt(np.maximum(apart, 0.0) / n_joints))
+
+
+# ---- ends, starts and turns
+
+
+def _tails(look: Look) -> Iterator[Proposal]:
+    """Standing before and behind what a clip shows."""
+    first, last = _moving(look)
+    if first is None or last is None:
+        return
+    n = look.poses.n_frames
+    head = first - round(NEAR_STANDING_S * look.rate)
+    if head / look.rate >= LEAST_TAIL_S:
+        yield look.said(
+            "tails", ReservedTag.DO_NOT_CHOOSE, None, head, f"stands for {head / look.rate:.2f} s first", head / look.rate
+        )
+    tail_s = (n - 1 - last) / look.rate
+    if tail_s >= LEAST_TAIL_S:
+        yield look.said("tails", ReservedTag.DO_NOT_CHOOSE, last, None, f"stands for its last {tail_s:.2f} s", tail_s)
+
+
+def _starts(look: Look) -> Iterator[Proposal]:
+    """From a stand to nine tenths of the middle speed."""
+    first, _ = _moving(look)
+    if not first:
+        return
+    fast = np.flatnonzero(look.speeds[first:] >= AT_SPEED * look.usual_mps)
+    if len(fast) and fast[0]:
+        stop = first + int(fast[0])
+        seconds = (stop - first) / look.rate
+        reason = f"speeds up from a stand to {look.speeds[stop]:.2f} m/s within {seconds:.2f} s"
+        yield look.said("starts", ReservedTag.NEXT_NATURAL_ONLY, first, stop, reason, seconds)
+
+
+def _moving(look: Look) -> tuple[int | None, int | None]:
+    """The first and the last frame in which the body of a clip goes anywhere; None where it stands all the time."""
+    moving = np.flatnonzero(look.speeds >= look.stands_mps)
+    if look.usual_mps < STANDING_MPS or not len(moving):
+        return None, None
+    return int(moving[0]), int(moving[-1])
+
+
+def _turns(look: Look) -> Iterator[Proposal]:
+    """Each turn of a clip that else goes straight."""
+    if abs(float(np.median(look.moments.turns))) >= STEADY_DPS:
+        return
+    half = look.moments.n // 2
+    for first, stop in spans_of(np.abs(look.moments.turns) >= BENDING_DPS):
+        turns = look.moments.turns[first:stop]
+        turned, seconds = float(turns.sum()) / look.rate, (stop - 1 - first) / look.rate
+        if np.abs(turns).max() >= TURNING_DPS and abs(turned) >= LEAST_TURN_DEG and 0.0 < seconds <= LONGEST_TURN_S:
+            reason = f"turns by {abs(turned):.0f}° to the {'left' if turned > 0.0 else 'right'} within {seconds:.2f} s"
+            first, last = first + half, stop - 1 + half
+            yield look.said("turns", ReservedTag.NEXT_NATURAL_ONLY, first, last, reason, abs(turned))
+
+
+# ---- noise
+
+
+def _noise(look: Look) -> Iterator[Proposal]:
+    """Frames between which a joint jumps."""
+    n = look.poses.n_frames
+    if n < 5:
+        return
+    steps = np.linalg.norm(np.diff(look.poses.positions, axis=0), axis=-1).max(axis=1) * look.rate
+    around = np.maximum(_moved_by(steps, 3), _moved_by(steps, -3))
+    for first, stop in spans_of((steps >= SPIKE_MPS) & (steps >= SPIKE * np.maximum(around, 1.0))):
+        fastest = float(steps[first:stop].max())
+        reason = f"a joint moves at {fastest:.0f} m/s from one frame to the next"
+        if stop <= END_SHARE * n:
+            yield look.said("noise", ReservedTag.EXCLUDED, None, stop - 1, f"{reason}: what is before is no part of it", fastest)
+        elif first >= (1.0 - END_SHARE) * n:
+            yield look.said("noise", ReservedTag.EXCLUDED, first + 1, None, f"{reason}: what is behind is no part of it", fastest)
+        else:
+            last = max(first + 1, stop - 1)
+            yield look.said("noise", ReservedTag.EXCLUDED, first + 1, last, reason, fastest)
+
+
+def _moved_by(values: Floats, n: int) -> Floats:
+    """The values so many places before, or behind; at the ends those of the other side count, so 0."""
+    moved = np.zeros_like(values)
+    if n > 0:
+        moved[n:] = values[:-n]
+    else:
+        moved[:n] = values[-n:]
+    return moved
+
+
+# ---- clips that are alike
+
+
+def _shape(look: Look) -> Floats:
+    """The poses of a clip at shares of its length: [samples, J, 3]."""
+    at = np.linspace(0.0, look.poses.n_frames - 1, N_SAMPLES).round().astype(np.int64)
+    return look.own[at]
+
+
+def _duplicates(shapes: Sequence[tuple[Clip, Floats]]) -> Iterator[Proposal]:
+    """Clips that show what one before them shows."""
+    firsts: list[tuple[Clip, Floats]] = []
+    for clip, shape in shapes:
+        for other, seen in firsts:
+            if other.skeleton.names != clip.skeleton.names or _differ(clip.duration_s, other.duration_s):
+                continue
+            apart = float(np.linalg.norm(shape - seen, axis=-1).mean())
+            if apart <= ALIKE_M:
+                reason = f"its joints are {100.0 * apart:.1f} cm from those of {in_quotes(other.name)} on the mean"
+                yield Proposal(clip.name, "duplicates", ReservedTag.DO_NOT_CHOOSE, None, None, None, reason, round(apart, 4))
+                break
+        else:
+            firsts.append((clip, shape))
+
+
+def _differ(one: float, other: float) -> bool:
+    return abs(one - other) > ALIKE_S * max(one, other)
+
+
+_OF_ONE: dict[Kind, Callable[[Look], Iterator[Proposal]]] = {
+    "contacts": _contacts,
+    "loops": _loops,
+    "cuts": _cuts,
+    "tails": _tails,
+    "noise": _noise,
+    "starts": _starts,
+    "turns": _turns,
+}

@@ -1,0 +1,218 @@
+"""A table from clips: made clips of known speed, turn, direction, gait and style come back; their cells share out all contexts."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import contextdb as cdb
+from contextdb import motion
+from contextdb.errors import ContextDBError
+from contextdb.motion.clips.poses import poses_of
+from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
+from contextdb.motion.preparing.clip_facts import Moments, common_words, style_of
+from contextdb.motion.preparing.describing import condition_sections, patterns_of, table_section
+
+MADE = motion.made_clips()
+ROWS = {row.asset: row for row in motion.describe([made.clip for made in MADE])}
+STEADY = [made for made in MADE if made.recipe.change == "steady"]
+
+
+def table_of(rows: list[motion.Described]) -> cdb.Table:
+    columns = {"Asset Name": [row.asset for row in rows]}
+    columns |= {name: [row.cells[name] for row in rows] for name in rows[0].cells}
+    conditions = {name: said for (_, name), said in condition_sections(rows).items()}
+    return cdb.Table.from_columns(columns, conditions, table_section(rows, "Asset Name", "moves.csv"), "moves")
+
+
+# ---- what is measured
+
+
+@pytest.mark.parametrize("made", STEADY, ids=lambda made: made.name)
+def test_a_made_clip_has_the_speed_and_turn_of_its_recipe(made: motion.MadeClip):
+    facts = ROWS[made.name].facts
+    assert facts.speed_mps.middle == pytest.approx(made.recipe.pace.speed_mps, abs=0.02)
+    assert facts.turn_dps.middle == pytest.approx(made.recipe.turn_dps, abs=1.0)
+    if made.recipe.gait != "Idle":
+        assert facts.direction_deg is not None
+        assert abs(facts.direction_deg.middle) < 1.0
+        assert facts.step_s == pytest.approx(1.0 / made.recipe.pace.cycles_per_s, abs=0.04)
+
+
+@pytest.mark.parametrize("made", MADE, ids=lambda made: made.name)
+def test_gait_style_and_duration_come_back(made: motion.MadeClip):
+    facts = ROWS[made.name].facts
+    assert facts.gait == made.recipe.gait
+    assert facts.style == made.recipe.style
+    assert facts.duration_s == pytest.approx(made.clip.duration_s, abs=1e-3)
+
+
+@pytest.mark.parametrize("made", MADE, ids=lambda made: made.name)
+def test_starts_begin_and_stops_end_standing(made: motion.MadeClip):
+    facts = ROWS[made.name].facts
+    is_idle = made.recipe.gait == "Idle"
+    assert (facts.start == "Idle") == (is_idle or made.recipe.change == "start")
+    assert (facts.end == "Idle") == (is_idle or made.recipe.change == "stop")
+    assert facts.gaits == (("Idle", made.recipe.gait) if made.recipe.change == "stop" else (made.recipe.gait,))
+
+
+@pytest.mark.parametrize("degrees", [-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0])
+def test_a_direction_against_the_facing_comes_back(degrees: float):
+    path = motion.steady_path(1.3, 40.0, strafe_deg=degrees, rate=30.0)
+    moments = Moments.of(path, 1.0)
+    found = np.degrees(np.arctan2(moments.velocities[:, 0], moments.velocities[:, 1]))
+    assert np.abs((found - degrees + 180.0) % 360.0 - 180.0).max() < 0.5
+    assert moments.speeds == pytest.approx(1.3, abs=0.002)
+    assert moments.turns == pytest.approx(40.0, abs=0.01)
+
+
+def test_a_clip_that_walks_sideways_has_that_direction():
+    walk = motion.make_clip("walk").clip
+    turned = turned_by(walk, 90.0)
+    row = motion.describe([turned])[0]
+    assert row.facts.direction_deg is not None
+    assert abs(abs(row.facts.direction_deg.middle) - 90.0) < 2.0
+    assert row.facts.speed_mps.middle == pytest.approx(1.3, abs=0.02)
+
+
+def turned_by(clip: motion.Clip, degrees: float) -> motion.Clip:
+    """A clip whose hips go in another direction than its body faces: their places on the ground turned about the origin."""
+    poses = poses_of(clip)
+    path = root_trajectory(poses)
+    root = clip.skeleton.channels[0]
+    columns = [root.index("Xposition"), root.index("Zposition")]
+    values = np.array(clip.values)
+    angle = np.radians(degrees)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    values[:, columns] = (path.positions @ turn.T) / clip.metres_per_unit
+    return replace(clip, values=values)
+
+
+def test_a_path_of_one_frame_stands():
+    moments = Moments.of(Trajectory(30.0, np.zeros((1, 2)), np.zeros(1)), 1.0)
+    assert moments.speeds.tolist() == [0.0]
+    assert moments.turns.tolist() == [0.0]
+
+
+def test_a_clip_of_one_frame_is_described():
+    walk = motion.make_clip("walk").clip
+    row = motion.describe([replace(walk, values=walk.values[:1])])[0]
+    assert row.cells["gait"] == "Idle"
+    assert row.cells["duration_s"] == "0"
+
+
+# ---- styles from names
+
+
+@pytest.mark.parametrize(
+    ("name", "style"),
+    [
+        ("walk_tired", "tired"),
+        ("walk_turn_left_90", "normal"),
+        ("start_run", "normal"),
+        ("dataset-2_walk-turn-left_exhausted_001", "exhausted"),
+        ("RunInjuredLeft", "injured"),
+        ("02_10_wash_self", "wash_self"),
+        ("Walk_Neutral_Fwd", "normal"),
+        ("", "normal"),
+    ],
+)
+def test_a_style_is_what_the_name_says_beside_the_movement(name: str, style: str):
+    assert style_of(name) == style
+
+
+def test_words_that_all_names_hold_are_no_style():
+    names = ["hero_walk_sad", "hero_run"]
+    assert [style_of(name, common_words(names)) for name in names] == ["sad", "normal"]
+
+
+# ---- cells
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_every_cell_accepts_what_its_clip_shows(mirrored: bool):
+    rows = motion.describe([made.clip for made in MADE], mirrored=mirrored)
+    compiled = table_of(rows).compile()
+    for row in rows:
+        facts = row.facts
+        direction = 0.0 if facts.direction_deg is None else facts.direction_deg.middle
+        context = {"gait": facts.gait, "speed": facts.speed_mps.middle, "direction": direction}
+        assert row.asset in compiled.query({**context, "turn": facts.turn_dps.middle, "style": facts.style}).assets
+
+
+def test_for_every_context_some_clip_is_valid():
+    compiled = table_of(list(ROWS.values())).compile()
+    speeds, turns, directions = (0.0, 0.9, 1.55, 2.9, 6.0), (-200.0, -60.0, -20.0, 0.0, 20.0, 60.0, 200.0), (-179.0, 0.0, 90.0)
+    for gait, speed, turn, direction, style in itertools.product(
+        ("Idle", "Walk", "Run"), speeds, turns, directions, ("normal", "tired")
+    ):
+        context = {"gait": gait, "speed": speed, "turn": turn, "direction": direction, "style": style}
+        assert compiled.query(context), context
+
+
+def test_neighbours_overlap_a_little_and_far_ones_do_not():
+    compiled = table_of(list(ROWS.values())).compile()
+    context = {"gait": "Walk", "direction": 0.0, "turn": 0.0, "style": "normal"}
+    steady = {"walk_slow", "walk", "walk_fast"}
+    assert steady & set(compiled.query({**context, "speed": 1.3}).assets) == {"walk"}
+    assert steady & set(compiled.query({**context, "speed": 1.05}).assets) == {"walk_slow", "walk"}
+    assert steady & set(compiled.query({**context, "speed": 0.6}).assets) == {"walk_slow"}
+
+
+def test_a_mirrored_turn_leaves_the_other_side_to_its_mirror():
+    clips = [motion.make_clip(name).clip for name in ("walk", "walk_turn_left_90")]
+    alone, both = ({row.asset: row.cells["turn"] for row in motion.describe(clips, mirrored=each)} for each in (False, True))
+    assert alone["walk"].startswith("<=")
+    assert both["walk"] == "-55..55"
+    assert both["walk_turn_left_90"] == alone["walk_turn_left_90"] == ">=35"
+
+
+def test_a_normal_clip_serves_styles_without_one_of_its_gait():
+    clips = [motion.make_clip(name).clip for name in ("idle", "walk", "walk_tired")]
+    styles = {row.asset: row.cells["style"] for row in motion.describe(clips)}
+    assert styles == {"idle": "Any", "walk": "normal", "walk_tired": "tired"}
+
+
+def test_a_description_does_not_depend_on_the_order_of_clips():
+    again = motion.describe([made.clip for made in reversed(MADE)])
+    assert {row.asset: dict(row.cells) for row in again} == {name: dict(row.cells) for name, row in ROWS.items()}
+
+
+def test_two_clips_of_one_name_are_refused():
+    clip = motion.make_clip("walk").clip
+    with pytest.raises(ContextDBError, match='two clips are named "walk"'):
+        motion.describe([clip, clip])
+
+
+def test_progress_tells_of_each_clip():
+    told: list[tuple[int, int, str]] = []
+    motion.describe([motion.make_clip(name).clip for name in ("idle", "walk")], progress=lambda *args: told.append(args))
+    assert told == [(0, 2, "idle"), (1, 2, "walk")]
+
+
+# ---- patterns of files
+
+
+@pytest.mark.parametrize(
+    ("own", "others", "patterns"),
+    [
+        (["clips/a.bvh", "clips/b.bvh"], set(), ["clips/*.bvh"]),
+        (["x/a.bvh"], {"y/a.bvh"}, ["x/*.bvh"]),
+        (["c/01.bvh", "c/02.bvh"], {"c/131.bvh"}, ["c/0*.bvh"]),
+        (["c/a.bvh", "c/ab.bvh"], {"c/abc.bvh"}, ["c/a.bvh", "c/ab.bvh"]),
+        (["c/[a].bvh"], {"c/b.bvh"}, ["c/[[]*.bvh"]),
+        (["a.bvh"], {"c/b.bvh"}, ["*.bvh"]),
+    ],
+)
+def test_patterns_fit_the_clips_of_a_rig_and_no_others(own: list[str], others: set[str], patterns: list[str]):
+    assert patterns_of(own, others) == patterns
+
+
+def test_a_clip_that_is_too_far_away_is_refused():
+    walk = motion.make_clip("walk").clip
+    for call in (motion.describe, motion.prepare):
+        with pytest.raises(ContextDBError, match="too far away"):
+            call([replace(walk, values=walk.values * 1e300)])

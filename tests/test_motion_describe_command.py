@@ -1,0 +1,195 @@
+"""`contextdb motion describe` writes a table that checks, builds and drives; fills one that is there; tells where clips differ."""
+
+from __future__ import annotations
+
+import csv
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from running import Result, run
+
+from contextdb.motion import make_clip, write_bvh
+
+NAMES = ("idle", "walk", "walk_turn_left_90", "walk_turn_right_90", "jog", "start_walk", "stop_walk")
+COLUMNS = ["Asset Name", "gait", "speed", "direction", "turn", "style", "duration_s", "start", "end"]
+MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2] / "shared" / "data" / "mocap"))
+
+
+@pytest.fixture
+def game(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "game" / "clips").mkdir(parents=True)
+    for name in NAMES:
+        put(tmp_path / "game", name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "game"
+
+
+def put(game: Path, recipe: str, name: str = "") -> None:
+    write_bvh(make_clip(recipe).clip, game / "clips" / f"{name or recipe}.bvh", digits=4)
+
+
+def describe(*arguments: str, code: int = 0) -> Result:
+    result = run("motion", "describe", *arguments)
+    assert result.code == code, result.out + result.err
+    return result
+
+
+def rows(file: Path) -> list[list[str]]:
+    with file.open(encoding="utf-8", newline="") as text:
+        return list(csv.reader(text))
+
+
+# ---- a new table
+
+
+def test_a_table_is_printed_where_none_is_asked_for(game: Path):
+    result = describe("game/clips")
+    assert result.lines[0] == ",".join(COLUMNS)
+    assert len(result.lines) == len(NAMES) + 1
+    assert result.err == ""
+    assert list(game.iterdir()) == [game / "clips"]
+
+
+def test_the_same_clips_give_the_same_bytes(game: Path):
+    assert describe("game/clips").out == describe("game/clips").out
+    assert describe("game/clips", "--json").out == describe("game/clips", "--json").out
+
+
+def test_a_document_has_cells_and_measures(game: Path):
+    document = describe("game/clips", "--json").json
+    assert document["format"] == 1
+    walk = next(clip for clip in document["clips"] if clip["asset"] == "walk")
+    assert list(walk["cells"]) == COLUMNS[1:]
+    assert walk["facts"]["speed_mps"]["middle"] == pytest.approx(1.3, abs=0.02)
+    assert document["differences"] == document["left_out"] == []
+
+
+def test_a_written_table_checks_builds_and_drives(game: Path):
+    assert "7 rows written to game/moves.csv" in describe("game/clips", "--out", "game/moves.csv").out
+    assert rows(game / "moves.csv")[0] == COLUMNS
+    assert run("check", "game", "--fail-on", "warning").code == 0
+    assert run("motion", "check", "game").code == 0
+    assert run("motion", "build", "game").code == 0
+    probed = run("motion", "probe", "game", "player", "--drive", "straight", "--speed", "1.3", "--json")
+    assert probed.code == 0, probed.err
+    (session,) = probed.json["sessions"]
+    assert session["path_rms_m"] < 0.2
+    assert session["frames_used_share"] > 0.0
+
+
+def test_a_table_that_is_there_is_not_overwritten(game: Path):
+    (game / "moves.csv").write_text("Asset Name\nmine\n", encoding="utf-8")
+    assert "--into" in describe("game/clips", "--out", "game/moves.csv", code=2).err
+    assert (game / "moves.csv").read_text(encoding="utf-8") == "Asset Name\nmine\n"
+
+
+def test_clips_that_lie_elsewhere_give_a_table_without_databases(game: Path):
+    (game.parent / "other").mkdir()
+    assert "no database is declared" in describe("game/clips", "--out", "other/moves.csv", code=1).err
+    assert "databases" not in (game.parent / "other" / "contextdb.toml").read_text(encoding="utf-8")
+    assert run("check", "other").code == 0
+
+
+def test_conditions_that_are_declared_stay(game: Path):
+    toml = '[conditions.speed]\ntype = "number"\nmax = 50.0 # ours\n'
+    (game / "contextdb.toml").write_text(toml, encoding="utf-8")
+    describe("game/clips", "--out", "game/moves.csv")
+    assert (game / "contextdb.toml").read_text(encoding="utf-8").startswith(toml)
+
+
+def test_a_condition_that_cannot_take_the_cells_stops_it(game: Path):
+    (game / "contextdb.toml").write_text('[conditions.gait]\ntype = "enum"\nvalues = ["Swim"]\n', encoding="utf-8")
+    describe("game/clips", "--out", "game/moves.csv", code=2)
+    assert not (game / "moves.csv").exists()
+
+
+def test_a_file_that_is_no_clip_is_left_out_and_told(game: Path):
+    (game / "clips" / "bad.bvh").write_text("no clip", encoding="utf-8")
+    result = describe("game/clips", code=1)
+    assert "left out: game/clips/bad.bvh" in result.err
+    assert len(result.lines) == len(NAMES) + 1
+
+
+def test_clips_in_metres_are_taken_for_such(game: Path):
+    for name in NAMES:
+        clip = make_clip(name).clip
+        scaled = replace(clip.skeleton, offsets=clip.skeleton.offsets * 0.01)
+        values = clip.values.copy()
+        values[:, :3] *= 0.01
+        write_bvh(replace(clip, skeleton=scaled, values=values), game / "clips" / f"{name}.bvh")
+    result = describe("game/clips", "--json")
+    assert "a unit of 1 m (metres) is taken" in result.err
+    speeds = {clip["asset"]: clip["facts"]["speed_mps"]["middle"] for clip in result.json["clips"]}
+    assert speeds["walk"] == pytest.approx(1.3, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("nowhere",), "there is no such folder"),
+        (("game",), ""),
+        (("empty",), "there is no BVH file"),
+        (("game", "--out", "a.csv", "--into", "b.csv"), "one of the two"),
+        (("game", "--update"), "--into TABLE --update"),
+        (("game", "--metres-per-unit", "x"), "is not a unit"),
+    ],
+)
+def test_wrong_uses_are_told(game: Path, arguments: tuple[str, ...], told: str):
+    (game.parent / "empty").mkdir()
+    assert told in describe(*arguments, code=2 if told else 0).err
+
+
+# ---- a table that is there
+
+
+def test_filling_its_own_table_changes_nothing(game: Path):
+    describe("game/clips", "--out", "game/moves.csv")
+    before = [(game / name).read_bytes() for name in ("moves.csv", "contextdb.toml")]
+    assert "0 cells filled, 0 rows added" in describe("game/clips", "--into", "game/moves.csv").out
+    assert [(game / name).read_bytes() for name in ("moves.csv", "contextdb.toml")] == before
+
+
+def test_missing_columns_cells_and_rows_are_filled_and_what_is_written_stays(game: Path):
+    (game / "moves.csv").write_text("Name,speed,Mine\nwalk,1..1.5,x\njog,,y\nswim,,z\n", encoding="utf-8")
+    result = describe("game/clips", "--into", "game/moves.csv")
+    assert "no clip for 1 row" in result.err
+    header, *lines = rows(game / "moves.csv")
+    assert header == ["Name", "speed", "Mine", "gait", "direction", "turn", "style", "duration_s", "start", "end"]
+    assert lines[0][:4] == ["walk", "1..1.5", "x", "Walk"]
+    assert lines[2] == ["swim", "", "z", "", "", "", "", "", "", ""]
+    assert sorted(line[0] for line in lines[3:]) == sorted(set(NAMES) - {"walk", "jog"})
+
+
+def test_a_cell_that_its_clip_contradicts_is_told_and_replaced_on_demand(game: Path):
+    describe("game/clips", "--out", "game/moves.csv")
+    put(game, "walk_turn_left_90", "walk")
+    told = describe("game/clips", "--into", "game/moves.csv", code=1)
+    (line,) = [line for line in told.lines if "walk, turn:" in line]
+    assert "the clip shows" in line
+    found = run("motion", "describe", "game/clips", "--into", "game/moves.csv", "--json").json["differences"]
+    assert ("walk", "turn") in {(each["asset"], each["column"]) for each in found}
+    describe("game/clips", "--into", "game/moves.csv", "--update")
+    describe("game/clips", "--into", "game/moves.csv")
+
+
+# ---- captured clips
+
+
+@pytest.mark.skipif(not (MOCAP / "assets.csv").is_file(), reason="no captured clips: set CONTEXTDB_MOCAP to their folder")
+def test_the_table_of_all_captured_clips_checks_and_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "game").mkdir()
+    (tmp_path / "game" / "clips").symlink_to(MOCAP)
+    described = describe("game/clips", "--out", "game/moves.csv")
+    assert "units of CMU" in described.err
+    assert len(rows(tmp_path / "game" / "moves.csv")) == 129
+    assert run("check", "game", "--fail-on", "warning").code == 0
+    assert run("motion", "check", "game", "--fail-on", "error").code == 0
+    probed = run("motion", "probe", "game", "player", "--drive", "circle", "--drive", "straight", "--json")
+    assert probed.code == 0, probed.err
+    sessions = probed.json["sessions"]
+    assert len(sessions) >= 10
+    assert max(session["path_rms_m"] for session in sessions) < 0.2
+    assert max(session["jumps_per_s"] for session in sessions) < 6.0

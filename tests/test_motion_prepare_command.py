@@ -1,0 +1,151 @@
+"""`contextdb motion prepare` shows a diff that applies and is taken back, writes only when asked, and keeps what is there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from running import Result, run
+
+from contextdb.commands.motion_prepare_command import with_marks
+from contextdb.motion import Markup, Proposal, make_clip, write_bvh
+
+NAMES = ("idle", "walk", "start_walk", "stop_walk")
+HAND = "tag,asset,to,from\r\nMove.Walk,walk*,,\r\nLooping,idle,,"
+MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2] / "shared" / "data" / "mocap"))
+TOML = """
+[features.loco]
+rate = 30.0
+channels = [{ type = "position", bone = "LeftFoot" }]
+[databases.loco] # all of them
+clips = "clips/*.bvh"
+features = "loco"
+"""
+
+
+@pytest.fixture
+def game(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "game" / "clips").mkdir(parents=True)
+    for name in NAMES:
+        write_bvh(make_clip(name).clip, tmp_path / "game" / "clips" / f"{name}.bvh", digits=4)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "game"
+
+
+def prepare(*arguments: str, code: int = 0) -> Result:
+    result = run("motion", "prepare", *arguments)
+    assert result.code == code, result.out + result.err
+    return result
+
+
+def as_bytes(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def test_without_write_nothing_changes_and_the_reasons_come_first(game: Path):
+    before = as_bytes(game)
+    result = prepare("game/clips", code=1)
+    assert as_bytes(game) == before
+    assert "# walk: Looping all of it: its ends are 0.0 cm" in result.out
+    assert "# walk: Contact.Left: 5 stances" in result.out
+    assert "+start_walk,NextNaturalOnly,0.733,1.167,0.2" in result.lines
+    assert result.out == prepare("game/clips", code=1).out
+
+
+def test_what_is_written_is_stable_when_run_again(game: Path):
+    prepare("game/clips", "--write")
+    before = as_bytes(game)
+    again = prepare("game/clips", "--write")
+    assert "nothing to propose" in again.err
+    assert as_bytes(game) == before
+    assert prepare("game/clips").code == 0
+
+
+def test_lines_by_hand_stay_and_their_columns_and_line_ends_are_kept(game: Path):
+    file = game / "clips" / "marks.csv"
+    file.write_bytes(HAND.encode())
+    prepare("game/clips", "--write")
+    text = file.read_bytes().decode()
+    assert text.startswith(HAND + "\r\n")
+    assert "\n" not in text.replace("\r\n", "")
+    assert "Looping,walk,,\r\n" in text
+    assert text.count("Looping,idle") == 1
+    assert Markup.load(file).is_looping("walk")
+
+
+def test_a_project_names_the_markup_that_it_gets(game: Path):
+    (game / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    prepare("game", "--write", "--only", "loops")
+    toml = (game / "contextdb.toml").read_text(encoding="utf-8")
+    assert 'markup = "clips/marks.csv"' in toml
+    assert "[databases.loco] # all of them" in toml
+    assert (game / "clips" / "marks.csv").read_text(encoding="utf-8") == (
+        "asset,tag,from,to,value\nidle,Looping,,,\nwalk,Looping,,,\n"
+    )
+    assert prepare("game", "--only", "loops").out == ""
+    assert run("motion", "build", "game").code == 0
+
+
+@pytest.mark.skipif(shutil.which("patch") is None, reason="no patch on this machine")
+@pytest.mark.parametrize(
+    "hand", [None, HAND, HAND + "\r\n", "asset,tag,from,to,value\nidle,Looping,,,\n", "asset,tag,from,to\na,B,,"]
+)
+def test_the_diff_applies_and_is_taken_back(game: Path, hand: str | None):
+    (game / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    file = game / "clips" / "marks.csv"
+    if hand is not None:
+        file.write_bytes(hand.encode())
+    before = as_bytes(game)
+    diff = run("motion", "prepare", "game", "--json").json["files"]
+    text = "".join(each["diff"] for each in diff)
+    patched(game, text)
+    applied = as_bytes(game)
+    patched(game, text, "-R")
+    assert as_bytes(game) == before
+    prepare("game", "--write")
+    assert as_bytes(game) == applied
+
+
+def patched(folder: Path, diff: str, *more: str) -> None:
+    command = ["patch", "-p1", "--binary", "--no-backup-if-mismatch", *more]
+    done = subprocess.run(command, input=diff.encode(), cwd=folder, capture_output=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_document_has_each_proposal_with_reason_and_measure(game: Path):
+    document = run("motion", "prepare", "game/clips", "--json").json
+    assert document["format"] == 1
+    assert document["written"] is False
+    (loop,) = [each for each in document["proposals"] if (each["asset"], each["kind"]) == ("walk", "loops")]
+    assert loop["tag"] == "Looping"
+    assert loop["measure"] < 0.001
+
+
+def test_markup_that_cannot_be_read_stops_it(game: Path):
+    (game / "clips" / "marks.csv").write_text("asset,tag,from,to\nwalk,DoNotChose,,\n", encoding="utf-8")
+    assert "DoNotChoose" in prepare("game/clips", "--write", code=2).err
+
+
+@pytest.mark.parametrize("arguments", [("nowhere",), ("game", "--only", "lops"), ("empty",)])
+def test_wrong_uses_are_refused(game: Path, arguments: tuple[str, ...]):
+    (game.parent / "empty").mkdir()
+    assert prepare(*arguments, code=2).out == ""
+
+
+def test_marks_are_quoted_where_they_must_be():
+    mark = Proposal('a,"b"', "loops", "Looping", None, None, None, "", 0.0)
+    text = with_marks("", [mark])
+    assert Markup.parse(text).is_looping('a,"b"')
+
+
+@pytest.mark.skipif(not (MOCAP / "assets.csv").is_file(), reason="no captured clips: set CONTEXTDB_MOCAP to their folder")
+def test_proposals_for_captured_clips_are_stable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(MOCAP, tmp_path / "clips")
+    told = prepare("clips", "--write")
+    assert "NextNaturalOnly" in told.out
+    assert len(Markup.load(tmp_path / "clips" / "marks.csv").spans) > 1000
+    assert "nothing to propose" in prepare("clips").err

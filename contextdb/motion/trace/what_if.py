@@ -10,7 +10,7 @@ from a generator of its own, so that a session with variation is compared with i
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -102,8 +102,8 @@ def what_if(recorded: Reasked, changed: Reasked) -> WhatIf:
     )
 
 
-def run_again(asked: Reasked) -> list[Decision]:
-    """The decisions of a session run again in closed loop, with what is asked otherwise.
+def run_again(asked: Reasked, on_step: Callable[[], None] | None = None) -> list[Decision]:
+    """The decisions of a session run again in closed loop, with what is asked otherwise; `on_step` is called after each.
 
     Raises
     ------
@@ -119,7 +119,12 @@ def run_again(asked: Reasked) -> list[Decision]:
             )
         )
     runner = _Runner.of(asked, decisions)
-    return [runner.update(each) for each in decisions]
+    found = []
+    for each in decisions:
+        found.append(runner.update(each))
+        if on_step is not None:
+            on_step()
+    return found
 
 
 @dataclass(eq=False)

@@ -151,7 +151,7 @@ class Bars(Widget, can_focus=True):
         """One line of the screen."""
         width = self.size.width
         if y == 0:
-            head = f"  {fitted('asset', self._name_width)} {'best':>{COST}} every frame: tall is cheap, blue may play"
+            head = f"  {fitted('asset', self._name_width)} {'best':>{COST}} every frame: tall is cheap"
             return Strip([Segment(fitted(head, width), self.get_component_rich_style("bars--head"))])
         at = self.top + y - 1
         if self.note and y == 1:

@@ -14,9 +14,9 @@ from contextdb.motion.clips.quaternions import Floats
 
 LEAST_ZOOM, MOST_ZOOM = 0.2, 8.0
 MOST_PITCH = math.radians(89.0)
-SHOWN_HIGH_M, SHOWN_WIDE_M = 2.35, 2.6
+SHOWN_HIGH_M, SHOWN_WIDE_M = 2.1, 2.6
 """So much fits at zoom 1."""
-GROUND_SHARE = 0.8
+GROUND_SHARE = 0.84
 """How far down on the canvas the body stands."""
 
 

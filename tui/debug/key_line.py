@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from tui.debug.keys import name_of
+from tui.debug.keys import TOGETHER, name_of
 from tui.widgets.key_line import Key, KeyLine
 
 
@@ -13,4 +13,4 @@ class DebugKeyLine(KeyLine):
     """The keys that are bound now, letters as they are."""
 
     def _bound(self) -> Iterator[Key]:
-        return (replace(key, name=name_of(key.key)) for key in super()._bound())
+        return (replace(key, name=TOGETHER.get(key.key) or name_of(key.key)) for key in super()._bound())

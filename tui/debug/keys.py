@@ -29,11 +29,11 @@ KEYS = (
     Key("left", "step(-1)", "Step back", "One update earlier.", TIME),
     Key("shift+right", "step(10)", "Ten", "Ten updates later.", TIME),
     Key("shift+left", "step(-10)", "Ten back", "Ten updates earlier.", TIME),
-    Key("right_square_bracket", "jump(1)", "Next jump", "To the next jump.", TIME, True),
+    Key("right_square_bracket", "jump(1)", "Jump", "To the next jump.", TIME, True),
     Key("left_square_bracket", "jump(-1)", "Last jump", "To the jump before.", TIME),
     Key("n", "peak(1)", "Peak", "To the next peak of the chosen measure.", TIME, True),
     Key("N", "peak(-1)", "Peak before", "To the peak before.", TIME),
-    Key("m", "measure", "Measure", "Choose the next measure: its strip is marked with ▸.", TIME, True),
+    Key("m", "measure", "Measure", "Choose the next measure: its strip is marked with ▸.", TIME),
     Key("home", "end(-1)", "Start", "To the start of the session.", TIME),
     Key("end", "end(1)", "End", "To its end.", TIME),
     Key("space", "play", "Play", "Play from here, or stop.", TIME, True),
@@ -42,7 +42,7 @@ KEYS = (
     Key(
         "tab",
         "pane(1)",
-        "Next pane",
+        "Pane",
         "To the next pane: bars, why, poses, weights. A small screen shows one of them.",
         CHOOSE,
         True,
@@ -55,14 +55,14 @@ KEYS = (
     Key(
         "plus,equals_sign",
         "turn(1)",
-        "Weight up",
+        "Weight",
         "Turn up the weight, or threshold, under the cursor of the weights.",
         WEIGHTS,
         True,
     ),
-    Key("minus", "turn(-1)", "Weight down", "Turn it down.", WEIGHTS, True),
+    Key("minus", "turn(-1)", "Weight down", "Turn it down.", WEIGHTS),
     Key("0", "reset", "Reset", "All weights and thresholds as they were recorded.", WEIGHTS),
-    Key("r", "run", "Run again", "Run the whole session again with these weights; Esc ends it.", WEIGHTS, True),
+    Key("r", "run", "Run", "Run the whole session again with these weights; Esc ends it.", WEIGHTS, True),
     Key("w", "write", "Write", "Write turned weights and thresholds into contextdb.toml.", WEIGHTS),
     Key("u", "undo", "Undo", "Take back what was written last.", WEIGHTS),
     Key("h", "orbit(-1, 0)", "Turn left", "Look from farther left; also by dragging.", LOOK),
@@ -96,6 +96,10 @@ NAMES = {
     "f1": "F1",
     "ctrl+q": "Ctrl+Q",
 }
+
+
+TOGETHER = {"right_square_bracket": "[ ]", "plus": "+ -"}
+"""Keys that the foot of the screen shows with their opposite."""
 
 
 def name_of(key: str) -> str:

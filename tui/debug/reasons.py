@@ -9,7 +9,7 @@ from typing import Any
 from contextdb.errors import ContextDBError
 from contextdb.motion.trace.cost_views import cost_text
 from contextdb.motion.trace.other_filters import UNKNOWN
-from contextdb.motion.trace.why_not import WhyNot, why_not
+from contextdb.motion.trace.why_not import why_not
 from tui.debug.landscape import Row
 from tui.debug.recording import Moment, Recording
 
@@ -40,16 +40,10 @@ def _why(moment: Moment, row: Row) -> Iterator[Line]:
     for reason in told.reasons:
         yield Line(f"  {reason}", "bad")
     yield Line("it would win with" if any(each.wins for each in told.changes) else "no single change is enough", "head")
-    for each in told.changes:
+    for each in sorted(told.changes, key=lambda change: not change.wins):
         to = each.to if isinstance(each.to, str) else f"{each.to:.4g}"
-        yield Line(
-            f"  {_change(told, each.kind)}{each.what} → {to}{'' if each.wins else '   (not enough)'}",
-            "good" if each.wins else "dim",
-        )
-
-
-def _change(told: WhyNot, kind: str) -> str:
-    return f"{kind} "
+        sign, kind = ("✓", "good") if each.wins else ("– not enough:", "dim")
+        yield Line(f"  {sign} {each.kind} {each.what} → {to}", kind)
 
 
 def _table(recording: Recording, moment: Moment, row: Row) -> Iterator[Line]:

@@ -52,7 +52,7 @@ HIGH = 44
 PANES = ("bars", "why", "stage", "channels")
 TITLES = {"bars": "Bars", "why": "Why", "stage": "Poses", "channels": "Weights"}
 FRAME_S = 1.0 / 30.0
-STYLES = {"head": "bold", "plain": "", "bad": "$error", "good": "$success", "dim": "$text-muted"}
+STYLES = {"head": "bold", "plain": "", "bad": "$error", "good": "$success", "dim": "$foreground 55%"}
 
 
 class DebugScreen(Screen[None]):

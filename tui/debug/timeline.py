@@ -255,8 +255,8 @@ class Timeline(Widget):
     def _strip(self, name: str, edges: Ints) -> tuple[tuple[str, Style], list[tuple[str, Style]]]:
         values = np.nan_to_num(self.strips[name], nan=0.0)
         first, stop = int(edges[0]), int(edges[-1])
-        starts = np.minimum(edges[:-1], len(values) - 1)
-        peaks = np.maximum.reduceat(values, starts) if stop > first else np.zeros(self._n_columns)
+        starts = np.minimum(edges[:-1], stop - 1)
+        peaks = np.maximum.reduceat(values[:stop], starts) if stop > first else np.zeros(self._n_columns)
         top = float(np.quantile(values, 0.995)) if len(values) else 0.0
         is_chosen = name == self.measure
         style = self.get_component_rich_style("timeline--chosen" if is_chosen else "timeline--strip")

@@ -34,7 +34,6 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     trace = Trace.load(arguments.file)
     if not len(trace):
         raise MotionError(Fault("the session has no decision.", "one with at least an update", place=Place(arguments.file)))
-    require_terminal(INSTEAD)
     folder, _ = project_of(trace, arguments.folder, arguments.file)
     try:
         databases, why = databases_of(trace, arguments.folder, arguments.file)
@@ -43,6 +42,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             raise
         databases, why = {}, error.faults[0].message
     why = why or trace.use(databases)
+    require_terminal(INSTEAD)
     from tui.run import debug
 
     debug(arguments.file, trace, folder, databases, why)

@@ -70,7 +70,7 @@ def _section(title: str, lines: tuple[tuple[str, str], ...]) -> Table:
     table = Table(
         title=Text(title, style="bold"), title_justify="left", box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0)
     )
-    table.add_column(min_width=16, max_width=24)
+    table.add_column(min_width=16, max_width=36)
     table.add_column()
     for left, right in lines:
         table.add_row(Text(left, style="bold"), Text(right))

@@ -52,6 +52,7 @@ HIGH = 44
 PANES = ("bars", "why", "stage", "channels")
 TITLES = {"bars": "Bars", "why": "Why", "stage": "Poses", "channels": "Weights"}
 FRAME_S = 1.0 / 30.0
+SAME_S = 1e-6
 STYLES = {"head": "bold", "plain": "", "bad": "$error", "good": "$success", "dim": "$foreground 55%"}
 
 
@@ -261,7 +262,7 @@ class DebugScreen(Screen[None]):
     def play_to(self, time_s: float) -> None:
         """Show the moment of a second of the session; stop at its end."""
         times = self.recording.line.times_s
-        index = int(np.searchsorted(times, time_s, side="right")) - 1
+        index = int(np.searchsorted(times, time_s + SAME_S, side="right")) - 1
         if index != self.index:
             self.go(index)
         if time_s >= times[-1]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from textual.app import App
-
 from tui.debug.recording import Recording
 from tui.debug.screen import DebugScreen
+from tui.one_key import OneKeyAtATime
 from tui.themes import DARK, THEMES
 
 
-class DebugApp(App[None]):
+class DebugApp(OneKeyAtATime):
     """The debugger of a session."""
 
     TITLE = "contextdb"

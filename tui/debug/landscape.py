@@ -5,7 +5,7 @@ R ranges of all databases that were searched. Costs are those of `contextdb.moti
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,6 +34,8 @@ class Row:
     cost: float
     left_out: LeftOut
     """Why its best frame may not be chosen."""
+    is_searched: bool
+    """Whether its database was searched, and none before it won outright."""
 
     @property
     def name(self) -> str:
@@ -43,15 +45,22 @@ class Row:
     @property
     def may_play(self) -> bool:
         """Whether any of its frames may be chosen."""
-        return self.left_out is LeftOut.NO
+        return self.left_out is LeftOut.NO and self.is_searched
+
+    @property
+    def reason(self) -> str:
+        """Why none may; "" where one may."""
+        return self.left_out.text or ("" if self.is_searched else "another database won before it was searched")
 
 
 class Landscape:
-    """The costs of all frames that were searched."""
+    """The costs of all frames that were, or could have been, searched; `searched` are the databases that were."""
 
-    def __init__(self, searches: Mapping[str, ReaskedSearch]) -> None:
+    def __init__(self, searches: Mapping[str, ReaskedSearch], searched: Collection[str] = ()) -> None:
         self.searches = dict(searches)
-        self.rows: tuple[Row, ...] = tuple(row for name, search in self.searches.items() for row in _rows(name, search))
+        self.rows: tuple[Row, ...] = tuple(
+            row for name, search in self.searches.items() for row in _rows(name, search, name in searched)
+        )
 
     def ordered(self, order: str, text: str = "", uses: Mapping[tuple[str, bool], int] | None = None) -> list[Row]:
         """The rows whose asset's name holds a text, by "best" cost, by "name", or by "use" in the session."""
@@ -86,8 +95,8 @@ class Landscape:
         costs, is_free = search.costs[start:stop], search.left_out[start:stop] == LeftOut.NO
         of_free = np.minimum.reduceat(np.where(is_free, costs, np.inf), edges)
         of_all = np.minimum.reduceat(costs, edges)
-        may = np.isfinite(of_free)
-        return self._levels(np.where(may, of_free, of_all)), may, (start, stop)
+        may = np.isfinite(of_free) & row.is_searched
+        return self._levels(np.where(np.isfinite(of_free), of_free, of_all)), may, (start, stop)
 
     def _levels(self, costs: Floats) -> Ints:
         least, most = self.reach
@@ -95,7 +104,7 @@ class Landscape:
         return np.where(np.isfinite(costs), 1 + np.round(shares * (LEVELS - 1)), 0).astype(np.int64)
 
 
-def _rows(name: str, search: ReaskedSearch) -> Sequence[Row]:
+def _rows(name: str, search: ReaskedSearch, is_searched: bool) -> Sequence[Row]:
     database = search.database
     starts, stops = np.asarray(database.starts, np.int64), np.asarray(database.stops, np.int64)
     found = []
@@ -106,5 +115,5 @@ def _rows(name: str, search: ReaskedSearch) -> Sequence[Row]:
         free = np.where(why == LeftOut.NO, costs, np.inf)
         at = int(free.argmin()) if np.isfinite(free).any() else int(costs.argmin())
         mirrored = bool(database.mirrored[i])
-        found.append(Row(name, i, database.assets[i], mirrored, start + at, float(costs[at]), LeftOut(int(why[at]))))
+        found.append(Row(name, i, database.assets[i], mirrored, start + at, float(costs[at]), LeftOut(int(why[at])), is_searched))
     return found

@@ -137,6 +137,8 @@ class Recording:
         self.searches = np.flatnonzero(self.line.searched)
         self.jumps = np.flatnonzero(self.line.jumped)
         self._decisions: list[Decision] | None = None
+        self.run_again: Mapping[str, float | None] | None = None
+        """Its measures run again with nothing turned, once they are known."""
 
     @property
     def name(self) -> str:
@@ -288,4 +290,4 @@ class Moment:
     @cached_property
     def landscape(self) -> Landscape:
         """The costs of all frames; empty where the search cannot be asked again."""
-        return Landscape({} if self.turned is None else self.turned.searched)
+        return Landscape({}) if self.turned is None else Landscape(self.turned.searches, self.turned.searched)

@@ -184,13 +184,14 @@ class DebugScreen(Screen[None]):
         self.query_one("#left").display = bool(seen & {"stage", "channels"})
         self.query_one("#right").display = bool(seen & {"bars", "why"})
         self.query_one("#detail").display = "bars" in seen
+        self._show_stage()
+        self._show_reasons()
 
     def action_pane(self, by: int) -> None:
         """Give another pane the focus."""
         self._pane = PANES[(PANES.index(self._pane) + by) % len(PANES)]
         self._arrange()
         self.query_one(f"#{self._pane}").focus()
-        self._show_reasons()
 
     # ---- time
 
@@ -376,7 +377,7 @@ class DebugScreen(Screen[None]):
         database = search.database
         rate = 30.0 if database.schema is None else database.schema.rate
         at_s = (row.frame - int(database.starts[row.range])) / rate
-        out = "" if row.may_play else f" · left out: {row.left_out.text}"
+        out = "" if row.may_play else f" · left out: {row.reason}"
         tags = [
             tag
             for tag, has in zip(database.marks.tags, database.marks.kind_tags[database.marks.kinds[row.frame]], strict=True)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from contextdb.motion.trace.reasked import Reasked
+from contextdb.motion.trace.reasked import Changes, Reasked
 from contextdb.motion.trace.stats import measures_of
 from contextdb.motion.trace.what_if import run_again
 from tui.debug.recording import Recording, Turned
 
+Measured = Mapping[str, float | None]
 Progress = Callable[[float], None]
 """Is told the share that is done; raises Cancelled to end it."""
 LABELS = (
@@ -38,8 +39,8 @@ class Outcome:
     searches: int
     other_frames: int
     other_assets: int
-    before: Mapping[str, float | None]
-    after: Mapping[str, float | None]
+    before: Measured
+    after: Measured
 
     @property
     def text(self) -> str:
@@ -56,23 +57,36 @@ def outcome_of(recording: Recording, turned: Turned, progress: Progress) -> Outc
     """What weights make of a session. Raises MotionError where it cannot be run again."""
     n = len(recording)
     steps = _Steps(progress, 4 * n)
-    decisions = recording.decisions(steps.step)
+    recording.decisions(steps.step)
     steps.at(n)
-    changes = Reasked(
-        decisions, recording.trace.about, recording.stock, {"weights": turned.weights, "thresholds": dict(turned.thresholds)}
-    )
+    counts = asked_again(recording, turned, steps.step)
+    return Outcome(*counts, *run_both(recording, turned, steps.step))
+
+
+def asked_again(recording: Recording, turned: Turned, on_step: Callable[[], None]) -> tuple[int, int, int]:
+    """How many searches there are, and how many choose another frame, and another asset."""
     n_searches = n_frames = n_assets = 0
-    for asked in changes:
-        steps.step()
+    for asked in _reasked(recording, turned):
+        on_step()
         if asked.choice is not None:
             n_searches += 1
             n_frames += asked.is_changed
             n_assets += asked.is_other_asset
-    recorded = Reasked(decisions, recording.trace.about, recording.stock, {})
+    return n_searches, n_frames, n_assets
+
+
+def run_both(recording: Recording, turned: Turned, on_step: Callable[[], None]) -> tuple[Measured, Measured]:
+    """The measures of the session run again in closed loop, without the weights and with them."""
     about = recording.trace.about
-    before = measures_of(run_again(recorded, steps.step), about)
-    after = measures_of(run_again(changes, steps.step), about)
-    return Outcome(n_searches, n_frames, n_assets, before, after)
+    if recording.run_again is None:
+        recording.run_again = measures_of(run_again(_reasked(recording, Turned()), on_step), about)
+    return recording.run_again, measures_of(run_again(_reasked(recording, turned), on_step), about)
+
+
+def _reasked(recording: Recording, turned: Turned) -> Reasked:
+    decisions = recording.decisions(lambda: None)
+    changes: Changes = {"weights": turned.weights, "thresholds": dict(turned.thresholds)}
+    return Reasked(decisions, recording.trace.about, recording.stock, changes)
 
 
 class _Steps:

@@ -226,8 +226,9 @@ def _rows(asked: ReaskedDecision, at: Place) -> list[Row]:
     if table is None or context is None:
         return []
     try:
-        explained = table.compile().explain(_facts(asked), unknown=UNKNOWN)
-        return [row for row in explained if row.asset == at.asset and not row.is_valid]
+        found = table.compile().explain(_facts(asked), unknown=UNKNOWN).asset(at.asset)
+        own = [row for row in found if row.asset == at.asset and not row.is_valid]
+        return sorted(own, key=lambda row: len(row.failures))
     except ContextDBError:
         return []
 

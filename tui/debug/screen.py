@@ -22,7 +22,7 @@ from textual.screen import Screen
 from textual.timer import Timer
 from textual.widget import Widget
 from textual.widgets import Input, Static
-from textual.worker import get_current_worker
+from textual.worker import Worker, WorkerState, get_current_worker
 
 from contextdb.console import printable
 from contextdb.edits.schema_file import SchemaChange
@@ -500,18 +500,19 @@ class DebugScreen(Screen[None]):
             self.say("The weight of every channel would be 0: at least one is to be above it.")
             return
         self._turn(Turned(weights, thresholds))
+        keys = "r runs the whole session with it, w writes it, 0 takes it back." if self.turned else "All is as it was recorded."
+        self.say(f"{dial.label} {dial.now:g} → {now:g} · {keys}")
 
     def action_reset(self) -> None:
         """As it was recorded."""
         self._turn(Turned())
+        self.say("All is as it was recorded.")
 
     def _turn(self, turned: Turned) -> None:
         self.turned = turned
         if self.moment is not None:
             self.moment = self.moment.with_turned(turned)
             self._show()
-        if turned:
-            self.say("r runs the whole session with these weights, w writes them into contextdb.toml, 0 takes them back.")
 
     def action_write(self) -> None:
         """Write what is turned into contextdb.toml."""
@@ -626,6 +627,11 @@ class DebugScreen(Screen[None]):
 
         return progress
 
+    def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
+        """Say why work beside the screen has ended."""
+        if event.state is WorkerState.ERROR:
+            self.say(str(event.worker.error), is_error=True)
+
     def action_stop(self) -> None:
         """End what is at work, or show all assets again."""
         field = self.query_one("#find", Input)
@@ -633,9 +639,10 @@ class DebugScreen(Screen[None]):
         if self._playing is not None:
             self._stop_playing()
         elif field.has_class("-shown") or self.text:
+            if field.has_focus:
+                self.bars.focus()
             field.remove_class("-shown")
             field.value = ""
-            self.bars.focus()
         elif is_at_work:
             self.workers.cancel_node(self)
             self.say("Ended.")

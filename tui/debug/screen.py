@@ -595,7 +595,7 @@ class DebugScreen(Screen[None]):
     def measure(self) -> None:
         """Make the poses of the session, and measure them."""
         progress = self._progress("poses and measures")
-        steps = _counted(progress, 2 * len(self.recording))
+        steps = _counted(progress, 3 * len(self.recording))  # the last third is measuring
         try:
             banks = self.recording.open_banks()
             self.app.call_from_thread(self._take_banks, banks)

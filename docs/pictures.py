@@ -21,7 +21,9 @@ from itertools import accumulate
 from pathlib import Path
 
 from drawing import Look, Run, Sheet, svg
-from screens import SCENES, Scene, draw_scene
+
+from screens import SCENES, Scene, draw_scene  # isort: skip - it says where tui is
+from debug_screens import DEBUG_SCENES, DebugScene, draw_debug_scene
 from slips import Slip, make
 
 ROOT = Path(__file__).parent.parent
@@ -50,7 +52,7 @@ class Picture:
     steps: tuple[str | Slip, ...]
 
 
-PICTURES: dict[str, Picture | Scene] = {
+PICTURES: dict[str, Picture | Scene | DebugScene] = {
     "session.svg": Picture(
         "A terminal: contextdb query lists the valid assets for a context and why the nearest others are not valid; "
         "contextdb check finds a misspelt cell and names its line and what was meant.",
@@ -61,13 +63,16 @@ PICTURES: dict[str, Picture | Scene] = {
         ),
     ),
     **SCENES,
+    **DEBUG_SCENES,
 }
 
 
-def draw(picture: Picture | Scene) -> str:
+def draw(picture: Picture | Scene | DebugScene) -> str:
     """The picture as SVG."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(ROOT / "tables", Path(folder) / "tables")
+        if isinstance(picture, DebugScene):
+            return draw_debug_scene(picture, Path(folder))
         if isinstance(picture, Scene):
             return draw_scene(picture, Path(folder))
         return svg(picture.title, [runs(line) for line in session(picture.steps, Path(folder))], PAPER)

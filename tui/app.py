@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections import deque
 from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import ClassVar
 
-from textual import events
 from textual.app import SystemCommand
 from textual.binding import BindingType
-from textual.dom import DOMNode
 from textual.screen import Screen
 from textual.theme import BUILTIN_THEMES
-from textual.widget import Widget
 
 from contextdb.errors import ContextDBError
 from contextdb.tables.merging.conflicts import Side
@@ -32,10 +27,6 @@ from tui.screens.conflicts import ConflictsDialog
 from tui.screens.leaving import HeldDialog, LeavingDialog
 from tui.screens.main import MainScreen
 from tui.themes import DARK, THEMES
-
-WAIT_FOR_PART_S = 2.0
-"""So long a key waits for a part of the screen that is still at work on the key before."""
-
 
 LOW = 14
 """On a screen of fewer lines the tools and the details give way to the rows."""
@@ -77,11 +68,8 @@ class EditorApp(Editor):
             self.register_theme(one)
         self.theme = theme or self.settings.theme or DARK
         self.set_keymap(dict(self.settings.keys))
-        self._ahead: deque[events.Event] = deque()
-        """What was typed before the key before it has done all it does."""
         self._outer: list[str] = []
         """The tables whose rows were gone into, and not come back from."""
-        self._settling: asyncio.Task[None] | None = None
 
     @staticmethod
     def theme_names() -> list[str]:
@@ -93,40 +81,6 @@ class EditorApp(Editor):
             Begin(self, self.workspace, self.workspace.beginning).ask()
         else:
             self.open_table(self.workspace.first)
-
-    # ---- typing faster than the screen
-
-    async def on_event(self, event: events.Event) -> None:
-        """Take one key at a time. A key can open an editor or a dialog, and what is typed after it is meant for that."""
-        is_waiting = self._settling is not None or bool(self._ahead)
-        if is_waiting and isinstance(event, (events.InputEvent, events.Paste)) and not event.is_forwarded:
-            self._ahead.append(event)
-        else:
-            await self._take(event)
-
-    async def _take(self, event: events.Event) -> None:
-        is_typed = isinstance(event, (events.Key, events.Paste)) and not event.is_forwarded
-        await super().on_event(event)
-        if is_typed and self._settling is None:
-            self._settling = asyncio.create_task(self._settle())
-
-    async def _settle(self) -> None:
-        """Wait until the parts that a key may have gone to have done their work, and those that it made are there."""
-        for _ in range(2):
-            for part in self._parts_at_work():
-                await _done(part)
-        self._settling = None
-        self.call_later(self._take_next)
-
-    def _parts_at_work(self) -> list[DOMNode]:
-        if not self.screen_stack:
-            return []
-        new = [part for part in self.screen.walk_children(Widget, with_self=True) if not part.is_mounted]
-        return [*(self.focused or self.screen).ancestors_with_self, *new, self]
-
-    async def _take_next(self) -> None:
-        while self._ahead and self._settling is None:
-            await self._take(self._ahead.popleft())
 
     # ---- tables
 
@@ -251,13 +205,3 @@ class EditorApp(Editor):
     def _leave(self) -> None:
         self.workspace.close()
         self.exit()
-
-
-async def _done(part: DOMNode) -> None:
-    """Wait until a part of the screen has handled all that it was told up to now; one that is being closed is not waited for."""
-    done = asyncio.Event()
-    if part.call_later(done.set):
-        try:
-            await asyncio.wait_for(done.wait(), WAIT_FOR_PART_S)
-        except TimeoutError:
-            return

@@ -5,13 +5,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 
-from textual.app import App
-
 from tui.editor_settings import EditorSettings
 from tui.model.importing import Import
+from tui.one_key import OneKeyAtATime
 
 
-class Editor(App[None]):
+class Editor(OneKeyAtATime):
     """The app around a screen; `tui.app.EditorApp` is the one there is."""
 
     settings: EditorSettings

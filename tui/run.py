@@ -1,10 +1,12 @@
-"""Run the editor in this terminal: what `contextdb edit` calls. An edge."""
+"""Run the editor or the debugger in this terminal: what `contextdb edit` and `contextdb motion debug` call. An edge."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
+from contextdb.motion import MotionDatabase, Trace
 from tui.app import EditorApp
 from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
 from tui.keyboard import read_whole_keys
@@ -34,6 +36,36 @@ def edit(path: str | None, theme: str | None = None) -> None:
     _forget_exported_size()
     read_whole_keys()
     EditorApp(workspace, settings, theme or _theme_for(settings)).run()
+
+
+def debug(file: str, trace: Trace, folder: str, databases: Mapping[str, MotionDatabase], missing: str) -> None:
+    """Show a recorded session, and stay until it is left.
+
+    Parameters
+    ----------
+    file : str
+        Its name.
+    trace : Trace
+        With a decision at least.
+    folder : str
+        Of its project; "" where there is none.
+    databases : mapping of name to MotionDatabase
+    missing : str
+        Why its searches cannot be asked again, in a sentence; "" when they can.
+
+    Raises
+    ------
+    ContextDBError
+        The settings cannot be taken.
+    """
+    from tui.debug.app import DebugApp
+    from tui.debug.recording import Recording
+
+    settings = read_settings(settings_path(), EditorApp.theme_names())
+    recording = Recording(file, trace, folder, databases, missing)
+    _forget_exported_size()
+    read_whole_keys()
+    DebugApp(recording, _theme_for(settings)).run()
 
 
 def _forget_exported_size() -> None:

@@ -28,18 +28,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Open the editor, and stay in it until it is left."""
-    _require_terminal()
+    require_terminal()
     from tui.run import edit
 
     edit(arguments.path, arguments.theme)
     return ExitCode.OK
 
 
-def _require_terminal() -> None:
+def require_terminal(instead: str = 'to use "contextdb query" and "contextdb check" in scripts') -> None:
+    """Raise TerminalError where there is no terminal to show a screen on."""
     term = os.environ.get("TERM", "" if os.name != "nt" else "windows")
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         found = "standard input and output are not a terminal."
-        raise TerminalError(Fault(found, "a terminal", 'to use "contextdb query" and "contextdb check" in scripts'))
+        raise TerminalError(Fault(found, "a terminal", instead))
     if term in ("", "dumb", "unknown"):
         found = f"the terminal cannot move its cursor (TERM is {term or 'not set'})."
         raise TerminalError(Fault(found, "a terminal such as xterm", "to set TERM=xterm-256color where the terminal is one"))

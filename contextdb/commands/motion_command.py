@@ -8,6 +8,7 @@
   contextdb motion search game/ loco --query walk@1.5 --speed 1.3
   contextdb motion run game/ player stick.csv --out session.parquet
   contextdb motion replay session.parquet --at 2.5s
+  contextdb motion debug session.parquet
 
 The command `demo --keep game` makes a project to try them on.
 """
@@ -25,6 +26,7 @@ COMMANDS = {
     "probe": "drive a character over the contexts of its tables by itself, and measure how well it moves",
     "measure": "how good the motion of a session is, beside the clips that it is made of",
     "replay": "what was decided in a recorded session, and why",
+    "debug": "the same in the terminal, moment by moment, with poses and weights to turn",
     "describe": "a table from clips: gait, speed, direction, turn and style of each",
     "prepare": "markup proposed for clips, as a diff: contacts, loops, ends, noise, starts, turns, duplicates",
 }

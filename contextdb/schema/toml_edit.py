@@ -59,6 +59,26 @@ def set_key(text: str, path: Path, value: object, behind: Sequence[Path] = ()) -
     return _inserted(text, at, [*blank, f"[{dotted(part)}]", f"{dotted(path[-1:])} = {as_toml(value)}"])
 
 
+def set_in_list(text: str, path: Path, place: int, key: str, value: object) -> str:
+    """The text with a key set in one of a list of tables, however the list is written: in one value, or as [[a.b]]."""
+    found = statements(text)
+    heads = [i for i, one in enumerate(found) if one.path == path and one.value is None]
+    if not heads:
+        items: Any = tomllib.loads(text)
+        for name in path:
+            items = items[name]
+        return set_key(text, path, [{**item, key: value} if i == place else item for i, item in enumerate(items)])
+    inside = [found[heads[place]]]
+    for one in found[heads[place] + 1 :]:
+        if one.value is None:
+            break
+        inside.append(one)
+    for one in inside:
+        if one.value and one.path == (*path, key):
+            return _replaced(text, one.value, as_toml(value))
+    return _inserted(text, inside[-1].stop, [_indent(text, inside[-1]) + f"{dotted((key,))} = {as_toml(value)}"])
+
+
 def add_sections(text: str, sections: Mapping[Path, Mapping[str, object]], behind: Sequence[Path] = ()) -> str:
     """The text with sections that it does not have yet, one behind the other, where `set_key` would put the first of them."""
     at = _end_of_section(text, statements(text), behind)

@@ -139,9 +139,9 @@ def _taken(items: list[_Item], value: Any) -> _Item:
     said, text = item.said, item.text
     if said == value:
         return item
-    if said.keys() != value.keys():
+    if not said.keys() <= value.keys():
         return replace(item, text=as_toml(value))
-    for key in (key for key in said if said[key] != value[key]):
+    for key in (key for key in value if key not in said or said[key] != value[key]):
         text = _inline(text, (key,), value[key])
     return replace(item, text=text)
 

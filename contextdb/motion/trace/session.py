@@ -130,6 +130,14 @@ class Trace(Sequence[Decision]):
         for place, row in enumerate(self._every_row("query", "candidates", FILTERS, INPUTS)):
             yield self._decision_of({**row, "query": None, "candidates": [], FILTERS: [], INPUTS: None}, place)
 
+    def columns(self, names: Sequence[str]) -> pl.DataFrame:
+        """Some columns of all rows, as the file has them."""
+        import polars as pl
+
+        own = _frame([{**dict.fromkeys(columns()), **row} for row in map(_unpacked, self._rows)])
+        frames = [own] if self._loaded is None else [self._loaded, own]
+        return pl.concat([frame.select(names) for frame in frames])
+
     def events(self, index: int) -> Events:
         """What the markup says of the frames that a decision mentions, by (database, frame), as far as it says anything."""
         place = self._place(index)

@@ -10,7 +10,7 @@ from a generator of its own, so that a session with variation is compared with i
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -103,8 +103,8 @@ def what_if(recorded: Reasked, changed: Reasked) -> WhatIf:
     )
 
 
-def run_again(asked: Reasked) -> list[Decision]:
-    """The decisions of a session run again in closed loop, with what is asked otherwise.
+def run_again(asked: Reasked, on_step: Callable[[], None] | None = None) -> list[Decision]:
+    """The decisions of a session run again in closed loop, with what is asked otherwise; `on_step` is called after each.
 
     Raises
     ------
@@ -120,7 +120,13 @@ def run_again(asked: Reasked) -> list[Decision]:
             )
         )
     runner = _Runner.of(asked, decisions)
-    return [runner.update(each) for each in progress(decisions, "running the session again")]
+    steps = progress(decisions, "running the session again") if on_step is None else decisions
+    found = []
+    for each in steps:
+        found.append(runner.update(each))
+        if on_step is not None:
+            on_step()
+    return found
 
 
 @dataclass(eq=False)

@@ -1,0 +1,143 @@
+"""A session as columns: what played when, what was searched and what it cost, without a look into queries and candidates.
+
+T updates. A session of ten minutes has 18,000; columns of them are read at once, and no `Decision` is made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.selection.decision import Action
+from contextdb.motion.trace.rows import BODY, FILTERS
+from contextdb.motion.trace.session import Trace
+
+if TYPE_CHECKING:
+    from polars import Expr, Series
+
+Flags = NDArray[np.bool_]
+CHANGES = (str(Action.START), str(Action.JUMP))
+READ = ("tick", "time_s", "action", "searched", "playing", "cost", "continuing_cost", "context", "root_motion", *BODY, FILTERS)
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """The updates of a session.
+
+    Attributes
+    ----------
+    ticks : int64 array, shape (T,)
+    times_s : float64 array, shape (T,)
+    assets : tuple of str
+        What plays anywhere, in the order in which it first does.
+    playing : int64 array, shape (T,)
+        Which of `assets` plays; -1 for nothing.
+    mirrored, searched, jumped, forced : bool arrays, shape (T,)
+        `jumped` where something begins to play, by a jump or at the start; `forced` where it had to jump: nothing could play on.
+    new_facts : bool array, shape (T,)
+        Whether the context is another than one update before.
+    costs, continuing : float64 arrays, shape (T,)
+        Of the last search: the chosen frame, and playing on; NaN where there was none.
+    n_valid : float64 array, shape (T,)
+        How many ranges could play at the last search; NaN where the session does not say.
+    roots : float64 array, shape (T, 3)
+        x, z and heading of the body: the game's, or, where the session does not say it, what the animations moved.
+    """
+
+    ticks: Ints
+    times_s: Floats
+    assets: tuple[str, ...]
+    playing: Ints
+    mirrored: Flags
+    searched: Flags
+    jumped: Flags
+    forced: Flags
+    new_facts: Flags
+    costs: Floats
+    continuing: Floats
+    n_valid: Floats
+    roots: Floats
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    @property
+    def rate(self) -> float:
+        """About how many updates a second has."""
+        return 1.0 / float(np.median(np.diff(self.times_s))) if len(self) > 1 and self.times_s[-1] > self.times_s[0] else 30.0
+
+    @property
+    def seconds(self) -> float:
+        """From the first update to the last."""
+        return float(self.times_s[-1] - self.times_s[0]) if len(self) else 0.0
+
+    def uses(self) -> dict[tuple[str, bool], int]:
+        """In how many updates each asset plays, as it is and mirrored."""
+        keys, counts = np.unique(2 * self.playing[self.playing >= 0] + self.mirrored[self.playing >= 0], return_counts=True)
+        return {(self.assets[key // 2], bool(key % 2)): n for key, n in zip(keys.tolist(), counts.tolist(), strict=True)}
+
+
+def timeline_of(trace: Trace) -> Timeline:
+    """The columns of a session."""
+    import polars as pl
+
+    playing, ranges = pl.col("playing").struct, pl.element().struct.field("ranges")
+    motion = [pl.col("root_motion").struct.field(name).fill_null(0.0) for name in ("left_m", "ahead_m", "turn_rad")]
+    action = pl.col("action")
+    found = trace.columns(READ).select(
+        "tick",
+        "time_s",
+        playing.field("asset"),
+        playing.field("mirrored").fill_null(False),
+        "searched",
+        *BODY,
+        jumped=action.is_in(CHANGES),
+        forced=(action == str(Action.JUMP)) & pl.col("continuing_cost").is_null(),
+        new_facts=(pl.col("context") != pl.col("context").shift(1)).fill_null(False),
+        cost=_last_searched(pl.col("cost")),
+        continuing=_last_searched(pl.col("continuing_cost")),
+        n_valid=_last_searched(pl.col(FILTERS).list.eval(ranges.list.sum()).list.sum().cast(pl.Float64())),
+        left=motion[0],
+        ahead=motion[1],
+        turn=motion[2],
+    )
+    names = found["asset"].drop_nulls().unique(maintain_order=True).to_list()
+    numbers = {name: i for i, name in enumerate(names)}
+    roots = found.select(*BODY).to_numpy().astype(np.float64)
+    if np.isnan(roots).any():
+        roots = _moved(*(found[name].to_numpy() for name in ("left", "ahead", "turn")))
+    return Timeline(
+        ticks=found["tick"].to_numpy().astype(np.int64),
+        times_s=found["time_s"].to_numpy().astype(np.float64),
+        assets=tuple(names),
+        playing=np.array([-1 if name is None else numbers[name] for name in found["asset"]], np.int64),
+        **{name: found[name].to_numpy().astype(np.bool_) for name in ("mirrored", "searched", "jumped", "forced", "new_facts")},
+        costs=_numbers(found["cost"]),
+        continuing=_numbers(found["continuing"]),
+        n_valid=_numbers(found["n_valid"]),
+        roots=roots,
+    )
+
+
+def _last_searched(value: Expr) -> Expr:
+    """A value of the last search; NaN where it had none."""
+    import polars as pl
+
+    return pl.when("searched").then(value.fill_null(float("nan"))).forward_fill()
+
+
+def _numbers(values: Series) -> Floats:
+    return values.fill_null(float("nan")).to_numpy().astype(np.float64)
+
+
+def _moved(left: Floats, ahead: Floats, turn: Floats) -> Floats:
+    """Where a body comes to that begins at the origin: x, z and heading."""
+    heading = np.cumsum(turn)
+    facing = heading - turn
+    sin, cos = np.sin(facing), np.cos(facing)
+    return np.stack((np.cumsum(cos * left + sin * ahead), np.cumsum(cos * ahead - sin * left), heading), axis=1)

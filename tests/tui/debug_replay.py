@@ -1,0 +1,89 @@
+"""Replay files of the debugger, in replays/debug: the commands of `replay.py`, on a session of a project of made clips.
+
+    session [COLUMNS ROWS]      open it, in a terminal of 80 x 24 or that size
+    press, type, click, screen, file    as there; a file is one of the project
+
+`python tests/tui/debug_replay.py --update` writes what is shown now into the files.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent), str(HERE.parent.parent)]
+
+from replay import SCROLL_BAR, Replay, ReplayError, Step, _text, read_steps, written  # noqa: E402
+from running import run  # noqa: E402
+from terminal import alone, drive, screen_text  # noqa: E402
+from test_motion_commands import MARKS, STICK, TABLE, TOML  # noqa: E402
+
+from contextdb.commands.motion_replay_command import databases_of  # noqa: E402
+from contextdb.motion import Trace, make_clip, write_bvh  # noqa: E402
+from tui.debug.app import DebugApp  # noqa: E402
+from tui.debug.recording import Recording  # noqa: E402
+
+FILES = sorted((HERE / "replays" / "debug").glob("*.keys"))
+
+
+class DebugReplay(Replay):
+    """The debugger, driven by the steps of a file."""
+
+    def shown(self, steps: list[Step]) -> list[Step]:
+        """The steps with what is shown now."""
+        opening, *rest = steps
+        if opening.command != "session":
+            raise ReplayError("the first line is `session`")
+        self._make()
+        file = str(self.folder / "session.parquet")
+        trace = Trace.load(file)
+        databases, _ = databases_of(trace, None, file)
+        recording = Recording("session.parquet", trace, str(self.folder / "game"), databases, trace.use(databases))
+        app: Any = DebugApp(recording, measures=False)
+        self.app = app
+        columns, rows = map(int, opening.rest.split() or (80, 24))
+        return [opening, *drive(app, lambda pilot: self._all(pilot, rest), (columns, rows))]
+
+    def _make(self) -> None:
+        clips = self._path("clips")
+        clips.mkdir(parents=True)
+        for name, text in (("contextdb.toml", TOML), ("moves.csv", TABLE), ("clips/marks.csv", MARKS), ("../stick.csv", STICK)):
+            self._path(name).write_text(text, encoding="utf-8")
+        for name in ("idle", "walk", "walk_tired", "jog"):
+            write_bvh(make_clip(name).clip, clips / f"{name}.bvh", digits=3)
+        session = ("player", str(self.folder / "stick.csv"), "--out", str(self.folder / "session.parquet"))
+        assert run("motion", "run", str(self.folder / "game"), *session).code == 0
+        self.at_first = {"contextdb.toml": _text(self._path("contextdb.toml"))}
+
+    def _show(self, step: Step) -> Any:
+        if step.command != "screen":
+            return super()._show(step)
+        assert self.app is not None
+        text = screen_text(self.app).replace(str(self.folder), "FOLDER")
+        lines = [SCROLL_BAR.sub("", line) for line in text.splitlines()]
+        first, last = map(int, step.rest.split() or (0, len(lines) - 1))
+        return iter(lines[first : last + 1])
+
+    def _path(self, name: str) -> Path:
+        return self.folder / "game" / name
+
+
+def replayed(path: Path) -> tuple[str, str]:
+    """The text of a replay file, and what it would be if all that it shows is as it is now."""
+    text = path.read_text("utf-8")
+    steps, ending = read_steps(text)
+    with TemporaryDirectory() as folder, alone(Path(folder)):
+        return text, written([replace(step) for step in DebugReplay(Path(folder)).shown(steps)], ending)
+
+
+if __name__ == "__main__":
+    for each in FILES:
+        before, after = replayed(each)
+        if before != after:
+            print(f"{each.name}: {'written' if '--update' in sys.argv else 'differs'}")
+            if "--update" in sys.argv:
+                each.write_text(after, "utf-8")

@@ -1,0 +1,14 @@
+"""Replay files of the debugger show what its screen shows now."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import debug_replay
+import pytest
+
+
+@pytest.mark.parametrize("path", debug_replay.FILES, ids=lambda path: path.stem)
+def test_the_debugger_shows_what_a_replay_file_shows(path: Path):
+    before, now = debug_replay.replayed(path)
+    assert now.splitlines() == before.splitlines()

@@ -1,0 +1,1 @@
+"""The debugger of recorded sessions: `contextdb motion debug`."""

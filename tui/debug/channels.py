@@ -1,0 +1,160 @@
+"""Channels with their weights, which can be turned, and what each adds to the cost of three frames; thresholds below them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rich.segment import Segment
+from rich.style import Style
+from textual import events
+from textual.binding import Binding, BindingType
+from textual.message import Message
+from textual.strip import Strip
+from textual.widget import Widget
+
+from contextdb.motion.trace.cost_views import cost_text
+from tui.widgets.fitted import fitted
+
+NUMBER, COST, LEAST_NAME = 11, 9, 18
+
+
+@dataclass(frozen=True, slots=True)
+class Dial:
+    """A number that can be turned: the weight of a channel, or the threshold of a database.
+
+    `costs` are what a channel adds to what is chosen, to what would play on, and to the asset under the cursor.
+    """
+
+    name: str
+    is_weight: bool
+    recorded: float
+    now: float
+    costs: tuple[float | None, float | None, float | None] = (None, None, None)
+
+    @property
+    def label(self) -> str:
+        """As it is shown."""
+        return self.name if self.is_weight else f"threshold {self.name}"
+
+
+class Channels(Widget, can_focus=True):
+    """Weights and thresholds."""
+
+    ALLOW_SELECT = False
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up", "move(-1)", "Up", show=False),
+        Binding("down", "move(1)", "Down", show=False),
+    ]
+    COMPONENT_CLASSES: ClassVar[set[str]] = {
+        "channels--head",
+        "channels--plain",
+        "channels--cursor",
+        "channels--turned",
+        "channels--chosen",
+        "channels--playing",
+        "channels--asset",
+    }
+    DEFAULT_CSS = """
+    Channels {
+        background: $surface;
+        & .channels--head { color: $text-muted; }
+        & .channels--plain { color: $foreground; }
+        & .channels--cursor { background: $boost; text-style: bold; }
+        & .channels--turned { color: $warning; text-style: bold; }
+        & .channels--chosen { color: $success; }
+        & .channels--playing { color: $foreground 60%; }
+        & .channels--asset { color: $warning; }
+        &:focus .channels--cursor { background: $primary 35%; }
+    }
+    """
+
+    @dataclass
+    class Clicked(Message):
+        """One of the two arrows was clicked."""
+
+        up: bool
+
+    def __init__(self) -> None:
+        super().__init__(id="channels")
+        self.dials: list[Dial] = []
+        self.at = 0
+        self.top = 0
+
+    def get_content_height(self, container: object, viewport: object, width: int) -> int:
+        """A line for each number, and one above them."""
+        return 1 + len(self.dials)
+
+    @property
+    def dial(self) -> Dial | None:
+        """The number under the cursor."""
+        return self.dials[self.at] if self.dials else None
+
+    def show(self, dials: list[Dial]) -> None:
+        """Show these."""
+        is_longer = len(dials) != len(self.dials)
+        self.dials = dials
+        self.at = min(self.at, max(0, len(dials) - 1))
+        self._keep_in_sight()
+        self.refresh(layout=is_longer)
+
+    def action_move(self, by: int) -> None:
+        """To the next number."""
+        self.at = min(max(0, self.at + by), max(0, len(self.dials) - 1))
+        self._keep_in_sight()
+        self.refresh()
+
+    def _keep_in_sight(self) -> None:
+        n_lines = max(1, self.size.height - 1)
+        self.top = min(max(self.top, self.at - n_lines + 1), self.at)
+
+    def on_resize(self) -> None:
+        """Keep the cursor in sight."""
+        self._keep_in_sight()
+
+    def on_click(self, event: events.Click) -> None:
+        """Go to a number, or turn it."""
+        place = event.get_content_offset(self)
+        if place is not None and place.y >= 1 and self.top + place.y - 1 < len(self.dials):
+            self.at = self.top + place.y - 1
+            self.refresh()
+            x = place.x - 1 - self._name_width
+            if 0 <= x < NUMBER:
+                self.post_message(self.Clicked(x > NUMBER // 2))
+
+    # ---- painting
+
+    @property
+    def _n_costs(self) -> int:
+        return min(3, max(0, (self.size.width - 1 - LEAST_NAME - NUMBER) // (COST + 1)))
+
+    @property
+    def _name_width(self) -> int:
+        longest = max((len(dial.label) for dial in self.dials), default=LEAST_NAME)
+        room = self.size.width - 1 - NUMBER - self._n_costs * (COST + 1)
+        return max(LEAST_NAME, min(longest, room))
+
+    def render_line(self, y: int) -> Strip:
+        """One line of the screen."""
+        width, name_width = self.size.width, self._name_width
+        if y == 0:
+            heads = "".join(f" {text:>{COST}}" for text in ("chosen", "plays on", "at cursor")[: self._n_costs])
+            text = f" {fitted('channel', name_width)}{'weight':^{NUMBER}}{heads}"
+            return Strip([Segment(fitted(text, width), self.get_component_rich_style("channels--head"))])
+        at = self.top + y - 1
+        if at >= len(self.dials):
+            return Strip.blank(width, self.rich_style)
+        dial = self.dials[at]
+        over = self.get_component_rich_style("channels--cursor") if at == self.at else Style()
+        kind = "turned" if dial.now != dial.recorded else "plain"
+        plain = self.get_component_rich_style("channels--plain") + over
+        number = f"◀ {dial.now:g} ▶"
+        segments = [
+            Segment(f" {fitted(dial.label, name_width)}", plain),
+            Segment(f"{number:^{NUMBER}}"[:NUMBER], self.get_component_rich_style(f"channels--{kind}") + over),
+        ]
+        kinds = ("chosen", "playing", "asset")[: self._n_costs]
+        for cost, of in zip(dial.costs, kinds, strict=False):
+            style = self.get_component_rich_style(f"channels--{of}") + over
+            segments.append(Segment(f" {cost_text(cost):>{COST}}", style))
+        return Strip(segments).adjust_cell_length(width, plain)

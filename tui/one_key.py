@@ -1,0 +1,66 @@
+"""Typing faster than the screen: an app that takes one key at a time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+
+from textual import events
+from textual.app import App
+from textual.dom import DOMNode
+from textual.widget import Widget
+
+WAIT_FOR_PART_S = 2.0
+"""So long a key waits for a part of the screen that is still at work on the key before."""
+
+
+class OneKeyAtATime(App[None]):
+    """An app in which what is typed after a key that opens something is meant for that."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._ahead: deque[events.Event] = deque()
+        """What was typed before the key before it has done all it does."""
+        self._settling: asyncio.Task[None] | None = None
+
+    async def on_event(self, event: events.Event) -> None:
+        """Take one key at a time. A key can open an editor or a dialog, and what is typed after it is meant for that."""
+        is_waiting = self._settling is not None or bool(self._ahead)
+        if is_waiting and isinstance(event, (events.InputEvent, events.Paste)) and not event.is_forwarded:
+            self._ahead.append(event)
+        else:
+            await self._take(event)
+
+    async def _take(self, event: events.Event) -> None:
+        is_typed = isinstance(event, (events.Key, events.Paste)) and not event.is_forwarded
+        await super().on_event(event)
+        if is_typed and self._settling is None:
+            self._settling = asyncio.create_task(self._settle())
+
+    async def _settle(self) -> None:
+        """Wait until the parts that a key may have gone to have done their work, and those that it made are there."""
+        for _ in range(2):
+            for part in self._parts_at_work():
+                await _done(part)
+        self._settling = None
+        self.call_later(self._take_next)
+
+    def _parts_at_work(self) -> list[DOMNode]:
+        if not self.screen_stack:
+            return []
+        new = [part for part in self.screen.walk_children(Widget, with_self=True) if not part.is_mounted]
+        return [*(self.focused or self.screen).ancestors_with_self, *new, self]
+
+    async def _take_next(self) -> None:
+        while self._ahead and self._settling is None:
+            await self._take(self._ahead.popleft())
+
+
+async def _done(part: DOMNode) -> None:
+    """Wait until a part of the screen has handled all that it was told up to now; one that is being closed is not waited for."""
+    done = asyncio.Event()
+    if part.call_later(done.set):
+        try:
+            await asyncio.wait_for(done.wait(), WAIT_FOR_PART_S)
+        except TimeoutError:
+            return

@@ -77,6 +77,9 @@ from contextdb.motion.trace.stats import SessionStats
 from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
 from contextdb.motion.trace.why_not import WhyNot
 from contextdb.motion.trace.winning_changes import Change, ChangePart
+from contextdb.motion.walking.blending import Gait
+from contextdb.motion.walking.cycle import Cycle
+from contextdb.motion.walking.stances import Stances
 
 __all__ = [
     "ANY_TAGS",
@@ -104,12 +107,14 @@ __all__ = [
     "ControllerState",
     "Crowd",
     "CustomFunction",
+    "Cycle",
     "DatabaseSettings",
     "Decision",
     "Description",
     "Entry",
     "FeatureSchema",
     "Footfalls",
+    "Gait",
     "GateLook",
     "Hit",
     "Inputs",
@@ -158,6 +163,7 @@ __all__ = [
     "Skeleton",
     "Skip",
     "Span",
+    "Stances",
     "Status",
     "Steered",
     "TagFilter",

@@ -79,7 +79,9 @@ from contextdb.motion.trace.why_not import WhyNot
 from contextdb.motion.trace.winning_changes import Change, ChangePart
 from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
+from contextdb.motion.walking.footsteps import Footstep
 from contextdb.motion.walking.stances import Stances
+from contextdb.motion.walking.walker import Walker, WalkSettings, WalkState
 
 __all__ = [
     "ANY_TAGS",
@@ -114,6 +116,7 @@ __all__ = [
     "Entry",
     "FeatureSchema",
     "Footfalls",
+    "Footstep",
     "Gait",
     "GateLook",
     "Hit",
@@ -172,6 +175,9 @@ __all__ = [
     "Trajectory",
     "Updated",
     "Variation",
+    "WalkSettings",
+    "WalkState",
+    "Walker",
     "WarpShare",
     "WhatIf",
     "WhyNot",

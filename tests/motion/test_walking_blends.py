@@ -103,7 +103,7 @@ def test_a_blend_of_a_cycle_with_itself_is_that_cycle(share, phase):
 @pytest.mark.parametrize("share", [0.25, 0.5, 0.8])
 def test_a_foot_stands_still_in_a_blend(first, second, share):
     mix = Mix.of([cycle(first), cycle(second)], np.array([share, 1.0 - share]))
-    reach = min(each.stances.length(0) / 2.0 - 2.0 / len(each.rotations) for each in mix.cycles)
+    reach = min(each.stances.length(0) / 2.0 - 1.0 / len(each.rotations) for each in mix.cycles)
     phases = np.linspace(-reach, reach, 200)
     places = np.array([mix.toes_at(phase)[0] + np.array([0.0, 0.0, mix.stride_m * phase]) for phase in phases])
     duration_s = sum(weight * each.duration_s for each, weight in zip(mix.cycles, mix.weights, strict=True))

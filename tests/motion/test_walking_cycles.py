@@ -62,16 +62,18 @@ def test_a_made_clip_gives_its_speed_cadence_and_turn(name, is_given):
 @pytest.mark.parametrize("name", ["walk", "run", "walk_turn_left_45"])
 def test_phase_0_is_the_left_foot_in_mid_stance_and_the_right_foot_follows_half_a_cycle_later(name):
     made = make_clip(name)
-    stances, half = Cycle.of(made.clip, footfalls=made.footfalls).stances, made.recipe.pace.duty / 2.0
-    np.testing.assert_allclose(stances.down, (1.0 - half, 0.5 - half), atol=1e-3)
-    np.testing.assert_allclose(stances.up, (half, 0.5 + half), atol=1e-3)
+    cycle, half = Cycle.of(made.clip, footfalls=made.footfalls), made.recipe.pace.duty / 2.0
+    moment = 1.0 / len(cycle.rotations)
+    for foot, middle in enumerate((1.0, 0.5)):  # down from its first moment within the stance to its last
+        assert 0.0 <= cycle.stances.down[foot] - (middle - half) < moment
+        assert 0.0 <= (middle + half) % 1.0 - cycle.stances.up[foot] < moment
 
 
 @pytest.mark.parametrize("name", ["walk", "jog"])
 def test_a_foot_that_is_down_stands_still_below_a_body_that_moves_at_the_cycles_speed(name):
     made = make_clip(name)
     cycle = Cycle.of(made.clip, footfalls=made.footfalls)
-    reach = cycle.stances.length(0) / 2.0 - 2.0 / len(cycle.rotations)
+    reach = cycle.stances.length(0) / 2.0 - 1.0 / len(cycle.rotations)
     phases = np.linspace(-reach, reach, 200)
     places = np.array([cycle.toes_at(phase)[0] + np.array([0.0, 0.0, cycle.stride_m * phase]) for phase in phases])
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=-1) / (2.0 * reach / 199.0 * cycle.duration_s)

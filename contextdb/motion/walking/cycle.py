@@ -221,7 +221,7 @@ def _cut(clip: Clip, bones: FootBones, falls: Footfalls | None, stances: Stances
     n = len(cut.local.rotations) - 1
     round_ = LocalPoses(poses.skeleton, poses.rate, cut.local.positions[:-1], cut.local.rotations[:-1])
     local = _sampled(round_, np.asarray(np.arange(n) + shift * n), loops=True)
-    own = own.shifted(shift) if stances is None else stances
+    own = _inwards(own.shifted(shift), n) if stances is None else stances
     return Cycle(clip.name, poses.skeleton, feet, cut.duration_s, cut.movement, local.rotations, local.positions, own)
 
 
@@ -243,6 +243,13 @@ def _known(falls: Footfalls, span: tuple[float, float]) -> Stances | None:
             return None
         own.append((((inside[0][0] - begin) / long) % 1.0, ((inside[0][1] - begin) / long) % 1.0))
     return Stances((own[0][0], own[1][0]), (own[0][1], own[1][1]))
+
+
+def _inwards(stances: Stances, n: int) -> Stances:
+    """The stances from the first of n moments in which a foot is down to the last: nobody knows where it is between moments."""
+    (a, b), (c, d) = stances.down, stances.up
+    down = math.ceil(a * n - 1e-6) / n % 1.0, math.ceil(b * n - 1e-6) / n % 1.0
+    return replace(stances, down=down, up=(math.floor(c * n + 1e-6) / n % 1.0, math.floor(d * n + 1e-6) / n % 1.0))
 
 
 def _found(cut: _Cut, bones: FootBones) -> Stances | None:

@@ -81,6 +81,7 @@ from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.footsteps import Footstep
 from contextdb.motion.walking.stances import Stances
+from contextdb.motion.walking.transitions import Missing, Transitions
 from contextdb.motion.walking.walker import Walker, WalkSettings, WalkState
 
 __all__ = [
@@ -135,6 +136,7 @@ __all__ = [
     "MatchNode",
     "MatchPlay",
     "Measures",
+    "Missing",
     "Moment",
     "MotionConfig",
     "MotionDatabase",
@@ -173,6 +175,7 @@ __all__ = [
     "Target",
     "Trace",
     "Trajectory",
+    "Transitions",
     "Updated",
     "Variation",
     "WalkSettings",

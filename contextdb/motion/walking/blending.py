@@ -23,7 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from contextdb.cells.arguments import require_kind, require_many_of, require_text
+from contextdb.cells.arguments import require_kind, require_many_of, require_real, require_text
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import Place3
@@ -92,6 +92,9 @@ class Gait:
 
     def weights(self, speed_mps: float, acceleration: float = 0.0, turn: float = 0.0) -> Floats:
         """The weight of each of `cycles`, which sum to one; acceleration and turn from -1 to 1, where 1 is the full of it."""
+        speed_mps, acceleration, turn = (
+            require_real(value, name) for value, name in ((speed_mps, "speed_mps"), (acceleration, "acceleration"), (turn, "turn"))
+        )
         found = np.zeros(len(self.cycles))
         speeds = _between([cycle.speed_mps for cycle in self.steady], speed_mps)
         for i, of_acceleration in enumerate(_column(acceleration)):

@@ -356,6 +356,8 @@ CALLS: dict[str, Call] = {
     "Cycle.of(feet)": lambda x: motion.Cycle.of(motion.make_clip("walk").clip, feet=x),
     "Cycle.of(footfalls)": lambda x: motion.Cycle.of(CLIP, footfalls=x),
     "Cycle.of(stances)": lambda x: motion.Cycle.of(CLIP, stances=x),
+    "Cycle.of(most_m)": lambda x: motion.Cycle.of(CLIP, most_m=x),
+    "Cycle.of(most_deg)": lambda x: motion.Cycle.of(CLIP, most_deg=x),
     "Cycle.at(phase)": lambda x: WALKED.at(x),
     "Cycle.toes_at(phase)": lambda x: WALKED.toes_at(x),
     "Stances(down)": lambda x: motion.Stances(x, (0.0, 0.5)),

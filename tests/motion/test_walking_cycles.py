@@ -111,8 +111,19 @@ def test_a_cycle_goes_on_without_a_step_over_its_end():
 
 
 def test_a_clip_whose_ends_differ_is_refused_with_the_joint():
-    with pytest.raises(MotionError, match=r"walk: the cycle's end is not its beginning: \".+\" is .+ cm and .+° from"):
+    with pytest.raises(
+        MotionError, match=r"walk: the cycle's end is not its beginning: \".+\" and others are up to .+ cm and .+° from"
+    ):
         Cycle.of(part(make_clip("walk").clip, 0, 20))
+
+
+def test_wider_limits_take_a_clip_that_was_refused_and_close_it():
+    made = make_clip("walk_slow")
+    with pytest.raises(MotionError, match="at most 3 cm and 5°"):
+        Cycle.of(made.clip)
+    cycle = Cycle.of(made.clip, most_m=0.1, most_deg=15.0)
+    assert cycle.speed_mps == pytest.approx(made.recipe.pace.speed_mps, abs=1e-6)
+    np.testing.assert_allclose(cycle.at(0.0)[1], cycle.at(1.0)[1], atol=1e-9)
 
 
 @pytest.mark.parametrize(("name", "says"), [("idle", "0.00 m far"), ("start_walk", "end is not its beginning|no whole cycle")])

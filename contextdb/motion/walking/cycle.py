@@ -82,6 +82,8 @@ class Cycle:
         feet: tuple[str, str] | None = None,
         footfalls: Footfalls | None = None,
         stances: Stances | None = None,
+        most_m: float = MOST_APART_M,
+        most_deg: float = MOST_APART_DEG,
     ) -> Cycle:
         """Cut one cycle from a clip: between two mid-stances of its left foot, or of a loop its whole.
 
@@ -96,20 +98,24 @@ class Cycle:
         stances : Stances, optional
             When the feet are down in the cycle, counted from its mid-stance. Default: as the footfalls say.
 
+        most_m, most_deg : float
+            A cycle whose end is farther from its beginning is refused; what there is is spread over all of it.
+
         Raises
         ------
         MotionError
-            The clip has no cycle, its ends differ by more than 3 cm or 5°, or it does not move on.
+            The clip has no cycle, its ends differ by more than that, or it does not move on.
         ContextError
             An argument of another type.
         """
         require_kind(clip, Clip, "clip", "a Clip")
         require_kind(footfalls, (Footfalls, type(None)), "footfalls", "Footfalls, or None")
         require_kind(stances, (Stances, type(None)), "stances", "Stances, or None")
+        most_m, most_deg = require_real(most_m, "most_m", 1e-6), require_real(most_deg, "most_deg", 1e-6)
         if feet is not None:
             require_pair(feet, "feet", "the names of two bones, left and right")
         try:
-            return _cut(clip, FootBones(feet), footfalls, stances)
+            return _cut(clip, FootBones(feet), footfalls, stances, (most_m, most_deg))
         except MotionError as error:
             raise MotionError(*(fault.at(Place(clip.name)) for fault in error.faults)) from None
 
@@ -182,7 +188,7 @@ def _cubic(share: float) -> Floats:
 class _Cut:
     """A cycle as it comes out of its clip: its moments with the end against the body, and how far the body comes.
 
-    `joint`, `apart_m` and `apart_deg`: where end and beginning are farthest apart.
+    `apart_m` and `apart_deg`: how far end and beginning are apart at most, and at which joint they are farthest.
     """
 
     local: LocalPoses
@@ -193,13 +199,12 @@ class _Cut:
     apart_m: float
     apart_deg: float
 
-    @property
-    def apart(self) -> float:
+    def apart(self, most: tuple[float, float]) -> float:
         """How far apart the ends are, of what is accepted."""
-        return max(self.apart_m / MOST_APART_M, self.apart_deg / MOST_APART_DEG)
+        return max(self.apart_m / most[0], self.apart_deg / most[1])
 
 
-def _cut(clip: Clip, bones: FootBones, falls: Footfalls | None, stances: Stances | None) -> Cycle:
+def _cut(clip: Clip, bones: FootBones, falls: Footfalls | None, stances: Stances | None, most: tuple[float, float]) -> Cycle:
     poses = poses_of(clip)
     if poses.n_frames < LEAST_MOMENTS:
         raise MotionError(Fault(f"the clip has {poses.n_frames} frames.", f"at least {LEAST_MOMENTS}"))
@@ -209,8 +214,8 @@ def _cut(clip: Clip, bones: FootBones, falls: Footfalls | None, stances: Stances
     middles = _middles(known, 0, poses)
     spans = list(pairwise(middles)) or [(0.0, (poses.n_frames - 1) / poses.rate)]
     cuts = [_between(poses, begin_s, end_s) for begin_s, end_s in spans]
-    best = min(range(len(cuts)), key=lambda i: cuts[i].apart)
-    cut = _closed(cuts[best])
+    best = min(range(len(cuts)), key=lambda i: cuts[i].apart(most))
+    cut = _closed(cuts[best], most)
     if math.hypot(*cut.movement[:2]) < LEAST_STRIDE_M:
         raise MotionError(Fault(f"the body comes {math.hypot(*cut.movement[:2]):.2f} m far in a cycle.", "a cycle that moves on"))
     is_known = falls is not None and len(middles) > 1
@@ -349,16 +354,16 @@ def _compared(local: LocalPoses, duration_s: float, movement: Place3) -> _Cut:
     missing = quaternions.multiply(local.rotations[0], quaternions.inverse(local.rotations[-1]))
     turned = np.rad2deg(np.linalg.norm(quaternions.rotation_vectors(missing), axis=-1))
     joint = int(np.argmax(np.maximum(apart / MOST_APART_M, turned / MOST_APART_DEG)))
-    return _Cut(local, duration_s, movement, missing, joint, float(apart[joint]), float(turned[joint]))
+    return _Cut(local, duration_s, movement, missing, joint, float(apart.max()), float(turned.max()))
 
 
-def _closed(cut: _Cut) -> _Cut:
+def _closed(cut: _Cut, most: tuple[float, float]) -> _Cut:
     """The cycle with its end where it began, what is between the two spread evenly; refused where that is too much."""
     local = cut.local
-    if cut.apart > 1.0:
+    if cut.apart(most) > 1.0:
         name = in_quotes(local.skeleton.names[cut.joint])
-        found = f"the cycle's end is not its beginning: {name} is {100.0 * cut.apart_m:.1f} cm and"
-        accepted = f"ends that differ by at most {100.0 * MOST_APART_M:.0f} cm and {MOST_APART_DEG:.0f}°"
+        found = f"the cycle's end is not its beginning: {name} and others are up to {100.0 * cut.apart_m:.1f} cm and"
+        accepted = f"ends that differ by at most {100.0 * most[0]:g} cm and {most[1]:g}°"
         raise MotionError(Fault(f"{found} {cut.apart_deg:.1f}° from where it began.", accepted))
     n = len(local.rotations) - 1
     shares = (np.arange(n + 1) / n)[:, None, None]

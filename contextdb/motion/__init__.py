@@ -83,6 +83,12 @@ from contextdb.motion.trace.stats import SessionStats
 from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
 from contextdb.motion.trace.why_not import WhyNot
 from contextdb.motion.trace.winning_changes import Change, ChangePart
+from contextdb.motion.walking.blending import Gait
+from contextdb.motion.walking.cycle import Cycle
+from contextdb.motion.walking.footsteps import Footstep
+from contextdb.motion.walking.stances import Stances
+from contextdb.motion.walking.transitions import Missing, Transitions
+from contextdb.motion.walking.walker import Walker, WalkSettings, WalkState
 
 __all__ = [
     "ANY_TAGS",
@@ -114,6 +120,7 @@ __all__ = [
     "ControllerState",
     "Crowd",
     "CustomFunction",
+    "Cycle",
     "DatabaseSettings",
     "Decision",
     "Described",
@@ -121,6 +128,8 @@ __all__ = [
     "Entry",
     "FeatureSchema",
     "Footfalls",
+    "Footstep",
+    "Gait",
     "GateLook",
     "Hit",
     "Inputs",
@@ -138,6 +147,7 @@ __all__ = [
     "MatchNode",
     "MatchPlay",
     "Measures",
+    "Missing",
     "Moment",
     "MotionConfig",
     "MotionCoverage",
@@ -173,6 +183,7 @@ __all__ = [
     "Skip",
     "Span",
     "Spread",
+    "Stances",
     "Status",
     "Steered",
     "TagFilter",
@@ -183,6 +194,9 @@ __all__ = [
     "Transitions",
     "Updated",
     "Variation",
+    "WalkSettings",
+    "WalkState",
+    "Walker",
     "WarpShare",
     "WhatIf",
     "WhyNot",

@@ -49,6 +49,9 @@ DECISION = motion.Controller(motion.Selector([motion.Entry("only", BUILT)])).upd
 BY_CLIP = motion.PoseSettings(root="animation")
 POSED = [motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1)]
 PLAYER = motion.Character(motion.Controller(motion.Selector([motion.Entry("only", BUILT)])), SCHEMA, None, motion.PoseStream(BANK))
+WALKED = motion.Cycle.of(motion.make_clip("walk").clip)
+WALKS = [motion.Gait("walk", [WALKED])]
+STANCES = WALKED.stances
 Call = Callable[[object], object]
 CALLS: dict[str, Call] = {
     "describe(clips)": lambda x: motion.describe(x),
@@ -375,6 +378,41 @@ CALLS: dict[str, Call] = {
     "Crowd.update(facing)": lambda x: motion.Crowd([PLAYER.copy()]).update(0.1, [(0.0, 1.0)], facing=x),
     "Marks.left_out(tags)": lambda x: DATABASE.marks.left_out(x),
     "Marks.tag_biases(tags)": lambda x: DATABASE.marks.tag_biases(x),
+    "Cycle.of(clip)": lambda x: motion.Cycle.of(x),
+    "Cycle.of(feet)": lambda x: motion.Cycle.of(motion.make_clip("walk").clip, feet=x),
+    "Cycle.of(footfalls)": lambda x: motion.Cycle.of(CLIP, footfalls=x),
+    "Cycle.of(stances)": lambda x: motion.Cycle.of(CLIP, stances=x),
+    "Cycle.of(most_m)": lambda x: motion.Cycle.of(CLIP, most_m=x),
+    "Cycle.of(most_deg)": lambda x: motion.Cycle.of(CLIP, most_deg=x),
+    "Cycle.at(phase)": lambda x: WALKED.at(x),
+    "Cycle.toes_at(phase)": lambda x: WALKED.toes_at(x),
+    "Stances(down)": lambda x: motion.Stances(x, (0.0, 0.5)),
+    "Stances(holds)": lambda x: motion.Stances((0.0, 0.5), (0.5, 0.0), x),
+    "Stances.of_curves(curves)": lambda x: motion.Stances.of_curves(x),
+    "Stances.is_down(foot)": lambda x: STANCES.is_down(x, 0.0),
+    "Stances.is_down(phase)": lambda x: STANCES.is_down(0, x),
+    "Stances.until_change(foot)": lambda x: STANCES.until_change(x, 0.0),
+    "Stances.share_of_state(phase)": lambda x: STANCES.share_of_state(0, x),
+    "Gait(name)": lambda x: motion.Gait(x, [WALKED]),
+    "Gait(steady)": lambda x: motion.Gait("walk", x),
+    "Gait(steady), one": lambda x: motion.Gait("walk", [x]),
+    "Gait(speeding_up)": lambda x: motion.Gait("walk", [WALKED], x),
+    "Gait.weights(speed_mps)": lambda x: WALKS[0].weights(x),
+    "Gait.weights(acceleration)": lambda x: WALKS[0].weights(1.0, x),
+    "WalkSettings(halflife_s)": lambda x: motion.WalkSettings(halflife_s=x),
+    "WalkSettings(full_turn_dps)": lambda x: motion.WalkSettings(full_turn_dps=x),
+    "Walker(gaits)": lambda x: motion.Walker(x),
+    "Walker(settings)": lambda x: motion.Walker(WALKS, x),
+    "Walker(phase)": lambda x: motion.Walker(WALKS, phase=x),
+    "Walker.update(dt)": lambda x: motion.Walker(WALKS).update(x, (0.0, 0.0, 0.0)),
+    "Walker.update(body)": lambda x: motion.Walker(WALKS).update(0.1, x),
+    "Walker.update(ground)": lambda x: callable(x) or motion.Walker(WALKS).update(0.1, (0.0, 0.0, 0.0), x),
+    "Walker.update(adjust)": lambda x: callable(x) or motion.Walker(WALKS).update(0.1, (0.0, 0.0, 0.0), None, x),
+    "Walker.restore(state)": lambda x: motion.Walker(WALKS).restore(x),
+    "Transitions(clips)": lambda x: motion.Transitions(x),
+    "Transitions(patterns)": lambda x: motion.Transitions([], x),
+    "Transitions.find(from_state)": lambda x: motion.Transitions([]).find(x, "walk"),
+    "Transitions.missing(states)": lambda x: motion.Transitions([]).missing(x),
 }
 
 

@@ -49,12 +49,8 @@ def free_places(
     parents, offsets, places, rotations, positions, x, z, heading, joints, more, vx, vz, to_positions, to_world, to_free
 ):
     """Place all joints in the world; and each foot's toe, moved along the way for steps that are by `more` longer."""
-    translations = offsets.copy()
-    for j in range(places.shape[0]):
-        if places[j] >= 0:
-            for i in range(3):
-                translations[j, i] = positions[places[j], i]
-    kernels.place(parents, translations, rotations, x, z, heading, to_positions, to_world)
+    translations = np.empty_like(to_positions)
+    kernels.place_whole(parents, offsets, places, rotations, positions, x, z, heading, translations, to_positions, to_world)
     size = math.hypot(vx, vz)
     for foot in range(joints.shape[0]):
         hip, ankle, toe = joints[foot, 0], joints[foot, 2], joints[foot, 3]

@@ -4,7 +4,8 @@
 
 A controller follows a stick over all made clips for a minute; its decisions are then played by streams with more and more stages,
 in turn, round by round. A figure is the median of the rounds. The controller's own cost stands beside them, its path and its query
-not in it, and what a pose costs each of a thousand characters.
+not in it, and what a pose costs each of a thousand characters. Then whole updates, path, query, search and pose in them: of one
+character, and of a crowd of a thousand; as every third update searches, these are means of such threes.
 """
 
 from __future__ import annotations
@@ -17,13 +18,28 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 if __package__ in (None, ""):
     sys.path[0] = str(Path(__file__).parent.parent)  # not this folder: its coverage.py is no package of that name
 
 from benchmarks import timing
 from benchmarks.sections import print_aligned
 from contextdb import motion
-from contextdb.motion import Controller, Decision, Entry, FeatureSchema, MotionDatabase, PoseBank, PoseSettings, Selector, Steered
+from contextdb.motion import (
+    Character,
+    Controller,
+    Crowd,
+    Decision,
+    Entry,
+    FeatureSchema,
+    MotionDatabase,
+    PoseBank,
+    PoseSettings,
+    PoseStream,
+    Selector,
+    Steered,
+)
 from contextdb.motion.output.stages import Ground
 
 RATE, SECONDS, ROUNDS = 30.0, 60, 15
@@ -67,6 +83,11 @@ def main() -> None:
     rows.append(("controller, on the mean", f"{statistics.mean(controller_us[100:]):.1f}", ""))
     crowd = crowd_microseconds(bank, played)
     rows.append((f"all but ground, {CROWD:,} characters", f"{statistics.median(crowd):.1f}", f"{min(crowd):.1f}"))
+    selector = Selector([Entry("loco", database)])
+    for n, poses, what in ((1, True, ""), (CROWD, False, " without poses"), (CROWD, True, "")):
+        whole = update_microseconds(motion.Character(Controller(selector), schema, None, PoseStream(bank) if poses else None), n)
+        name = "a character's update" if n == 1 else f"a crowd's update, each of {n:,}{what}"
+        rows.append((name, f"{statistics.median(whole):.1f}", f"{min(whole):.1f}"))
     print_aligned([("stages", "us", "least"), *rows])
 
 
@@ -105,6 +126,23 @@ def crowd_microseconds(bank: PoseBank, played: Sequence[tuple[Decision, Steered]
             stream.update(decision, 1.0 / RATE, body)
         found.append((time.process_time() - began) / CROWD * 1e6)
     return found[1:]
+
+
+def update_microseconds(first: Character, n: int) -> list[float]:
+    """Of processor time, a character, in updates of a crowd of so many, or of one alone; of each three updates the mean."""
+    crowd = Crowd([first.copy() for _ in range(n)])
+    speeds, ways = 0.3 + np.arange(n) % 37 / 10.0, np.arange(n) % 61 / 10.0
+    sticks = np.column_stack((speeds * np.sin(ways), speeds * np.cos(ways)))
+    found = []
+    for _ in range(200 if n == 1 else 10):
+        began = time.process_time()
+        for _ in range(3):
+            if n == 1:
+                crowd[0].update(1.0 / RATE, (float(sticks[0, 0]), float(sticks[0, 1])))
+            else:
+                crowd.update(1.0 / RATE, sticks)
+        found.append((time.process_time() - began) / (3 * n) * 1e6)
+    return found[2:]
 
 
 def microseconds(

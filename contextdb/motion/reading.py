@@ -96,6 +96,8 @@ class Section:
 
 def as_number(value: object) -> float | None:
     """A finite float, or None for anything else; True is not a number."""
+    if type(value) is float:
+        return value if math.isfinite(value) else None
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         return None
     try:

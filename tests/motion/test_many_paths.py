@@ -77,7 +77,7 @@ def test_the_bodies_of_a_crowd_move_as_each_alone(drawn, is_facing, dt_s):
     assume(all(_is_clear(*each, is_facing) for each in drawn))
     sticks = np.array(wanted).reshape(-1, 2)
     moved = ManySteered.of(bodies).moved(dt_s, sticks, facing if is_facing else None)
-    assert len(moved) == len(bodies)
+    assert list(moved) == [moved[i] for i in range(len(bodies))]
     for i, body in enumerate(bodies):
         alone, own = body.moved(dt_s, wanted[i], facing[i] if is_facing else None), moved[i]
         assert (own.velocity_halflife_s, own.heading_halflife_s) == (alone.velocity_halflife_s, alone.heading_halflife_s)

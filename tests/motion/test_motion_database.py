@@ -369,3 +369,10 @@ def test_a_miss_has_no_time_and_no_costs():
         LOCO.time_s(miss)
     with pytest.raises(QueryError, match="the frame is -1"):
         LOCO.channel_costs(miss, np.zeros(19))
+
+
+def test_the_features_of_many_frames_are_those_of_each_and_none_between_ranges():
+    database = MotionDatabase.from_features(np.arange(10.0).reshape(5, 2), [0, 3], [2, 5], ["a", "b"])
+    assert database.raw_many([4, 0, 1]).tolist() == [database.raw(frame).tolist() for frame in (4, 0, 1)]
+    with pytest.raises(QueryError, match="frame 2 is in no range"):
+        database.raw_many([0, 2])

@@ -124,9 +124,9 @@ class Crowd(Sequence[Character]):
         headings = None if facing is None else np.asarray(facing, np.float64)
         given = _facts_of_each(facts, len(self))
         steps = []
-        for i, (character, (x, z)) in enumerate(zip(self, wanted.tolist(), strict=True)):
+        for i, (character, (x, z), body) in enumerate(zip(self, wanted.tolist(), bodies, strict=True)):
             heading = None if headings is None else float(headings[i])
-            steps.append(character.step_of(dt, (x, z), given[i], heading, bodies[i]))
+            steps.append(character.step_of(dt, (x, z), given[i], heading, body))
         group = ControllerGroup(character.controller for character in self)
         queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
         valid = self._valid(steps)

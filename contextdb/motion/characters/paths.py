@@ -32,7 +32,7 @@ A_PLACE = "x and z in metres and a heading in radians"
 
 def ahead_s(schema: FeatureSchema, speed_mps: float, halflife_s: float) -> float:
     """How many seconds of the way ahead a search must be given; behind them the way goes straight on."""
-    seconds, metres = _points(schema)
+    seconds, metres = schema.path_reaches
     needed = max((0.0, *seconds))
     if metres:
         settled = SETTLED_HALFLIVES * halflife_s
@@ -42,20 +42,9 @@ def ahead_s(schema: FeatureSchema, speed_mps: float, halflife_s: float) -> float
 
 def back_s(schema: FeatureSchema) -> float:
     """How many seconds of the way back a search must be given; 0 where no feature looks back."""
-    seconds, metres = _points(schema)
+    seconds, metres = schema.path_reaches
     back = max((0.0, *(-second for second in seconds)))
     return max(back, LEAST_BACK_S) if min((0.0, *metres)) < 0.0 else back
-
-
-def _points(schema: FeatureSchema) -> tuple[list[float], list[float]]:
-    """The seconds and the metres at which the trajectory channels look at the path."""
-    seconds: list[float] = []
-    metres: list[float] = []
-    for channel in schema.channels:
-        if channel.type == "trajectory":
-            seconds += channel.at
-            metres += channel.along
-    return seconds, metres
 
 
 def path_from(root: Sequence[float], path: Trajectory, *, halflife_s: float = RETURN_HALFLIFE_S) -> Trajectory:

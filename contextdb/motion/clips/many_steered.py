@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +52,12 @@ class ManySteered:
 
     def __len__(self) -> int:
         return len(self.headings)
+
+    def __iter__(self) -> Iterator[Steered]:
+        """Each body."""
+        pairs = (map(tuple, each.tolist()) for each in (self.positions, self.velocities, self.accelerations))
+        others = (self.headings, self.turn_rates, self.velocity_halflives_s, self.heading_halflives_s)
+        return map(Steered, *pairs, *(each.tolist() for each in others))
 
     def __getitem__(self, i: int) -> Steered:
         x, z = self.positions[i].tolist(), self.velocities[i].tolist()

@@ -120,6 +120,15 @@ class FeatureSchema:
                 return slice(start, start + size), seconds if kind == "position" else 1.0
         return None
 
+    @cached_property
+    def path_reaches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The seconds and the metres at which the trajectory channels look at the path."""
+        channels = [channel for channel in self.channels if channel.type == "trajectory"]
+        return (
+            tuple(second for channel in channels for second in channel.at),
+            tuple(metre for channel in channels for metre in channel.along),
+        )
+
     @property
     def weights(self) -> Floats:
         """Each channel's weight: float64 [channels]."""

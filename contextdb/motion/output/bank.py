@@ -189,7 +189,7 @@ class PoseBank:
         """How many frames all ranges have."""
         return len(self.root)
 
-    @property
+    @cached_property
     def n_joints(self) -> int:
         """How many joints a pose has."""
         return self.skeleton.n_joints

@@ -282,6 +282,15 @@ def place(parents, translations, rotations, x, z, heading, to_positions, to_worl
             to_world[j, i] = turned[i]
 
 
+@compiled
+def place_whole(parents, offsets, places, rotations, positions, x, z, heading, to_translations, to_positions, to_world):
+    """As `place`, of positions [M, 3]: `places` says which row is each joint's; below 0 it keeps its offset."""
+    for j in range(parents.shape[0]):
+        for i in range(3):
+            to_translations[j, i] = offsets[j, i] if places[j] < 0 else positions[places[j], i]
+    place(parents, to_translations, rotations, x, z, heading, to_positions, to_world)
+
+
 # ---- legs
 
 

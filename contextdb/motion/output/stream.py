@@ -237,9 +237,12 @@ class PoseStream:
 
     def _placed(self, posture: Posture, decision: Decision, rate: float, contacts: Flags) -> Pose:
         rig, playing, is_jump = self._rig, decision.playing, decision.action is Action.JUMP
-        translations = rig.translations(posture.positions)
-        positions, world = np.empty((rig.n_joints, 3)), np.empty((rig.n_joints, 4))
-        loops().place(rig.skeleton.parents, translations, posture.rotations, *posture.root, positions, world)
+        n, skeleton = rig.n_joints, rig.skeleton
+        translations, positions, world = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 4))
+        loops().place_whole(
+            skeleton.parents, skeleton.offsets, rig.places, posture.rotations, posture.positions, *posture.root,
+            translations, positions, world,
+        )  # fmt: skip
         is_forced = is_jump and decision.continuing_cost is None
         return Pose(playing, is_jump, is_forced, posture.root, posture.rotations, translations, positions, contacts, rate)
 

@@ -408,8 +408,22 @@ class MotionDatabase(Searched):
     def raw_many(self, frames: Sequence[int] | NDArray[np.integer]) -> Floats:
         """The features of many frames in the schema's units, the poses of a crowd: float64 [Q, F]. Raises QueryError for a
         frame that is in no range."""
-        numbers = np.array([self._number(frame) for frame in require_many(frames, "frames", "a list of frames")], np.int64)
+        given = require_many(frames, "frames", "a list of frames")
+        numbers = np.array([arguments.frame_of(frame, self.n_frames, "frame") for frame in given], np.int64)
+        for frame in numbers[~self.layout.are_in_ranges(numbers)].tolist():
+            self._number(frame)
         return self.normalisation.undo(self.layout.take(numbers))
+
+    def path_speed(self, frame: int) -> float | None:
+        """How fast the path of a frame goes, m/s, by the features that say so; None where the schema has none. Kept once asked."""
+        if frame not in self._path_speeds:
+            where = None if self.schema is None else self.schema.speed_features
+            self._path_speeds[frame] = None if where is None else math.hypot(*self.raw(frame)[where[0]].tolist()) / where[1]
+        return self._path_speeds[frame]
+
+    @cached_property
+    def _path_speeds(self) -> dict[int, float | None]:
+        return {}
 
     def normalised(self, query: ArrayLike) -> Floats:
         """A query [F] in the schema's units, checked, as costs are computed with it: float64."""

@@ -124,8 +124,13 @@ class Layout:
 
     def range_of(self, frame: int) -> int:
         """The range that holds a frame, or -1 for a frame between ranges."""
-        box = int(np.searchsorted(self.box_starts, frame, side="right")) - 1
+        box = int(self.box_starts.searchsorted(frame, side="right")) - 1
         return int(self.box_ranges[box]) if box >= 0 and frame < self.box_starts[box] + self.box_sizes[box] else -1
+
+    def are_in_ranges(self, frames: Ints) -> NDArray[np.bool_]:
+        """Which frames are in a range, and not between two: bool [len(frames)]."""
+        boxes = self.box_starts.searchsorted(frames, side="right") - 1
+        return np.asarray((boxes >= 0) & (frames < self.box_starts[boxes] + self.box_sizes[boxes]))
 
     def kinds_of_boxes(self, kinds: NDArray[np.integer]) -> NDArray[np.int32]:
         """The kind of all frames of each box, -1 where they are of several: int32 [B], from the kind of every frame."""

@@ -112,7 +112,7 @@ class Controller:
         self.selector, self.settings, self.recorder = selector, settings, recorder
         self._rng, self._clock = rng, clock
         self._state = ControllerState()
-        self._moved: tuple[object, Ongoing | None] | None = None
+        self._moved: tuple[object, object, object, Ongoing | None] | None = None
 
     @property
     def playing(self) -> Playing | None:
@@ -129,10 +129,10 @@ class Controller:
 
     def _ongoing(self, dt_s: float) -> Ongoing | None:
         """What plays, moved on; the last is kept, for an update mostly follows what was asked of `upcoming`."""
-        asked = (self._state.playing, self.selector, self.settings.rate, dt_s * self._state.play_rate)
-        if self._moved is None or self._moved[0] != asked:
-            self._moved = asked, Ongoing.of(*asked)
-        return self._moved[1]
+        playing, selector, of_time = self._state.playing, self.selector, (self.settings.rate, dt_s * self._state.play_rate)
+        if self._moved is None or self._moved[0] is not playing or self._moved[1] is not selector or self._moved[2] != of_time:
+            self._moved = playing, selector, of_time, Ongoing.of(playing, selector, *of_time)
+        return self._moved[3]
 
     def copy(self) -> Controller:
         """Another controller that stands where this one does, with the same selector and settings, and no recorder."""
@@ -143,7 +143,7 @@ class Controller:
     @property
     def state(self) -> ControllerState:
         """Where the controller is, to come back to with `restore`."""
-        return replace(self._state, rng=variation.state_of(self._rng))
+        return self._state if self._rng is None else replace(self._state, rng=variation.state_of(self._rng))
 
     def restore(self, state: ControllerState) -> None:
         """Go on from a state of this controller, or of another one with the same selector and settings.
@@ -152,7 +152,7 @@ class Controller:
         """
         require_kind(state, ControllerState, "state", "a ControllerState, what `state` gives")
         variation.restore(self._rng, state.rng)
-        self._state = replace(state, rng=None)
+        self._state = state if state.rng is None else replace(state, rng=None)
 
     def update(
         self,

@@ -26,6 +26,8 @@ from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.selector import Selector
 
+HAS_IT = Fault("the group has this controller already.", "a controller of its own for each character")
+
 Flag = bool | Sequence[bool] | NDArray[np.bool_]
 OfBodies = ManySteered | Sequence[OfBody | None] | NDArray[np.float64]
 
@@ -45,14 +47,14 @@ class ControllerGroup(Sequence[Controller]):
     """
 
     def __init__(self, controllers: Iterable[Controller] = ()) -> None:
-        self._controllers: list[Controller] = []
-        for controller in require_many_of(controllers, Controller, "controllers", "a list of Controller"):
-            self.add(controller)
+        self._controllers: list[Controller] = require_many_of(controllers, Controller, "controllers", "a list of Controller")
+        if len({id(controller) for controller in self._controllers}) < len(self._controllers):
+            raise MotionError(HAS_IT)
 
     def add(self, controller: Controller) -> None:
         """Take one more character, as the last."""
         if any(own is controller for own in self._controllers):
-            raise MotionError(Fault("the group has this controller already.", "a controller of its own for each character"))
+            raise MotionError(HAS_IT)
         self._controllers.append(controller)
 
     def remove(self, controller: Controller) -> None:

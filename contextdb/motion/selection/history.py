@@ -33,9 +33,13 @@ def remembered(
     history: tuple[Played, ...], database: str, spans: Iterable[tuple[int, int]], now_s: float, for_s: float
 ) -> tuple[Played, ...]:
     """A history with some spans that are played now; what was played `for_s` seconds ago, or before, is forgotten."""
+    if for_s <= 0.0:
+        return ()
     oldest_s = now_s - for_s + TOLERANCE_S
-    recent = tuple(played for played in history if played.time_s > oldest_s)
-    return recent + tuple(Played(database, start, stop, now_s) for start, stop in spans) if for_s > 0.0 else ()
+    n_forgotten = 0  # of those in front: what is remembered is in the order of its moments
+    while n_forgotten < len(history) and history[n_forgotten].time_s <= oldest_s:
+        n_forgotten += 1
+    return (*history[n_forgotten:], *(Played(database, start, stop, now_s) for start, stop in spans))
 
 
 def history_skips(history: Iterable[Played]) -> dict[str, list[Skip]]:

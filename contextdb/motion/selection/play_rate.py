@@ -31,8 +31,8 @@ def play_rate(database: MotionDatabase, frame: int, query: Floats, limits: tuple
     if where is None:
         return 1.0
     columns, seconds = where
-    wanted, own = (math.hypot(*each[columns].tolist()) / seconds for each in (query, database.raw(frame)))
-    if wanted < LEAST_MPS or own < LEAST_MPS:
+    wanted, own = math.hypot(*query[columns].tolist()) / seconds, database.path_speed(frame)
+    if own is None or wanted < LEAST_MPS or own < LEAST_MPS:
         return 1.0
     return float(min(max((wanted / own) ** SHARE, least), most))
 

@@ -1,0 +1,182 @@
+"""Loops over the feet of one pose: where they are without a lock, where they are shown, and the legs that bend to that.
+
+What and why is told in `contextdb.motion.output.feet`; how these are compiled in `contextdb.motion.output.kernels`. F feet, and for
+each its joints [F, 4]: hip, knee, ankle and what stands, all below 0 for a foot without a leg. A footing is the height of the
+ground below a foot and by how much it rises along x and z: [F, 3].
+"""
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return"
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contextdb.motion.output import kernels
+from contextdb.motion.output.kernels import compiled
+from contextdb.motion.output.stages import damping
+
+STRAIGHT = math.radians(170.0)
+"""A knee that is straighter is damped."""
+FAR_M = 1.0
+"""A foot that is farther from its clip's place belongs to a character that was put elsewhere: it goes there at once."""
+BACK_SHARE, SLOW_MPS = 1.0 / 3.0, 0.5
+"""A foot that had to be let go is locked again when it has come back to its clip as far as to this share of the radius, and
+moves no faster than this."""
+HIPS_HALFLIFE_S = 0.1
+"""How fast hips and feet come to the height of the ground."""
+HIPS_DAMPING = damping(HIPS_HALFLIFE_S)
+LEAST_MPS = 1e-6
+MOST_LOWER = 0.25
+"""The hips go down by no more metres than this for a foot out of reach."""
+
+
+SEEN, DOWN, LOCKED, POINT, OFFSET, SPEED, FREE, SHOWN, WIDTH = 0, 1, 2, 3, 5, 8, 11, 14, 17
+"""A foot's state is a row of so many numbers: whether it was seen, is down in the clip and is locked; where it is locked over the
+ground (x and z); the offset to that, or to where the foot is without a lock, and its change a second; where the foot is without a
+lock; and where it is shown. Each constant is the first column."""
+
+
+@compiled
+def _come(value, speed, y, dt):
+    """A number and its change a second some time later: it decays to 0 as a critically damped spring."""
+    fade, pushed = math.exp(-y * dt), speed + value * y
+    return fade * (value + pushed * dt), fade * (speed - pushed * y * dt)
+
+
+@compiled
+def free_places(
+    parents, offsets, places, rotations, positions, x, z, heading, joints, more, vx, vz, to_positions, to_world, to_free
+):
+    """Place all joints in the world; and each foot's toe, moved along the way for steps that are by `more` longer."""
+    translations = np.empty_like(to_positions)
+    kernels.place_whole(parents, offsets, places, rotations, positions, x, z, heading, translations, to_positions, to_world)
+    size = math.hypot(vx, vz)
+    for foot in range(joints.shape[0]):
+        hip, ankle, toe = joints[foot, 0], joints[foot, 2], joints[foot, 3]
+        if toe < 0:
+            continue
+        for i in range(3):
+            to_free[foot, i] = to_positions[toe, i]
+        if more != 0.0 and size >= LEAST_MPS:
+            ways = (vx / size, vz / size)
+            apart = (to_positions[ankle, 0] - to_positions[hip, 0], to_positions[ankle, 2] - to_positions[hip, 2])
+            along = more * (ways[0] * apart[0] + ways[1] * apart[1])
+            to_free[foot, 0] += along * ways[0]
+            to_free[foot, 2] += along * ways[1]
+
+
+@compiled
+def _locked(to, x, z, height, toe):
+    """Write a foot that is down and locked, its offset and speed written already."""
+    to[SEEN], to[DOWN], to[LOCKED], to[POINT], to[POINT + 1] = 1.0, 1.0, 1.0, x, z
+    place = (x, height, z)
+    for i in range(3):
+        to[FREE + i] = toe[i]
+        to[SHOWN + i] = place[i] + to[OFFSET + i]
+
+
+@compiled
+def _free(to, is_down, toe):
+    """Write a foot that is not locked, its offset and speed written already."""
+    to[SEEN], to[DOWN], to[LOCKED], to[POINT], to[POINT + 1] = 1.0, 1.0 if is_down else 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        to[FREE + i] = toe[i]
+        to[SHOWN + i] = toe[i] + to[OFFSET + i]
+
+
+@compiled
+def move_foot(own, toe, height, is_down, y, radius, dt, to):
+    """Write the foot after this tick, whose toe is at a place without a lock and has a height in the clip."""
+    moved = (toe[0] - own[FREE], toe[1] - own[FREE + 1], toe[2] - own[FREE + 2])
+    for i in range(6):
+        to[OFFSET + i] = 0.0
+    if own[SEEN] == 0.0 or math.sqrt(moved[0] * moved[0] + moved[1] * moved[1] + moved[2] * moved[2]) > FAR_M:
+        if is_down:
+            to[OFFSET + 1] = toe[1] - height
+            _locked(to, toe[0], toe[2], height, toe)
+        else:
+            _free(to, False, toe)
+        return
+    was_locked = own[LOCKED] != 0.0
+    if was_locked and not is_down:
+        for i in range(3):
+            to[OFFSET + i], to[SPEED + i] = _come(own[SHOWN + i] - own[FREE + i], 0.0, y, dt)
+        _free(to, False, toe)
+        return
+    for i in range(3):
+        to[OFFSET + i], to[SPEED + i] = _come(own[OFFSET + i], own[SPEED + i], y, dt)
+    if was_locked:
+        x, z = own[POINT], own[POINT + 1]
+        if math.hypot(x - toe[0], z - toe[2]) <= radius:
+            _locked(to, x, z, height, toe)
+            return
+        point = (x, height, z)
+        for i in range(3):
+            to[OFFSET + i] = point[i] + to[OFFSET + i] - toe[i]
+            to[SPEED + i] -= moved[i] / dt if dt > 0.0 else 0.0
+        _free(to, True, toe)
+        return
+    is_near = math.hypot(to[OFFSET], to[OFFSET + 2]) < BACK_SHARE * radius
+    is_back = is_near and math.hypot(moved[0], moved[2]) <= SLOW_MPS * dt
+    if is_down and (own[DOWN] == 0.0 or is_back):
+        x, z = toe[0] + to[OFFSET], toe[2] + to[OFFSET + 2]
+        to[OFFSET + 1] = toe[1] + to[OFFSET + 1] - height
+        to[OFFSET], to[OFFSET + 2] = 0.0, 0.0
+        to[SPEED], to[SPEED + 1], to[SPEED + 2] = 0.0, 0.0, 0.0
+        _locked(to, x, z, height, toe)
+        return
+    _free(to, is_down, toe)
+
+
+@compiled
+def stand_all(
+    parents, offsets, places, clip_rotations, clip_positions, joints, tops, is_locking, y, radius, dt,
+    contacts, free, footings, hips, feet, positions, world, to_feet, lower, rotations, moved,
+):  # fmt: skip
+    """Move all feet on, lower the hips by what their legs need, and bend the legs.
+
+    `lower`, how low the hips are and its change a second, `rotations` and `moved`, the positions [M, 3], are changed.
+    """
+    n_feet = joints.shape[0]
+    toes, heights = np.zeros(n_feet, np.int64), np.zeros(n_feet)
+    for foot in range(n_feet):
+        toes[foot] = max(joints[foot, 3], 0)
+    if is_locking:
+        kernels.heights(parents, offsets, places, clip_rotations, clip_positions, toes, heights)
+    most = 0.0
+    for foot in range(n_feet):
+        to = to_feet[foot]
+        if joints[foot, 3] < 0:
+            to[:] = 0.0
+            continue
+        over = (free[foot, 0], free[foot, 1] + footings[foot, 0], free[foot, 2])
+        if is_locking:
+            move_foot(feet[foot], over, heights[foot] + footings[foot, 0], contacts[foot], y, radius, dt, to)
+        else:
+            for i in range(6):
+                to[OFFSET + i] = 0.0
+            _free(to, False, over)
+        shown = (to[SHOWN], to[SHOWN + 1], to[SHOWN + 2])
+        down = kernels.too_high(positions, joints[foot], joints[foot, 3], shown, footings[foot, 1], footings[foot, 2], STRAIGHT)
+        most = max(most, min(down + hips, MOST_LOWER))
+    apart, speed = _come(lower[0] - most, lower[1], HIPS_DAMPING, dt)
+    lower[0], lower[1] = most + apart, speed
+    if lower[0] < most:
+        lower[0], lower[1] = most, max(speed, 0.0)
+    height = hips - lower[0]
+    if height != 0.0:
+        for k in range(tops.shape[0]):
+            moved[tops[k], 1] += height
+        for j in range(positions.shape[0]):
+            positions[j, 1] += height
+    for foot in range(n_feet):
+        toe = joints[foot, 3]
+        if toe < 0:
+            continue
+        shown = (to_feet[foot, SHOWN], to_feet[foot, SHOWN + 1], to_feet[foot, SHOWN + 2])
+        is_there = shown[0] == positions[toe, 0] and shown[1] == positions[toe, 1] and shown[2] == positions[toe, 2]
+        if not is_there or footings[foot, 0] != 0.0 or footings[foot, 1] != 0.0 or footings[foot, 2] != 0.0:
+            kernels.stand(
+                parents, positions, world, joints[foot], toe, shown, footings[foot, 1], footings[foot, 2], STRAIGHT, rotations
+            )

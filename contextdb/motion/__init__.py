@@ -43,7 +43,7 @@ from contextdb.motion.measuring.coverage import ClipContexts, ClipFrames, Contex
 from contextdb.motion.measuring.measure import measure
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.near_clips import Near
-from contextdb.motion.measuring.transition_names import Transitions
+from contextdb.motion.measuring.transition_names import TransitionCoverage
 from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
@@ -191,6 +191,7 @@ __all__ = [
     "ToCapture",
     "Trace",
     "Trajectory",
+    "TransitionCoverage",
     "Transitions",
     "Updated",
     "Variation",

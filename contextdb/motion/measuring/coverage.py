@@ -30,7 +30,7 @@ from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.measuring.moves import DIRECTION, LEAST_FRAMES, MAPS, SPEED, TURN, WINDOW_S, Bin, Counts, Map, Moves, Span
 from contextdb.motion.measuring.near_clips import NEAR_COST, Near, Tell, near_clips
-from contextdb.motion.measuring.transition_names import PATTERN, Transitions, transitions_of
+from contextdb.motion.measuring.transition_names import PATTERN, TransitionCoverage, transitions_of
 from contextdb.motion.measuring.usage import usable
 from contextdb.motion.search.database import MotionDatabase
 
@@ -183,7 +183,7 @@ class MotionCoverage:
     clips : tuple of ClipFrames
     contexts : tuple of ContextCoverage
         The largest share first.
-    transitions : Transitions
+    transitions : TransitionCoverage
     near : tuple of Near
     never_valid : tuple of str
         Clips that no context lets play.
@@ -193,7 +193,7 @@ class MotionCoverage:
     databases: tuple[str, ...]
     clips: tuple[ClipFrames, ...]
     contexts: tuple[ContextCoverage, ...]
-    transitions: Transitions
+    transitions: TransitionCoverage
     near: tuple[Near, ...]
     never_valid: tuple[str, ...]
 

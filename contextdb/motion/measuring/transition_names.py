@@ -1,4 +1,4 @@
-"""Transitions between states that have no clip, by the names of clips: a pattern such as `{from}_to_{to}` says which they are.
+"""TransitionCoverage between states that have no clip, by the names of clips: a pattern such as `{from}_to_{to}` says which they are.
 
 A state is what some clip's name has in the place of `{from}` or `{to}`. Names say nothing more: a state that no transition names is
 none, and one way of going from a state to another is enough. Source of the pattern: the transitions of Forsyth's talk, seed 003.
@@ -17,7 +17,7 @@ ACCEPTED = '{from} and {to}, each once, with text between them, such as "{from}_
 
 
 @dataclass(frozen=True)
-class Transitions:
+class TransitionCoverage:
     """The states that transitions join, and the pairs of them, from and to, that have a clip and that have none."""
 
     pattern: str
@@ -39,7 +39,7 @@ class Transitions:
         }
 
 
-def transitions_of(names: Iterable[str], pattern: str = PATTERN) -> Transitions:
+def transitions_of(names: Iterable[str], pattern: str = PATTERN) -> TransitionCoverage:
     """The transitions among some clips. What is before `{from}`, between and behind `{to}` is compared to the letter; a name that
     fits in several ways is divided where the pattern fits first.
 
@@ -53,7 +53,7 @@ def transitions_of(names: Iterable[str], pattern: str = PATTERN) -> Transitions:
     present = [pair for pair in pairs if pair[0] != pair[1]]
     states = tuple(sorted({state for pair in present for state in pair}))
     missing = ((a, b) for a in states for b in states if a != b and (a, b) not in pairs)
-    return Transitions(pattern, states, tuple(sorted(present)), tuple(missing))
+    return TransitionCoverage(pattern, states, tuple(sorted(present)), tuple(missing))
 
 
 def _expression(pattern: str) -> str:

@@ -55,6 +55,11 @@ class Height:
         (apart, _, _), (speed, _, _) = decayed((self.now - goal, 0.0, 0.0), (self.speed, 0.0, 0.0), HIPS_DAMPING, dt_s)
         return Height(goal + apart, speed)
 
+    def gone_down(self, least: float, dt_s: float) -> Height:
+        """How far hips are down some time later: as far as legs need it, and back up by and by."""
+        back = self.come(least, dt_s)
+        return back if back.now >= least else Height(least, max(back.speed, 0.0))
+
 
 LEVEL_HIPS = Height()
 

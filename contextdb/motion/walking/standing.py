@@ -16,7 +16,8 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.output import kernels
 from contextdb.motion.output.bank import Place3, tops_of
-from contextdb.motion.output.feet import HIPS_DAMPING, LEVEL_HIPS, MOST_LOWER, STRAIGHT, Height
+from contextdb.motion.output.feet import LEVEL_HIPS, Height
+from contextdb.motion.output.feet_loops import HIPS_DAMPING, MOST_LOWER, STRAIGHT
 from contextdb.motion.output.ground import FLAT, Footing, below, standing, swinging
 from contextdb.motion.output.legs import Leg, eased, leg_of
 from contextdb.motion.output.stages import Ground

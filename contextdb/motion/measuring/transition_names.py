@@ -1,4 +1,4 @@
-"""TransitionCoverage between states that have no clip, by the names of clips: a pattern such as `{from}_to_{to}` says which they are.
+"""Transitions between states that have no clip, by the names of clips: a pattern such as `{from}_to_{to}` says which they are.
 
 A state is what some clip's name has in the place of `{from}` or `{to}`. Names say nothing more: a state that no transition names is
 none, and one way of going from a state to another is enough. Source of the pattern: the transitions of Forsyth's talk, seed 003.

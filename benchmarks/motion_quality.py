@@ -5,8 +5,8 @@
     python benchmarks/motion_quality.py --probes              the last stage probe by probe too; --json FILE for programs
 
 A body follows a stick as `Steered` does, in six probes of a minute: straight on, turns of 90 and of 180 degrees, changes of speed,
-a circle and a figure eight. The controller is asked with its path; its decisions become poses with more and more stages. In the
-last one the path begins with the heading that is shown, in the others with that of the body. All assets are valid, settings are the
+a circle and a figure eight. The controller is asked with its path; its decisions become poses with more and more stages. The last
+one is a `Character`, whose path begins where the animation is shown, not where the body is. All assets are valid, settings are the
 defaults. A stage whose settings this version does not have is left out.
 
 The captured clips are not part of this project: the environment variable CONTEXTDB_MOCAP names their folder.
@@ -19,7 +19,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -125,7 +125,7 @@ class Stage:
     has_rate: bool
     settings: PoseSettings
     is_closed: bool = False
-    """Whether the path that is asked for begins with the heading that is shown, not with that of the game's body."""
+    """Whether it is a `Character`: the path that is asked for begins where the animation is shown, not where the game's body is."""
 
 
 def stages() -> list[Stage]:
@@ -171,13 +171,11 @@ class Run:
     wanted: list[tuple[float, float]]
 
 
-def run(clips: Clips, stick: Stick, seconds: float, chooser: Any, closed: PoseSettings | None = None) -> Run:
-    """Let a chooser follow a stick; with settings, the path begins with the heading of the pose that they show."""
+def run(clips: Clips, stick: Stick, seconds: float, chooser: Any) -> Run:
+    """Let a chooser follow a stick."""
     chooser.recorder = trace = motion.Trace(0)
-    stream = None if closed is None else motion.PoseStream(clips.bank, closed)
-    body = seen = motion.Steered()
+    body = motion.Steered()
     past, wanted = [body], []
-    poses: list[motion.Pose] = []
     pose = clips.database.normalisation.undo(np.zeros(clips.schema.n_features))
     for tick in range(round(seconds * RATE) + 1):
         asked = stick(tick / RATE)
@@ -185,15 +183,20 @@ def run(clips: Clips, stick: Stick, seconds: float, chooser: Any, closed: PoseSe
         dt_s = 1.0 / RATE if tick else 0.0
         if tick:
             body = body.moved(dt_s, asked)
-            seen = body if stream is None else replace(body, heading=poses[-1].root[2])
             past = [*past, body][-31:]
         ahead = chooser.upcoming(dt_s)
         pose = pose if ahead is None else clips.database.raw(ahead.frame)
-        query = motion.with_path(clips.schema, pose, motion.steered_path([*past[:-1], seen], asked))
-        decision = chooser.update(dt_s, query, body=body)
-        if stream is not None:
-            poses.append(stream.update(decision, dt_s, body))
-    return Run(trace, None if stream is None else poses, wanted)
+        query = motion.with_path(clips.schema, pose, motion.steered_path(past, asked))
+        chooser.update(dt_s, query, body=body)
+    return Run(trace, None, wanted)
+
+
+def run_character(clips: Clips, stick: Stick, seconds: float, controller: Any, settings: PoseSettings) -> Run:
+    """Let a character follow a stick."""
+    character = motion.Character(controller, clips.schema, None, motion.PoseStream(clips.bank, settings))
+    trace, wanted = character.record(0), [stick(tick / RATE) for tick in range(round(seconds * RATE) + 1)]
+    poses = [character.update(1.0 / RATE if tick else 0.0, asked).pose for tick, asked in enumerate(wanted)]
+    return Run(trace, [pose for pose in poses if pose is not None], wanted)
 
 
 # ---- the tables
@@ -212,17 +215,18 @@ COLUMNS = (
     ("missed", "n_missed", 0),
     ("stay s", "stay_s", 2),
     ("used %", "frames_used_share", -1),
+    ("forced cost", "forced_cost", 2),
 )
 RAW = {"skate_cm_s": "skate_raw_cm_s", "skate_m_min": "skate_raw_m_min", "accel_p99": "accel_raw_p99"}
-SUMMED = ("forced_jumps", "n_missed")
+TOGETHER: dict[str, Callable[..., Any]] = {"forced_jumps": sum, "n_missed": sum, "forced_cost": max}
 
 
 def row(name: str, found: Sequence[Measures]) -> tuple[str, ...]:
-    """A line of the table: means over probes, or sums of counts."""
+    """A line of the table: means over probes, sums of counts, or the dearest forced jump."""
     cells = [name]
     for _, key, decimals in COLUMNS:
         values = [value for each in found if (value := getattr(each, key)) is not None]
-        value = (sum(values) if key in SUMMED else float(np.mean(values))) if values else None
+        value = (TOGETHER.get(key, np.mean)(values)) if values else None
         cells.append("-" if value is None else f"{100.0 * value:.2f}" if decimals < 0 else f"{value:.{decimals}f}")
     return tuple(cells)
 
@@ -241,9 +245,10 @@ def measured(clips: Clips, seconds: float) -> Iterator[tuple[Stage, dict[str, Me
         key = stage.is_plain, stage.has_rate, stage.is_closed
         if key not in runs:
             choosers = (PlainMatching(clips.database) if stage.is_plain else controller_of(clips, stage.has_rate) for _ in PROBES)
-            closed = stage.settings if stage.is_closed else None
             runs[key] = {
-                name: run(clips, stick, seconds, chooser, closed)
+                name: run_character(clips, stick, seconds, chooser, stage.settings)
+                if stage.is_closed
+                else run(clips, stick, seconds, chooser)
                 for (name, stick), chooser in zip(PROBES.items(), choosers, strict=True)
             }
         yield (
@@ -270,7 +275,7 @@ def main() -> None:
         n_assets = len(set(clips.database.assets))
         print(
             f"\n{clips.name}: {n_assets} clips, {clips.database.n_frames:,} frames, mirrored ones among them; "
-            f"means over {len(PROBES)} probes of {arguments.seconds:g} s; forced and missed are sums\n"
+            f"means over {len(PROBES)} probes of {arguments.seconds:g} s; forced and missed are sums, forced cost is the most\n"
         )
         header = ("stage", *(label for label, _, _ in COLUMNS))
         rows = [row(stage.name, list(found.values())) for stage, found in told]

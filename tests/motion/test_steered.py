@@ -13,7 +13,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from contextdb.motion import Entry, FeatureSchema, MotionConfig, MotionDatabase, Selector, load_bvh, made_clips, with_path
+from contextdb.motion import (
+    Entry,
+    FeatureSchema,
+    MotionConfig,
+    MotionDatabase,
+    PoseSettings,
+    Selector,
+    load_bvh,
+    made_clips,
+    with_path,
+)
 from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.markup.marks import Mark
 from contextdb.motion.markup.markup import Markup
@@ -119,11 +129,20 @@ def test_a_steered_character_of_made_clips_is_never_stuck_and_enters_no_barred_f
 
 
 def test_it_plays_what_the_stick_asks_for():
-    _, decisions = made_run()
+    _, decisions = made_run(min_play_rate=1.0, max_play_rate=1.0)
     at = {second: decisions[round(second * RATE)].playing.asset for second in (1.0, 5.5, 8.5, 12.5, 19.5, 25.5, 32.5, 39.5)}
     assert all("walk" in at[second] for second in (5.5, 8.5, 25.5))
     assert all("jog" in at[second] or "run" in at[second] for second in (12.5, 32.5))
     assert all(at[second].startswith(("idle", "stop")) for second in (1.0, 19.5, 39.5))
+
+
+def test_with_play_rates_what_plays_goes_as_fast_as_asked_but_for_what_longer_steps_make_up_for():
+    _, decisions = made_run()
+    for second, asked in ((5.5, 1.3), (12.5, 2.5), (25.5, 1.3), (32.5, 2.5)):
+        during = decisions[round((second - 0.5) * RATE) : round((second + 0.5) * RATE)]
+        speed = np.mean([math.hypot(each.root_motion.left_m, each.root_motion.ahead_m) for each in during]) * RATE
+        assert PoseSettings().min_stride <= asked / speed <= PoseSettings().max_stride, (second, speed)
+    assert all(decisions[round(second * RATE)].playing.asset.startswith(("idle", "stop")) for second in (1.0, 19.5, 39.5))
 
 
 def test_no_tired_clip_plays_while_its_database_is_not_among_and_some_do_when_it_is():

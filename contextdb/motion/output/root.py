@@ -4,7 +4,8 @@ Movement of the animation goes the way that the body is aligned to, in steps as 
 
 In the mode "mixed" a share of the movement is the animation's and the rest the game's. What then lies between the character and the
 game's body is made up for by and by, by at most half as far as the character moves itself, so that nobody slides while standing;
-and never is it farther away than the clamp.
+and never is it farther away than the clamp. The heading may be pulled by more with each metre that is walked: a clip that goes
+straight on is steered along a curve, and turns on the feet that are locked.
 
 In the mode "path" the way is the game's, and how fast it is gone is the animation's: what lies to the side of the way is made up
 for, what lies along it is not. The game then goes on from the pose's root.
@@ -29,8 +30,8 @@ from contextdb.motion.selection.root_motion import RootMotion
 
 MOST_PULL = 0.5
 """The pull is at most this share of the character's own movement."""
-TURN_PER_M = 1.0
-"""So many radians of turning a metre of way allows the pull as well: who walks straight may be turned."""
+TURN_PER_M = 6.0
+"""So many radians of turning a metre of way allows the pull as well: who walks may be steered, and who stands is not turned."""
 NOTHING: Place3 = (0.0, 0.0, 0.0)
 
 

@@ -5,21 +5,21 @@
     position_weight = 1.0      # mixed: how much of the movement comes from the animation, 0 to 1, beside its own root weight
     rotation_weight = 1.0      # and of the turning
     position_pull_s = 0.1      # mixed: half of the way to the game's body is made up for in so many seconds; 0 is no pull
-    rotation_pull_s = 0.2
-    position_clamp_m = 0.15    # mixed: never farther from the game's body
+    rotation_pull_s = 0.1
+    position_clamp_m = 0.1     # mixed: never farther from the game's body
     rotation_clamp_deg = 90.0
     blend = "spring"           # how a jump is hidden: "spring", "dead", or "none"
     halflife_s = 0.1           # of the spring, for joints and root
     fade_s = 0.5               # dead: how long what was left fades
     fade_halflife_s = 0.25     # dead: how fast it slows down
     path_alignment = true      # hips and legs turn to the way that the game goes, and the chest stays
-    alignment_limit_deg = 35.0 # by so much at most
+    alignment_limit_deg = 70.0 # by so much at most
     alignment_halflife_s = 0.15
     min_stride = 0.8           # steps become so many times as long, as far as the play rate does not make up for the speed
     max_stride = 1.25
     foot_lock = true           # feet that are down in the clip stay where they came down
     foot_halflife_s = 0.1      # how fast a foot that was let go comes to the clip
-    foot_radius_m = 0.3        # a foot is let go where the clip has it so far away
+    foot_radius_m = 0.45       # a foot is let go where the clip has it so far away
 
 Reading touches no file.
 Source of the defaults: orangeduck/Motion-Matching, `controller.cpp`, and its dead blending demo.
@@ -44,18 +44,18 @@ NUMBERS = {
     "position_weight": ("a share from 0 to 1", 0.0, 1.0),
     "rotation_weight": ("a share from 0 to 1", 0.0, 1.0),
     "position_pull_s": ("seconds from 0 to 60, such as 0.1; 0 is no pull", 0.0, 60.0),
-    "rotation_pull_s": ("seconds from 0 to 60, such as 0.2; 0 is no pull", 0.0, 60.0),
-    "position_clamp_m": ("metres from 0 to 1000, such as 0.15", 0.0, 1000.0),
+    "rotation_pull_s": ("seconds from 0 to 60, such as 0.1; 0 is no pull", 0.0, 60.0),
+    "position_clamp_m": ("metres from 0 to 1000, such as 0.1", 0.0, 1000.0),
     "rotation_clamp_deg": ("degrees from 0 to 180, such as 90", 0.0, 180.0),
     "halflife_s": ("seconds from 0.001 to 60, such as 0.1", LEAST_HALFLIFE_S, 60.0),
     "fade_s": ("seconds from 0.001 to 60, such as 0.5", LEAST_HALFLIFE_S, 60.0),
     "fade_halflife_s": ("seconds from 0.001 to 60, such as 0.25", LEAST_HALFLIFE_S, 60.0),
-    "alignment_limit_deg": ("degrees from 0 to 90, such as 35", 0.0, 90.0),
+    "alignment_limit_deg": ("degrees from 0 to 90, such as 70", 0.0, 90.0),
     "alignment_halflife_s": ("seconds from 0.001 to 60, such as 0.15", LEAST_HALFLIFE_S, 60.0),
     "min_stride": ("a share from 0.1 to 1, such as 0.8; 1 shortens no step", 0.1, 1.0),
     "max_stride": ("a number from 1 to 3, such as 1.25; 1 lengthens no step", 1.0, 3.0),
     "foot_halflife_s": ("seconds from 0.001 to 60, such as 0.1", LEAST_HALFLIFE_S, 60.0),
-    "foot_radius_m": ("metres from 0 to 10, such as 0.3", 0.0, 10.0),
+    "foot_radius_m": ("metres from 0 to 10, such as 0.45", 0.0, 10.0),
 }
 FLAGS, TRUTH = ("path_alignment", "foot_lock"), "true or false"
 KEYS = (*WORDS, *NUMBERS, *FLAGS)
@@ -104,21 +104,21 @@ class PoseSettings:
     position_weight: float = 1.0
     rotation_weight: float = 1.0
     position_pull_s: float = 0.1
-    rotation_pull_s: float = 0.2
-    position_clamp_m: float = 0.15
+    rotation_pull_s: float = 0.1
+    position_clamp_m: float = 0.1
     rotation_clamp_deg: float = 90.0
     blend: Blend = "spring"
     halflife_s: float = 0.1
     fade_s: float = 0.5
     fade_halflife_s: float = 0.25
     path_alignment: bool = True
-    alignment_limit_deg: float = 35.0
+    alignment_limit_deg: float = 70.0
     alignment_halflife_s: float = 0.15
     min_stride: float = 0.8
     max_stride: float = 1.25
     foot_lock: bool = True
     foot_halflife_s: float = 0.1
-    foot_radius_m: float = 0.3
+    foot_radius_m: float = 0.45
 
     def __post_init__(self) -> None:
         if faults := list(_faults({field.name: getattr(self, field.name) for field in fields(self)})):

@@ -169,7 +169,7 @@ class PoseStream:
         if ground is not None and not callable(ground):
             raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
         place = self._place_of(body)
-        velocity = _velocity(body, place, dt, self._state)
+        velocity = _velocity(place, dt, self._state)
         decision, is_ahead = self._joined(decision, dt)
         state, playing = self._state, decision.playing
         moment, bank = None, self._rig
@@ -300,10 +300,8 @@ def _first(tick: Tick) -> Tick:
     return replace(tick, dt_s=0.0, left=None, entered=None, root_motion=NO_MOTION)
 
 
-def _velocity(body: object, place: Place3 | None, dt_s: float, state: PoseState) -> tuple[float, float] | None:
-    """How fast the game moves the body: as it says itself, else by how far it came since the last update."""
-    if isinstance(body, Steered):
-        return body.velocity
+def _velocity(place: Place3 | None, dt_s: float, state: PoseState) -> tuple[float, float] | None:
+    """How fast the game moves the body: by how far it came since the last update, as a session knows no more."""
     if place is None or state.body is None or dt_s <= 0.0:
         return state.velocity
     return (place[0] - state.body[0]) / dt_s, (place[1] - state.body[1]) / dt_s

@@ -193,7 +193,7 @@ async def _facts(app: Any, made: generator.GameTable) -> float:
 
 
 async def _live(app: Any, made: generator.GameTable) -> float:
-    """A moment of a game that is followed: every fact of the table is given, and a third of the numbers and one bool are others."""
+    """A moment of a game that is followed: its bools and numbers are given, and a third of the numbers and one bool are others."""
     from tui.model.game_answer import GameAnswer
     from tui.model.moments import Moment
     from tui.screens.following import ITEMS

@@ -81,7 +81,7 @@ async def follow(app: Any, pilot: Any, ask: Callable[[], object], at: int = 0) -
 
     await until(pilot, is_there)
     await press(pilot, *["down"] * at, "enter")
-    await until(pilot, lambda: ask() and False or app.main.following.moment is not None)
+    await until(pilot, lambda: (ask() and False) or app.main.following.moment is not None)
 
 
 def shows(app: Any, **facts: str) -> bool:

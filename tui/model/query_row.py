@@ -30,7 +30,7 @@ from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.data import CompiledData, costs_of
 from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
-from contextdb.compiled.pick import Outcome
+from contextdb.compiled.pick import Outcome, percent
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, some
 from contextdb.expressions.rules import WhenColumn, WhenRules
@@ -367,6 +367,17 @@ class QueryRow:
         is_flat = self.is_nested and self.asked is not None and self.asked.fault is None
         own = self.asked.valid_rows(row) if is_flat and self.asked is not None else [row]
         return self.outcome.said_of(own)
+
+    def brief(self, row: int) -> str:
+        """How a valid row stands, in the fewest words: "40 %", "outranked by B"; nothing for one that is picked in any case."""
+        if not self.bits >> row & 1 or self.outcome.refusal is not None:
+            return ""
+        is_flat = self.is_nested and self.asked is not None and self.asked.fault is None
+        own = self.asked.valid_rows(row) if is_flat and self.asked is not None else [row]
+        if any(one in self.outcome.chances for one in own):
+            chance = self.outcome.chance(own)
+            return percent(chance) if chance < 1.0 else ""
+        return self.outcome.why_not(own[0]).partition(" (")[0] if own else ""
 
     def doubt(self, row: int) -> str:
         """Why a valid row only may be valid; nothing for one that is decided."""

@@ -42,6 +42,8 @@ class WindowRow:
     """How many of its cells do not accept their fact."""
     is_played: bool = False
     """A game that is followed has picked it."""
+    standing: str = ""
+    """The chance that it is picked, or what outranks it; empty where that goes without saying."""
 
     @property
     def mark(self) -> str:
@@ -69,6 +71,7 @@ class Window:
             marks = (query.flags(bits)[rows].tolist() for bits in (query.bits, query.undecided, query.picked))
             counts = self._failing.sum(axis=1).tolist() if self._failing is not None else [0] * self.n_rows
             self.rows = [WindowRow(r.number, r.is_enabled, *said) for r, *said in zip(self.rows, *marks, counts, strict=True)]
+            self.rows = [replace(r, standing=query.brief(r.number - 1)) if r.is_valid else r for r in self.rows]
         if sheet.played is not None:
             self.rows = [replace(r, is_played=True) if r.number - 1 == sheet.played else r for r in self.rows]
         self._notes = [sheet.notes(row) for row in rows.tolist()] if sheet.query.has_notes else []

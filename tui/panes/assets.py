@@ -301,6 +301,7 @@ class AssetsPane(Pane):
     @on(Grid.FactChanged)
     def _fact_changed(self) -> None:
         self.grid.test_name = ""
+        self.grid.refit()
         self.show()
 
     def action_clear_context(self) -> None:
@@ -322,7 +323,7 @@ class AssetsPane(Pane):
 
     def follow(self, facts: Mapping[str, str], actors: Offered, played: int | None, name: str) -> None:
         """Show what the table makes of a moment of a game, and which row the game picked."""
-        sheet, is_other = self.sheet, bool(actors or self.sheet.query.actors)
+        sheet, is_other = self.sheet, bool(actors or self.sheet.query.actors or self.sheet.query.is_empty)
         sheet.played = played
         sheet.follow(facts, actors)
         self.grid.test_name = name

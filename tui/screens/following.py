@@ -18,7 +18,7 @@ from tui.model.asked import Offered
 from tui.model.context_list import ContextList
 from tui.model.game_answer import GameAnswer, played_row
 from tui.model.listening import Listening
-from tui.model.moments import Key, Moment, Session, Track
+from tui.model.moments import Key, LiveTrack, Moment, Session, Track
 from tui.model.session import Session as TableSession
 from tui.screens.context_forms import KeepDialog, Kept
 from tui.widgets.bar import Item
@@ -139,6 +139,14 @@ class Following:
         self.followed, self.moment, self._shown, self._texts = None, None, None, None
         if self._timer is not None:
             self._timer.pause()
+
+    @property
+    def kept(self) -> tuple[str, list[Moment]] | None:
+        """Who is followed, and the moments that are kept of a running game; None where none is followed."""
+        track = self.followed.track if self.followed is not None else None
+        if self.followed is None or not isinstance(track, LiveTrack):
+            return None
+        return self.followed.name, track.kept
 
     # ---- moments
 

@@ -215,7 +215,10 @@ class MainScreen(Screen[None]):
             return OptionsPane(sheet, id=name)
         if name == "priorities":
             return PrioritiesPane(sheet, id=name)
-        return CoveragePane(sheet, self.coverage, id=name) if name == "coverage" else ProblemsPane(sheet, id=name)
+        return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
+
+    def _coverage_pane(self, name: str) -> CoveragePane:
+        return CoveragePane(self.session.sheet, self.coverage, lambda: self.following.kept, self.workspace.folder, id=name)
 
     async def action_next_tab(self, by: int) -> None:
         """Go to the tab beside."""

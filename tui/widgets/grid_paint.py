@@ -255,6 +255,9 @@ class Painter:
             if note and room >= min(cell_len(text), LEAST_BESIDE):
                 yield Segment(mark + _shortened(text, room, n_shared), self.style(under, meant))
                 yield Segment(f" {note}", self.style(under, meant if column == cursor else "valid" if seen.is_valid else "muted"))
+            elif not note and column == asset and seen.standing and cell_len(text) + cell_len(seen.standing) < width:
+                yield Segment(mark + cut(text, width - cell_len(seen.standing)), self.style(under, meant))
+                yield Segment(seen.standing, self.style(under, meant if column == cursor else "muted"))
             else:
                 yield Segment(mark + _shortened(text, width, n_shared), self.style(under, meant))
 

@@ -16,6 +16,7 @@ from textual.reactive import reactive
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from contextdb.schema.shapes import CHANCE
 from tui.model.alignment import MOST_ALIGNED, indented
 from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
@@ -292,7 +293,9 @@ class GridView(ScrollView, inherit_bindings=False):
         role = query.role_of(column.name)
         is_opener = query.is_nested and at == self.sheet.asset_at
         if role is None and not is_opener:
-            return 0
+            is_weighed = at == self.sheet.asset_at and not query.is_empty and self.sheet.table.settings.policy in CHANCE
+            longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0) if is_weighed else 0
+            return longest + len(">99 %") + 2 if is_weighed else 0
         longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0)
         if role is None:
             return longest + len(" 000 of 000 rows") + 1

@@ -64,7 +64,7 @@ def test_the_numbers_are_those_of_the_command_line_and_t_loads_the_moment(path):
     screen, unused, found, texts, name = with_editor(path, script, (120, 30))
     expected = observe(cdb.load(path), path.with_name("play.csv"))
     assert found.observed.to_json() == expected.to_json()
-    assert "50.0 % of 6 recorded moments have a valid row" in screen
+    assert "50.00 % of 6 recorded moments have a valid row" in screen
     assert "never" in unused
     assert list(found.unused) == list(expected.never_used) == [2]
     number = int(name.split()[1])
@@ -106,6 +106,6 @@ def test_the_last_minute_of_a_game_is_read_too(path):
 
     nobody, screen, result = with_editor(path, script, (120, 30))
     assert "No game is followed" in nobody
-    assert "the last minute of game · player: 50.0 % of 6 recorded moments" in screen
+    assert "the last minute of game · player: 50.00 % of 6 recorded moments" in screen
     plain = observe(cdb.load(path), path.with_name("play.csv")).to_json()
     assert json.dumps(result.observed.to_json()["gaps"]) == json.dumps(plain["gaps"])

@@ -134,7 +134,7 @@ class CoveragePane(Pane):
                 empty=EMPTY["rows"],
                 id="rows",
             )
-            yield RowList(
+            yield GapList(
                 [*columns, ListColumn("Moments without a valid row", 27, 3), ListColumn("Nearest row", 13, 2)],
                 empty=NO_PLAY,
                 id="played",

@@ -18,6 +18,7 @@ import contextlib
 import gc
 import json
 import os
+import random
 import statistics
 import subprocess
 import sys
@@ -39,7 +40,7 @@ SHAPES = {
     "100,000 x 60": generator.Shape("100,000 x 60", 100_000, 36, 12, 12),
 }
 GRIDS = ("contextdb", "fastdatatable", "DataTable")
-STEPS = ("down, in view", "down, scrolling", "right", "page down", "type a cell", "undo", "test-row key")
+STEPS = ("down, in view", "down, scrolling", "right", "page down", "type a cell", "undo", "test-row key", "live change")
 SCREEN = (200, 50)
 N_KEYS = 24
 
@@ -167,6 +168,7 @@ async def _ours(made: generator.GameTable) -> Figures:
             figures["type a cell"] = await _typing(app, sheet)
             figures["undo"] = await _keys(app, "ctrl+z", n=N_KEYS // 2)
             figures["test-row key"] = await _facts(app, made)
+            figures["live change"] = await _live(app, made)
         return figures
 
 
@@ -187,6 +189,30 @@ async def _facts(app: Any, made: generator.GameTable) -> float:
         assets.show()
         await asyncio.sleep(0.1)
         times.append(1e3 * (time.process_time() - start))
+    return statistics.median(times)
+
+
+async def _live(app: Any, made: generator.GameTable) -> float:
+    """A moment of a game that is followed: its bools and numbers are given, and a third of the numbers and one bool are others."""
+    from tui.model.game_answer import GameAnswer
+    from tui.model.moments import Moment
+    from tui.screens.following import ITEMS
+    from tui.widgets.bar import Item
+    from tui.widgets.live_line import Said
+
+    assets, times, rng = app.main.assets, [], random.Random(1)
+    facts: dict[str, object] = dict.fromkeys(made.bool_names, True) | dict.fromkeys(made.number_names, 50.0)
+    for i in range(2 * N_KEYS):
+        moment = Moment(i / 30, dict(facts), 0, 0)
+        start = time.process_time()
+        assets.follow(moment.texts(assets.sheet.query.wanted.given), {}, i, "game")
+        said = Said("●", "game", GameAnswer(moment, assets.sheet.query).said, "")
+        assets.show_live(said, [Item(*item) for item in ITEMS])
+        await asyncio.sleep(0.1)
+        times.append(1e3 * (time.process_time() - start))
+        facts[rng.choice(made.bool_names)] = rng.random() < 0.5
+        for name in made.number_names[::3]:
+            facts[name] = min(max(float(str(facts[name])) + rng.uniform(-2, 2), 0.0), 100.0)
     return statistics.median(times)
 
 

@@ -215,6 +215,14 @@ _OF_SCREEN = (
     Command("contexts", "f9", "Contexts", "Load a saved or recorded context.", "Test row", "contexts", in_footer=True),
     Command("next-context", "f8", "Next context", "Load the next context of the file.", "Test row", "step(1)"),
     Command("previous-context", "f7", "Previous context", "Load the previous context.", "Test row", "step(-1)"),
+    Command("live", "alt+u", "Follow a game", "Let the test row follow a running game, or a recording.", "Test row", "live"),
+    Command(
+        "live-pause", "alt+6", "Pause the game", "Hold the moment of the game that is followed; go on.", "Test row", "live_pause"
+    ),
+    Command("live-back", "alt+8", "A second back", "Go back a second in what the game did.", "Test row", "live_by(-1)"),
+    Command("live-ahead", "alt+9", "A second ahead", "Go on a second in what the game did.", "Test row", "live_by(1)"),
+    Command("live-keep", "alt+7", "Keep the moment", "Save this moment as a context.", "Test row", "live_keep"),
+    Command("live-stop", "", "Stop following", "Let go of the game; its last facts stay.", "Test row", "live_stop"),
     Command("actors", "alt+p", "Actors", "Who may fill each role, for the test row.", "Test row", "actors"),
     Command(
         "why",

@@ -209,7 +209,7 @@ def test_sections_turn_with_brackets_and_are_clicked():
     app, _ = shown(keys=("right_square_bracket", "right_square_bracket"))
     assert app.pane.section == 2
     app, _ = shown(keys=("left_square_bracket",))
-    assert app.pane.section == 4
+    assert app.pane.section == 6
 
     async def click(pilot: Pilot[None]) -> None:
         await pilot.click("#coverage-sections", offset=(16, 0))

@@ -30,7 +30,7 @@ from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
 from contextdb.compiled.data import CompiledData, costs_of
 from contextdb.compiled.explain import Explanation, Failure, RowExplanation, describe_fact
-from contextdb.compiled.pick import Outcome
+from contextdb.compiled.pick import Outcome, percent
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import Fault, some
 from contextdb.expressions.rules import WhenColumn, WhenRules
@@ -46,6 +46,8 @@ from tui.model.wanted import Wanted, flat_of
 
 MOST_EXPLAINED = 50
 """So many rows behind one row are looked through for the cells of it that keep actors from a role."""
+FEW_CELLS = 32
+"""Of a column with fewer distinct cells, each is asked; that takes less than its masks."""
 
 
 class QueryRow:
@@ -61,6 +63,8 @@ class QueryRow:
         self._bits: dict[str, tuple[int, int]] = {}
         """By condition the rows whose cell accepts some value of its fact, and those whose cell accepts every one."""
         self._words: dict[str, NDArray[np.uint64]] = {}
+        self._masks: dict[str, CompiledData | None] = {}
+        """Columns that were asked again, compiled: a running game asks them many times a second. None for one asked once."""
         self._readable: dict[str, int] = {}
         self.actors: Offered = {}
         """Who may play each role. The facts of a role with actors are theirs, not those of the test row."""
@@ -115,6 +119,11 @@ class QueryRow:
         """Write all facts again: those not named are left out."""
         self.texts = dict(texts)
         self._read()
+
+    def follow(self, texts: Mapping[str, str], actors: Offered) -> None:
+        """Write all facts again, and offer other actors: `load` and `offer` in one."""
+        self.texts = dict(texts)
+        self.offer(actors)
 
     def is_computed(self, condition: str) -> bool:
         """Whether a fact is computed from others, and so never typed."""
@@ -359,6 +368,17 @@ class QueryRow:
         own = self.asked.valid_rows(row) if is_flat and self.asked is not None else [row]
         return self.outcome.said_of(own)
 
+    def brief(self, row: int) -> str:
+        """How a valid row stands, in the fewest words: "40 %", "outranked by B"; nothing for one that is picked in any case."""
+        if not self.bits >> row & 1 or self.outcome.refusal is not None:
+            return ""
+        is_flat = self.is_nested and self.asked is not None and self.asked.fault is None
+        own = self.asked.valid_rows(row) if is_flat and self.asked is not None else [row]
+        if any(one in self.outcome.chances for one in own):
+            chance = self.outcome.chance(own)
+            return percent(chance) if chance < 1.0 else ""
+        return self.outcome.why_not(own[0]).partition(" (")[0] if own else ""
+
     def doubt(self, row: int) -> str:
         """Why a valid row only may be valid; nothing for one that is decided."""
         if not self.undecided >> row & 1:
@@ -456,8 +476,20 @@ class QueryRow:
         for name, column in self._columns.items():
             if name in fresh or before.get(name) != self.facts[name]:
                 self._words.pop(name, None)
+                if name in fresh:
+                    self._masks.pop(name, None)
                 everything, fact = (1 << column.texts.n_rows) - 1, self.facts[name]
-                self._bits[name] = (everything, everything) if fact is None else _accepting(column, fact)
+                self._bits[name] = (everything, everything) if fact is None else self._accepting(name, column, fact)
+
+    def _accepting(self, name: str, column: ConditionColumn, fact: Fact) -> tuple[int, int]:
+        """As `_accepting`; a column of many cells that is asked again is asked by its masks."""
+        if len(column.cells) < FEW_CELLS or column.soft is not None or column.faults:
+            return _accepting(column, fact)
+        masks = self._masks.get(name)
+        if masks is None:
+            masks = compile_table(_alone(column)) if name in self._masks else None
+            self._masks[name] = masks
+        return _accepting(column, fact) if masks is None else masks.condition_bits(0, fact)
 
     def _mask(self, name: str) -> NDArray[np.uint64]:
         if name not in self._words:
@@ -467,6 +499,7 @@ class QueryRow:
     def _forget(self, name: str) -> None:
         self._bits.pop(name, None)
         self._words.pop(name, None)
+        self._masks.pop(name, None)
         self._readable.pop(name, None)
 
 

@@ -72,6 +72,8 @@ class ShownTable:
         self.view = View.of(self.table)
         self.columns_shown = ColumnsShown()
         self.version = 0
+        self.played: int | None = None
+        """The row of the file that a game which is followed has picked."""
         self._places: dict[str, tuple[TextColumn, int]] = {}
         """For columns of numbers how far they are indented, for the assets how long their shared end is, and of which texts."""
         self._findings: NDArray[np.bool_] | None = None
@@ -402,6 +404,11 @@ class ShownTable:
                 self.query.load(facts)
 
         self._ask(name, change)
+
+    def follow(self, facts: Mapping[str, str], actors: Offered) -> None:
+        """Ask what a running game asks. It is no step: the game asks many times a second."""
+        self.version += 1
+        self.query.follow(facts, actors)
 
     def _ask(self, name: str, change: Callable[[], object]) -> None:
         self.version += 1

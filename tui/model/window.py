@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -21,6 +21,8 @@ MARKS: dict[Kind, str] = {"text": " ", "any": " ", "failing": "×", "fault": "!"
 
 PICKED, VALID, MAY_BE = "◉", "●", "◐"
 """What is next to a valid row: the policy may pick it; it picks others; it is not known whether the row is valid."""
+PLAYS = "▶"
+"""Stands before that sign where a game that is followed has picked the row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,10 @@ class WindowRow:
     """It is valid, and the table's policy may pick it."""
     n_failing: int = 0
     """How many of its cells do not accept their fact."""
+    is_played: bool = False
+    """A game that is followed has picked it."""
+    standing: str = ""
+    """The chance that it is picked, or what outranks it; empty where that goes without saying."""
 
     @property
     def mark(self) -> str:
@@ -65,7 +71,12 @@ class Window:
             marks = (query.flags(bits)[rows].tolist() for bits in (query.bits, query.undecided, query.picked))
             counts = self._failing.sum(axis=1).tolist() if self._failing is not None else [0] * self.n_rows
             self.rows = [WindowRow(r.number, r.is_enabled, *said) for r, *said in zip(self.rows, *marks, counts, strict=True)]
+            self.rows = [replace(r, standing=query.brief(r.number - 1)) if r.is_valid else r for r in self.rows]
+        if sheet.played is not None:
+            self.rows = [replace(r, is_played=True) if r.number - 1 == sheet.played else r for r in self.rows]
         self._notes = [sheet.notes(row) for row in rows.tolist()] if sheet.query.has_notes else []
+        self._texts: dict[int, list[tuple[str, Kind]]] = {}
+        """The cells as they are without facts."""
         self._columns: dict[int, list[tuple[str, Kind]]] = {}
 
     def holds(self, row: int) -> bool:
@@ -80,6 +91,32 @@ class Window:
         """The columns whose cells in a row of the view do not accept their fact."""
         return [] if self._failing is None else np.flatnonzero(self._failing[row - self.top]).tolist()
 
+    def again(self) -> Window:
+        """The same rows read for the facts that are asked now; the texts of cells are those that were read."""
+        window = Window(self._sheet, self.top, self.n_rows)
+        window._texts = self._texts
+        return window
+
+    def changed_since(self, before: Window) -> list[int]:
+        """The rows of the view that look otherwise than before, of the same rows."""
+        same = [a == b for a, b in zip(self.rows, before.rows, strict=True)]
+        if self._failing is not None and before._failing is not None:
+            differ = (self._failing != before._failing).any(axis=1).tolist()
+            same = [s and not d for s, d in zip(same, differ, strict=True)]
+        elif (self._failing is None) != (before._failing is None):
+            same = [False] * self.n_rows
+        if self._notes or before._notes:
+            notes = zip(self._notes or [{}] * self.n_rows, before._notes or [{}] * self.n_rows, strict=True)
+            same = [s and a == b for s, (a, b) in zip(same, notes, strict=True)]
+        return [self.top + at for at, is_same in enumerate(same) if not is_same]
+
+    def began_to_fail(self, before: Window) -> frozenset[tuple[int, int]]:
+        """The cells that fail now and did not before: rows of the view, and columns."""
+        if self._failing is None or before._failing is None:
+            return frozenset()
+        rows, columns = np.nonzero(self._failing & ~before._failing)
+        return frozenset(zip((rows + self.top).tolist(), columns.tolist(), strict=True))
+
     def cell(self, row: int, column: int) -> tuple[str, Kind]:
         """The text of a cell, and how it is meant."""
         if column not in self._columns:
@@ -91,6 +128,16 @@ class Window:
         return self._notes[row - self.top].get(column) if self._notes else None
 
     def _read(self, column: int) -> list[tuple[str, Kind]]:
+        if column not in self._texts:
+            self._texts[column] = self._read_texts(column)
+        found, condition = self._texts[column], self._sheet.condition(column)
+        is_rule = self._sheet.table.columns[column].name == self._sheet.table.settings.when
+        if self._failing is None or (condition is None and not is_rule):
+            return found
+        fails = self._failing[:, column].tolist()
+        return [(text, "failing") if f and kind != "fault" else (text, kind) for (text, kind), f in zip(found, fails, strict=True)]
+
+    def _read_texts(self, column: int) -> list[tuple[str, Kind]]:
         texts = self._sheet.table.columns[column]
         condition = self._sheet.condition(column)
         codes = texts.codes[self._rows].tolist()
@@ -101,10 +148,7 @@ class Window:
         if condition is None and self._sheet.missing_output(column) is not None:
             is_missing = [self._sheet.is_missing(int(row), column) for row in self._rows]
             found = [(text, "fault" if wrong else kind) for (text, kind), wrong in zip(found, is_missing, strict=True)]
-        if self._failing is None or (condition is None and texts.name != self._sheet.table.settings.when):
-            return found
-        fails = self._failing[:, column].tolist()
-        return [(text, "failing") if f and kind != "fault" else (text, kind) for (text, kind), f in zip(found, fails, strict=True)]
+        return found
 
     def _kind(self, column: int, condition: ConditionColumn | None, code: int) -> Kind:
         if condition is None:

@@ -32,6 +32,7 @@ from tui.widgets.bar import Bar, CellLine, Item
 from tui.widgets.cell_editor import CellEditor
 from tui.widgets.find_bar import FilterBar, FindBar, SheetBar
 from tui.widgets.grid import Grid
+from tui.widgets.live_line import LiveLine, Said
 
 MOST_KNOWN = 10_000
 """So many of a column's texts are offered to complete from."""
@@ -51,7 +52,7 @@ class _Place:
 class AssetsPane(Pane):
     """A table as a spreadsheet, with the test row at its foot."""
 
-    DEFAULT_CSS = "AssetsPane { layout: vertical; & Grid { height: 1fr; } & #chips { display: none; } }"
+    DEFAULT_CSS = "AssetsPane { layout: vertical; & Grid { height: 1fr; } & #chips { display: none; } & #live { display: none; } }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f6", "back", "Back to the table", show=False)]
 
     def __init__(self, sheet: Sheet, clipboard: Clipboard) -> None:
@@ -68,6 +69,8 @@ class AssetsPane(Pane):
     def compose(self) -> ComposeResult:
         yield CellLine()
         yield WhyPane()
+        yield LiveLine()
+        yield Bar(id="live")
         yield Bar(id="chips")
         yield Grid(self.sheet)
         yield FilterBar()
@@ -298,6 +301,7 @@ class AssetsPane(Pane):
     @on(Grid.FactChanged)
     def _fact_changed(self) -> None:
         self.grid.test_name = ""
+        self.grid.refit()
         self.show()
 
     def action_clear_context(self) -> None:
@@ -314,6 +318,35 @@ class AssetsPane(Pane):
         self.grid.test_name = name
         self.show()
         self.grid.post_message(Grid.Moved())
+
+    # ---- a game that is followed
+
+    def follow(self, facts: Mapping[str, str], actors: Offered, played: int | None, name: str) -> None:
+        """Show what the table makes of a moment of a game, and which row the game picked."""
+        sheet, is_other = self.sheet, bool(actors or self.sheet.query.actors or self.sheet.query.is_empty)
+        sheet.played = played
+        sheet.follow(facts, actors)
+        self.grid.test_name = name
+        if sheet.filter.is_valid:
+            sheet.refresh()
+        if is_other:
+            self.grid.refit()
+            self.grid.changed()
+        else:
+            self.grid.asked_again()
+        self._show_cell()
+
+    def show_live(self, said: Said | None, items: Sequence[Item] = ()) -> None:
+        """Say how it stands with the game; None: none is followed."""
+        line, tools = self.query_one(LiveLine), self.query_one("#live", Bar)
+        if line.display != (said is not None):
+            line.display = tools.display = said is not None
+        if said is not None:
+            line.show(said)
+            tools.show(items)
+        elif self.sheet.played is not None:
+            self.sheet.played = None
+            self.grid.changed()
 
     def refresh_valid(self) -> None:
         """Filter again where only valid rows are shown, and make room for what is beside cells."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import ClassVar
 
-from textual import on
+from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
@@ -17,24 +18,31 @@ from textual.widgets import ContentSwitcher, Static
 
 from contextdb.covering import CoverageReport, format_percent
 from contextdb.errors import ContextDBError, in_quotes
+from contextdb.telemetry.observed import SeenGap
 from tui.messages import FillGap, GoToCell, SetContext, Told
 from tui.model import coverage_lines as lines
 from tui.model.coverage_run import CoverageRun, Result, is_quick
 from tui.model.moment import moment_inside
+from tui.model.moments import Moment
+from tui.model.played_run import Played, PlayedRun, moment_in
 from tui.model.sheet import Sheet
 from tui.panes.pair_map import PairMap
 from tui.panes.pane import Pane
+from tui.screens.ask import AskDialog
 from tui.widgets.choice_line import ChoiceLine
 from tui.widgets.fitted import bar
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 
-SECTIONS = ("gaps", "pairs", "crowded", "rows", "about")
-NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About")
+SECTIONS = ("gaps", "pairs", "crowded", "rows", "about", "played", "unused")
+NAMES = ("Gaps", "Pairs", "Crowded", "Rows", "About", "Played", "Unused")
+OF_PLAY = ("played", "unused")
+NO_PLAY = "O reads recorded moments, from files; L those of the game that the test row follows."
 EMPTY = {
     "gaps": "No gap is known.",
     "crowded": "Nowhere are two rows valid at once, as far as is known.",
     "rows": "No row was found to be redundant.",
 }
+EMPTY_OF_PLAY = {"played": "Every recorded moment has a valid row.", "unused": "Every row was valid in some recorded moment."}
 """What a list without lines says once the table is measured."""
 
 
@@ -59,6 +67,8 @@ class CoveragePane(Pane):
         Binding("right_square_bracket", "turn(1)", "Next section", show=False),
         Binding("t", "try_context", "To the test row"),
         Binding("r", "measure", "Measure again"),
+        Binding("o", "read_files", "Recorded moments"),
+        Binding("l", "read_live", "Of the game"),
         Binding("escape", "back", "Stop, or back", show=False),
     ]
     DEFAULT_CSS = """
@@ -82,9 +92,20 @@ class CoveragePane(Pane):
     class Changed(Message):
         """The run has got somewhere; sent from its thread."""
 
-    def __init__(self, sheet: Sheet, run: CoverageRun, *, id: str | None = None) -> None:  # noqa: A002
+    def __init__(
+        self,
+        sheet: Sheet,
+        run: CoverageRun,
+        live: Callable[[], tuple[str, list[Moment]] | None] = lambda: None,
+        folder: Path = Path(),
+        *,
+        id: str | None = None,  # noqa: A002
+    ) -> None:
+        """`live` gives the moments of the game that is followed; recordings are looked for from `folder` on."""
         super().__init__(id=id)
-        self.sheet, self.run = sheet, run
+        self.sheet, self.run, self.live, self.folder = sheet, run, live, folder
+        self.played = PlayedRun()
+        self._shown_play: Played | None = None
         self.section = 0
         self._shown: Result | None = None
         self._details = dict.fromkeys(SECTIONS, "")
@@ -113,6 +134,12 @@ class CoveragePane(Pane):
                 empty=EMPTY["rows"],
                 id="rows",
             )
+            yield GapList(
+                [*columns, ListColumn("Moments without a valid row", 27, 3), ListColumn("Nearest row", 13, 2)],
+                empty=NO_PLAY,
+                id="played",
+            )
+            yield RowList([ListColumn("Row", 6, 0, True), ListColumn("Asset", 16, 2)], empty=NO_PLAY, id="unused")
             with VerticalScroll(id="about"):
                 yield Static(id="about-text", markup=False)
         with VerticalScroll(id="coverage-detail"):
@@ -127,6 +154,7 @@ class CoveragePane(Pane):
         """Listen no more; nobody waits for what runs."""
         self.run.unlisten(self._tell)
         self.run.cancel()
+        self.played.close()
 
     def _tell(self) -> None:
         self.post_message(self.Changed())
@@ -148,7 +176,9 @@ class CoveragePane(Pane):
     @on(Changed)
     def _show_state(self) -> None:
         run = self.run
-        self.query_one("#coverage-state", Static).update(lines.state_text(run, self.sheet.table))
+        of_play = self._play_text() if SECTIONS[self.section] in OF_PLAY else ""
+        self.query_one("#coverage-state", Static).update(of_play or lines.state_text(run, self.sheet.table))
+        self._show_play()
         self._show_bar()
         if run.result is not self._shown:
             self._shown = run.result
@@ -159,6 +189,30 @@ class CoveragePane(Pane):
             self.query_one(f"#{name}", LineList).say_empty(unknown or text)
         self.set_class(run.state == "stale", "-stale")
         self._show_section()
+
+    def _play_text(self) -> str:
+        played, result = self.played, self.played.result
+        if played.reading:
+            return f"Reading {played.reading} …"
+        if played.problem:
+            return f"✗ {played.problem}"
+        if result is None:
+            return "Which moments of real play have no valid row?"
+        is_stale = result.table is not self.sheet.table
+        return f"The table has changed since. O or L reads again. Before: {result.headline}" if is_stale else result.headline
+
+    def _show_play(self) -> None:
+        result = self.played.result
+        if result is None or result is self._shown_play:
+            return
+        self._shown_play = result
+        for name, text in EMPTY_OF_PLAY.items():
+            self.query_one(f"#{name}", LineList).say_empty(text)
+        self.query_one("#played", LineList).show(len(result.gaps), lambda at: _played_line(result.gaps[at]))
+        assets = result.table.assets
+        self.query_one("#unused", LineList).show(
+            len(result.unused), lambda at: [str(result.unused[at] + 1), assets[result.unused[at]]]
+        )
 
     def _show_bar(self) -> None:
         result, width = self.run.result, max(10, min(40, self.size.width - 50))
@@ -192,11 +246,13 @@ class CoveragePane(Pane):
 
     def _labels(self) -> Sequence[str]:
         result = self.run.result
-        counts = ["", "", "", "", ""]
+        play = self.played.result
+        counts = [""] * 5 if result is None else []
         if result is not None:
             report = result.report
             more = "" if report.gaps_complete else "+"
             counts = [f" {len(report.gaps)}{more}", "", f" {len(report.crowded)}", f" {len(report.findings)}", ""]
+        counts += ["", ""] if play is None else [f" {len(play.gaps)}", f" {len(play.unused)}"]
         return [f"{at + 1} {name}{counts[at]}" for at, name in enumerate(NAMES)]
 
     def on_resize(self) -> None:
@@ -217,6 +273,10 @@ class CoveragePane(Pane):
     def _moved(self, event: LineList.Moved) -> None:
         event.stop()
         result, table = self.run.result, self.sheet.table
+        if event.list.id in OF_PLAY:
+            self._details[event.list.id] = self._play_detail(event.list.id, event.index)
+            self._show_section()
+            return
         if result is None or event.list.id not in self._details:
             return
         text, report = "", result.report
@@ -235,13 +295,54 @@ class CoveragePane(Pane):
         self._details["pairs"] = event.text
         self._show_section()
 
+    def _play_detail(self, section: str, at: int) -> str:
+        play = self.played.result
+        if play is None or at < 0:
+            return ""
+        if section == "unused":
+            row = play.unused[at]
+            return f"{lines.row_text(row, play.table.assets[row])} was valid in no recorded moment. Enter goes there."
+        gap = play.gaps[at]
+        size = f"{format_percent(gap.share)} of the recorded moments, {gap.moments:,.0f}"
+        return f"Gap {at + 1} of {len(play.gaps)}: {size}\n{gap.text}\nT puts a moment of it into the test row, Enter makes a row."
+
     # ---- what can be done
+
+    def action_read_files(self) -> None:
+        """Ask for recorded moments: a file, or a pattern of files."""
+
+        def named(text: str | None) -> None:
+            if text is not None and text.strip():
+                path = self.folder / Path(text.strip()).expanduser()
+                self.played.start(self.sheet.table, str(path), text.strip(), self._tell)
+                self.action_section(SECTIONS.index("played"))
+                self._show_state()
+
+        question = "A file of recorded moments, or a pattern: session.jsonl, telemetry/*.parquet"
+        self.app.push_screen(AskDialog("Recorded moments", question, "", lambda _: ""), named)
+
+    def action_read_live(self) -> None:
+        """Take the moments of the game that the test row follows."""
+        found = self.live()
+        if found is None or not found[1]:
+            self.post_message(Told("No game is followed. Alt+U shows the games that run.", "warning"))
+            return
+        self.played.start_live(self.sheet.table, found[1], f"the last minute of {found[0]}", self._tell)
+        self.action_section(SECTIONS.index("played"))
+        self._show_state()
+
+    @work(thread=True, exclusive=True)
+    def _try_moment(self, play: Played, at: int) -> None:
+        """Put the first recorded moment of a gap into the test row; looking for it may take a while."""
+        found = moment_in(play, play.gaps[at])
+        message = SetContext(*found) if found is not None else Told("No recorded moment of this gap was found.", "warning")
+        self.post_message(message)
 
     def action_section(self, at: int) -> None:
         """Show another section."""
         had_focus = self.has_focus_within
         self.section = at
-        self._show_section()
+        self._show_state()
         self.refresh_bindings()
         if had_focus:
             self.take_focus()
@@ -271,7 +372,13 @@ class CoveragePane(Pane):
     @on(LineList.Chosen)
     def _chosen(self, event: LineList.Chosen) -> None:
         event.stop()
-        result = self.run.result
+        result, play = self.run.result, self.played.result
+        if event.list.id in OF_PLAY and play is not None:
+            if event.list.id == "unused":
+                self._go_to(play.unused[event.index])
+            else:
+                self._fill_gap(play.gaps[event.index].cells)
+            return
         if result is None:
             return
         report = result.report
@@ -305,10 +412,14 @@ class CoveragePane(Pane):
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Only where there are contexts, one can be tried."""
-        return action != "try_context" or SECTIONS[self.section] in ("gaps", "pairs", "crowded")
+        return action != "try_context" or SECTIONS[self.section] in ("gaps", "pairs", "crowded", "played")
 
     def action_try_context(self) -> None:
         """Put a context of what the cursor is on into the test row."""
+        play = self.played.result
+        if SECTIONS[self.section] == "played" and play is not None and play.gaps:
+            self._try_moment(play, self.query_one("#played", LineList).index)
+            return
         found = self._cells_here()
         if found is None:
             self.post_message(Told("There is nothing here to try.", "warning"))
@@ -340,6 +451,12 @@ def _gap_line(report: CoverageReport, at: int) -> Sequence[ListCell]:
     share = (f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}", "strong") if gap.share else ("points", "muted")
     new: ListCell = ("same", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
     return [share, new, partial(lines.cells_within, gap.cells), lines.nearest_text(gap.nearest)]
+
+
+def _played_line(gap: SeenGap) -> Sequence[ListCell]:
+    new: ListCell = ("same", "muted") if gap.new_share == gap.share else format_percent(gap.new_share)
+    share = f"{'' if gap.is_exact else '~'}{format_percent(gap.share)}"
+    return [(share, "strong"), new, partial(lines.cells_within, gap.cells), lines.nearest_text(gap.nearest)]
 
 
 def _crowd_line(report: CoverageReport, at: int) -> Sequence[ListCell]:

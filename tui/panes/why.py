@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from textual.app import ComposeResult
 from textual.containers import VerticalScroll
 from textual.content import Content
@@ -48,13 +50,17 @@ class WhyPane(VerticalScroll, can_focus=False):
         if sheet.query.is_empty or not len(sheet.view):
             said = Content(NO_FACTS if sheet.query.is_empty else "No row is shown.")
         else:
-            said = _said(why_row(sheet.query, sheet.table, int(sheet.view.rows[sheet.cursor[0]])))
+            row = int(sheet.view.rows[sheet.cursor[0]])
+            why, outputs = why_row(sheet.query, sheet.table, row), sheet.table.settings.outputs
+            gives = [f"{name} = {sheet.table.text(row, name) or '–'}" for name in outputs] if why.is_picked else []
+            said = _said(why, gives)
         self.query_one(Static).update(said)
 
 
-def _said(why: RowWhy) -> Content:
-    """A row in full: the cells that matter first, those that hold in few words."""
+def _said(why: RowWhy, gives: Sequence[str]) -> Content:
+    """A row in full: what it gives where it may be picked, the cells that matter, those that hold in few words."""
     lines = [Content.styled(row_state(why), "bold"), Content("")]
+    lines += [Content(f"gives {', '.join(gives)}"), Content("")] if gives else []
     for cell in why.cells:
         if cell.is_wrong or cell.state == "open":
             lines += _told(cell)

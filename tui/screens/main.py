@@ -40,6 +40,7 @@ from tui.screens.ask import AskDialog, ChooseDialog
 from tui.screens.asking import TestRow
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
 from tui.screens.export_table import Export
+from tui.screens.following import Followed, Following
 from tui.screens.steps import StepsDialog
 from tui.widgets.bar import Bar, Item, StatusLine
 from tui.widgets.grid import Grid
@@ -92,6 +93,7 @@ class MainScreen(Screen[None]):
         self.session: Session = workspace.session(name)
         self.coverage = CoverageRun()
         self.test_row = TestRow(self)
+        self.following = Following(self)
         self.came_from = ""
         """The table from a row of which this one was gone into."""
         self.renamed = ""
@@ -126,6 +128,7 @@ class MainScreen(Screen[None]):
 
     def on_unmount(self) -> None:
         self.coverage.cancel()
+        self.following.close()
 
     # ---- what is shown
 
@@ -212,7 +215,10 @@ class MainScreen(Screen[None]):
             return OptionsPane(sheet, id=name)
         if name == "priorities":
             return PrioritiesPane(sheet, id=name)
-        return CoveragePane(sheet, self.coverage, id=name) if name == "coverage" else ProblemsPane(sheet, id=name)
+        return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
+
+    def _coverage_pane(self, name: str) -> CoveragePane:
+        return CoveragePane(self.session.sheet, self.coverage, lambda: self.following.kept, self.workspace.folder, id=name)
 
     async def action_next_tab(self, by: int) -> None:
         """Go to the tab beside."""
@@ -474,7 +480,37 @@ class MainScreen(Screen[None]):
 
     def action_step(self, by: int) -> None:
         """Load the next context, or the one before."""
-        self.try_to(lambda: self.test_row.step(by))
+        if self.following.followed is not None:
+            self.following.step(by)
+        else:
+            self.try_to(lambda: self.test_row.step(by))
+
+    def action_live(self) -> None:
+        """Let the test row follow a game, or a recording."""
+        from tui.screens.live import LiveDialog
+
+        def chosen(answer: Followed | None) -> None:
+            if answer is not None:
+                self._switch_to("assets")
+                self.following.start(answer)
+
+        self.app.push_screen(LiveDialog(self.table_name, self.workspace.folder), chosen)
+
+    def action_live_pause(self) -> None:
+        """Hold the moment of the game, or go on."""
+        self.following.pause()
+
+    def action_live_by(self, by: int) -> None:
+        """Go back a second of the game, or ahead."""
+        self.following.seconds(by)
+
+    def action_live_keep(self) -> None:
+        """Save the moment of the game as a context."""
+        self.try_to(self.following.keep)
+
+    def action_live_stop(self) -> None:
+        """Let go of the game."""
+        self.following.stop()
 
     def action_actors(self) -> None:
         """Say who may play each role."""
@@ -540,7 +576,8 @@ class MainScreen(Screen[None]):
 
     @on(SetContext)
     def set_context(self, event: SetContext) -> None:
-        """Make these the facts of the test row."""
+        """Make these the facts of the test row; a game is not followed any more."""
+        self.following.stop()
         self._switch_to("assets")
         self.assets.set_context(dict(event.facts), event.name)
 

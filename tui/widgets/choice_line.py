@@ -42,12 +42,18 @@ class ChoiceLine(Widget):
         self.labels, self.taken = tuple(labels), taken
         self.refresh()
 
+    @property
+    def _gap(self) -> int:
+        """So many cells between two choices: fewer where not all would fit."""
+        width = sum(map(cell_len, self.labels))
+        return next((gap for gap in range(GAP, 1, -1) if width + gap * (len(self.labels) - 1) <= self.content_size.width), 1)
+
     def render(self) -> Content:
         """The line."""
         parts: list[Content] = []
         for at, label in enumerate(self.labels):
             parts.append(Content.styled(label, "$foreground bold underline" if at == self.taken else ""))
-            parts.append(Content(" " * GAP))
+            parts.append(Content(" " * self._gap))
         return Content("").join(parts)
 
     def on_click(self, event: events.Click) -> None:
@@ -59,4 +65,4 @@ class ChoiceLine(Widget):
             stop = start + cell_len(label)
             if offset is not None and start <= at_x < stop + 1:
                 self.post_message(self.Picked(self, at))
-            start = stop + GAP
+            start = stop + self._gap

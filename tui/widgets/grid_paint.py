@@ -18,7 +18,7 @@ from contextdb.errors import plural
 from tui.model.layout import Layout, cut, cut_middle, name_lines
 from tui.model.selection import Block
 from tui.model.shown import Header, ShownTable
-from tui.model.window import MARKS, PICKED, Window
+from tui.model.window import MARKS, PICKED, PLAYS, Window
 
 LOWEST = 8
 """In a window of fewer lines only the names of the columns stand over the rows."""
@@ -111,14 +111,31 @@ class Painter:
         self.sheet = sheet
         self.style = style
         self._window: Window | None = None
+        self.flashing: frozenset[tuple[int, int]] = frozenset()
+        """Cells that have just begun to fail: rows of the view, and columns."""
+        self.began: frozenset[tuple[int, int]] = frozenset()
+        """Those of them that began with the last facts."""
         self._headers: dict[int, Header] = {}
         self._read = sheet.table, sheet.view
 
     def changed(self) -> None:
         """Read the sheet again."""
         self._window = None
+        self.flashing = self.began = frozenset()
         self._headers.clear()
         self._read = self.sheet.table, self.sheet.view
+
+    def asked_again(self) -> list[int] | None:
+        """Read the answers again after other facts, and remember which cells have just begun to fail; gives the rows of the view
+        that look otherwise, None where nothing was read yet."""
+        before = self._window
+        self._headers.clear()
+        if before is None or self._read[0] is not self.sheet.table or self._read[1] is not self.sheet.view:
+            return None
+        self._window = now = before.again()
+        self.began = now.began_to_fail(before)
+        self.flashing = self.flashing | self.began
+        return now.changed_since(before)
 
     def line(self, y: int, look: Look) -> Strip:
         """Line `y` of the window."""
@@ -227,6 +244,8 @@ class Painter:
             under = ground if column >= look.layout.n_frozen or seen.is_valid else "frozen"
             if column == cursor:
                 under, meant = ("cursor", "on-cursor") if look.has_focus else ("cursor-away", "name")
+            elif (row, column) in self.flashing and kind == "failing":
+                under = "flash"
             elif block is not None and block.holds(row, column):
                 under = "selected"
             note, width = window.note(row, column), look.layout.widths[column] - 1
@@ -236,15 +255,19 @@ class Painter:
             if note and room >= min(cell_len(text), LEAST_BESIDE):
                 yield Segment(mark + _shortened(text, room, n_shared), self.style(under, meant))
                 yield Segment(f" {note}", self.style(under, meant if column == cursor else "valid" if seen.is_valid else "muted"))
+            elif not note and column == asset and seen.standing and cell_len(text) + cell_len(seen.standing) < width:
+                yield Segment(mark + cut(text, width - cell_len(seen.standing)), self.style(under, meant))
+                yield Segment(seen.standing, self.style(under, meant if column == cursor else "muted"))
             else:
                 yield Segment(mark + _shortened(text, width, n_shared), self.style(under, meant))
 
         number = f"{seen.number:>{look.layout.gutter - 3}}"
         style = self.style("gutter", "valid" if seen.is_valid else "name" if cursor is not None else "muted")
+        plays = Segment(PLAYS if seen.is_played else " ", self.style("gutter", "name"))
         if seen.mark != " " or not seen.n_failing:
-            return self._joined([Segment(f"{number} {seen.mark} ", style)], cell, look, ground)
+            return self._joined([Segment(number, style), plays, Segment(f"{seen.mark} ", style)], cell, look, ground)
         count = MARKS["failing"] + (str(seen.n_failing) if seen.n_failing < 10 else "+")
-        gutter = [Segment(number, style), Segment(f"{count} ", self.style("gutter", "failing"))]
+        gutter = [Segment(number, style), Segment(count, self.style("gutter", "failing")), plays]
         return self._joined(gutter, cell, look, ground, window.failing(row))
 
     def _window_at(self, row: int, look: Look) -> Window:

@@ -6,6 +6,7 @@ Only what is seen is read and painted: see `tui.widgets.grid_paint`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import ClassVar
 
 from rich.cells import cell_len
@@ -15,6 +16,7 @@ from textual.reactive import reactive
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from contextdb.schema.shapes import CHANCE
 from tui.model.alignment import MOST_ALIGNED, indented
 from tui.model.layout import COMPACT, MOST_TEXTS, WIDEST, Layout, fitted_width, layout, name_lines, name_width
 from tui.model.sheet import Sheet
@@ -22,9 +24,11 @@ from tui.widgets.grid_paint import Look, Painter
 
 GROUNDS = (
     "row", "row-valid", "row-picked", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test",
-    "selected", "cursor", "cursor-away",
+    "selected", "cursor", "cursor-away", "flash",
 )  # fmt: skip
 MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
+FLASH_S = 0.4
+"""So long a cell is lit that has just begun to fail."""
 
 
 class GridView(ScrollView, inherit_bindings=False):
@@ -50,6 +54,7 @@ class GridView(ScrollView, inherit_bindings=False):
         .grid--test { background: $boost; text-style: bold; }
         .grid--selected { background: $primary 35%; }
         .grid--cursor { background: $block-cursor-background; color: $block-cursor-foreground; text-style: bold; }
+        .grid--flash { background: $warning 45%; }
         .grid--cursor-away { background: $primary 50%; text-style: bold; }
         .grid--text { color: $foreground; }
         .grid--any { color: $foreground 45%; }
@@ -126,6 +131,30 @@ class GridView(ScrollView, inherit_bindings=False):
         self._fit()
         self.show_cursor(is_after_edit=True)
         self.refresh()
+
+    def asked_again(self) -> None:
+        """Show the answers to other facts. Only lines that look otherwise are painted; cells that have just begun to fail flash."""
+        rows = self._painter.asked_again()
+        if rows is None or self.grid_layout.width != self.window.width or not self.is_mounted:
+            self.changed()
+            return
+        self._paint_rows(rows)
+        look = self.look
+        self.refresh(Region(0, look.n_headers - 1, look.layout.width, 1), Region(0, look.foot, look.layout.width, 1))
+        if self._painter.began:
+            self.set_timer(FLASH_S, partial(self._flashed, self._painter.began))
+
+    def _flashed(self, cells: frozenset[tuple[int, int]]) -> None:
+        """Let some cells flash no more."""
+        gone = self._painter.flashing & cells
+        self._painter.flashing -= gone
+        self._paint_rows(sorted({row for row, _ in gone}))
+
+    def _paint_rows(self, rows: Sequence[int]) -> None:
+        look = self.look
+        seen = [row for row in rows if look.top <= row < look.top + look.n_body]
+        if seen:
+            self.refresh(*(Region(0, look.n_headers + row - look.top, look.layout.width, 1) for row in seen))
 
     def forget_widths(self) -> None:
         """Fit the columns again that nobody gave a width: their texts are others now."""
@@ -264,7 +293,9 @@ class GridView(ScrollView, inherit_bindings=False):
         role = query.role_of(column.name)
         is_opener = query.is_nested and at == self.sheet.asset_at
         if role is None and not is_opener:
-            return 0
+            is_weighed = at == self.sheet.asset_at and not query.is_empty and self.sheet.table.settings.policy in CHANCE
+            longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0) if is_weighed else 0
+            return longest + len(">99 %") + 2 if is_weighed else 0
         longest = max((cell_len(text) for text in column.texts[:MOST_TEXTS]), default=0)
         if role is None:
             return longest + len(" 000 of 000 rows") + 1

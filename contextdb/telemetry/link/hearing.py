@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -79,7 +80,9 @@ class Hearing:
             batch = self._lines(got)
 
     def close(self) -> None:
-        """Hang up."""
+        """Hang up; a thread that waits for lines is woken by it, and sees the end."""
+        with suppress(OSError):  # the game has hung up already
+            self._connection.shutdown(socket.SHUT_RDWR)
         self._connection.close()
 
     def __enter__(self) -> Hearing:

@@ -141,24 +141,27 @@ def rows_of(result: Result) -> list[list[str]]:
 def test_the_group_lists_its_commands(arguments: list[str]):
     result = motion(*arguments)
     assert [line.split()[0] for line in result.lines[result.lines.index("commands:") + 1 :] if line[2:3].strip()] == [
+        "describe",
+        "prepare",
         "bones",
         "check",
         "build",
+        "coverage",
         "search",
         "select",
         "run",
         "probe",
         "measure",
         "replay",
-        "describe",
-        "prepare",
+        "debug",
     ]
     assert run("motion") == Result(2, "", result.out)
     assert run("help", "motion") == result
 
 
 @pytest.mark.parametrize(
-    "command", ["bones", "check", "build", "search", "select", "run", "probe", "measure", "replay", "describe"]
+    "command",
+    ["describe", "prepare", "bones", "check", "build", "coverage", "search", "select", "run", "probe", "measure", "replay"],
 )
 @pytest.mark.parametrize("width", [60, 100])
 def test_each_command_has_a_help_that_fits_with_examples(command: str, width: int, monkeypatch: pytest.MonkeyPatch):
@@ -174,7 +177,7 @@ def test_each_command_has_a_help_that_fits_with_examples(command: str, width: in
 @pytest.mark.parametrize(("word", "near"), [("serch", "search"), ("Replay", "replay"), ("selekt", "select"), ("bild", "build")])
 def test_a_misspelt_command_of_the_group_is_named_with_the_nearest(word: str, near: str):
     told = refused(word, "game")
-    assert told.startswith(f'contextdb: there is no command "motion {word}". Accepted: bones, check, build, search, select, ')
+    assert told.startswith(f'contextdb: there is no command "motion {word}". Accepted: describe, prepare, bones, check, build, ')
     assert told.endswith(f' Did you mean "motion {near}"?\n')
 
 

@@ -33,6 +33,7 @@ RULES: dict[str, Rule] = {
             "cells.arguments",
             "commands.evaluate_command",
             "commands.import_command",
+            "commands.motion_clips",
             "commands.motion_page",
             "commands.motion_replay_command",
             "commands.motion_run_command",

@@ -16,17 +16,17 @@ The command `demo --keep game` makes a project to try them on.
 from __future__ import annotations
 
 COMMANDS = {
+    "describe": "a table from clips: gait, speed, direction, turn and style of each",
+    "prepare": "markup proposed for clips, as a diff: contacts, loops, ends, noise, starts, turns, duplicates",
     "bones": "the bones of clips, and which are found as feet, hips and head",
     "check": "what is wrong with clips, markup and motion settings",
     "build": "save the motion databases that contextdb.toml declares",
+    "coverage": "which movements have no clip, in which contexts, and what to capture next",
     "search": "the best frames of one database, with what each channel adds to their cost",
     "select": "which database of a selector wins, with which frame, and why",
     "run": "steer a character along a recorded stick, and record what it decides",
-    "coverage": "which movements have no clip, in which contexts, and what to capture next",
     "probe": "drive a character over the contexts of its tables by itself, and measure how well it moves",
     "measure": "how good the motion of a session is, beside the clips that it is made of",
     "replay": "what was decided in a recorded session, and why",
     "debug": "the same in the terminal, moment by moment, with poses and weights to turn",
-    "describe": "a table from clips: gait, speed, direction, turn and style of each",
-    "prepare": "markup proposed for clips, as a diff: contacts, loops, ends, noise, starts, turns, duplicates",
 }

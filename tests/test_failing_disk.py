@@ -251,6 +251,7 @@ ALLOWED = {
     "contextdb/commands/evaluate_command.py": {"sink_csv", "sink_parquet"},
     "contextdb/edits/diffing/lines.py": {"write_bytes"},  # into a temporary folder, for git to read
     "contextdb/commands/demo_command.py": {"os.rename"},  # a whole folder
+    "tui/model/played_run.py": {"write_bytes"},  # into a temporary folder
     "contextdb/telemetry/link/game.py": {"path.open"},  # a recording, which grows while the game runs
     "contextdb/telemetry/link/folder.py": {"os.open"},  # a lock
     "contextdb/telemetry/link/doors.py": {"os.open"},  # the token of a door

@@ -208,7 +208,7 @@ def test_mypy_refuses_a_context_that_a_query_refuses(said: dict[str, list[str]],
         ("slip in del", "incompatible type \"Literal['sped']\""),
         ("slip in actor", 'Missing key "height"'),
         ("no plain fact", 'Missing key "speed"'),
-        ("misspelt", 'no attribute "Projectt"; maybe "Project"?'),
+        ("misspelt", 'no attribute "Projectt"; maybe "Project"'),
         ("old", 'no attribute "QueryError"'),
     ],
 )

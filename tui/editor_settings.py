@@ -4,7 +4,7 @@
 
     [keys]
     duplicate = "ctrl+u"
-    sort = "alt+u,f10"
+    sort = "shift+f6,f10"
 
 The file is `contextdb/editor.toml` in the folder for settings of the system, or the one that CONTEXTDB_EDITOR names.
 """

@@ -119,7 +119,7 @@ def test_the_timeline_says_what_the_decisions_say(here: Path):
         assert line.jumped[i] == (str(decision.action) in ("starts", "jumps"))
         assert line.forced[i] == (str(decision.action) == "jumps" and decision.continuing_cost is None)
         if decision.searched:
-            assert line.costs[i] == decision.cost
+            assert (None if np.isnan(line.costs[i]) else line.costs[i]) == decision.cost
             assert line.n_valid[i] == sum(int(chosen.ranges.sum()) for _, chosen in decision.filters)
         if decision.body is not None:
             np.testing.assert_array_equal(line.roots[i], decision.body)

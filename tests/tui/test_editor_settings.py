@@ -41,9 +41,9 @@ def test_without_a_file_nothing_is_set(tmp_path):
 
 
 def test_a_theme_and_keys_are_taken(tmp_path):
-    found = read(tmp_path, '\ufefftheme = "nord"\n[keys]\nduplicate = "ctrl+u"\nsort = "alt+u, f11"\n')
+    found = read(tmp_path, '\ufefftheme = "nord"\n[keys]\nduplicate = "ctrl+u"\nsort = "shift+f6, f11"\n')
     assert found.theme == "nord"
-    assert dict(found.keys) == {"duplicate": "ctrl+u", "sort": "alt+u, f11"}
+    assert dict(found.keys) == {"duplicate": "ctrl+u", "sort": "shift+f6, f11"}
 
 
 @pytest.mark.parametrize("name", THEMES)
@@ -136,10 +136,10 @@ def test_the_keys_of_a_keymap_work_in_place_of_the_stock_ones(path):
 
 
 def test_keys_with_a_blank_behind_the_comma_all_work(tmp_path, path):
-    settings = read(tmp_path, '[keys]\nduplicate = "ctrl+u, alt+u"\n')
+    settings = read(tmp_path, '[keys]\nduplicate = "ctrl+u, shift+f6"\n')
 
     async def script(app, pilot):
-        await press(pilot, "ctrl+u", "alt+u")
+        await press(pilot, "ctrl+u", "shift+f6")
         return app.main.session.sheet.table.n_rows
 
     assert with_editor(path, script, settings=settings) == 4

@@ -275,10 +275,15 @@ def test_a_game_in_another_process_is_followed_stops_floods_and_is_killed(path):
         seen.append(app.main.session.sheet.query.texts)
         os.kill(game.pid, signal.SIGSTOP)
         listening = following.followed.listening
-        listening._heard_at -= 10
-        await until(pilot, lambda: "nothing asked" in listening.trouble)
-        following.tick()
         await press(pilot, "down")
+
+        def is_said() -> bool:
+            """What was on its way when the game stopped still comes, so that the clock is put back until nothing does."""
+            listening._heard_at -= 10
+            following.tick()
+            return "nothing asked for" in screen_text(app)
+
+        await until(pilot, is_said)
         seen.append(screen_text(app))
         os.kill(game.pid, signal.SIGKILL)
         await until(pilot, lambda: listening.is_over)

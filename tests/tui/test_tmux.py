@@ -246,7 +246,7 @@ def test_the_debugger_works_in_a_real_terminal(terminal):
     terminal.start("screen-256color", program="-m contextdb motion debug s.parquet")
     terminal.wait("s.parquet  1.00 s of 5.00", "▶ walk", "1 of 5 may play", "F1 Help")
     terminal.keys("]")
-    terminal.wait("tick 62", "walk has ended: walk at 3.10 s")
+    terminal.wait("tick 61", "walk has ended: walk at 3.10 s")
     terminal.keys("Home", "Right")
     terminal.wait("tick 1 ", "Nothing was searched.")
     lines = terminal.screen.splitlines()

@@ -82,7 +82,8 @@ class Stances:
         """The share of the cycle until a foot next comes down or goes up."""
         foot, phase = _foot(foot), require_real(phase, "phase")
         edge = self.up[foot] if self.is_down(foot, phase) else self.down[foot]
-        return (edge - phase) % 1.0
+        until = (edge - phase) % 1.0
+        return until if until < 1.0 else 0.0  # a hair before the edge rounds to a whole cycle
 
     def share_of_state(self, foot: int, phase: float) -> float:
         """How much of the time for which a foot is down, or up, has passed: 0 to 1."""

@@ -58,7 +58,8 @@ def full(n_rows: int) -> Words:
 
 def count(words: Words) -> NDArray[np.int64]:
     """How many rows each mask holds: uint64 [..., W] to int64 [...]."""
-    return np.asarray(np.bitwise_count(words).sum(axis=-1, dtype=np.int64))
+    counts = np.bitwise_count(words)
+    return np.asarray(counts[..., 0].astype(np.int64) if words.shape[-1] == 1 else counts.sum(axis=-1, dtype=np.int64))
 
 
 def to_int(words: Words) -> int:

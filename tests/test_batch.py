@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import date
@@ -379,3 +380,10 @@ def test_tags_may_be_lists_sets_or_texts():
     table = Table.from_columns({"Asset": ["a", "b"], "x": ["+InAir", "-Move"]}, {"x": {"type": "tags"}}).compile()
     for column in ([["InAir"], []], [{"InAir"}, set()], ["InAir", ""], pl.Series([["InAir"], []], dtype=pl.List(pl.String))):
         assert [rows.tolist() for rows in table.query_many({"x": column}).lists()] == [[0, 1], [1]]
+
+
+@pytest.mark.parametrize("n_bounds", [0, 1, batch.FEW_BOUNDS, batch.FEW_BOUNDS + 1])
+def test_few_bounds_and_many_give_the_classes_that_bisection_gives(n_bounds: int):
+    bounds = np.linspace(-9.0, 9.0, n_bounds)
+    facts = np.array([-np.inf, -9.0, *np.random.default_rng(3).uniform(-10.0, 10.0, 50), *bounds, 9.0, np.inf])
+    assert batch._n_not_above(facts, bounds).tolist() == [bisect_right(bounds.tolist(), fact) for fact in facts.tolist()]

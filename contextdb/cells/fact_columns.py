@@ -30,6 +30,8 @@ def as_series(given: Any, listed: pl.DataType) -> pl.Series | None:
 
 def plain_numbers(given: Any, kind: Kind) -> NDArray[np.float64] | None:
     """A column of numbers as doubles, NaN where missing, angles not yet wrapped; None when it must be read fact by fact."""
+    if isinstance(given, np.ndarray) and given.dtype == np.float64 and given.ndim == 1 and not kind.is_whole:
+        return None if kind.is_circular and np.isinf(given).any() else given
     series = as_series(given, kind.dtype)
     if series is None or not kind.is_column(series.dtype):
         return None

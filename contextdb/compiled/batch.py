@@ -50,6 +50,8 @@ RULED_WORDS = 1 << 21
 MUCH_WORK = 1 << 18
 """Words of answers from which loading the compiled kernels, a third of a second, is worth it."""
 
+FEW_BOUNDS = 100
+"""So few bounds are compared with every fact sooner than each fact is bisected among them."""
 THREAD_CONTEXTS = 8192
 """Fewer contexts than this are not worth a second thread."""
 
@@ -419,5 +421,15 @@ def _in_context(error: Exception, row: int, name: str, value: object) -> Context
 def _encode_with_numpy(numbers: Numbers, out: Codes) -> None:
     for j, facts in enumerate(numbers.facts):
         own = numbers.bounds[numbers.edges[j] : numbers.edges[j + 1]]
-        classes = numbers.firsts[j] + np.searchsorted(own, facts, "right")
+        classes = numbers.firsts[j] + _n_not_above(facts, own)
         out[numbers.slots[j]] = np.where(np.isnan(facts), numbers.missing[j], classes)
+
+
+def _n_not_above(facts: NDArray[np.float64], bounds: NDArray[np.float64]) -> NDArray[np.int64]:
+    """How many of the ascending bounds are not above each fact; of a NaN any number."""
+    if len(bounds) > FEW_BOUNDS:
+        return np.searchsorted(bounds, facts, "right")
+    found = np.zeros(len(facts), np.uint8)
+    for bound in bounds:
+        found += facts >= bound
+    return found.astype(np.int64)

@@ -30,9 +30,12 @@ def uniform(seed: int, who: int, turn: int, depth: int) -> float:
 def uniforms(seed: int, who: NDArray[np.int64], turns: NDArray[np.int64], depth: int) -> NDArray[np.float64]:
     """The same for many characters: float64 [N]."""
     z = np.full(len(who), seed & _ALL, np.uint64)
-    for part in (who.astype(np.uint64), turns.astype(np.uint64), np.full(len(who), depth, np.uint64)):
+    for part in (who.astype(np.uint64), turns.astype(np.uint64), np.array([depth], np.uint64)):
         z += (part + np.uint64(1)) * np.uint64(_STEP)
-        z = (z ^ (z >> np.uint64(30))) * np.uint64(_FIRST)
-        z = (z ^ (z >> np.uint64(27))) * np.uint64(_SECOND)
+        z ^= z >> np.uint64(30)
+        z *= np.uint64(_FIRST)
+        z ^= z >> np.uint64(27)
+        z *= np.uint64(_SECOND)
         z ^= z >> np.uint64(31)
-    return (z >> np.uint64(11)).astype(np.float64) * 2.0**-53
+    z >>= np.uint64(11)
+    return z.astype(np.float64) * 2.0**-53

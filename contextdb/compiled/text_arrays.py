@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 Words = NDArray[np.uint64]
 MIX = np.uint64(0x9E3779B97F4A7C15)
 """An odd number without a pattern: different texts are seldom in one slot."""
-SHIFT = 48
-N_SLOTS = 1 << (64 - SHIFT)
+SLOT_BITS = (8, 16)
+"""At least and at most so many bits number the slots: few slots for few values, which are cleared for each column of facts."""
 
 
 def is_text_array(given: object) -> bool:
@@ -35,8 +35,9 @@ def classes_of_texts(given: NDArray[Any], values: Sequence[str]) -> NDArray[np.i
         texts, own = _as_words(given, values)
     except UnicodeEncodeError:  # texts of numpy's variable width that are not all ASCII
         return None
-    slots, own_slots = _slots(texts), _slots(own)
-    numbers = np.zeros(N_SLOTS, np.int32)
+    bits = _slot_bits(len(values))
+    slots, own_slots = _slots(texts, bits), _slots(own, bits)
+    numbers = np.zeros(1 << bits, np.int32)
     numbers[own_slots] = np.arange(len(values))
     if (numbers[own_slots] != np.arange(len(values))).any():
         return None
@@ -66,8 +67,9 @@ def _characters(texts: NDArray[Any]) -> NDArray[np.uint32]:
 
 
 def _padded(characters: NDArray[np.uint32], width: int, size: type[np.unsignedinteger[Any]]) -> NDArray[Any]:
-    padded = np.zeros((len(characters), width), size)
-    padded[:, : characters.shape[1]] = characters
+    padded, given = np.empty((len(characters), width), size), characters.shape[1]
+    padded[:, :given] = characters
+    padded[:, given:] = 0
     return padded
 
 
@@ -75,10 +77,16 @@ def _words(texts: NDArray[Any]) -> Words:
     return np.ascontiguousarray(texts).view(np.uint64).reshape(len(texts), -1)
 
 
-def _slots(words: Words) -> Words:
-    """A number below `N_SLOTS` for each text, equal for equal ones."""
+def _slot_bits(n_values: int) -> int:
+    """So many that two values are seldom in one slot: with 16 slots for each pair of them in about one table of 32."""
+    least, most = SLOT_BITS
+    return min(most, max(least, (16 * n_values * n_values - 1).bit_length()))
+
+
+def _slots(words: Words, bits: int) -> Words:
+    """A number of so many bits for each text, equal for equal ones."""
     keys = words[:, 0] * MIX
     for word in words.T[1:]:
         keys ^= word
         keys *= MIX
-    return keys >> np.uint64(SHIFT)
+    return keys >> np.uint64(64 - bits)

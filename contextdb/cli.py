@@ -176,9 +176,10 @@ def _run(group: Group, given: Sequence[str]) -> int:
         print(group.overview, end="", file=sys.stdout if given else sys.stderr)
         return ExitCode.OK if given else ExitCode.BAD_USE
     if given[0] == "--version" and not group.words:
+        from contextdb.commands import installed
         from contextdb.console import __version__
 
-        print(f"contextdb {__version__}")
+        print(f"contextdb {__version__}", *installed.lines(), sep="\n")
         return ExitCode.OK
     if given[0] == "help":
         return _run(group, [*given[1:], "--help"])
@@ -213,7 +214,7 @@ def _overview(commands: Mapping[str, str]) -> str:
     return (
         "usage: contextdb COMMAND …\n\n"
         + "\n".join(lines)
-        + '\n\n"contextdb COMMAND --help" shows its options; --version prints the version.\n'
+        + '\n\n"contextdb COMMAND --help" shows its options; --version prints the versions of contextdb and of what it uses.\n'
     )
 
 

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -51,9 +52,35 @@ def test_without_a_command_the_overview_is_a_message_and_the_use_is_wrong():
 
 
 def test_the_version_is_that_of_the_package():
-    assert run("--version") == Result(0, f"contextdb {contextdb.__version__}\n", "")
+    result = run("--version")
+    assert (result.code, result.lines[0], result.err) == (0, f"contextdb {contextdb.__version__}", "")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert project["version"] == contextdb.__version__
+
+
+def test_beside_the_version_are_those_of_the_packages_and_how_to_get_what_is_missing(monkeypatch: pytest.MonkeyPatch):
+    installed = {"numpy": "2.1.0", "polars": "2.0.0"}
+
+    def version(name: str) -> str:
+        if name not in installed:
+            raise metadata.PackageNotFoundError(name)
+        return installed[name]
+
+    required = ["numpy<3,>=2", "polars>=1.30", "numba>=0.61; python_version < '3.16'", 'pygltflib>=1.16; extra == "gltf"']
+    monkeypatch.setattr(metadata, "requires", lambda _: [*required, 'ruff; extra == "dev"'])
+    monkeypatch.setattr(metadata, "version", version)
+    told = [line.split(maxsplit=1) for line in run("--version").lines[1:]]
+    assert [name for name, _ in told] == ["python", "numpy", "polars", "numba", "pygltflib"]
+    assert [text.split(";")[0] for _, text in told[1:]] == ["2.1.0", "2.0.0", "not installed", "not installed"]
+    assert told[-1][1].endswith('pip install "contextdb[gltf]"')
+
+
+def test_a_folder_that_was_not_installed_has_a_version_too(monkeypatch: pytest.MonkeyPatch):
+    def requires(name: str) -> list[str]:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "requires", requires)
+    assert [line.split()[0] for line in run("--version").lines] == ["contextdb", "python"]
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)

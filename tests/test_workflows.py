@@ -1,0 +1,106 @@
+"""What is published beside the code: the workflow for other repositories, run step by step in a checkout; forms; citation."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+import contextdb
+
+ROOT = Path(__file__).parent.parent
+GITHUB = ROOT / ".github"
+TABLE = "Asset,speed\nwalk,0..2\nrun,(2..5]\n"
+TOML = '[conditions.speed]\ntype = "number"\nmin = 0\nmax = 5\n'
+
+
+def read(path: Path) -> Any:
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+WORKFLOW = read(GITHUB / "workflows" / "tables.yml")["jobs"]["tables"]
+STEPS = {step["name"]: step["run"] for step in WORKFLOW["steps"] if "name" in step}
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A repository whose branch "main" lies at origin/main, and on whose own branch a row is missing."""
+    made = tmp_path / "checkout"
+    (made / "tables").mkdir(parents=True)
+    (made / "tables" / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    (made / "tables" / "moves.csv").write_text(TABLE, encoding="utf-8")
+    git(made, "init", "--quiet", "--initial-branch=main")
+    git(made, "add", ".")
+    git(made, "-c", "user.name=a", "-c", "user.email=a@example.com", "commit", "--quiet", "-m", "tables")
+    git(made, "update-ref", "refs/remotes/origin/main", "HEAD")
+    return made
+
+
+def git(folder: Path, *arguments: str) -> None:
+    subprocess.run(["git", *arguments], cwd=folder, check=True, capture_output=True)
+
+
+def run_step(name: str, checkout: Path, max_drop: str = "0") -> subprocess.CompletedProcess[str]:
+    """A step of the workflow as the runner runs it."""
+    temporary = checkout.parent / "runner"
+    temporary.mkdir(exist_ok=True)
+    own = {
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "FOLDER": "tables",
+        "MAX_DROP": max_drop,
+        "GITHUB_BASE_REF": "main",
+        "GITHUB_STEP_SUMMARY": str(temporary / "summary.md"),
+        "RUNNER_TEMP": str(temporary),
+    }
+    command = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", STEPS[name]]
+    return subprocess.run(command, cwd=checkout, env=os.environ | own, capture_output=True, encoding="utf-8")
+
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which("bash") and shutil.which("contextdb", path=str(Path(sys.executable).parent))),
+    reason="needs bash, and contextdb installed beside this Python",
+)
+
+
+def test_the_workflow_lets_a_change_pass_that_opens_no_gap(checkout: Path):
+    assert run_step("check", checkout).returncode == 0
+    done = run_step("coverage", checkout)
+    assert done.returncode == 0, done.stderr
+    assert (checkout / "coverage.html").is_file()
+    assert "moves" in (checkout.parent / "runner" / "summary.md").read_text(encoding="utf-8")
+
+
+def test_the_workflow_fails_a_change_that_opens_a_gap_and_names_it(checkout: Path):
+    (checkout / "tables" / "moves.csv").write_text(TABLE.replace("run,(2..5]\n", ""), encoding="utf-8")
+    done = run_step("coverage", checkout)
+    assert done.returncode == 1
+    assert "speed: (2..5]" in done.stdout
+    assert (checkout / "coverage.html").is_file()
+
+
+def test_the_workflow_fails_a_table_that_cannot_be_read_at_its_line(checkout: Path):
+    (checkout / "tables" / "moves.csv").write_text(TABLE.replace("0..2", "fast"), encoding="utf-8")
+    done = run_step("check", checkout)
+    assert done.returncode == 1
+    assert "::error file=tables/moves.csv,line=2" in done.stdout
+
+
+def test_the_forms_of_issues_have_what_a_forge_asks_of_them():
+    forms = [read(path) for path in sorted((GITHUB / "ISSUE_TEMPLATE").glob("*.yml")) if path.name != "config.yml"]
+    assert len(forms) == 2
+    for form in forms:
+        assert {"name", "description", "body"} <= form.keys()
+        ids = [part["id"] for part in form["body"]]
+        assert len(ids) == len(set(ids))
+        assert all(part["type"] in ("input", "textarea") and part["attributes"]["label"] for part in form["body"])
+
+
+def test_the_citation_names_the_version():
+    citation = read(ROOT / "CITATION.cff")
+    assert (citation["cff-version"], citation["version"]) == ("1.2.0", contextdb.__version__)

@@ -12,7 +12,7 @@ Source: Hall, "On representatives of subsets", J. London Math. Soc. 10, 1935.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import or_
@@ -28,6 +28,7 @@ from contextdb.compiled.casting.assigning import Chosen, Holds, Part, best, ever
 from contextdb.compiled.casting.facts import Actor, Actors, Ask, Offer, mirrored_offers, read_offers
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.rules import CastRules
+from contextdb.compiled.casting.together import casts_of
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Answering, SetMatches, Stages
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
@@ -76,6 +77,19 @@ class CastMatches(SetMatches):
     def castings(self, row: int) -> list[Casting]:
         """All castings of a valid row that fill as many optional roles as can be, best first."""
         return self._stage(row).all(row)
+
+    def casts(self, roles: Sequence[str]) -> list[tuple[tuple[Actor, ...], int]]:
+        """Every way to give these roles to distinct actors, in the order of the roles, and the valid rows, as bits, in which they
+        may play them. Empty where nobody is offered for one of the roles."""
+        found: dict[tuple[object, ...], tuple[tuple[Actor, ...], int]] = {}
+        left = self.bits
+        for rows, stage in self._cast_by:
+            for cast, bits in stage.casts(left & rows, roles):
+                key = tuple(offer.key for _, offer in cast)
+                actors, known = found.get(key, (tuple(offer.actor for _, offer in cast), 0))
+                found[key] = actors, known | bits
+            left &= ~rows
+        return list(found.values())
 
     def _stage(self, row: int) -> Stage:
         if require_whole(row, "row") not in self:
@@ -218,6 +232,11 @@ class Stage:
     def all(self, row: int) -> list[Casting]:
         """Every casting of a row with the most optional roles, best first."""
         return [_as_casting(c) for c in every(*self.parts(row), self._holds(row))]
+
+    def casts(self, rows: int, roles: Sequence[str]) -> Iterator[tuple[Chosen, int]]:
+        """Every cast of these roles in some of the rows that can be cast, with the rows in which it may be."""
+        ruled = 0 if self.rules is None else self.rules.rows
+        return casts_of(rows, roles, self.offers, self.roles.required, ruled, self._holds)
 
     def _holds(self, row: int) -> Holds | None:
         rules = self.rules

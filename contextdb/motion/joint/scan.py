@@ -1,0 +1,85 @@
+"""The joint search without numba, and where candidates come from: the total of every joint frame with every cast.
+
+C casts, J joint ranges, K roles, P ordered pairs of roles, M joint frames, A actors. Costs are summed up in the order of the
+compiled search, so that both find the same frame at the same cost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contextdb.motion.arguments import Flags
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.joint.database import FACING, PLACE, JointDatabase
+from contextdb.motion.search import cost
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What one joint search of one database compares.
+
+    Attributes
+    ----------
+    queries : float64 array, shape (A, F)
+        Of each actor, normalised.
+    seen : float64 array, shape (A, A, 4)
+        What each actor sees of each other, in the units of costs.
+    casts : int64 array, shape (C, K)
+        The actor of each role.
+    valid : bool array, shape (C, J)
+        Which cast may play which joint range.
+    range_biases : float64 array, shape (J,)
+        What the table's soft cells, or penalties, cost.
+    frame_biases : float64 array, shape (M,)
+        inf where a frame may not be chosen.
+    """
+
+    queries: Floats
+    seen: Floats
+    casts: Ints
+    valid: Flags
+    range_biases: Floats
+    frame_biases: Floats
+
+
+def least(joint: JointDatabase, asked: Asked) -> tuple[float, int, int]:
+    """The lowest total, its joint frame and its cast; on a tie the lowest frame, then the first cast. inf, -1, -1 for none."""
+    found = totals(joint, asked)
+    best = found.min(initial=np.inf)
+    if best == np.inf:
+        return np.inf, -1, -1
+    frame = int(np.argmax((found == best).any(axis=0)))
+    return float(best), frame, int(np.argmax(found[:, frame] == best))
+
+
+def totals(joint: JointDatabase, asked: Asked) -> Floats:
+    """The total of each cast and joint frame, inf where it may not be: float64 [C, M]."""
+    found = np.empty((len(asked.casts), joint.n_frames))
+    ranges = joint.frame_ranges
+    own = _own_costs(joint, asked)
+    biases = asked.range_biases[ranges] + asked.frame_biases
+    place_weight, facing_weight = joint.relative_weights
+    for c, cast in enumerate(asked.casts.tolist()):
+        total = np.zeros(joint.n_frames)
+        for k, actor in enumerate(cast):
+            total += own[actor, k]
+        for p, (role, other) in enumerate(joint.pairs):
+            apart = joint.relative[p] - asked.seen[cast[role], cast[other]]
+            apart *= apart
+            for columns, weight in ((PLACE, place_weight), (FACING, facing_weight)):
+                total += weight * (apart[:, columns.start] + apart[:, columns.start + 1])
+        found[c] = np.where(asked.valid[c][ranges], total + biases, np.inf)
+    return found
+
+
+def _own_costs(joint: JointDatabase, asked: Asked) -> dict[tuple[int, int], Floats]:
+    """What the pose and path of an actor cost in each frame of a role that a cast gives him: [M] by (actor, role)."""
+    database = joint.database
+    wanted = {(actor, k) for cast in asked.casts.tolist() for k, actor in enumerate(cast)}
+    return {
+        (actor, k): cost.costs(database.layout, joint.frames[k], asked.queries[actor], database.slices, joint.own_weights)
+        for actor, k in wanted
+    }

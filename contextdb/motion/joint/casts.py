@@ -91,10 +91,11 @@ class CastMaker:
                 biases = np.where(side, np.where(np.isfinite(penalties), penalties, 0.0), biases)
         both = list(dict.fromkeys([*rows[0], *rows[1]]))
         valid = np.zeros((len(both), n_ranges), np.bool_)
+        n_bytes = 8 * bitmask.n_words(len(answer.table_assets))
         for found, side in zip(rows, sides, strict=True):
-            masks = [bitmask.from_int(found.get(cast, 0), len(answer.table_assets)) for cast in both]
-            if masks:
-                valid |= table.valid_of_many(np.array(masks, np.uint64).reshape(len(both), -1)) & side
+            if found:
+                octets = b"".join(found.get(cast, 0).to_bytes(n_bytes, "little") for cast in both)
+                valid |= table.valid_of_many(np.frombuffer(octets, "<u8").astype(np.uint64).reshape(len(both), -1)) & side
         return Casts(both, valid, biases, (rows[0], rows[1]), answer.table_assets)
 
     def _table_ranges(self, table_assets: Sequence[str]) -> TableRanges:
@@ -111,8 +112,12 @@ def _rows_of_casts(answer: Any, roles: Sequence[str], listed: list[Cast] | None,
         every = list(permutations(actors, len(roles))) if listed is None else listed
         return dict.fromkeys(every, answer.bits)
     found: dict[Cast, int] = {}
+    known: dict[int, Hashable] = {}
     for cast, bits in answer.casts(roles):
-        key = tuple(_id_of(actor, role) for actor, role in zip(cast, roles, strict=True))
+        for actor, role in zip(cast, roles, strict=True):
+            if id(actor) not in known:
+                known[id(actor)] = _id_of(actor, role)
+        key = tuple([known[id(actor)] for actor in cast])
         found[key] = found.get(key, 0) | bits
     return found
 

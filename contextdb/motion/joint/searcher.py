@@ -39,8 +39,8 @@ from contextdb.motion.selection.choice import Choice, Search
 from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.selector import Entry, Selector, choice_of
 
-Queries = Mapping[Hashable, ArrayLike]
-Places = Mapping[Hashable, Sequence[float]]
+Queries = Mapping[Any, ArrayLike]
+Places = Mapping[Any, Sequence[float]]
 Place = tuple[float, float, float]
 Found = tuple[float, int, int]
 """A total, its joint frame and its cast; inf, -1, -1 for none."""

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from running import run
 from strategies import examples
 
 import contextdb as cdb
@@ -29,6 +30,7 @@ from contextdb.motion import (
     make_joint_clip,
     pose_schema,
     poses_of,
+    write_bvh,
     write_joint_clips,
 )
 from contextdb.motion.joint import searcher as searching
@@ -396,3 +398,22 @@ def test_an_actor_of_a_query_needs_an_id(greetings, table):
     answer = table.query({}, actors={"Host": [{"mood": "glad"}], "Guest": [{"id": 3, "side": 1.0}]})
     with pytest.raises(QueryError, match='an actor offered for "Host" has no id'):
         JointSearcher(greetings).search(queries, places, valid=answer)
+
+
+def test_check_tells_every_fault_of_joint_clips_and_counts_their_asset_as_having_a_clip(tmp_path):
+    (tmp_path / "clips").mkdir()
+    write_joint_clips(tmp_path / "clips")
+    (tmp_path / "greetings.csv").write_text("Asset\ngreet_run\ngreet_walk\ngreet_tired\n", encoding="utf-8")
+    (tmp_path / "contextdb.toml").write_text(
+        '[tables.greetings]\n[features.pose]\nrate = 30.0\nchannels = [{ type = "position", bone = "LeftFoot" }]\n'
+        '[databases.greetings]\ntable = "greetings"\nclips = "clips/*.bvh"\nfeatures = "pose"\nroles = ["Host", "Guest"]\n',
+        encoding="utf-8",
+    )
+    assert run("motion", "check", str(tmp_path)).out == "1 database and 6 clips checked: nothing found.\n"
+    host = make_joint_clip("greet_walk")["Host"]
+    write_bvh(replace(host, values=host.values[1:]), tmp_path / "clips" / "greet_walk.Host.bvh")
+    (tmp_path / "clips" / "greet_run.Guest.bvh").unlink()
+    found = run("motion", "check", str(tmp_path), "--json").json["findings"]
+    assert {each["rule"] for each in found} == {"roles"}
+    assert ["greet_run" in each["message"] for each in found] == [True, False]
+    assert "differ in length: Host 148 frames, Guest 149 frames" in found[1]["message"]

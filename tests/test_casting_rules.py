@@ -225,5 +225,5 @@ def test_casts_of_two_roles_are_those_of_trying_every_pair(moment):
             is_open = truth is None and any(r not in cast for r in named)
             if fits and len({a["id"] for a in cast.values()}) == len(cast) and (truth or is_open):
                 expected.setdefault((receiver["id"], defender["id"]), set()).add(at)
-    found = {tuple(a["id"] for a in cast): {i for i in range(len(rows)) if bits >> i & 1} for cast, bits in matches.casts(pair)}
+    found = {tuple(a["id"] for a in cast): {i for i in range(len(rows)) if bits >> i & 1} for cast, bits, _ in matches.casts(pair)}
     assert found == expected

@@ -200,6 +200,27 @@ def test_each_listed_cast_is_tried_where_an_answer_has_no_actors(greetings, tabl
     assert (found.asset, found.row, found.cast) == ("greet_run", 0, {"Host": 3, "Guest": 7})
 
 
+def test_a_soft_cell_costs_those_casts_alone_that_do_not_fit_it(greetings):
+    conditions = {"Host.mood": {"type": "enum", "values": ["glad", "cross"]}, "Guest.mood": {"type": "enum", "values": ["glad"]}}
+    columns = {
+        "Asset Name": ["greet_run", "greet_run"],
+        "Host.mood": ["glad ~0.5", "cross ~0.25"],
+        "Guest.mood": ["glad", "Any"],
+        "Mandatory_Slots": ["Host", "Host"],
+    }
+    table = cdb.Table.from_columns(columns, conditions, TableSettings(name="soft", outputs=("Mandatory_Slots",))).compile()
+    people = [{"id": 3, "mood": "cross"}, {"id": 7, "mood": "glad"}]
+    matches = table.query({}, actors={"Host": people, "Guest": people[1:]})
+    queries, places = recorded(greetings, 0, 40)
+    found = JointSearcher(greetings).search(queries, places, valid=matches)
+    assert (found.row, found.cast, found.bias) == (1, {"Host": 3, "Guest": 7}, 0.0)
+    matches = table.query({}, actors={"Host": people[1:], "Guest": [{"id": 3, "mood": "glad"}]})
+    found = JointSearcher(greetings).search(queries, places, valid=matches)
+    assert (found.row, found.cast, found.bias) == (0, {"Host": 7, "Guest": 3}, 0.0)
+    found = JointSearcher(greetings).search(queries, places, valid=matches.only([1]))
+    assert (found.row, found.bias) == (1, 0.25)
+
+
 # ---- several databases, candidates, explanation
 
 

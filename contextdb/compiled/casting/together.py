@@ -7,10 +7,39 @@ are Python integers, row r as bit r.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.compiled.casting.assigning import Chosen, Holds, assignments
-from contextdb.compiled.casting.facts import Offer
+from contextdb.compiled.casting.facts import Actor, Offer
+
+
+class CastRows(NamedTuple):
+    """A cast of some roles, and where it may be.
+
+    Attributes
+    ----------
+    actors : tuple of Actor
+        In the order of the roles.
+    rows : int
+        The rows, as bits.
+    penalties : float64 array, shape (n_rows,), or None
+        What the soft cells of these rows cost with this cast; None for a table without any.
+    """
+
+    actors: tuple[Actor, ...]
+    rows: int
+    penalties: NDArray[np.float64] | None
+
+    def joined(self, other: CastRows, n_rows: int) -> CastRows:
+        """The rows of both, which share none."""
+        penalties = self.penalties
+        if penalties is not None and other.penalties is not None:
+            penalties = np.where(bitmask.flags_of(self.rows, n_rows), penalties, other.penalties)
+        return CastRows(self.actors, self.rows | other.rows, penalties)
 
 
 def casts_of(

@@ -16,7 +16,6 @@ from contextdb import bitmask
 from contextdb.cells.arguments import require_many, require_mapping
 from contextdb.errors import Fault, QueryError, in_quotes, some
 from contextdb.motion import arguments
-from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.search.table_ranges import TableRanges
@@ -32,23 +31,26 @@ class Casts:
     Attributes
     ----------
     listed : list of Cast, length C
-    valid : bool array, shape (C, J)
-        Which may play which joint range.
-    range_biases : float64 array, shape (J,)
-        What the soft cells of the table cost.
+    biases : float64 array, shape (C, J)
+        What the soft cells of a table cost with each cast in each joint range, the cheapest row of its asset; inf where it may not
+        play.
+    sides : (as it is, in a mirror)
+        What each row costs with each cast, float64 [C, n_rows]; None for an answer without rows.
+    table_assets : sequence of str
+        The assets of the rows.
     """
 
     listed: list[Cast]
-    valid: Flags
-    range_biases: Floats
-    rows: tuple[dict[Cast, int], dict[Cast, int]] = ({}, {})
-    """For each cast the rows, as bits, in which it may be: as it is, and in a mirror."""
+    biases: Floats
+    sides: tuple[Floats, Floats] | None = None
     table_assets: Sequence[str] = ()
 
-    def row(self, cast: Cast, asset: str, mirrored: bool) -> int | None:
-        """The first row of an asset in which a cast may be; None for an answer without rows."""
-        bits = self.rows[mirrored].get(cast, 0)
-        return next((i for i, name in enumerate(self.table_assets) if name == asset and bits >> i & 1), None)
+    def row(self, cast: int, asset: str, mirrored: bool) -> int | None:
+        """The row of an asset that costs least with a cast, the first of several; None for an answer without rows."""
+        if self.sides is None:
+            return None
+        costs = self.sides[mirrored][cast]
+        return min((i for i, name in enumerate(self.table_assets) if name == asset), key=lambda i: costs[i], default=None)
 
 
 class CastMaker:
@@ -73,30 +75,21 @@ class CastMaker:
             listed = list(permutations(actors, len(self.joint.roles)))
         n_ranges = len(self.joint.assets)
         flags = np.ones(n_ranges, np.bool_) if valid is None else arguments.flags_of(valid, n_ranges, "valid", "joint range")
-        return Casts(listed, np.tile(flags, (len(listed), 1)), np.zeros(n_ranges))
+        return Casts(listed, np.tile(np.where(flags, 0.0, np.inf), (len(listed), 1)))
 
     def _of_answer(self, answer: Any, listed: list[Cast] | None, actors: Sequence[Hashable]) -> Casts:
-        sides = [self.joint.mirrored == side for side in (False, True)]
-        seen = answer.mirrored if sides[1].any() and hasattr(answer, "mirrored") else answer
+        mirrored = self.joint.mirrored
+        seen = answer.mirrored if mirrored.any() and hasattr(answer, "mirrored") else answer
+        both = [_rows_of_casts(answer, self.joint.roles, listed, actors)]
+        both.append(_rows_of_casts(seen, self.joint.roles, listed, actors) if seen is not answer else both[0])
+        every = list(dict.fromkeys([*both[0], *both[1]]))
+        plain = _costs_of_rows(both[0], every, answer)
+        sides = plain, plain if seen is answer else _costs_of_rows(both[1], every, answer)
         table = self._table_ranges(answer.table_assets)
-        n_ranges = len(self.joint.assets)
-        wanted = None if listed is None else dict.fromkeys(listed)
-        rows: list[dict[Cast, int]] = []
-        biases = np.zeros(n_ranges)
-        for each, side in zip((answer, seen), sides, strict=True):
-            found = _rows_of_casts(each, self.joint.roles, listed, actors) if side.any() else {}
-            rows.append(found if wanted is None else {cast: bits for cast, bits in found.items() if cast in wanted})
-            penalties = table.valid(each)[1] if side.any() else None
-            if penalties is not None:
-                biases = np.where(side, np.where(np.isfinite(penalties), penalties, 0.0), biases)
-        both = list(dict.fromkeys([*rows[0], *rows[1]]))
-        valid = np.zeros((len(both), n_ranges), np.bool_)
-        n_bytes = 8 * bitmask.n_words(len(answer.table_assets))
-        for found, side in zip(rows, sides, strict=True):
-            if found:
-                octets = b"".join(found.get(cast, 0).to_bytes(n_bytes, "little") for cast in both)
-                valid |= table.valid_of_many(np.frombuffer(octets, "<u8").astype(np.uint64).reshape(len(both), -1)) & side
-        return Casts(both, valid, biases, (rows[0], rows[1]), answer.table_assets)
+        biases = table.least_of_each(sides[0])
+        if seen is not answer:
+            biases = np.where(mirrored, table.least_of_each(sides[1]), biases)
+        return Casts(every, biases, sides, answer.table_assets)
 
     def _table_ranges(self, table_assets: Sequence[str]) -> TableRanges:
         known = self._tables.get(id(table_assets))
@@ -106,20 +99,40 @@ class CastMaker:
         return known
 
 
-def _rows_of_casts(answer: Any, roles: Sequence[str], listed: list[Cast] | None, actors: Sequence[Hashable]) -> dict[Cast, int]:
-    """The rows of each cast: by the castings of an answer to a query with actors, else those of the answer for every cast."""
+def _rows_of_casts(
+    answer: Any, roles: Sequence[str], listed: list[Cast] | None, actors: Sequence[Hashable]
+) -> dict[Cast, tuple[int, Floats | None]]:
+    """The rows of each cast, as bits, and what rows cost with it: by the castings of an answer to a query with actors, else those
+    of the answer for every cast."""
     if not hasattr(answer, "casts"):
         every = list(permutations(actors, len(roles))) if listed is None else listed
-        return dict.fromkeys(every, answer.bits)
-    found: dict[Cast, int] = {}
+        return dict.fromkeys(every, (answer.bits, answer.penalties if answer.has_penalties else None))
+    wanted = None if listed is None else set(listed)
+    found: dict[Cast, tuple[int, Floats | None]] = {}
     known: dict[int, Hashable] = {}
-    for cast, bits in answer.casts(roles):
+    for cast, bits, penalties in answer.casts(roles):
         for actor, role in zip(cast, roles, strict=True):
             if id(actor) not in known:
                 known[id(actor)] = _id_of(actor, role)
         key = tuple([known[id(actor)] for actor in cast])
-        found[key] = found.get(key, 0) | bits
+        if wanted is None or key in wanted:
+            found[key] = bits, penalties
     return found
+
+
+def _costs_of_rows(found: Mapping[Cast, tuple[int, Floats | None]], every: Sequence[Cast], answer: Any) -> Floats:
+    """What each row costs with each of some casts, inf where it may not be: float64 [C, n_rows]."""
+    n_rows = len(answer.table_assets)
+    n_bytes = 8 * bitmask.n_words(n_rows)
+    nowhere = 0, None
+    octets = b"".join(found.get(cast, nowhere)[0].to_bytes(n_bytes, "little") for cast in every)
+    masks = np.frombuffer(octets, "<u8").astype(np.uint64).reshape(len(every), n_bytes // 8)
+    costs = np.where(bitmask.unpack(masks, n_rows), 0.0, np.inf)
+    for i, cast in enumerate(every):
+        penalties = found.get(cast, nowhere)[1]
+        if penalties is not None:
+            costs[i] += penalties
+    return costs
 
 
 def _id_of(actor: Mapping[str, Any], role: str) -> Hashable:

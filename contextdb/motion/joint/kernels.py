@@ -22,6 +22,8 @@ _options: dict[str, Any] = {"cache": True, "nogil": True, "boundscheck": False, 
 
 ROUNDED = 1e-12
 """More than rounding can add to a bound, of its size."""
+TILE = 64
+"""So many boxes are bounded at a time, so that what actors see of each other stays in the processor's cache."""
 
 
 def _in(dtype: str, n_axes: int) -> Any:
@@ -48,8 +50,7 @@ _given = {
     "queries": _in("f8", 2),
     "seen": _in("f8", 3),
     "casts": _in("i8", 2),
-    "valid": _in("b1", 2),
-    "range_biases": _in("f8", 1),
+    "range_biases": _in("f8", 2),
     "frame_biases": _in("f8", 2),
 }
 """What `search` takes. Told beforehand, so that no array of another kind has it compiled again in the middle of a game."""
@@ -77,7 +78,6 @@ def search(
     queries,
     seen,
     casts,
-    valid,
     range_biases,
     frame_biases,
 ):
@@ -93,13 +93,13 @@ def search(
         See `contextdb.motion.joint.boxes`.
     pairs : int64 array, shape (P, 2)
     relative_weights : float64 array, shape (2,)
-    queries, seen, casts, valid, range_biases
+    queries, seen, casts, range_biases
         See `contextdb.motion.joint.scan.Asked`.
     frame_biases : float64 array, shape (B, 16)
     """
     n_actors, n_features = queries.shape
     n_casts, n_roles = casts.shape
-    n_pairs = pairs.shape[0]
+    n_boxes, n_pairs = boxes.shape[0], pairs.shape[0]
     best, best_frame, best_cast = np.inf, -1, -1
 
     plays = np.zeros((n_actors, n_roles), np.bool_)
@@ -111,8 +111,12 @@ def search(
         feature_weights[channels[c] : channels[c + 1]] = weights[c]
 
     own = _own_bounds(boxes, lows, highs, order, feature_weights, queries, plays)
-    near = _relative_bounds(relative_lows, relative_highs, pairs, relative_weights, seen, casts)
-    bounds, least = _bounds(boxes, box_ranges, own, near, pairs, casts, valid, range_biases, frame_biases)
+    bounds, least = np.empty((n_casts, n_boxes)), np.full(n_boxes, np.inf)
+    near = np.empty((n_pairs, n_actors, n_actors, TILE))
+    for start in range(0, n_boxes, TILE):
+        stop = min(start + TILE, n_boxes)
+        _relative_bounds(start, stop, relative_lows, relative_highs, pairs, relative_weights, seen, casts, near)
+        _bounds(start, stop, box_ranges, own, near, pairs, casts, range_biases, frame_biases, bounds, least)
 
     costs = np.empty((n_actors, n_roles, LANES))
     is_known = np.empty((n_actors, n_roles), np.bool_)
@@ -139,7 +143,7 @@ def search(
                         first = np.float64(relative[box, p, 2 * part, lane]) - wanted[2 * part]
                         second = np.float64(relative[box, p, 2 * part + 1, lane]) - wanted[2 * part + 1]
                         totals[lane] += relative_weights[part] * (first * first + second * second)
-            range_bias = range_biases[box_ranges[box]]
+            range_bias = range_biases[c, box_ranges[box]]
             for lane in range(LANES):
                 total = totals[lane] + (range_bias + frame_biases[box, lane])
                 frame = box_firsts[box] + lane
@@ -173,11 +177,10 @@ def _own_bounds(boxes, lows, highs, order, feature_weights, queries, plays):
 
 
 @njit(**_options)
-def _relative_bounds(lows, highs, pairs, weights, seen, casts):
-    """What one actor sees of another costs at least, for each ordered pair of roles: [P, A, A, B], where a cast has them."""
-    n_actors, n_boxes = seen.shape[0], lows.shape[2]
-    found = np.empty((pairs.shape[0], n_actors, n_actors, n_boxes))
-    is_known = np.zeros((pairs.shape[0], n_actors, n_actors), np.bool_)
+def _relative_bounds(start, stop, lows, highs, pairs, weights, seen, casts, found):
+    """What one actor sees of another costs at least in some boxes, for each ordered pair of roles, where a cast has them: fills
+    `found` [P, A, A, TILE]."""
+    is_known = np.zeros(found.shape[:3], np.bool_)
     for c in range(casts.shape[0]):
         for p in range(pairs.shape[0]):
             one, other = casts[c, pairs[p, 0]], casts[c, pairs[p, 1]]
@@ -187,43 +190,40 @@ def _relative_bounds(lows, highs, pairs, weights, seen, casts):
             total = found[p, one, other]
             total[:] = 0.0
             for i in range(4):
-                wanted, weight = seen[one, other, i], weights[i // 2]
-                for box in range(n_boxes):
-                    apart = max(max(np.float64(lows[p, i, box]) - wanted, wanted - np.float64(highs[p, i, box])), 0.0)
-                    total[box] += weight * (apart * apart)
-    return found
+                wanted, weight, low, high = seen[one, other, i], weights[i // 2], lows[p, i], highs[p, i]
+                for at in range(stop - start):
+                    apart = max(max(np.float64(low[start + at]) - wanted, wanted - np.float64(high[start + at])), 0.0)
+                    total[at] += weight * (apart * apart)
 
 
 @njit(**_options)
-def _bounds(boxes, box_ranges, own, near, pairs, casts, valid, range_biases, frame_biases):
-    """What each cast costs at least in each box, inf where it may not play, and the least of all casts: [C, B] and [B]."""
-    n_casts, n_boxes = casts.shape[0], boxes.shape[0]
-    bounds, least = np.empty((n_casts, n_boxes)), np.full(n_boxes, np.inf)
-    biases = np.empty(n_boxes)
-    for box in range(n_boxes):
-        biases[box] = np.inf
+def _bounds(start, stop, box_ranges, own, near, pairs, casts, range_biases, frame_biases, bounds, least):
+    """What each cast costs at least in some boxes, inf where it may not play, and the least of all casts: fills `bounds` [C, B] and
+    `least` [B]."""
+    biases = np.full(TILE, np.inf)
+    for at in range(stop - start):
         for lane in range(LANES):
-            biases[box] = min(biases[box], frame_biases[box, lane])
-        biases[box] += range_biases[box_ranges[box]]
-    for c in range(n_casts):
+            biases[at] = min(biases[at], frame_biases[start + at, lane])
+    for c in range(casts.shape[0]):
         bound = bounds[c]
-        bound[:] = 0.0
+        for box in range(start, stop):
+            bound[box] = 0.0
         for k in range(casts.shape[1]):
             part = own[casts[c, k], k]
-            for box in range(n_boxes):
+            for box in range(start, stop):
                 bound[box] += part[box]
         for p in range(pairs.shape[0]):
             part = near[p, casts[c, pairs[p, 0]], casts[c, pairs[p, 1]]]
-            for box in range(n_boxes):
-                bound[box] += part[box]
-        for box in range(n_boxes):
-            if valid[c, box_ranges[box]] and biases[box] < np.inf:
-                lowered = bound[box] * (1.0 - ROUNDED) + biases[box]
-                bound[box] = lowered - ROUNDED * (abs(lowered) + abs(biases[box]))
+            for box in range(start, stop):
+                bound[box] += part[box - start]
+        for box in range(start, stop):
+            bias = biases[box - start] + range_biases[c, box_ranges[box]]
+            if bias < np.inf:
+                lowered = bound[box] * (1.0 - ROUNDED) + bias
+                bound[box] = lowered - ROUNDED * (abs(lowered) + abs(bias))
                 least[box] = min(least[box], bound[box])
             else:
                 bound[box] = np.inf
-    return bounds, least
 
 
 @njit(inline="always", **_options)

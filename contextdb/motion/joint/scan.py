@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.joint.database import FACING, PLACE, JointDatabase
@@ -29,10 +28,8 @@ class Asked:
         What each actor sees of each other, in the units of costs.
     casts : int64 array, shape (C, K)
         The actor of each role.
-    valid : bool array, shape (C, J)
-        Which cast may play which joint range.
-    range_biases : float64 array, shape (J,)
-        What the table's soft cells, or penalties, cost.
+    range_biases : float64 array, shape (C, J)
+        What the table's soft cells cost with each cast in each joint range; inf where it may not play.
     frame_biases : float64 array, shape (M,)
         inf where a frame may not be chosen.
     """
@@ -40,7 +37,6 @@ class Asked:
     queries: Floats
     seen: Floats
     casts: Ints
-    valid: Flags
     range_biases: Floats
     frame_biases: Floats
 
@@ -60,7 +56,6 @@ def totals(joint: JointDatabase, asked: Asked) -> Floats:
     found = np.empty((len(asked.casts), joint.n_frames))
     ranges = joint.frame_ranges
     own = _own_costs(joint, asked)
-    biases = asked.range_biases[ranges] + asked.frame_biases
     place_weight, facing_weight = joint.relative_weights
     for c, cast in enumerate(asked.casts.tolist()):
         total = np.zeros(joint.n_frames)
@@ -71,7 +66,7 @@ def totals(joint: JointDatabase, asked: Asked) -> Floats:
             apart *= apart
             for columns, weight in ((PLACE, place_weight), (FACING, facing_weight)):
                 total += weight * (apart[:, columns.start] + apart[:, columns.start + 1])
-        found[c] = np.where(asked.valid[c][ranges], total + biases, np.inf)
+        found[c] = total + (asked.range_biases[c][ranges] + asked.frame_biases)
     return found
 
 

@@ -184,8 +184,8 @@ class JointSearcher:
             Where each actor is in the world: metres, and radians to the left, such as `Pose.root`.
         valid : Matches, or bool array, shape (J,), or mapping of database name to either, optional
             Matches, the answer to a query with actors: the assets of its rows, each with every cast that its cells accept, by the
-            `"id"` of the actors; mirrored clips go by `Matches.mirrored`. Soft cells add what a row costs with its best casting.
-            An array: which joint ranges may play. Default: all.
+            `"id"` of the actors; mirrored clips go by `Matches.mirrored`. A soft cell adds its
+            penalty for the cast at hand. An array: which joint ranges may play. Default: all.
         casts : sequence of mappings of role to actor, optional
             Only these. Default: those of the answer; without one every way to give the roles to different actors of `queries`.
         tags : TagFilter, optional
@@ -294,8 +294,7 @@ class _Engine:
             wanted,
             seen_by(where[:, None], where[None, :]),
             cast_numbers.reshape(-1, len(self.joint.roles)),
-            found.valid,
-            found.range_biases,
+            found.biases,
             frame_biases,
         )
         return _Question(asked, found, where, _gives_of(gives, self.joint.roles), box_biases)
@@ -307,7 +306,7 @@ class _Engine:
             return math.inf, -1, -1
         if kernels is None:
             return scan.least(self.joint, asked)
-        compared = (asked.queries, asked.seen, asked.casts, asked.valid, asked.range_biases)
+        compared = (asked.queries, asked.seen, asked.casts, asked.range_biases)
         found: Found = kernels.search(*self._pack, *map(np.ascontiguousarray, compared), question.box_biases)
         return found
 
@@ -315,7 +314,7 @@ class _Engine:
         """The best frame of each joint range with each cast that may play it."""
         totals = scan.totals(self.joint, question.asked)
         for i, (first, length) in enumerate(zip(self.joint.firsts.tolist(), self.joint.lengths.tolist(), strict=True)):
-            for cast in np.flatnonzero(question.asked.valid[:, i]).tolist() if length else ():
+            for cast in np.flatnonzero(question.asked.range_biases[:, i] < np.inf).tolist() if length else ():
                 own = totals[cast, first : first + length]
                 at = int(np.argmin(own))
                 if own[at] < np.inf:
@@ -342,7 +341,7 @@ class _Engine:
         return JointHit(
             name,
             asset,
-            question.casts.row(actors, asset, mirrored),
+            question.casts.row(cast, asset, mirrored),
             mirrored,
             at,
             own,
@@ -350,7 +349,7 @@ class _Engine:
             total,
             dict(zip(joint.roles, actors, strict=True)),
             self._costs(asked, frame, numbers.tolist()),
-            float(asked.range_biases[at] + asked.frame_biases[frame]),
+            float(asked.range_biases[cast, at] + asked.frame_biases[frame]),
             dict(zip(joint.roles, frames.tolist(), strict=True)),
             {role: _place(put[k]) for k, role in enumerate(joint.roles)},
             {role: moved(places[k], put[k]) for k, role in enumerate(joint.roles)},

@@ -25,6 +25,9 @@ from contextdb.motion import (
     Markup,
     MotionConfig,
     MotionDatabase,
+    PoseBank,
+    PoseSettings,
+    PoseStream,
     RootMotion,
     build,
     make_joint_clip,
@@ -115,7 +118,7 @@ def tried(joint, queries, places, cast, at, frame):
     return total / sizes + 0.75
 
 
-@examples(1.0)
+@examples(0.5)
 @given(joint_moments())
 def test_the_search_finds_what_trying_every_cast_clip_and_frame_finds(moment):
     joint, queries, places, casts, valid, every = moment
@@ -343,6 +346,18 @@ def test_the_play_ends_before_a_frame_that_is_excluded_for_one_role():
 
 def test_nothing_is_entered_when_nothing_may_play(greetings):
     assert entered(greetings, options={"casts": []})[0] is None
+
+
+def test_the_hands_of_two_streams_meet_at_the_contact(greetings):
+    play = entered(greetings, 90, {"casts": CAST})[0]
+    bank = PoseBank.build(CLIPS, SCHEMA, mirror=True, markup=MARKUP)
+    streams = {role: PoseStream(bank, PoseSettings(root="code", foot_lock=False)) for role in JOINT_ROLES}
+    hands, step = {}, 1.0 / SCHEMA.rate
+    while play.time_s < play.contact_s - 1e-9:
+        for role, place in play.advance(step).items():
+            pose = streams[role].update(play.decision(role), step, place)
+            hands[role] = pose.positions[bank.skeleton.index("RightHand")]
+    assert np.linalg.norm(hands["Host"] - hands["Guest"]) < 0.01
 
 
 # ---- clips, settings, faults

@@ -19,9 +19,10 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_whole
+from contextdb.cells.arguments import require_kind, require_mapping, require_whole
 from contextdb.console import announce
-from contextdb.errors import Fault, MotionError, QueryError, in_quotes, nearest, some
+from contextdb.errors import ContextError, Fault, MotionError, QueryError, in_quotes, nearest, some
+from contextdb.motion.clips.ground_place import A_BODY, GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.features.extraction import FARTHEST_M
 from contextdb.motion.joint import scan
@@ -40,12 +41,11 @@ from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.selector import Entry, Selector, choice_of
 
 Queries = Mapping[Any, ArrayLike]
-Places = Mapping[Any, Sequence[float]]
-Place = tuple[float, float, float]
+Places = Mapping[Any, OfBody]
 Found = tuple[float, int, int]
 """A total, its joint frame and its cast; inf, -1, -1 for none."""
 MOST_TAGS = 64
-PLACES = "a mapping of actors to (x, z, heading)"
+PLACES = f"a mapping of actors to places: {A_BODY}"
 
 
 class JointOptions(TypedDict, total=False):
@@ -106,7 +106,7 @@ class JointHit:
     costs: dict[str, dict[str, float]]
     bias: float
     frames: dict[str, int]
-    places: dict[str, Place]
+    places: dict[str, GroundPlace]
     alignment: dict[str, RootMotion]
     searches: tuple[Search, ...] = ()
     why: str = ""
@@ -180,7 +180,7 @@ class JointSearcher:
         ----------
         queries : mapping of actor to float array, shape (F,)
             The pose and path of each actor, as for `MotionDatabase.search`.
-        places : mapping of actor to (x, z, heading)
+        places : mapping of actor to (x, z, heading), or to Steered
             Where each actor is in the world: metres, and radians to the left, such as `Pose.root`.
         valid : Matches, or bool array, shape (J,), or mapping of database name to either, optional
             Matches, the answer to a query with actors: the assets of its rows, each with every cast that its cells accept, by the
@@ -431,7 +431,7 @@ def _nothing(choice: Choice) -> JointHit:
     return JointHit(None, None, None, False, -1, -1, None, math.inf, {}, {}, 0.0, {}, {}, {}, choice.searches, choice.why)
 
 
-def _place(numbers: Floats) -> Place:
+def _place(numbers: Floats) -> GroundPlace:
     x, z, heading = numbers.tolist()
     return x, z, heading
 
@@ -445,9 +445,12 @@ def places_of(places: Places, actors: Sequence[Hashable]) -> Floats:
             raise QueryError(
                 Fault(f"there is no place for the actor {actor!r}.", "(x, z, heading) for each actor that may be cast")
             )
-        numbers = list(map(as_number, require_many(places[actor], "one of places", "(x, z, heading)")))
-        if len(numbers) != 3 or any(number is None or abs(number) > FARTHEST_M for number in numbers):
-            accepted = f"(x, z, heading): metres, at most {FARTHEST_M:,.0f}, and radians"
+        try:
+            numbers = place_of(places[actor])
+        except ContextError:
+            numbers = None
+        if numbers is None or max(map(abs, numbers)) > FARTHEST_M:
+            accepted = f"{A_BODY}, at most {FARTHEST_M:,.0f}"
             raise QueryError(Fault(f"the place of the actor {actor!r} is {places[actor]!r}.", accepted))
         found[i] = numbers
     return found

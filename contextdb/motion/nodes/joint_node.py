@@ -20,8 +20,9 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_text
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, some
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.joint.database import JointDatabase
-from contextdb.motion.joint.searcher import JointHit, JointOptions, JointSearcher, Place, Places, Queries, places_of
+from contextdb.motion.joint.searcher import JointHit, JointOptions, JointSearcher, Places, Queries, places_of
 from contextdb.motion.markup.spans import TOLERANCE_S
 from contextdb.motion.nodes.match_node import MatchCosts, MatchPlay
 from contextdb.motion.nodes.warping import Target, Window, warped
@@ -72,13 +73,13 @@ class JointPlay:
         """The frame of the motion database that each role shows now."""
         return {role: play.frame for role, play in self.plays.items()}
 
-    def advance(self, dt_s: float) -> dict[str, Place]:
+    def advance(self, dt_s: float) -> dict[str, GroundPlace]:
         """Play on for some seconds, and say where in the world each role's actor is then; at the end they stay."""
         for play in self.plays.values():
             play.advance(dt_s)
         return self.at(self.time_s)
 
-    def at(self, time_s: float) -> dict[str, Place]:
+    def at(self, time_s: float) -> dict[str, GroundPlace]:
         """Where in the world each role's actor is some seconds after the entry, as (x, z, heading)."""
         found = {role: self.starts[role].then(play.at(time_s)) for role, play in self.plays.items()}
         return {role: (place.left_m, place.ahead_m, place.turn_rad) for role, place in found.items()}

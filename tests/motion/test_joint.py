@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from dataclasses import replace
 from itertools import permutations
 from unittest import mock
@@ -372,10 +373,27 @@ def test_the_hands_of_a_made_greeting_meet_at_its_contact(name):
     assert np.linalg.norm(host.positions[0, hand] - guest.positions[0, hand]) > 2.0
 
 
+TOML = """
+[tables.greetings]
+[features.pose]
+rate = 30.0
+channels = [{ type = "position", bone = "LeftFoot" }]
+[databases.greetings]
+table = "greetings"
+clips = "clips/*.bvh"
+features = "pose"
+roles = ["Host", "Guest"]
+"""
+
+
+def settings_dict(**keys):
+    sections = tomllib.loads(TOML)
+    sections["databases"]["greetings"] |= keys
+    return {name: sections[name] for name in ("features", "databases")}
+
+
 def settings(**keys):
-    features = {"channels": [{"type": "position", "bone": "LeftFoot"}], "rate": 30.0}
-    database = {"clips": "clips/*.bvh", "features": "pose", "roles": list(JOINT_ROLES), "table": "greetings"}
-    return MotionConfig.from_dict({"features": {"pose": features}, "databases": {"greetings": database | keys}})
+    return MotionConfig.from_dict(settings_dict(**keys))
 
 
 def test_a_database_of_joint_clips_is_built_of_the_assets_of_its_table(tmp_path):
@@ -440,11 +458,7 @@ def test_check_tells_every_fault_of_joint_clips_and_counts_their_asset_as_having
     (tmp_path / "clips").mkdir()
     write_joint_clips(tmp_path / "clips")
     (tmp_path / "greetings.csv").write_text("Asset\ngreet_run\ngreet_walk\ngreet_tired\n", encoding="utf-8")
-    (tmp_path / "contextdb.toml").write_text(
-        '[tables.greetings]\n[features.pose]\nrate = 30.0\nchannels = [{ type = "position", bone = "LeftFoot" }]\n'
-        '[databases.greetings]\ntable = "greetings"\nclips = "clips/*.bvh"\nfeatures = "pose"\nroles = ["Host", "Guest"]\n',
-        encoding="utf-8",
-    )
+    (tmp_path / "contextdb.toml").write_text(TOML, encoding="utf-8")
     assert run("motion", "check", str(tmp_path)).out == "1 database and 6 clips checked: nothing found.\n"
     host = make_joint_clip("greet_walk")["Host"]
     write_bvh(replace(host, values=host.values[1:]), tmp_path / "clips" / "greet_walk.Host.bvh")
@@ -453,3 +467,16 @@ def test_check_tells_every_fault_of_joint_clips_and_counts_their_asset_as_having
     assert {each["rule"] for each in found} == {"roles"}
     assert ["greet_run" in each["message"] for each in found] == [True, False]
     assert "differ in length: Host 148 frames, Guest 149 frames" in found[1]["message"]
+
+
+def test_what_chooses_for_one_character_says_that_joint_clips_are_not_for_it(tmp_path):
+    config = MotionConfig.from_dict(settings_dict() | {"selectors": {"player": {"order": [{"database": "greetings"}]}}})
+    with pytest.raises(SchemaError, match=r'has the database "greetings" of clips that are cast and chosen together'):
+        config.selector("player", {})
+    assert config.joint_searcher("player", {"greetings": MotionDatabase.build(CLIPS, SCHEMA)}).roles == JOINT_ROLES
+    (tmp_path / "clips").mkdir()
+    write_joint_clips(tmp_path / "clips")
+    (tmp_path / "greetings.csv").write_text("Asset,wet\ngreet_run,True\n", encoding="utf-8")
+    (tmp_path / "contextdb.toml").write_text(TOML + '[conditions.wet]\ntype = "bool"\n', encoding="utf-8")
+    result = run("motion", "search", str(tmp_path), "greetings", "wet=True", "--query", "greet_run.Host@1")
+    assert "[databases.greetings] has roles: its clips are cast and chosen together" in result.err

@@ -40,6 +40,7 @@ __all__ = ["DatabaseSettings", "MotionConfig", "SelectorSettings"]
 SECTIONS = ("features", "databases", "selectors", "controllers", "output")
 STEP_KEYS = ("database", "threshold")
 MOST_COST = 1e30
+JOINTLY = "motion.JointSearcher in Python, for databases with roles"
 
 Part = TypeVar("Part")
 
@@ -136,8 +137,15 @@ class MotionConfig:
         return replace(self, features=given)
 
     def selector(self, name: str, databases: Mapping[str, MotionDatabase]) -> Selector:
-        """The selector of a name over built databases; one that is not among them counts as not loaded."""
+        """The selector of a name over built databases; one that is not among them counts as not loaded.
+
+        Raises SchemaError for an unknown name, and for one of joint databases, which `joint_searcher` takes.
+        """
         settings = _known("selectors", name, self.selectors, self.file)
+        for database, _ in settings.order:
+            if self.databases[database].roles:
+                found = f"[selectors.{name}] has the database {in_quotes(database)} of clips that are cast and chosen together."
+                raise SchemaError(Fault(found, JOINTLY, place=Place(self.file)))
         return Selector([Entry(database, databases.get(database), threshold) for database, threshold in settings.order])
 
     def joint(self, name: str, database: MotionDatabase) -> JointDatabase:

@@ -95,7 +95,7 @@ def joint_moments(draw):
     places = {actor: (*(rng.integers(-4, 5, 2) / 2.0).tolist(), float(rng.uniform(-4, 4))) for actor in actors}
     every = [dict(zip(joint.roles, each, strict=True)) for each in permutations(actors, n_roles)]
     casts = None if draw(st.booleans()) else [cast for cast in every if rng.random() < 0.5]
-    return joint, queries, places, casts, rng.random(n_clips) < 0.8, every
+    return joint, queries, places, casts, rng.random(n_clips) < 0.8, every, draw(st.sampled_from([2, 512]))
 
 
 def tried(joint, queries, places, cast, at, frame):
@@ -122,8 +122,9 @@ def tried(joint, queries, places, cast, at, frame):
 @examples(0.5)
 @given(joint_moments())
 def test_the_search_finds_what_trying_every_cast_clip_and_frame_finds(moment):
-    joint, queries, places, casts, valid, every = moment
-    found = JointSearcher(joint).search(queries, places, valid=valid, casts=casts)
+    joint, queries, places, casts, valid, every, at_once = moment
+    with mock.patch.object(searching, "CASTS_AT_ONCE", at_once):
+        found = JointSearcher(joint).search(queries, places, valid=valid, casts=casts)
     expected = [
         tried(joint, queries, places, cast, at, frame)
         for cast in (every if casts is None else casts)
@@ -149,6 +150,16 @@ def test_on_a_tie_the_first_frame_and_then_the_first_cast_wins():
     everybody = dict.fromkeys((5, 4, 6), (0.0, 0.0))
     found = JointSearcher(joint).search(everybody, dict.fromkeys(everybody, (0.0, 0.0, 0.0)))
     assert (found.asset, found.frame, found.cast) == ("b", 0, {"Tackler": 5, "Carrier": 4})
+
+
+@pytest.mark.parametrize("at_once", [2, 512])
+def test_on_a_tie_it_does_not_matter_how_many_casts_are_compared_together(at_once):
+    plain = MotionDatabase.from_features(np.ones((40, 2)), [0, 20], [20, 40], ["a.Tackler", "a.Carrier"])
+    joint = JointDatabase.of(replace(plain, root=np.zeros((40, 3), np.float32)), ROLES[:2])
+    queries = {5: (0.0, 0.0), 6: (1.0, 1.0), 7: (1.0, 1.0), 8: (1.0, 1.0)}
+    with mock.patch.object(searching, "CASTS_AT_ONCE", at_once):
+        found = JointSearcher(joint).search(queries, dict.fromkeys(queries, (0.0, 0.0, 0.0)))
+    assert (found.frame, found.cast) == (0, {"Tackler": 6, "Carrier": 7})
 
 
 @pytest.mark.parametrize("at", [0, 1, 4])
@@ -407,6 +418,11 @@ def test_a_database_of_joint_clips_is_built_of_the_assets_of_its_table(tmp_path)
     (tmp_path / "clips" / "greet_run.Guest.bvh").unlink()
     with pytest.raises(MotionError, match=r'joint asset "greet_run" has no clip for "Guest"'):
         build(config, tmp_path, {"greetings": ["greet_run"]})
+
+
+def test_an_asset_is_mirrored_for_all_its_roles_or_none():
+    with pytest.raises(MotionError, match="is mirrored for some of its roles alone"):
+        JointDatabase.of(MotionDatabase.build(CLIPS[:2], SCHEMA, mirror=[CLIPS[0].name]), JOINT_ROLES)
 
 
 @pytest.mark.parametrize("roles", [["Host"], ["Host", "Host"], ["a.b", "c"], "Host", [1, 2]])

@@ -75,7 +75,7 @@ class CastMaker:
             listed = list(permutations(actors, len(self.joint.roles)))
         n_ranges = len(self.joint.assets)
         flags = np.ones(n_ranges, np.bool_) if valid is None else arguments.flags_of(valid, n_ranges, "valid", "joint range")
-        return Casts(listed, np.tile(np.where(flags, 0.0, np.inf), (len(listed), 1)))
+        return Casts(listed, np.broadcast_to(np.where(flags, 0.0, np.inf), (len(listed), n_ranges)))
 
     def _of_answer(self, answer: Any, listed: list[Cast] | None, actors: Sequence[Hashable]) -> Casts:
         mirrored = self.joint.mirrored

@@ -103,13 +103,15 @@ class JointDatabase:
         for i, (name, mirrored) in enumerate(zip(database.assets, database.mirrored.tolist(), strict=True)):
             asset, role = divided(name, names)
             found.setdefault((asset, mirrored), {})[role] = i
-        whole = {key: each for key, each in found.items() if len(each) == len(names)}
-        ranges = np.array([[each[role] for role in names] for each in whole.values()], np.int64).reshape(-1, len(names))
+        if one_sided := [asset for (asset, _), each in found.items() if len(each) < len(names)]:
+            told = f"the joint asset {in_quotes(one_sided[0])} is mirrored for some of its roles alone."
+            raise MotionError(Fault(told, "all clips of an asset mirrored, or none", rule="roles"))
+        ranges = np.array([[each[role] for role in names] for each in found.values()], np.int64).reshape(-1, len(names))
         return cls(
             database,
             names,
-            tuple(asset for asset, _ in whole),
-            np.array([mirrored for _, mirrored in whole], np.bool_),
+            tuple(asset for asset, _ in found),
+            np.array([mirrored for _, mirrored in found], np.bool_),
             ranges,
             _weight(place_weight, "place_weight"),
             _weight(facing_weight, "facing_weight"),

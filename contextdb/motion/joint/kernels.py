@@ -52,6 +52,8 @@ _given = {
     "casts": _in("i8", 2),
     "range_biases": _in("f8", 2),
     "frame_biases": _in("f8", 2),
+    "best": types.f8,
+    "best_frame": types.i8,
 }
 """What `search` takes. Told beforehand, so that no array of another kind has it compiled again in the middle of a game."""
 
@@ -80,8 +82,10 @@ def search(
     casts,
     range_biases,
     frame_biases,
+    best,
+    best_frame,
 ):
-    """The lowest total, its joint frame and its cast; inf, -1, -1 for none.
+    """The lowest total, its joint frame and its cast.
 
     Parameters
     ----------
@@ -96,11 +100,14 @@ def search(
     queries, seen, casts, range_biases
         See `contextdb.motion.joint.scan.Asked`.
     frame_biases : float64 array, shape (B, 16)
+    best, best_frame : float, int
+        The lowest total of casts before these, and its frame; inf and -1 where there is none. Given back, with the cast -1, where
+        none of these is better.
     """
     n_actors, n_features = queries.shape
     n_casts, n_roles = casts.shape
     n_boxes, n_pairs = boxes.shape[0], pairs.shape[0]
-    best, best_frame, best_cast = np.inf, -1, -1
+    best_cast = -1
 
     plays = np.zeros((n_actors, n_roles), np.bool_)
     for c in range(n_casts):

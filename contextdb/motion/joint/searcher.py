@@ -45,6 +45,8 @@ Places = Mapping[Any, OfBody]
 Found = tuple[float, int, int]
 """A total, its joint frame and its cast; inf, -1, -1 for none."""
 MOST_TAGS = 64
+CASTS_AT_ONCE = 512
+"""So many casts are compared together, so that memory stays small however many actors there are."""
 PLACES = f"a mapping of actors to places: {A_BODY}"
 
 
@@ -306,9 +308,14 @@ class _Engine:
             return math.inf, -1, -1
         if kernels is None:
             return scan.least(self.joint, asked)
-        compared = (asked.queries, asked.seen, asked.casts, asked.range_biases)
-        found: Found = kernels.search(*self._pack, *map(np.ascontiguousarray, compared), question.box_biases)
-        return found
+        best, best_frame, best_cast = math.inf, -1, -1
+        for first in range(0, len(asked.casts), CASTS_AT_ONCE):
+            some = slice(first, first + CASTS_AT_ONCE)
+            compared = (asked.queries, asked.seen, asked.casts[some], asked.range_biases[some])
+            given = (*map(np.ascontiguousarray, compared), question.box_biases, best, best_frame)
+            best, best_frame, cast = kernels.search(*self._pack, *given)
+            best_cast = best_cast if cast < 0 else first + cast
+        return best, best_frame, best_cast
 
     def best_of_each(self, question: _Question) -> Iterator[Found]:
         """The best frame of each joint range with each cast that may play it."""

@@ -463,6 +463,13 @@ def test_an_actor_whose_query_or_place_is_missing_or_wrong_is_named(greetings, q
     assert told in str(error.value)
 
 
+def test_answers_for_many_contexts_are_refused(greetings, table):
+    queries, places = recorded(greetings, 0, 40)
+    many = table.query_many({"Host.mood": ["glad", "cross"], "Guest.side": [0.0, 0.0]})
+    with pytest.raises(QueryError, match="valid holds the answers for many contexts"):
+        JointSearcher(greetings).search(queries, places, valid=many)
+
+
 def test_an_actor_of_a_query_needs_an_id(greetings, table):
     queries, places = recorded(greetings, 0, 40)
     answer = table.query({}, actors={"Host": [{"mood": "glad"}], "Guest": [{"id": 3, "side": 1.0}]})

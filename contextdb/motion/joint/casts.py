@@ -69,7 +69,7 @@ class CastMaker:
         `actors` are all there are, for casts that neither the answer nor the game lists.
         """
         listed = None if casts is None else _read_casts(casts, self.joint.roles)
-        if hasattr(valid, "table_assets"):
+        if hasattr(valid, "table_assets") and not hasattr(valid, "lists"):
             return self._of_answer(valid, listed, actors)
         if listed is None:
             listed = list(permutations(actors, len(self.joint.roles)))

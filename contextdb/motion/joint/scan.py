@@ -6,6 +6,7 @@ compiled search, so that both find the same frame at the same cost.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,17 +44,16 @@ class Asked:
 
 def least(joint: JointDatabase, asked: Asked) -> tuple[float, int, int]:
     """The lowest total, its joint frame and its cast; on a tie the lowest frame, then the first cast. inf, -1, -1 for none."""
-    found = totals(joint, asked)
-    best = found.min(initial=np.inf)
-    if best == np.inf:
-        return np.inf, -1, -1
-    frame = int(np.argmax((found == best).any(axis=0)))
-    return float(best), frame, int(np.argmax(found[:, frame] == best))
+    best, best_frame, best_cast = np.inf, -1, -1
+    for c, total in enumerate(totals(joint, asked)):
+        frame = int(np.argmin(total))
+        if total[frame] < best or (total[frame] == best < np.inf and frame < best_frame):
+            best, best_frame, best_cast = float(total[frame]), frame, c
+    return best, best_frame, best_cast
 
 
-def totals(joint: JointDatabase, asked: Asked) -> Floats:
-    """The total of each cast and joint frame, inf where it may not be: float64 [C, M]."""
-    found = np.empty((len(asked.casts), joint.n_frames))
+def totals(joint: JointDatabase, asked: Asked) -> Iterator[Floats]:
+    """For each cast the total of each joint frame, inf where it may not be: float64 [M]; of a database with frames."""
     ranges = joint.frame_ranges
     own = _own_costs(joint, asked)
     place_weight, facing_weight = joint.relative_weights
@@ -66,8 +66,7 @@ def totals(joint: JointDatabase, asked: Asked) -> Floats:
             apart *= apart
             for columns, weight in ((PLACE, place_weight), (FACING, facing_weight)):
                 total += weight * (apart[:, columns.start] + apart[:, columns.start + 1])
-        found[c] = total + (asked.range_biases[c][ranges] + asked.frame_biases)
-    return found
+        yield total + (asked.range_biases[c][ranges] + asked.frame_biases)
 
 
 def _own_costs(joint: JointDatabase, asked: Asked) -> dict[tuple[int, int], Floats]:

@@ -319,13 +319,11 @@ class _Engine:
 
     def best_of_each(self, question: _Question) -> Iterator[Found]:
         """The best frame of each joint range with each cast that may play it."""
-        totals = scan.totals(self.joint, question.asked)
-        for i, (first, length) in enumerate(zip(self.joint.firsts.tolist(), self.joint.lengths.tolist(), strict=True)):
-            for cast in np.flatnonzero(question.asked.range_biases[:, i] < np.inf).tolist() if length else ():
-                own = totals[cast, first : first + length]
-                at = int(np.argmin(own))
-                if own[at] < np.inf:
-                    yield float(own[at]), first + at, cast
+        for cast, totals in enumerate(scan.totals(self.joint, question.asked) if self.joint.n_frames else ()):
+            for first, length in zip(self.joint.firsts.tolist(), self.joint.lengths.tolist(), strict=True):
+                own = totals[first : first + length]
+                if length and (least := float(own.min())) < np.inf:
+                    yield least, first + int(np.argmin(own)), cast
 
     def hit(self, total: float, frame: int) -> Hit:
         """What a selector compares."""

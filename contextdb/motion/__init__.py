@@ -35,7 +35,8 @@ from contextdb.motion.features.many_queries import with_paths
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.joint.database import JointDatabase
-from contextdb.motion.joint.searcher import JointHit, JointSearcher
+from contextdb.motion.joint.hit import JointHit
+from contextdb.motion.joint.searcher import JointSearcher
 from contextdb.motion.made.joint import JOINT_RECIPES, make_joint_clip, write_joint_clips
 from contextdb.motion.made.recipes import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
 from contextdb.motion.markup.left_out import LeftOut, Skip

@@ -30,6 +30,7 @@ from contextdb.motion import (
     PoseSettings,
     PoseStream,
     RootMotion,
+    Steered,
     build,
     make_joint_clip,
     pose_schema,
@@ -176,6 +177,12 @@ def test_actors_who_are_as_recorded_cost_nothing_wherever_in_the_world_they_are(
         assert (way.left_m, way.ahead_m, way.turn_rad) == pytest.approx((0.0, 0.0, 0.0), abs=1e-5)
 
 
+def test_a_place_may_be_a_steered_body(greetings):
+    queries, places = recorded(greetings, 0, 40)
+    steered = {actor: Steered(position=(x, z), heading=heading) for actor, (x, z, heading) in places.items()}
+    assert JointSearcher(greetings).search(queries, steered).cost == JointSearcher(greetings).search(queries, places).cost
+
+
 # ---- with a table
 
 
@@ -203,7 +210,7 @@ def test_only_casts_that_the_cells_of_a_row_accept_are_tried(greetings, table):
     queries, places = recorded(greetings, list(greetings.assets).index("greet_walk"), 40)
     found = JointSearcher(greetings).search(queries, places, valid=asked(table, {7: "cross", 3: "glad"}, {3: -1.0, 7: -1.0}))
     assert (found.asset, found.row, found.cast, found.mirrored) == ("greet_walk", 1, {"Host": 7, "Guest": 3}, False)
-    found = JointSearcher(greetings).search(queries, places, valid=asked(table, {7: "cross"}, {3: 1.0}), in_match_range=True)
+    found = JointSearcher(greetings).search(queries, places, valid=asked(table, {7: "cross"}, {3: 1.0}))
     assert found.mirrored, "as it is, row 1 wants the guest on the other side"
     assert not JointSearcher(greetings).search(queries, places, valid=asked(table, {}, {3: 1.0}))
 

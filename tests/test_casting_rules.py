@@ -201,3 +201,29 @@ def test_an_explanation_tells_the_facts_of_one_casting_that_breaks_the_rule():
     actors = {"Defender": [{"id": 1, "kind": "a", "x": 3.0}], "Receiver": [{"id": 2, "kind": "a", "x": 1.0}]}
     told = compiled.explain({"limit": 0}, actors=actors).row(0)
     assert str(told) == "row 0: When is false for every casting, such as gap = -2, limit = 0, the cell says gap > limit"
+
+
+@examples(0.6)
+@given(moments())
+def test_casts_of_two_roles_are_those_of_trying_every_pair(moment):
+    rows, context, actors = moment
+    pair = ("Receiver", "Defender")
+    matches = table_of(rows).query(context, actors=actors)
+    expected = {}
+    for at in matches:
+        row = rows[at]
+        mandatory, optional = (row.get(s, "").split() for s in SLOTS)
+        named, holds = RULES[row["When"]]
+        needs_judge = "Judge" in mandatory or ((row["Judge.kind"] != "Any" or "Judge" in named) and "Judge" not in optional)
+        for receiver, defender, judge in product(
+            actors["Receiver"], actors["Defender"], actors["Judge"] if needs_judge else [None]
+        ):
+            cast = {"Receiver": receiver, "Defender": defender} | ({"Judge": judge} if judge else {})
+            x = {r: cast[r]["x"] if r in cast else None for r in ROLES}
+            truth = holds(x, context["is_wet"], context["limit"])
+            fits = all(row[f"{r}.kind"] == "Any" or a["kind"] in row[f"{r}.kind"].split() for r, a in cast.items())
+            is_open = truth is None and any(r not in cast for r in named)
+            if fits and len({a["id"] for a in cast.values()}) == len(cast) and (truth or is_open):
+                expected.setdefault((receiver["id"], defender["id"]), set()).add(at)
+    found = {tuple(a["id"] for a in cast): {i for i in range(len(rows)) if bits >> i & 1} for cast, bits, _ in matches.casts(pair)}
+    assert found == expected

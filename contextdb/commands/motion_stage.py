@@ -31,6 +31,7 @@ from contextdb.motion import (
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.markup.reserved import MOST_COST
 from contextdb.motion.reading import as_number
+from contextdb.motion.storage.config import JOINTLY
 from contextdb.motion.trace.cost_views import View
 from contextdb.tables.project import SCHEMA_FILE, Project
 
@@ -96,6 +97,10 @@ class Stage:
         """
         if not given:
             return {}, {}
+        for name in names:
+            if self.config.databases[name].roles:
+                found = f"[databases.{name}] has roles: its clips are cast and chosen together, by facts of several actors."
+                raise ContextDBError(Fault(found, JOINTLY))
         tables = self.tables(names)
         if not tables:
             found = f"no table says which assets of {some(names)} are valid, so facts change nothing."

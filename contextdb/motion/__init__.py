@@ -7,6 +7,7 @@
                                       ControllerGroup: a crowd of them, searched for at once
                                       Character, Crowd: stick, body, facts, table and all of this in one update
                                       MatchNode, MatchGate: one-offs that end at a target
+                                      JointSearcher, JointNode: clips of several characters, cast and played as one
 
 A table's query says which assets are valid; this finds the best frame among theirs. It takes masks and names, never a table.
 Metres, seconds, y up; angles are positive to the left. numba makes the search fast and is loaded by the first one.
@@ -33,6 +34,10 @@ from contextdb.motion.features.live_query import LivePose, PoseHistory, query_fr
 from contextdb.motion.features.many_queries import with_paths
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
+from contextdb.motion.joint.database import JointDatabase
+from contextdb.motion.joint.hit import JointHit
+from contextdb.motion.joint.searcher import JointSearcher
+from contextdb.motion.made.joint import JOINT_RECIPES, make_joint_clip, write_joint_clips
 from contextdb.motion.made.recipes import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
@@ -44,6 +49,7 @@ from contextdb.motion.measuring.measure import measure
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.near_clips import Near
 from contextdb.motion.measuring.transition_names import TransitionCoverage
+from contextdb.motion.nodes.joint_node import JointNode, JointPlay
 from contextdb.motion.nodes.match_gate import GateLook, MatchGate
 from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
@@ -93,6 +99,7 @@ from contextdb.motion.walking.walker import Walker, WalkSettings, WalkState
 __all__ = [
     "ANY_TAGS",
     "FACTS",
+    "JOINT_RECIPES",
     "RECIPES",
     "Action",
     "Biases",
@@ -133,6 +140,11 @@ __all__ = [
     "GateLook",
     "Hit",
     "Inputs",
+    "JointDatabase",
+    "JointHit",
+    "JointNode",
+    "JointPlay",
+    "JointSearcher",
     "LeftOut",
     "LivePose",
     "LocalPoses",
@@ -220,6 +232,7 @@ __all__ = [
     "local_poses",
     "made_clips",
     "make_clip",
+    "make_joint_clip",
     "measure",
     "mirrored",
     "mirrored_path",
@@ -248,6 +261,7 @@ __all__ = [
     "with_path",
     "with_paths",
     "write_bvh",
+    "write_joint_clips",
     "write_made_clips",
     "write_poses",
 ]

@@ -52,6 +52,13 @@ PLAYER = motion.Character(motion.Controller(motion.Selector([motion.Entry("only"
 WALKED = motion.Cycle.of(motion.make_clip("walk").clip)
 WALKS = [motion.Gait("walk", [WALKED])]
 STANCES = WALKED.stances
+JOINT = motion.JointDatabase.of(
+    motion.MotionDatabase.build(motion.make_joint_clip("greet_walk").values(), SCHEMA), ("Host", "Guest")
+)
+TOGETHER = motion.JointSearcher(JOINT)
+POSED_TWO = {5: JOINT.database.raw(0), 6: JOINT.database.raw(0)}
+PLACED_TWO = {5: (0.0, 0.0, 0.0), 6: (0.0, 1.0, 3.0)}
+MET = motion.JointNode(TOGETHER).enter(POSED_TWO, PLACED_TWO)
 Call = Callable[[object], object]
 CALLS: dict[str, Call] = {
     "describe(clips)": lambda x: motion.describe(x),
@@ -230,6 +237,37 @@ CALLS: dict[str, Call] = {
     "Trace.diff(other)": lambda x: motion.Trace().diff(x),
     "MatchNode(database)": lambda x: motion.MatchNode(x),
     "MatchNode(position_weight)": lambda x: motion.MatchNode(DATABASE, position_weight=x),
+    "JointDatabase.of(database)": lambda x: motion.JointDatabase.of(x, ["Host", "Guest"]),
+    "JointDatabase.of(roles)": lambda x: motion.JointDatabase.of(JOINT.database, x),
+    "JointDatabase.of(place_weight)": lambda x: motion.JointDatabase.of(JOINT.database, JOINT.roles, place_weight=x),
+    "JointDatabase.with_weights(weights)": lambda x: JOINT.with_weights(x),
+    "JointDatabase.with_weights(facing_weight)": lambda x: JOINT.with_weights(facing_weight=x),
+    "JointSearcher(databases)": lambda x: motion.JointSearcher(x),
+    "JointSearcher(databases), one": lambda x: motion.JointSearcher({"joint": x}),
+    "JointSearcher(thresholds)": lambda x: motion.JointSearcher(JOINT, x),
+    "JointSearcher(thresholds), one": lambda x: motion.JointSearcher(JOINT, {"joint": x}),
+    "JointSearcher.search(queries)": lambda x: TOGETHER.search(x, PLACED_TWO),
+    "JointSearcher.search(queries), one": lambda x: TOGETHER.search(POSED_TWO | {6: x}, PLACED_TWO),
+    "JointSearcher.search(places)": lambda x: TOGETHER.search(POSED_TWO, x),
+    "JointSearcher.search(places), one": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO | {6: x}),
+    "JointSearcher.search(valid)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, valid=x),
+    "JointSearcher.search(casts)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, casts=x),
+    "JointSearcher.search(casts), one": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, casts=[x]),
+    "JointSearcher.search(casts), actor": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, casts=[{"Host": x, "Guest": 5}]),
+    "JointSearcher.search(tags)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, tags=x),
+    "JointSearcher.search(in_match_range)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, in_match_range=x),
+    "JointSearcher.search(gives)": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, gives=x),
+    "JointSearcher.search(gives), one": lambda x: TOGETHER.search(POSED_TWO, PLACED_TWO, gives={"Host": x}),
+    "JointSearcher.candidates(k)": lambda x: TOGETHER.candidates(POSED_TWO, PLACED_TWO, x),
+    "JointNode(searcher)": lambda x: motion.JointNode(x),
+    "JointNode.play(hit)": lambda x: motion.JointNode(TOGETHER).play(x, PLACED_TWO),
+    "JointNode.play(places)": lambda x: motion.JointNode(TOGETHER).play(MET.hit, x),
+    "JointPlay.advance(dt_s)": lambda x: MET.advance(x),
+    "JointPlay.at(time_s)": lambda x: MET.at(x),
+    "JointPlay.decision(role)": lambda x: MET.decision(x),
+    "JointPlay.decision(database)": lambda x: isinstance(x, str) or MET.decision("Host", x),
+    "make_joint_clip(name)": lambda x: motion.make_joint_clip(x),
+    "write_joint_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_joint_clips(x),
     "MatchGate(over)": lambda x: motion.MatchGate(x, 1.0),
     "MatchGate(threshold)": lambda x: motion.MatchGate(DATABASE, x),
     "MatchGate.update(query)": lambda x: motion.MatchGate(DATABASE, 1.0).update(x),

@@ -76,7 +76,7 @@ class Priorities:
 
     def __init__(self, sheet: Sheet) -> None:
         self.sheet = sheet
-        self._clips: dict[str, tuple[str, ...]] = {}
+        self._clips: dict[tuple[str, tuple[str, ...]], tuple[str, ...]] = {}
         self._tables: dict[str, Table | str] = {}
         self._answers: dict[str, Answer | str] = {}
 
@@ -156,12 +156,13 @@ class Priorities:
         return rows, tuple(asset for asset in rows if asset in valid), "no clips yet: counted from the rows of the table"
 
     def _clips_of(self, settings: DatabaseSettings) -> tuple[str, ...]:
-        if settings.clips not in self._clips:
+        key = settings.clips, settings.roles
+        if key not in self._clips:
             found: list[Path] = []
             with suppress(ValueError, OSError):  # a pattern that pathlib does not know, or a folder that may not be read
                 found = sorted(self.folder.glob(settings.clips)) if self.folder else []
-            self._clips[settings.clips] = tuple(dict.fromkeys(path.stem for path in found))
-        return self._clips[settings.clips]
+            self._clips[key] = tuple(dict.fromkeys(settings.asset_of(path.stem) for path in found))
+        return self._clips[key]
 
     def _valid_in(self, name: str) -> Answer | str:
         """What a table answers to the test row, or why it cannot be reported."""

@@ -12,7 +12,7 @@ Source: Hall, "On representatives of subsets", J. London Math. Soc. 10, 1935.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import or_
@@ -28,6 +28,7 @@ from contextdb.compiled.casting.assigning import Chosen, Holds, Part, best, ever
 from contextdb.compiled.casting.facts import Actor, Actors, Ask, Offer, mirrored_offers, read_offers
 from contextdb.compiled.casting.roles import roles_of_table
 from contextdb.compiled.casting.rules import CastRules
+from contextdb.compiled.casting.together import CastRows, casts_of
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.matches import Answering, SetMatches, Stages
 from contextdb.errors import ContextError, Fault, in_quotes, nearest, some
@@ -76,6 +77,17 @@ class CastMatches(SetMatches):
     def castings(self, row: int) -> list[Casting]:
         """All castings of a valid row that fill as many optional roles as can be, best first."""
         return self._stage(row).all(row)
+
+    def casts(self, roles: Sequence[str]) -> list[CastRows]:
+        """Every way to give these roles to distinct actors, with the valid rows in which they may play them. Empty where nobody is
+        offered for one of the roles."""
+        found: dict[tuple[object, ...], CastRows] = {}
+        left = self.bits
+        for rows, stage in self._cast_by:
+            for key, each in stage.casts(left & rows, roles):
+                found[key] = found[key].joined(each, self.n_rows) if key in found else each
+            left &= ~rows
+        return list(found.values())
 
     def _stage(self, row: int) -> Stage:
         if require_whole(row, "row") not in self:
@@ -218,6 +230,24 @@ class Stage:
     def all(self, row: int) -> list[Casting]:
         """Every casting of a row with the most optional roles, best first."""
         return [_as_casting(c) for c in every(*self.parts(row), self._holds(row))]
+
+    def casts(self, rows: int, roles: Sequence[str]) -> Iterator[tuple[tuple[object, ...], CastRows]]:
+        """Every cast of these roles in some of the rows that can be cast, with the keys of its actors."""
+        ruled = 0 if self.rules is None else self.rules.rows
+        is_soft = self.compiled.is_soft
+        plain = self._soft_costs(self.plain_facts) if is_soft else None
+        offers = [offer for role in roles for offer in self.offers.get(role, ())] if is_soft else []
+        own = {id(offer): self._soft_costs(offer.facts) for offer in offers}
+        for cast, bits in casts_of(rows, roles, self.offers, self.roles.required, ruled, self._holds):
+            penalties = None if plain is None else plain + sum(own[id(offer)] for _, offer in cast)
+            yield tuple([offer.key for _, offer in cast]), CastRows(tuple([offer.actor for _, offer in cast]), bits, penalties)
+
+    def _soft_costs(self, facts: Mapping[int, Fact]) -> NDArray[np.float64]:
+        """What the soft cells of all rows cost with some facts, over all depths: float64 [n_rows]."""
+        costs = np.zeros(self.compiled.n_rows)
+        for at, fact in facts.items():
+            costs += self.compiled.column_penalties(at, fact, self.unknown).sum(axis=0)
+        return costs
 
     def _holds(self, row: int) -> Holds | None:
         rules = self.rules

@@ -69,6 +69,14 @@ class TableRanges:
         found[:, self.ranges[self.firsts]] = own
         return found
 
+    def least_of_each(self, costs: Floats) -> Floats:
+        """What each range costs when rows cost as much, float64 [Q, n_rows]: that of the cheapest row of its asset, inf for a range
+        without a row: float64 [Q, R]."""
+        found = np.full((len(costs), self.n_ranges), np.inf)
+        if len(self.rows) and len(costs):
+            found[:, self.ranges[self.firsts]] = np.minimum.reduceat(costs[:, self.rows], self.firsts, axis=1)
+        return found
+
 
 def masks_of(answers: Sequence[Any]) -> tuple[Sequence[str], Words] | None:
     """The assets of a table's rows and the rows of many answers as bits, uint64 [Q, W]; None where they are answers of several

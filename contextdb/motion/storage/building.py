@@ -14,9 +14,10 @@ from os import PathLike
 from pathlib import Path
 
 from contextdb.cells.arguments import require_kind, require_many, require_mapping, require_path, require_text
-from contextdb.errors import ArtefactError, Fault, FileError, in_quotes, plural, some
+from contextdb.errors import ArtefactError, Fault, FileError, MotionError, Place, in_quotes, plural, some
 from contextdb.motion.clips.doubts import ClipFinding, doubts
 from contextdb.motion.features.normalisation import Normalisation
+from contextdb.motion.joint.database import joint_faults
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Biases
@@ -245,6 +246,10 @@ def _built(inputs: Inputs, name: str, found: list[Extracted], shared: Mapping[st
         biases=Biases(settings.base_bias, settings.looping_bias, settings.continuing_bias),
         end_s=settings.end_s,
     )
+    lengths = (database.stops - database.starts).tolist()
+    if settings.roles and (faults := list(joint_faults(database.assets, lengths, settings.roles))):
+        where = f"[databases.{name}]"
+        raise MotionError(*(replace(fault, found=f"{where} {fault.found}", place=Place(inputs.config.file)) for fault in faults))
     return Built(
         database.with_weights(settings.weights) if settings.weights else database,
         digest,

@@ -92,7 +92,7 @@ def clip_files(
     if not paths:
         found = f"[databases.{settings.name}] no file fits clips = {as_toml(settings.clips)}."
         raise MotionError(Fault(found, place=Place(file), rule="file"))
-    wanted = [path for path in paths if assets is None or path.stem in assets]
+    wanted = [path for path in paths if assets is None or settings.asset_of(path.stem) in assets]
     faults = list(_twice_named(settings.name, wanted, file))
     if faults:
         raise MotionError(*faults)
@@ -121,7 +121,7 @@ def unmatched(
     found: set[str] = set()
     held: set[str] = set()
     for settings in databases:
-        names = {path.stem for path in paths_of(settings, folder)}
+        names = {settings.asset_of(path.stem) for path in paths_of(settings, folder)}
         found |= names
         if settings.table is not None:
             clips.setdefault(settings.table, set()).update(names)

@@ -11,7 +11,7 @@ Reading touches no file; only `load_clips` and what builds do.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypedDict, TypeVar, Unpack
@@ -22,6 +22,8 @@ from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips import clip as clips
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
+from contextdb.motion.joint.database import JointDatabase
+from contextdb.motion.joint.searcher import JointSearcher
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.reading import Mapped, Section
 from contextdb.motion.search.database import MotionDatabase
@@ -38,6 +40,7 @@ __all__ = ["DatabaseSettings", "MotionConfig", "SelectorSettings"]
 SECTIONS = ("features", "databases", "selectors", "controllers", "output")
 STEP_KEYS = ("database", "threshold")
 MOST_COST = 1e30
+JOINTLY = "motion.JointSearcher in Python, for databases with roles"
 
 Part = TypeVar("Part")
 
@@ -134,9 +137,35 @@ class MotionConfig:
         return replace(self, features=given)
 
     def selector(self, name: str, databases: Mapping[str, MotionDatabase]) -> Selector:
-        """The selector of a name over built databases; one that is not among them counts as not loaded."""
+        """The selector of a name over built databases; one that is not among them counts as not loaded.
+
+        Raises SchemaError for an unknown name, and for one of joint databases, which `joint_searcher` takes.
+        """
         settings = _known("selectors", name, self.selectors, self.file)
+        for database, _ in settings.order:
+            if self.databases[database].roles:
+                found = f"[selectors.{name}] has the database {in_quotes(database)} of clips that are cast and chosen together."
+                raise SchemaError(Fault(found, JOINTLY, place=Place(self.file)))
         return Selector([Entry(database, databases.get(database), threshold) for database, threshold in settings.order])
+
+    def joint(self, name: str, database: MotionDatabase) -> JointDatabase:
+        """The joint clips of a built database whose settings name roles; see `JointDatabase.of` for what it raises."""
+        settings = self.database(name)
+        weights = {"place_weight": settings.place_weight, "facing_weight": settings.facing_weight}
+        if not settings.roles:
+            found = f"[databases.{name}] has no roles."
+            raise SchemaError(Fault(found, 'roles = ["Tackler", "Carrier"]', place=Place(self.file)))
+        return JointDatabase.of(database, settings.roles, **weights)
+
+    def joint_searcher(self, name: str, databases: Mapping[str, MotionDatabase]) -> JointSearcher:
+        """The searcher of the selector of a name over built databases, or of the one database of that name; databases that are not
+        loaded are passed over."""
+        if name in self.databases and name not in self.selectors:
+            order: Sequence[tuple[str, float | None]] = [(name, None)]
+        else:
+            order = _known("selectors", name, self.selectors, self.file).order
+        joint = {each: self.joint(each, databases[each]) for each, _ in order if each in databases}
+        return JointSearcher(joint, {each: limit for each, limit in order if limit is not None and each in joint})
 
     def databases_of(self, selector: str) -> list[str]:
         """The databases of the selector of a name, in order."""

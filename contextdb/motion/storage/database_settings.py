@@ -13,6 +13,9 @@
     continuing_bias = -0.1               # of the frame that would play on
     end_s = 0.3                          # so near its end a range that does not loop cannot be entered
     weights = { "Hips velocity" = 2.0 }  # instead of the channel's own
+    roles = ["Tackler", "Carrier"]       # clips are named ASSET.ROLE, and those of one asset play together
+    place_weight = 1.0                   # of where roles see each other
+    facing_weight = 1.0                  # of which way they see each other face
 
 Reading touches no file.
 """
@@ -29,8 +32,11 @@ from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Up
 from contextdb.motion.features.channels import MOST_WEIGHT
 from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.joint.database import divided, role_fault
 from contextdb.motion.reading import Mapped, Section
 
+JOINT_KEYS = ("roles", "place_weight", "facing_weight")
+"""What says how a database is searched for several characters at once; the database itself is the same without."""
 KEYS = (
     "table",
     "clips",
@@ -44,6 +50,7 @@ KEYS = (
     "continuing_bias",
     "end_s",
     "weights",
+    *JOINT_KEYS,
 )
 LOOPING_BIAS, CONTINUING_BIAS = -0.01, -0.1
 """Measured on captured and on made clips: the smallest with which a character who walks straight on stays in his clip, and turns,
@@ -53,6 +60,8 @@ END_S = 0.3
 
 CLIPS = 'a pattern of files in the folder of contextdb.toml or below it, such as "clips/*.bvh"'
 MARKUP = 'a file in the folder of contextdb.toml or below it, such as "clips/marks.csv"'
+ROLES = 'two names or more, each once and without a dot, such as ["Tackler", "Carrier"]'
+WEIGHT = f"a weight from 0 to {MOST_WEIGHT:g}, such as 1.0"
 MOST_BIAS = 1e30
 NUMBERS = {
     "metres_per_unit": ("metres, such as 0.01", 1e-9, 1e9),
@@ -60,6 +69,8 @@ NUMBERS = {
     "looping_bias": ("a cost, such as -0.01", -MOST_BIAS, MOST_BIAS),
     "continuing_bias": ("a cost, such as -0.1", -MOST_BIAS, MOST_BIAS),
     "end_s": ("seconds from 0 to 60, such as 0.3", 0.0, 60.0),
+    "place_weight": (WEIGHT, 0.0, MOST_WEIGHT),
+    "facing_weight": (WEIGHT, 0.0, MOST_WEIGHT),
 }
 FLAG_WORDS = {**dict.fromkeys(("true", "yes", "on", "1"), True), **dict.fromkeys(("false", "no", "off", "0"), False)}
 
@@ -89,6 +100,10 @@ class DatabaseSettings:
         Frames in the last seconds of a range that does not loop cannot be entered.
     weights : mapping of str to float
         By the name of a channel: its weight in this database.
+    roles : tuple of str
+        Of clips that were recorded together, which are named ASSET.ROLE; empty for others. See `JointDatabase`.
+    place_weight, facing_weight : float
+        Of what these roles see of each other.
     """
 
     name: str
@@ -104,6 +119,13 @@ class DatabaseSettings:
     continuing_bias: float = CONTINUING_BIAS
     end_s: float = END_S
     weights: Mapping[str, float] = field(default_factory=dict)
+    roles: tuple[str, ...] = ()
+    place_weight: float = 1.0
+    facing_weight: float = 1.0
+
+    def asset_of(self, clip: str) -> str:
+        """The asset of a clip of this name: that of its role, or the name itself."""
+        return divided(clip, self.roles)[0] if self.roles else clip
 
 
 def read_databases(
@@ -142,6 +164,8 @@ def _values(section: Section, features: list[str], tables: Collection[str] | Non
         yield "up", section.one_of("up", UPS, "axis")
     if "mirror" in part:
         yield "mirror", _read_flag(section, "mirror")
+    if "roles" in part:
+        yield "roles", _read_roles(section)
     if "markup" in part:
         yield "markup", _read_path(section, "markup", ".csv", "this is not a CSV file", MARKUP)
     for key, (accepted, least, most) in NUMBERS.items():
@@ -173,6 +197,15 @@ def _read_flag(section: Section, key: str) -> bool | None:
     meant = FLAG_WORDS.get(str(value).strip().casefold())
     mend = "" if meant is None else f"{key} = {as_toml(meant)}"
     section.wrong(key, f"this is {what(value)}, neither true nor false", "true or false", mend)
+    return None
+
+
+def _read_roles(section: Section) -> tuple[str, ...] | None:
+    value = section.part["roles"]
+    listed = value if isinstance(value, (list, tuple)) else ()
+    if all(isinstance(role, str) for role in listed) and not role_fault(listed):
+        return tuple(listed)
+    section.wrong("roles", "these are no roles of clips that play together", ROLES)
     return None
 
 

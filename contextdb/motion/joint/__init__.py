@@ -1,0 +1,1 @@
+"""Clips that were recorded together: one row, several roles, chosen, cast and played as one."""

@@ -1,0 +1,43 @@
+"""Where in the world a joint clip is played, so that its actors have the least to make up for.
+
+The clip as a whole is turned and put down so that, summed up over roles, the squared metres between where each actor is and where
+the clip has him, and the squared radians (of the chord) between the headings, are least. What then is missing is each actor's
+error; a role that gives way `g` times as readily as another makes up `g` times as much of a difference between them, and one that
+gives way by 0 makes up none.
+
+Places are (x, z, heading): metres and radians, as in `MotionDatabase.root`. K roles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.trajectory import to_own_frame
+from contextdb.motion.selection.root_motion import RootMotion, between
+
+
+def aligned(recorded: Floats, places: Floats, gives: Floats) -> Floats:
+    """Where a clip that was recorded at some places [K, 3] has each actor, when it is put down best for actors at `places`: [K, 3].
+
+    `gives` [K] is how readily each role gives way. Where none does, all give way alike.
+    """
+    if not gives.any():
+        gives = np.ones(len(gives))
+    still = gives == 0.0
+    weights = np.where(still, 1.0, 0.0) if still.any() else 1.0 / gives
+    weights = weights / weights.sum()
+    centre, recorded_centre = weights @ places[:, :2], weights @ recorded[:, :2]
+    there, here = places[:, :2] - centre, recorded[:, :2] - recorded_centre
+    turns = places[:, 2] - recorded[:, 2]
+    sine = weights @ (here[:, 1] * there[:, 0] - here[:, 0] * there[:, 1] + np.sin(turns))
+    cosine = weights @ (here[:, 0] * there[:, 0] + here[:, 1] * there[:, 1] + np.cos(turns))
+    turn = float(np.arctan2(sine, cosine))
+    put = centre + to_own_frame(recorded[:, :2] - recorded_centre, np.full(len(recorded), -turn))
+    return np.column_stack((put, recorded[:, 2] + turn))
+
+
+def moved(place: Floats, wanted: Floats) -> RootMotion:
+    """The movement that brings a body from its place to another one, the shorter way round."""
+    found = between(RootMotion(*place.tolist()), RootMotion(*wanted.tolist()))
+    return RootMotion(found.left_m, found.ahead_m, float(np.remainder(found.turn_rad + np.pi, 2.0 * np.pi) - np.pi))

@@ -1,0 +1,62 @@
+"""Joint frames in boxes of 16, beside the boxes of the motion database, for the compiled joint search.
+
+Each role's range has as many frames as the others', so box i of a joint range is box i of the range of each role, and its lanes are
+the same joint frames. B joint boxes, K roles, P ordered pairs of roles, 16 lanes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
+from contextdb.motion.joint.database import N_RELATIVE, JointDatabase
+from contextdb.motion.search.layout import LANES, Features
+
+
+class JointBoxes(NamedTuple):
+    """Attributes
+    ----------
+    boxes : int64 array, shape (B, K)
+        The box of each role in the motion database.
+    ranges, firsts, sizes : int64 array, shape (B,)
+        The joint range, the first joint frame, and how many frames there are.
+    relative : float32 array, shape (B, P, 4, 16)
+        What roles see of each other; a box of fewer frames repeats its last one.
+    lows, highs : float32 array, shape (P, 4, B)
+        The bounds of that.
+    """
+
+    boxes: Ints
+    ranges: Ints
+    firsts: Ints
+    sizes: Ints
+    relative: Features
+    lows: Features
+    highs: Features
+
+
+def boxes_of(joint: JointDatabase) -> JointBoxes:
+    """The boxes of a joint database."""
+    layout = joint.database.layout
+    counts = -(-joint.lengths // LANES)
+    ranges = np.repeat(np.arange(len(counts)), counts)
+    within = np.arange(len(ranges)) - np.repeat(np.cumsum(counts) - counts, counts)
+    firsts = joint.firsts[ranges] + LANES * within
+    sizes = np.minimum(LANES, joint.lengths[ranges] - LANES * within)
+    frames = firsts[:, None] + np.minimum(np.arange(LANES), sizes[:, None] - 1)
+    relative = joint.relative[:, frames].transpose(1, 0, 3, 2)
+    bounds = [np.ascontiguousarray(each.transpose(1, 2, 0)) for each in (relative.min(axis=3), relative.max(axis=3))]
+    n_pairs = len(joint.pairs)
+    boxes = layout.range_boxes[joint.ranges[ranges], 0] + within[:, None]
+    own = np.ascontiguousarray(relative).reshape(-1, n_pairs, N_RELATIVE, LANES)
+    return JointBoxes(np.ascontiguousarray(boxes, np.int64), ranges, firsts, sizes.astype(np.int64), own, bounds[0], bounds[1])
+
+
+def in_boxes(boxes: JointBoxes, values: Floats) -> Floats:
+    """A number of each joint frame [M] in boxes, inf in lanes without a frame: [B, 16]."""
+    lanes = np.arange(LANES)
+    frames = boxes.firsts[:, None] + np.minimum(lanes, boxes.sizes[:, None] - 1)
+    return np.where(lanes < boxes.sizes[:, None], values[frames], np.inf)

@@ -1,0 +1,175 @@
+"""A joint node: a clip of several roles, chosen and cast once when it is entered and played to completion, all roles in step.
+
+Each actor sets out from where he is. What he has to make up for (see `contextdb.motion.joint.alignment`) is blended in along his
+own path until the contact; there every two actors are to each other as they were recorded, and from there on they stay so. The
+contact is the earliest end of a warp range of any role (`WarpPosition`, `WarpRotation` in the markup), and the blending begins with
+the earliest of these ranges; without any, or behind the contact, the blending lasts to the end of the clip.
+
+All roles have one time: a frame is the same frame for each of them.
+
+K roles. Times are seconds. Source: the match node of Remedy's talk, for several.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Unpack
+
+import numpy as np
+
+from contextdb.cells.arguments import require_kind, require_text
+from contextdb.errors import Fault, MotionError, QueryError, in_quotes, some
+from contextdb.motion.clips.ground_place import GroundPlace
+from contextdb.motion.joint.database import JointDatabase
+from contextdb.motion.joint.hit import JointHit
+from contextdb.motion.joint.searcher import JointOptions, JointSearcher, Places, Queries, places_of
+from contextdb.motion.markup.spans import TOLERANCE_S
+from contextdb.motion.nodes.match_node import MatchCosts, MatchPlay
+from contextdb.motion.nodes.warping import Target, Window, warped
+from contextdb.motion.search.database import Hit
+from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.playhead import Playhead
+from contextdb.motion.selection.root_motion import RootMotion, between
+
+
+@dataclass(eq=False)
+class JointPlay:
+    """A joint clip that a node has entered.
+
+    Attributes
+    ----------
+    hit : JointHit
+        What was chosen.
+    plays : dict of str to MatchPlay
+        By role: the path of its actor.
+    starts : dict of str to RootMotion
+        Where each actor was in the world when it was entered.
+    contact_s : float
+        Seconds since the entry at which all actors are to each other as recorded.
+    """
+
+    hit: JointHit
+    plays: dict[str, MatchPlay]
+    starts: dict[str, RootMotion]
+    contact_s: float
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since the entry: the same for all roles."""
+        return next(iter(self.plays.values())).time_s
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the entry to the end."""
+        return next(iter(self.plays.values())).duration_s
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it has played to completion."""
+        return all(play.is_done for play in self.plays.values())
+
+    @property
+    def frames(self) -> dict[str, int]:
+        """The frame of the motion database that each role shows now."""
+        return {role: play.frame for role, play in self.plays.items()}
+
+    def advance(self, dt_s: float) -> dict[str, GroundPlace]:
+        """Play on for some seconds, and say where in the world each role's actor is then; at the end they stay."""
+        for play in self.plays.values():
+            play.advance(dt_s)
+        return self.at(self.time_s)
+
+    def at(self, time_s: float) -> dict[str, GroundPlace]:
+        """Where in the world each role's actor is some seconds after the entry, as (x, z, heading)."""
+        found = {role: self.starts[role].then(play.at(time_s)) for role, play in self.plays.items()}
+        return {role: (place.left_m, place.ahead_m, place.turn_rad) for role, place in found.items()}
+
+    def decision(self, role: str, database: str = "") -> Decision:
+        """What a role plays now, for `PoseStream.update`; as `MatchPlay.decision`. Raises QueryError for a role that it lacks."""
+        if require_text(role, "role") not in self.plays:
+            raise QueryError(Fault(f"there is no role {in_quotes(role)}.", some(self.plays)))
+        return self.plays[role].decision(database)
+
+
+class JointNode:
+    """Plays what a joint searcher finds.
+
+    Parameters
+    ----------
+    searcher : JointSearcher
+        Of databases that know their rate: built from clips.
+
+    Raises
+    ------
+    MotionError
+        A database without a rate.
+    """
+
+    def __init__(self, searcher: JointSearcher) -> None:
+        require_kind(searcher, JointSearcher, "searcher", "a JointSearcher")
+        for name, joint in searcher.databases.items():
+            if joint.rate is None:
+                found = f"the database {in_quotes(name)} has no schema that gives its rate."
+                raise MotionError(Fault(found, "a database that was built from clips"))
+        self.searcher = searcher
+
+    def enter(self, queries: Queries, places: Places, **options: Unpack[JointOptions]) -> JointPlay | None:
+        """Choose clip, frame and cast, and play them from this update on; None when nothing may play.
+
+        The parameters, and what it raises, are those of `JointSearcher.search`.
+        """
+        hit = self.searcher.search(queries, places, **options)
+        return self.play(hit, places) if hit else None
+
+    def play(self, hit: JointHit, places: Places) -> JointPlay:
+        """Start what a search found, with the actors where they are; raises QueryError for another's hit or a missing place."""
+        require_kind(hit, JointHit, "hit", "a JointHit")
+        joint = self.searcher.databases.get(str(hit.database)) if hit else None
+        if joint is None:
+            raise QueryError(Fault("there is nothing to play.", "a hit of this node's searcher"))
+        last = _last_frame(joint, hit)
+        window = _window(joint, hit, (last - hit.frame) / _rate(joint))
+        here = places_of(places, [hit.cast[role] for role in joint.roles])
+        starts = {role: RootMotion(*place) for role, place in zip(joint.roles, here.tolist(), strict=True)}
+        plays = {role: _play(joint, hit, k, last, starts[role], window) for k, role in enumerate(joint.roles)}
+        return JointPlay(hit, plays, starts, window.to_s)
+
+
+def _play(joint: JointDatabase, hit: JointHit, k: int, last: int, start: RootMotion, window: Window) -> MatchPlay:
+    """The path of one role's actor, from where he is to where the clip, put down in the world, has him at the contact."""
+    database, role, rate = joint.database, joint.roles[k], _rate(joint)
+    assert database.root is not None, "checked when the joint database was made"
+    at, frame = int(joint.ranges[hit.range, k]), hit.frames[role]
+    path = database.root[frame : frame + last - hit.frame + 1].astype(np.float64)
+    path[:, 2] = np.unwrap(path[:, 2])
+    times_s = np.arange(len(path)) / rate
+    contact = RootMotion(*(float(np.interp(window.to_s, times_s, column)) for column in path.T))
+    there = RootMotion(*hit.places[role]).then(between(RootMotion(*path[0].tolist()), contact))
+    target = Target.seen_from(start, there.left_m, there.ahead_m, there.turn_rad)
+    own = Hit(database.assets[at], at, frame, math.fsum(hit.costs[role].values()))
+    costs = MatchCosts(hit.costs[role], 0.0, 0.0, 0.0)
+    return MatchPlay(own, target, costs, warped(times_s, path, window, window, target), Playhead(database, at, rate))
+
+
+def _last_frame(joint: JointDatabase, hit: JointHit) -> int:
+    """The last frame of a joint range that playing on from a hit leads to: before the first that is excluded in any role."""
+    first, marks = int(joint.firsts[hit.range]), joint.database.marks
+    length = int(joint.lengths[hit.range])
+    frames = joint.frames[:, first + hit.frame + 1 : first + length]
+    may = marks.playable()[marks.kinds[frames]].all(axis=0)
+    return hit.frame + (len(may) if may.all() else int(np.argmin(may)))
+
+
+def _window(joint: JointDatabase, hit: JointHit, last_s: float) -> Window:
+    """When the actors are brought together, in seconds since the entry; up to the last frame where there is no contact ahead."""
+    warps = joint.database.marks.warps[joint.ranges[hit.range]] - hit.frame / _rate(joint)
+    if np.isnan(warps).all() or np.nanmin(warps[..., 1]) <= TOLERANCE_S:
+        return Window(0.0, last_s)
+    contact_s = min(float(np.nanmin(warps[..., 1])), last_s)
+    return Window(min(max(0.0, float(np.nanmin(warps[..., 0]))), contact_s), contact_s)
+
+
+def _rate(joint: JointDatabase) -> float:
+    assert joint.rate is not None, "checked when the node was made"
+    return joint.rate

@@ -33,7 +33,16 @@ from contextdb.motion.features.live_query import LivePose, PoseHistory, query_fr
 from contextdb.motion.features.many_queries import with_paths
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
-from contextdb.motion.made.recipes import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
+from contextdb.motion.made.recipes import (
+    ABOUT_TURNS,
+    RECIPES,
+    Description,
+    MadeClip,
+    descriptions,
+    made_clips,
+    make_clip,
+    write_made_clips,
+)
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup
@@ -91,6 +100,7 @@ from contextdb.motion.walking.transitions import Missing, Transitions
 from contextdb.motion.walking.walker import Walker, WalkSettings, WalkState
 
 __all__ = [
+    "ABOUT_TURNS",
     "ANY_TAGS",
     "FACTS",
     "RECIPES",

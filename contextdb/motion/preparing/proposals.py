@@ -1,4 +1,4 @@
-"""Markup proposed for clips: contacts, loops, standing ends, noise, starts, turns, near-duplicates; each with reason and measure.
+"""What is proposed for clips: roots, contacts, loops, standing ends, noise, starts, turns, duplicates; each with its reason.
 
     clip ─► Look: poses against the body's own place, path, feet ─► proposals of each kind ─► less what the markup says already
 
@@ -24,16 +24,22 @@ from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.contacts import spans_of
 from contextdb.motion.clips.feet import Footfalls
+from contextdb.motion.clips.foot_bones import UNDECLARED
 from contextdb.motion.clips.poses import Poses, poses_of
+from contextdb.motion.clips.prepared_root import prepared_path
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
 
-Kind = Literal["contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "duplicates"]
+Kind = Literal["roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "duplicates"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
+ROOT_SMOOTH_S = 0.2
+"""What is proposed for `root_smooth_s`: it evens out a step, and keeps a start and a bend."""
+SWAY_M, SWAY_DEG = 0.01, 3.0
+"""Hips that are farther than this from the body's prepared path, or turned, for a twentieth of the time, sway."""
 LOOP_M, LOOP_MPS = 0.03, 0.3
 """A clip loops where its joints are so near at both ends, and so alike in speed: root mean squares."""
 LOOP_SHARE = 0.15
@@ -65,7 +71,7 @@ N_SAMPLES = 24
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A mark that is proposed, or a cut of the clip's file, which is no mark.
+    """A mark that is proposed; or a cut of the clip's file or a path of its own for its root, which are no marks.
 
     Attributes
     ----------
@@ -73,7 +79,7 @@ class Proposal:
     kind : str
         One of `KINDS`.
     tag : str or None
-        None for a cut.
+        None for a cut and for a root.
     from_s, to_s : float or None
         Seconds since the clip's start; None is its start or its end.
     value : float or None
@@ -186,14 +192,16 @@ def prepare(
     markup : Markup, optional
         What is said already: nothing is proposed where it has a mark of the same tag.
     kinds : sequence of str, optional
-        Of "contacts", "loops", "cuts", "tails", "noise", "starts", "turns" and "duplicates" those that are wanted. Default: all.
+        Of `KINDS` those that are wanted: "roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "duplicates".
+        Default: all.
     progress : function, optional
         Called with the number of clips that are done, of all clips, and the name of the next.
 
     Returns
     -------
     list of Proposal
-        By clip, in their order. A cut has no tag: it says where the file would have to be cut for the clip to loop.
+        By clip, in their order. A cut has no tag: it says where the file would have to be cut for the clip to loop. Nor has a
+        root: it says that hips sway, which `root_smooth_s` of its features evens out.
 
     Raises
     ------
@@ -248,7 +256,18 @@ def _is_said(proposal: Proposal, markup: Markup) -> bool:
     return any(span.from_s <= last and first <= span.to_s for span in spans)
 
 
-# ---- feet
+# ---- hips and feet
+
+
+def _roots(look: Look) -> Iterator[Proposal]:
+    """Hips that sway about the path of the body."""
+    if look.usual_mps < STANDING_MPS or look.clip.duration_s < LEAST_LOOP_S:
+        return
+    path = prepared_path(look.poses, look.path, ROOT_SMOOTH_S, UNDECLARED)
+    metres = float(np.quantile(np.linalg.norm(path.positions - look.path.positions, axis=-1), 0.95))
+    degrees = float(np.rad2deg(np.quantile(np.abs(path.headings - look.path.headings), 0.95)))
+    if metres >= SWAY_M or degrees >= SWAY_DEG:
+        yield look.said("roots", None, None, None, f"its hips sway by {100.0 * metres:.1f} cm and {degrees:.0f}°", metres)
 
 
 def _contacts(look: Look) -> Iterator[Proposal]:
@@ -440,6 +459,7 @@ def _differ(one: float, other: float) -> bool:
 
 
 _OF_ONE: dict[Kind, Callable[[Look], Iterator[Proposal]]] = {
+    "roots": _roots,
     "contacts": _contacts,
     "loops": _loops,
     "cuts": _cuts,

@@ -634,8 +634,8 @@ WRONG_MIRRORS = [
      'mirror = { Left = "Right", Both = "Right" }: "Right": it has two partners.'
      ' Accepted: each name in one pair, such as { Left = "Right" }.'),
     ("number", "", '{ Left = "Right" }',
-     'mirror = { Left = "Right" }: a condition of type number has no names.'
-     ' Accepted: "negate" or "none". Did you mean mirror = "negate"?'),
+     'mirror = { Left = "Right" }: none of these is in the name "side".'
+     ' Accepted: a name in that of the condition, as Left is in "LeftFoot.Down"; "negate" or "none".'),
     ("number", 'expr = "2"', '"negate"',
      'mirror = "negate" has no place here: a derived fact is computed from mirrored facts.'
      ' Accepted: mirror in the conditions that it is computed from. Try to leave it out.'),
@@ -646,6 +646,19 @@ WRONG_MIRRORS = [
      'mirror = { A = "B", "A.x" = "C" }: "A.x": it is below "A", with which it is exchanged anyway.'
      ' Accepted: each name in one pair, such as { Left = "Right" }.'),
 ]  # fmt: skip
+LONE = """contextdb.toml, line 3: [conditions."LeftFoot.Down"] mirror = { Left = "Right" }: "RightFoot.Down", with which it \
+changes places, does not change places with it. Accepted: a condition of type bool with the same mirror. Did you mean \
+[conditions."RightFoot.Down"] with mirror = { Left = "Right" }?"""
+
+
+@pytest.mark.parametrize("other", ["", "type = 'bool'", "type = 'number'\nmirror = { Left = 'Right' }"])
+def test_a_condition_changes_places_only_with_one_of_its_type_that_changes_places_with_it(other: str):
+    text = "[conditions.'LeftFoot.Down']\ntype = 'bool'\nmirror = { Left = 'Right' }\n"
+    found = faults_of(text + (f"[conditions.'RightFoot.Down']\n{other}" if other else ""))
+    assert str(found[0]) == LONE
+    assert not faults_of(text + "[conditions.'RightFoot.Down']\ntype = 'bool'\nmirror = { Right = 'Left' }")
+
+
 MIRRORS_ACCEPTED = 'Accepted: "negate" (the other sign), "none", or names that change places, such as { Left = "Right" }.'
 
 

@@ -97,6 +97,7 @@ from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.footsteps import Footstep
 from contextdb.motion.walking.stances import Stances
 from contextdb.motion.walking.transitions import Missing, Transitions
+from contextdb.motion.walking.walked import walked_clips
 from contextdb.motion.walking.walker import Walker, WalkSettings, WalkState
 
 __all__ = [
@@ -255,6 +256,7 @@ __all__ = [
     "steady_path",
     "steered_path",
     "steered_paths",
+    "walked_clips",
     "with_path",
     "with_paths",
     "write_bvh",

@@ -351,6 +351,7 @@ CALLS: dict[str, Call] = {
     "Character(body)": lambda x: motion.Character(PLAYER.controller, SCHEMA, None, None, x),
     "Character(own_facts)": lambda x: motion.Character(PLAYER.controller, SCHEMA, own_facts=x),
     "Character(pose)": lambda x: motion.Character(PLAYER.controller, SCHEMA, pose=x),
+    "Character(ground)": lambda x: motion.Character(PLAYER.controller, SCHEMA, ground=x),
     "Character(unknown)": lambda x: motion.Character(PLAYER.controller, SCHEMA, unknown=x),
     "Character.of(project)": lambda x: motion.Character.of(x, "player"),
     "Character.record(n_candidates)": lambda x: PLAYER.copy().record(x),

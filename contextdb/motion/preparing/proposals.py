@@ -33,7 +33,7 @@ from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
 
-Kind = Literal["roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "duplicates"]
+Kind = Literal["roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "targets", "duplicates"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 ROOT_SMOOTH_S = 0.2
@@ -57,6 +57,8 @@ ENTRY_S = 0.2
 """The entry zone of a start and of a turn."""
 BENDING_DPS, TURNING_DPS, LEAST_TURN_DEG, LONGEST_TURN_S = 25.0, 50.0, 60.0, 3.0
 """A turn begins and ends at the first rate, and comes to the second."""
+LONGEST_ONE_OFF_S, LEAST_WAY_M = 6.0, 0.3
+"""A clip that is no longer, comes so far and then stands may bring a body to a target."""
 STEADY_DPS = 30.0
 """A clip whose middle turn is faster turns all the time, and is no turn to be played as a whole."""
 SPIKE_MPS, SPIKE = 8.0, 4.0
@@ -192,8 +194,8 @@ def prepare(
     markup : Markup, optional
         What is said already: nothing is proposed where it has a mark of the same tag.
     kinds : sequence of str, optional
-        Of `KINDS` those that are wanted: "roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "duplicates".
-        Default: all.
+        Of `KINDS` those that are wanted: "roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "targets",
+        "duplicates". Default: all.
     progress : function, optional
         Called with the number of clips that are done, of all clips, and the name of the next.
 
@@ -397,6 +399,23 @@ def _turns(look: Look) -> Iterator[Proposal]:
             yield look.said("turns", ReservedTag.NEXT_NATURAL_ONLY, first, last, reason, abs(turned))
 
 
+def _targets(look: Look) -> Iterator[Proposal]:
+    """Where a clip that comes to a stand may be entered, and where it may be bent towards the place at which a body is to stand."""
+    first, last = _moving(look)
+    if first is None or last is None or last >= look.poses.n_frames - 1 or (last - first) / look.rate > LONGEST_ONE_OFF_S:
+        return
+    metres = float(look.path.lengths[last] - look.path.lengths[first])
+    fast = np.flatnonzero(look.speeds[first : last + 1] >= AT_SPEED * look.usual_mps)
+    if metres < LEAST_WAY_M or not len(fast) or fast[-1] < 1:
+        return
+    slows = first + int(fast[-1])
+    begin = first or None
+    reason = f"from {slows / look.rate:.2f} s on it slows down to a stand"
+    yield look.said("targets", ReservedTag.MATCH_RANGE, begin, slows, reason, slows / look.rate)
+    reason = f"comes {metres:.2f} m far and then stands"
+    yield look.said("targets", ReservedTag.WARP_POSITION, begin, last, reason, metres)
+
+
 # ---- noise
 
 
@@ -467,4 +486,5 @@ _OF_ONE: dict[Kind, Callable[[Look], Iterator[Proposal]]] = {
     "noise": _noise,
     "starts": _starts,
     "turns": _turns,
+    "targets": _targets,
 }

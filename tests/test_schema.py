@@ -350,7 +350,12 @@ SECTIONS_SAID = (
         ("[Project]\nname = ''", f'line 1: "Project" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [project]?'),
         ("[qqq]", f'line 1: "qqq" is not a section. Accepted: {SECTIONS_SAID}.'),
         ("\nname = 'x'", f'line 2: "name" is not a section. Accepted: {SECTIONS_SAID}.'),
-        ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name". Did you mean "name"?'),
+        ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name", "transitions". Did you mean "name"?'),
+        (
+            "[project]\ntransitions = 'to_{to}'",
+            'line 2: [project] transitions = "to_{to}": this is no pattern of the names of transitions. Accepted: {from} and '
+            '{to}, each once, with text between them, such as "{from}_to_{to}". Did you mean transitions = "{from}_to_{to}"?',
+        ),
         ("conditions = 5", "line 1: conditions = 5: this is a number, not a section. Accepted: [conditions.NAME]."),
         ("project = 'x'", 'line 1: project = "x": this is text, not a section. Accepted: [project].'),
         ("[[tables]]", "line 1: tables = [ {} ]: this is a list, not a section. Accepted: [tables.NAME]."),

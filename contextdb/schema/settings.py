@@ -138,6 +138,8 @@ class Schema:
     controllers: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     output: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     file: str | None = None
+    transitions: str = ""
+    """How clips that lead from one state to another are named, such as "{from}_to_{to}"; "" where that is not declared."""
 
     def __repr__(self) -> str:
         told = f"{plural(len(self.conditions), 'condition')}, {plural(len(self.tables), 'table')}"
@@ -564,6 +566,7 @@ def _schema(document: Section, file: str) -> Schema:
         _parts(document, "controllers"),
         _parts(document, "output"),
         file,
+        document.get("project", {}).get("transitions", ""),
     )
 
 

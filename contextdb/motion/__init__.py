@@ -82,7 +82,7 @@ from contextdb.motion.storage.config import MotionConfig, SelectorSettings
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.pose_files import open_or_build_poses, open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
-from contextdb.motion.storage.written_poses import write_poses
+from contextdb.motion.storage.written_poses import write_arrays, write_poses
 from contextdb.motion.trace.reasked import Reasked
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.reasked_search import ReaskedSearch
@@ -92,6 +92,7 @@ from contextdb.motion.trace.stats import SessionStats
 from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
 from contextdb.motion.trace.why_not import WhyNot
 from contextdb.motion.trace.winning_changes import Change, ChangePart
+from contextdb.motion.walking.baked import baked_cycle
 from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.footsteps import Footstep
@@ -212,6 +213,7 @@ __all__ = [
     "WarpShare",
     "WhatIf",
     "WhyNot",
+    "baked_cycle",
     "best_start",
     "build",
     "build_all",
@@ -259,6 +261,7 @@ __all__ = [
     "walked_clips",
     "with_path",
     "with_paths",
+    "write_arrays",
     "write_bvh",
     "write_made_clips",
     "write_poses",

@@ -58,6 +58,7 @@ from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
 from contextdb.motion.nodes.warping import Target, WarpShare
 from contextdb.motion.output.bank import PoseBank, Sample
+from contextdb.motion.output.retargeting import retargeted
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
@@ -251,6 +252,7 @@ __all__ = [
     "query_from",
     "query_from_pose",
     "resampled",
+    "retargeted",
     "root_trajectory",
     "save_database",
     "save_poses",

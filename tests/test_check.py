@@ -393,6 +393,25 @@ when = "When"
     assert found["undeclared-mirror"].column == "foot"
 
 
+@pytest.mark.parametrize(
+    ("conditions", "columns", "says"),
+    [
+        ("mirror = { Left = 'Right' }", "LeftFoot.Down", "RightFoot.Down is no column, so this fact stays as it is"),
+        ("", "LeftFoot.Down,RightFoot.Down", 'Try mirror = { Left = "Right" }, or "none".'),
+        ("mirror = { Left = 'Right' }", "LeftFoot.Down,RightFoot.Down", ""),
+    ],
+)
+def test_facts_of_one_foot_that_see_themselves_in_a_mirror_are_told(tmp_path: Path, conditions: str, columns: str, says: str):
+    feet = "".join(f"[conditions.'{foot}.Down']\ntype = 'bool'\n{conditions}\n" for foot in ("LeftFoot", "RightFoot"))
+    database = "[databases.loco]\ntable = 'moves'\nclips = '*.bvh'\nfeatures = 'loco'\nmirror = true\n"
+    (tmp_path / "contextdb.toml").write_text(feet + database, encoding="utf-8")
+    cells = ",".join(["True"] * len(columns.split(",")))
+    (tmp_path / "moves.csv").write_text(f"Asset,{columns}\na,{cells}\n", encoding="utf-8")
+    told = [f.message for f in check(Project.load(tmp_path).tables["moves"]) if f.rule == "undeclared-mirror"]
+    assert len(told) == (len(columns.split(",")) if says else 0)
+    assert all(says in message for message in told)
+
+
 OLD_COSTS = """
 [features.loco]
 rate = 30.0

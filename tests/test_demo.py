@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from running import run
 
 from contextdb.commands.demo_command import sample_folder
 from contextdb.commands.demo_teams import CATCH, cast_lines, players
+from contextdb.commands.demo_world import DOWN_M, N_STEPS, RISE_M, SLOPE_M, STAIRS_M, ground
 from contextdb.motion import RECIPES, Markup, load_bvh
 from contextdb.tables.project import Project
 
@@ -54,11 +56,28 @@ def test_of_two_teams_it_casts_the_nearest_who_fits_and_says_of_everybody_near_w
 
 
 def test_it_plays_a_steered_character_and_writes_its_poses(tmp_path):
-    out = run("demo", "--keep", str(tmp_path / "game")).out
+    out = run("demo", "--keep", str(tmp_path / "game"), "--html", str(tmp_path / "world.html")).out
     clip = load_bvh(tmp_path / "game" / "player.bvh")
     assert (clip.n_frames, clip.skeleton.n_joints) == (330, 19)
     assert "11 s, 330 poses of 19 joints: player.bvh" in out
     assert re.search(r"\d\.\d jumps a second; feet that are down slide \d+\.\d cm/s, in the clips 0\.\d; 0\.\d\d m from", out)
+    page = (tmp_path / "world.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    (slid, apart), *_ = re.findall(r"60 s over 8 steps.*feet slide (\d+\.\d) cm/s.* (\d\.\d\d) m from the path", out)
+    assert float(slid) < 4.0
+    assert float(apart) < 0.1
+
+
+def test_a_page_that_cannot_be_written_is_refused_before_the_tour(tmp_path):
+    answer = run("demo", "--html", str(tmp_path / "world.txt"))
+    assert (answer.code, answer.out) == (2, "")
+
+
+def test_the_world_has_stairs_a_landing_and_a_slope_down():
+    on_a_step, height = ground(0.0, STAIRS_M + 0.1), ground(0.0, SLOPE_M - 0.1)
+    assert on_a_step == (RISE_M, (0.0, 1.0, 0.0))
+    assert height[0] == pytest.approx(N_STEPS * RISE_M)
+    assert ground(0.0, DOWN_M + 1.0)[0] == 0.0
 
 
 def test_it_prints_the_cast_between_the_first_answer_and_the_search():

@@ -329,3 +329,73 @@ def test_columns_written_later_change_no_answer_in_a_mirror():
     array[:], listed[:] = 0.0, [0.0, 0.0]
     for many in answers:
         assert [m.mirrored.assets for m in many] == [["right"], ["ahead"]]
+
+
+# ---- conditions that change places
+
+PAIRED = {
+    "LeftFoot.Down": {"type": "bool", "mirror": {"Left": "Right"}},
+    "RightFoot.Down": {"type": "bool", "mirror": {"Left": "Right"}},
+    "LeftFoot.UntilDown_s": {"type": "number", "mirror": {"Right": "Left"}},
+    "RightFoot.UntilDown_s": {"type": "number", "mirror": {"Right": "Left"}},
+    "direction": {"type": "angle"},
+}
+FEET = {
+    "Asset": ["a", "b", "c", "d"],
+    "LeftFoot.Down": ["True", "False", "Any", "True"],
+    "RightFoot.Down": ["Any", "True", "False", "Any"],
+    "LeftFoot.UntilDown_s": ["Any", "<=0.3", "0.2..", "<=0.5 ~2"],
+    "RightFoot.UntilDown_s": ["<0.4", "Any", "Any", "Any"],
+    "direction": ["0..90", "Any", "-90..0", "Any"],
+}
+MOMENTS = st.fixed_dictionaries(
+    {
+        "LeftFoot.Down": st.booleans(),
+        "RightFoot.Down": st.booleans(),
+        "LeftFoot.UntilDown_s": st.sampled_from([0.0, 0.3, 0.6]),
+        "RightFoot.UntilDown_s": st.sampled_from([0.0, 0.4, 0.6]),
+        "direction": st.sampled_from([-45.0, 0.0, 45.0]),
+    }
+)
+
+
+def other_side(facts):
+    """Facts of the oracle in a mirror: of the other foot, and of the opposite direction."""
+    names = {name: name.replace("Left", "*").replace("Right", "Left").replace("*", "Right") for name in facts}
+    return {name: -facts[name] if name == "direction" else facts[other] for name, other in names.items()}
+
+
+@given(st.lists(MOMENTS, min_size=1, max_size=3))
+def test_conditions_that_change_places_are_asked_with_the_facts_of_each_other(moments):
+    compiled = Table.from_columns(FEET, PAIRED).compile()
+    columns = {name: [facts[name] for facts in moments] for name in moments[0]}
+    many = compiled.query_many(columns)
+    for i, facts in enumerate(moments):
+        expected = compiled.query(other_side(facts))
+        for answer in (compiled.query(facts), compiled.live(facts).matches(), many[i]):
+            assert answer.mirrored.assets == expected.assets
+            assert answer.mirrored.penalties.tolist() == expected.penalties.tolist()
+            assert answer.mirrored.mirrored.assets == compiled.query(facts).assets
+
+
+def test_a_stored_table_knows_which_conditions_change_places(tmp_path):
+    compiled = Table.from_columns(FEET, PAIRED).compile()
+    compiled.save(tmp_path / "feet.safetensors")
+    facts = dict.fromkeys(FEET.keys() - {"Asset"}, 0.0) | {"LeftFoot.Down": True, "RightFoot.Down": False}
+    again = cdb.CompiledTable.open(tmp_path / "feet.safetensors")
+    assert again.query(facts).mirrored.assets == compiled.query(facts).mirrored.assets == compiled.query(other_side(facts)).assets
+
+
+def test_a_fact_of_the_other_side_that_is_missing_is_missing_in_the_mirror():
+    compiled = Table.from_columns(FEET, PAIRED).compile()
+    facts = {"LeftFoot.Down": True, "direction": 0.0}
+    assert (
+        compiled.query(facts, unknown="any").mirrored.assets
+        == compiled.query({"RightFoot.Down": True, "direction": 0.0}, unknown="any").assets
+    )
+
+
+def test_a_table_that_asks_for_one_side_alone_sees_its_fact_as_it_is():
+    columns = {"Asset": ["a", "b"], "LeftFoot.Down": ["True", "False"]}
+    compiled = Table.from_columns(columns, PAIRED).compile()
+    assert compiled.query({"LeftFoot.Down": True}).mirrored.assets == ["a"]

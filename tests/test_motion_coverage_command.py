@@ -285,6 +285,14 @@ def test_an_axis_is_a_condition_of_numbers():
     assert 'nothing is measured that is called "sped"' in refused("--axis", "sped=speed")
 
 
+def test_the_project_says_how_transitions_are_named_unless_the_command_does():
+    toml = Path("game", "contextdb.toml")
+    toml.write_text('[project]\ntransitions = "{from}_turn_{to}"\n' + toml.read_text(encoding="utf-8"), encoding="utf-8")
+    told = [covered(*more, "--json").json["tables"][0]["transitions"] for more in ((), ("--transitions", "{from}_to_{to}"))]
+    assert [each["pattern"] for each in told] == ["{from}_turn_{to}", "{from}_to_{to}"]
+    assert told[0]["present"] == [["jog", "left_60"], ["walk", "left_45"]]
+
+
 def test_other_names_of_transitions_and_other_costs_can_be_given():
     assert covered("--transitions", "{from}_turn_{to}", "--json").json["tables"][0]["transitions"]["states"]
     assert "no pattern of transitions" in refused("--transitions", "x")

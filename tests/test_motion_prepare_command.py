@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from running import Result, run
 
 from contextdb.commands.motion_prepare_command import with_marks
-from contextdb.motion import Markup, Proposal, make_clip, write_bvh
+from contextdb.motion import Markup, MotionConfig, Proposal, clip_features, make_clip, write_bvh
 
 NAMES = ("idle", "walk", "start_walk", "stop_walk")
 HAND = "tag,asset,to,from\r\nMove.Walk,walk*,,\r\nLooping,idle,,"
@@ -122,6 +124,29 @@ def test_a_document_has_each_proposal_with_reason_and_measure(game: Path):
     (loop,) = [each for each in document["proposals"] if (each["asset"], each["kind"]) == ("walk", "loops")]
     assert loop["tag"] == "Looping"
     assert loop["measure"] < 0.001
+
+
+def test_hips_that_sway_get_a_root_of_their_own_which_the_build_uses(game: Path):
+    (game / "contextdb.toml").write_text(TOML, encoding="utf-8")
+    before = as_bytes(game)
+    told = prepare("game", "--only", "roots", code=1)
+    assert told.lines[0].startswith("# 3 clips: root_smooth_s: hips sway about the body's path, most ")
+    assert "+root_smooth_s = 0.2" in told.lines
+    assert as_bytes(game) == before
+    prepare("game", "--only", "roots", "--write")
+    assert {name for name, data in as_bytes(game).items() if before[name] != data} == {"contextdb.toml"}
+    assert prepare("game", "--only", "roots").out == ""
+    config = MotionConfig.from_dict(tomllib.loads((game / "contextdb.toml").read_text(encoding="utf-8")))
+    (clip,) = config.load_clips("loco", game, ["walk"])
+    way = clip_features(clip, config.features["loco"]).root
+    assert np.abs(way[:, 0]).max() < 0.005  # straight on: the hips sway by 2 cm
+    assert np.ptp(way[:, 2]) < 0.02
+
+
+def test_features_that_say_that_the_hips_are_the_root_are_left_alone(game: Path):
+    toml = TOML.replace("rate = 30.0", "rate = 30.0\nroot_smooth_s = 0.0")
+    (game / "contextdb.toml").write_text(toml, encoding="utf-8")
+    assert prepare("game", "--only", "roots").out == ""
 
 
 def test_markup_that_cannot_be_read_stops_it(game: Path):

@@ -350,7 +350,12 @@ SECTIONS_SAID = (
         ("[Project]\nname = ''", f'line 1: "Project" is not a section. Accepted: {SECTIONS_SAID}. Did you mean [project]?'),
         ("[qqq]", f'line 1: "qqq" is not a section. Accepted: {SECTIONS_SAID}.'),
         ("\nname = 'x'", f'line 2: "name" is not a section. Accepted: {SECTIONS_SAID}.'),
-        ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name". Did you mean "name"?'),
+        ("[project]\nnmae = 'x'", 'line 2: [project] has no key "nmae". Accepted: "name", "transitions". Did you mean "name"?'),
+        (
+            "[project]\ntransitions = 'to_{to}'",
+            'line 2: [project] transitions = "to_{to}": this is no pattern of the names of transitions. Accepted: {from} and '
+            '{to}, each once, with text between them, such as "{from}_to_{to}". Did you mean transitions = "{from}_to_{to}"?',
+        ),
         ("conditions = 5", "line 1: conditions = 5: this is a number, not a section. Accepted: [conditions.NAME]."),
         ("project = 'x'", 'line 1: project = "x": this is text, not a section. Accepted: [project].'),
         ("[[tables]]", "line 1: tables = [ {} ]: this is a list, not a section. Accepted: [tables.NAME]."),
@@ -634,8 +639,8 @@ WRONG_MIRRORS = [
      'mirror = { Left = "Right", Both = "Right" }: "Right": it has two partners.'
      ' Accepted: each name in one pair, such as { Left = "Right" }.'),
     ("number", "", '{ Left = "Right" }',
-     'mirror = { Left = "Right" }: a condition of type number has no names.'
-     ' Accepted: "negate" or "none". Did you mean mirror = "negate"?'),
+     'mirror = { Left = "Right" }: none of these is in the name "side".'
+     ' Accepted: a name in that of the condition, as Left is in "LeftFoot.Down"; "negate" or "none".'),
     ("number", 'expr = "2"', '"negate"',
      'mirror = "negate" has no place here: a derived fact is computed from mirrored facts.'
      ' Accepted: mirror in the conditions that it is computed from. Try to leave it out.'),
@@ -646,6 +651,19 @@ WRONG_MIRRORS = [
      'mirror = { A = "B", "A.x" = "C" }: "A.x": it is below "A", with which it is exchanged anyway.'
      ' Accepted: each name in one pair, such as { Left = "Right" }.'),
 ]  # fmt: skip
+LONE = """contextdb.toml, line 3: [conditions."LeftFoot.Down"] mirror = { Left = "Right" }: "RightFoot.Down", with which it \
+changes places, does not change places with it. Accepted: a condition of type bool with the same mirror. Did you mean \
+[conditions."RightFoot.Down"] with mirror = { Left = "Right" }?"""
+
+
+@pytest.mark.parametrize("other", ["", "type = 'bool'", "type = 'number'\nmirror = { Left = 'Right' }"])
+def test_a_condition_changes_places_only_with_one_of_its_type_that_changes_places_with_it(other: str):
+    text = "[conditions.'LeftFoot.Down']\ntype = 'bool'\nmirror = { Left = 'Right' }\n"
+    found = faults_of(text + (f"[conditions.'RightFoot.Down']\n{other}" if other else ""))
+    assert str(found[0]) == LONE
+    assert not faults_of(text + "[conditions.'RightFoot.Down']\ntype = 'bool'\nmirror = { Right = 'Left' }")
+
+
 MIRRORS_ACCEPTED = 'Accepted: "negate" (the other sign), "none", or names that change places, such as { Left = "Right" }.'
 
 

@@ -4,7 +4,9 @@ A clip played mirrored turns right where it turned left, so its row must be aske
 condition says by `mirror` how its facts change:
 
     "negate"             the other sign: a number, an angle; of a bool the other value
-    {Left = "Right"}     two names change places, both ways; a tag under one of them changes with it: Left.Hand and Right.Hand
+    {Left = "Right"}     two names change places, both ways; a tag under one of them changes with it: Left.Hand and Right.Hand. A
+                         condition whose facts are no names changes places with that of the other name: LeftFoot.Down has the
+                         fact of RightFoot.Down. A table must ask for both
     "none"               nothing changes; what holds where nothing is said, but for angles, which are negated
 
 Derived facts have no way of their own: they are computed from mirrored ones. Whatever is mirrored twice is as it was.
@@ -41,13 +43,28 @@ def way_of(condition: Condition) -> Mirror:
 
 def changed_in_mirror(conditions: Iterable[Condition]) -> dict[str, Condition]:
     """Of some conditions those whose facts change in a mirror, by name."""
-    return {c.name: c for c in conditions if way_of(c) != "none"}
+    known = {c.name: c for c in conditions}
+    return {c.name: c for c in known.values() if way_of(c) != "none" and (partner_of(c) or c.name) in known}
+
+
+def partner_of(condition: Condition) -> str | None:
+    """The condition with which one changes places: its name with the other side in it. None where only its own facts change."""
+    way = condition.mirror
+    if type(way) is not tuple or condition.domain.type.is_swapped:
+        return None
+    return next((other for other in _other_names(condition.name, way) if other != condition.name), None)
+
+
+def _other_names(name: str, swaps: Swaps) -> Iterator[str]:
+    for one, other in (*swaps, *((right, left) for left, right in swaps)):
+        if one in name:
+            yield name.replace(one, other)
 
 
 def mirrored_fact(fact: Fact, condition: Condition) -> Fact:
-    """A fact in canonical form as the mirror shows it."""
+    """A fact in canonical form as the mirror shows it; of a condition that changes places as it is, for its partner."""
     way = way_of(condition)
-    if fact is None or way == "none":
+    if fact is None or way == "none" or partner_of(condition) is not None:
         return fact
     if isinstance(fact, Cell):
         return Cell(_mirrored_set(fact, way, condition.domain))
@@ -71,7 +88,9 @@ def mirrored_facts(facts: Mapping[str, object], conditions: Conditions) -> InMir
     found = InMirror(facts)
     for name, condition in conditions.items():
         fact = found.get(name)
-        if type(fact) is float and condition.domain.type.is_numeric:  # the usual fact; an angle is wrapped when it is read
+        if type(condition.mirror) is tuple and (partner := partner_of(condition)) is not None:
+            found[name] = facts.get(partner)
+        elif type(fact) is float and condition.domain.type.is_numeric:  # the usual fact; an angle is wrapped when it is read
             found[name] = 0.0 - fact
         elif fact is not None:
             found[name] = mirrored_fact(read_fact(fact, condition), condition)

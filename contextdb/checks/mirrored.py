@@ -1,17 +1,18 @@
 """What a check says of tables whose assets are played mirrored too: how facts change in the mirror, where nobody declared it.
 
 inferred-mirror     angles, negated because that is what angles do in a mirror
-undeclared-mirror   a condition with names of both sides that says nothing of a mirror, so that its facts stay as they are
+undeclared-mirror   a condition with names of both sides that says nothing of a mirror, or changes places
+                    with a condition that the table does not ask for, so that its facts stay as they are
 uneven-mirror       a negated number whose min is not the opposite of its max; whoever plays it
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from contextdb.cells.conditions import Condition
-from contextdb.cells.mirroring import sided_pairs, way_of
+from contextdb.cells.mirroring import SIDES, partner_of, sided_pairs, way_of
 from contextdb.cells.sets import Cell, TagSet, ValueSet
 from contextdb.cells.words import format_number
 from contextdb.errors import some
@@ -38,7 +39,11 @@ def check_mirroring(table: Table) -> Iterator[Finding]:
         yield Finding("inferred-mirror", "info", told, table.name, _file(table))
     columns = {c.condition.name: c for c in table.conditions}
     for condition in conditions.values():
-        pairs = _sides(condition, columns.get(condition.name))
+        if (partner := partner_of(condition)) is not None and partner not in conditions:
+            told = f"{partner} is no column, so this fact stays as it is for mirrored clips of {by}."
+            told += f" Try a column {partner}, Any in each row."
+            yield Finding("undeclared-mirror", "info", told, table.name, _file(table), column=condition.name)
+        pairs = _sides(condition, columns.get(condition.name)) or _other_sides(condition, conditions)
         if condition.mirror is None and condition.expr is None and pairs:
             told = f"no mirror is declared, so its facts stay as they are for mirrored clips of {by}."
             told += f' Try mirror = {as_toml(pairs)}, or "none".'
@@ -74,6 +79,19 @@ def _sides(condition: Condition, column: ConditionColumn | None) -> dict[str, st
     if condition.domain.values is not None or column is None:
         return sided_pairs(condition.domain.values or ())
     return sided_pairs(sorted({name for cell in column.cells for name in _names(cell)}))
+
+
+def _other_sides(condition: Condition, conditions: Collection[str]) -> dict[str, str]:
+    """The sides by which the name of a condition without names differs from another's."""
+    if condition.domain.type.is_swapped or condition.domain.type.is_circular:
+        return {}
+    return next(
+        ({a: b} for a, b in SIDES for one, other in ((a, b), (b, a)) if _is_other(condition.name, one, other, conditions)), {}
+    )
+
+
+def _is_other(name: str, one: str, other: str, conditions: Collection[str]) -> bool:
+    return one in name and name.replace(one, other) in conditions
 
 
 def _names(cell: Cell) -> frozenset[str]:

@@ -1,5 +1,6 @@
 """A tour of the sample tables: a context, its valid assets, why the others are not valid, a player from two teams cast for a role,
-a search of the valid clips' frames, and a character that is steered, its poses written as BVH.
+a search of the valid clips' frames, and a character that is steered, its poses written as BVH. With --html he is steered over
+stairs, a slope and bumps for a minute too, and a page shows it.
 
 Formulas make the clips, not motion capture. They are written as BVH files and read back like any others.
 """
@@ -18,10 +19,12 @@ from pathlib import Path
 import contextdb
 from contextdb.cells.facts import Context
 from contextdb.commands.demo_teams import cast_lines
+from contextdb.commands.demo_world import world
+from contextdb.commands.motion_page import page_file
 from contextdb.compiled.matches import Matches
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, output, styled, wants_colour
-from contextdb.disk import make_folder, refused_writing
+from contextdb.disk import make_folder, refused_writing, write_atomic
 from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.motion import (
@@ -75,17 +78,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep", metavar="FOLDER", help="a new folder for the tables, the synthetic clips and the poses, to experiment with"
     )
+    parser.add_argument("--html", metavar="FILE", help="write the page of a minute over stairs and slopes")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Print each step of the way."""
+    page = page_file(arguments.html) if arguments.html else None
     source = Path(arguments.tables) if arguments.tables else sample_folder()
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(arguments.keep) if arguments.keep else Path(temporary) / source.name
         make_sample(source, folder)
         colour = wants_colour(sys.stdout)
         with output():
-            for line in _steps(folder):
+            for line in _steps(folder, page):
                 print(styled(line, "bold", colour) if line[:1].isdigit() else line)
     return ExitCode.OK
 
@@ -126,7 +131,7 @@ def sample_folder() -> Path:
     raise FileError(Fault("the sample tables are missing.", "tables/ of the checkout: --tables FOLDER", place=Place(str(package))))
 
 
-def _steps(folder: Path) -> Iterator[str]:
+def _steps(folder: Path, page: Path | None) -> Iterator[str]:
     project = Project.load(folder)
     yield "1. The tables: one row an asset, one column a condition"
     yield ""
@@ -139,7 +144,7 @@ def _steps(folder: Path) -> Iterator[str]:
     yield "3. A ball in the air and two teams. Which contested catches are valid, and who plays the Defender?"
     yield ""
     yield from cast_lines(project["contested_catch"].compile())
-    yield from _motion(project, folder)
+    yield from _motion(project, folder, page)
 
 
 def _answer(compiled: CompiledTable, context: Context) -> Iterator[str]:
@@ -154,7 +159,7 @@ def _answer(compiled: CompiledTable, context: Context) -> Iterator[str]:
     yield ""
 
 
-def _motion(project: Project, folder: Path) -> Iterator[str]:
+def _motion(project: Project, folder: Path, page: Path | None) -> Iterator[str]:
     stage = Stage.of(project, folder)
     loco = stage.databases["loco"]
     yield "4. Clips for the locomotion table: made by formulas, not captured; written as BVH and read back"
@@ -182,7 +187,16 @@ def _motion(project: Project, folder: Path) -> Iterator[str]:
     yield from _choice(stage, TURN, stage.query("walk", 40, TURN_DPS))
     yield "8. The player stands, walks, turns to the left, runs and stops: the table says what may play, and poses come out"
     yield ""
+    other = stage.player.copy()
     yield from _steered(stage, folder)
+    if page is not None:
+        yield "9. Another minute of his, over stairs, a slope and bumps: legs follow the ground, and the page shows each moment"
+        yield ""
+        html, told = world(other)
+        write_atomic(page, html.encode())
+        yield f"   {told}"
+        yield f"   {page}"
+        yield ""
     yield 'Next: "contextdb query --help", and docs/tutorial.md.'
 
 

@@ -48,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--axis", metavar="AXIS=CONDITION", action="append", help="what asks for speed, turn or direction; may be repeated"
     )
-    parser.add_argument("--transitions", metavar="PATTERN", default=PATTERN, help=f"names of transitions (default: {PATTERN})")
+    told = f"names of transitions, such as {PATTERN} (default: as the project says, else that)"
+    parser.add_argument("--transitions", metavar="PATTERN", help=told)
     told = f"the cost under which a clip is near another (default: {NEAR_COST})"
     parser.add_argument("--near", metavar="COST", type=_cost, default=NEAR_COST, help=told)
 
@@ -87,11 +88,13 @@ def _results(arguments: argparse.Namespace, earlier: Mapping[str, Earlier] | Non
     with building_bar() as progress:
         databases = open_or_build(project.config, project.folder, project.assets, progress)
     with building_bar("comparing clips") as progress:
+        tables = Project.load(arguments.path)
+        pattern = tables.schema.transitions or PATTERN if arguments.transitions is None else arguments.transitions
         found = motion_coverage(
-            Project.load(arguments.path),
+            tables,
             databases,
             axes=_axes(arguments.axis or []),
-            pattern=arguments.transitions,
+            pattern=pattern,
             near_cost=arguments.near,
             progress=progress,
         )

@@ -1,8 +1,10 @@
 """Propose markup for clips, as a diff that can be reviewed, edited, applied and taken back: each mark with its reason and measure.
 
-Proposed are contacts of the feet, loops and the cuts that would make one, standing ends that are not to be entered, noise that is
-left out, starts and turns that play as a whole, and near-duplicates. What the markup says already stays as it is, and nothing is
-proposed beside it. The diff fits the folder: `patch -p1` applies it there, and `patch -p1 -R` takes it back.
+Where hips sway, root_smooth_s is proposed for the features of their databases: then a build makes the path of the body ahead from
+the hips and sideways from the feet. No clip file is changed. Proposed are too contacts of the feet, loops and the cuts that would
+make one, standing ends that are not to be entered, noise that is left out, starts and turns that play as a whole, and
+near-duplicates. What the markup says already stays as it is, and nothing is proposed beside it. The diff fits the folder:
+`patch -p1` applies it there, and `patch -p1 -R` takes it back.
 
 Exits with 1 if something is proposed that is not written, or a clip could not be read.
 
@@ -19,6 +21,7 @@ import difflib
 import io
 import os
 import sys
+import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,13 +34,14 @@ from contextdb.errors import Fault, FileError, Place, plural
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.markup.file import COLUMNS, text_of
 from contextdb.motion.markup.markup import Markup
-from contextdb.motion.preparing.proposals import KINDS, Proposal, prepare
+from contextdb.motion.preparing.proposals import KINDS, ROOT_SMOOTH_S, Proposal, prepare
 from contextdb.motion.storage.clip_files import paths_of
 from contextdb.report.render_json import as_json
 from contextdb.schema.toml_edit import set_key
 from contextdb.tables.project import SCHEMA_FILE
 
 BOM = "\ufeff"
+ROOT_KEY = "root_smooth_s"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,13 +76,17 @@ class MarkupFile:
     clips: list[Clip] = field(default_factory=list)
     databases: list[str] = field(default_factory=list)
     """The databases that do not name it yet."""
+    features: list[str] = field(default_factory=list)
+    """The features of its databases that do not say yet how a root is made."""
+    has_roots: bool = False
+    """Whether all its databases have features that say it, or there is none to say it."""
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Propose markup, and write it where that is asked for."""
     found = clips_of(arguments.path, arguments.metres_per_unit, arguments.up)
     proposals, changes = [], []
-    named: dict[str, str] = {}
+    settings: dict[tuple[str, str, str], str | float] = {}
     done = 0
     with progress_of("preparing") as tell:
         for file in _markup_files(found):
@@ -88,15 +96,18 @@ def run(arguments: argparse.Namespace) -> ExitCode:
 
             old, was = _text(file.path)
             markup = Markup.parse(old, str(file.path)) if old else Markup()
-            own = prepare(file.clips, markup, kinds=arguments.only, progress=told)
+            own = prepare(file.clips, markup, kinds=_kinds(arguments.only, file), progress=told)
             done += len(file.clips)
             proposals += own
+            if any(each.kind == "roots" for each in own):
+                settings |= dict.fromkeys((("features", name, ROOT_KEY) for name in file.features), ROOT_SMOOTH_S)
             marks = [each for each in own if each.tag is not None]
             if marks:
                 changes.append(Change(file.path, was, old, with_marks(old, marks)))
                 Markup.parse(changes[-1].new, str(file.path))
-                named |= dict.fromkeys(file.databases, file.path.relative_to(found.folder).as_posix())
-    changes += _settings(found.folder, named)
+                name = file.path.relative_to(found.folder).as_posix()
+                settings |= dict.fromkeys((("databases", database, "markup") for database in file.databases), name)
+    changes += _settings(found.folder, settings)
     if (
         arguments.write
         and changes
@@ -109,12 +120,18 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.FOUND if is_open or found.left_out else ExitCode.OK
 
 
+def _kinds(only: Sequence[str] | None, file: MarkupFile) -> list[str]:
+    """What is looked for: no roots where all features say how they are made."""
+    return [kind for kind in only or KINDS if kind != "roots" or not file.has_roots]
+
+
 def _markup_files(found: FolderClips) -> list[MarkupFile]:
     """The markup file of each clip: that of the first database that holds it, else one beside the clips."""
     at = dict(zip(found.paths, found.clips, strict=True))
     if not found.config.databases:
-        return [MarkupFile(found.folder / MARKUP, list(found.clips))]
+        return [MarkupFile(found.folder / MARKUP, list(found.clips), has_roots=True)]
     files: dict[Path, MarkupFile] = {}
+    said = _with_roots(found.folder)
     for name, settings in found.config.databases.items():
         paths = paths_of(settings, found.folder, found.config.file)
         own = [at.pop(path) for path in paths if path in at]
@@ -124,7 +141,17 @@ def _markup_files(found: FolderClips) -> list[MarkupFile]:
         file = files.setdefault(path, MarkupFile(path))
         file.clips += own
         file.databases += [] if settings.markup is not None else [name]
+        if settings.features not in said and settings.features not in file.features:
+            file.features.append(settings.features)
+    for file in files.values():
+        file.has_roots = not file.features
     return list(files.values())
+
+
+def _with_roots(folder: Path) -> set[str]:
+    """The features that say how a root is made, be it 0: as the hips are."""
+    parts = tomllib.loads(read_bytes(folder / SCHEMA_FILE).decode("utf-8-sig")).get("features", {})
+    return {name for name, part in parts.items() if ROOT_KEY in part}
 
 
 def _text(path: Path) -> tuple[str, bytes | None]:
@@ -153,16 +180,16 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.3f}".rstrip("0").rstrip(".")
 
 
-def _settings(folder: Path, named: dict[str, str]) -> list[Change]:
-    """What contextdb.toml becomes so that databases name their markup."""
-    if not named:
+def _settings(folder: Path, settings: dict[tuple[str, str, str], str | float]) -> list[Change]:
+    """What contextdb.toml becomes so that databases name their markup, and features say how a root is made."""
+    if not settings:
         return []
     path = folder / SCHEMA_FILE
     raw = read_bytes(path)
     old = raw.decode()
     new = old.removeprefix(BOM)
-    for database, file in named.items():
-        new = set_key(new, ("databases", database, "markup"), file)
+    for key, value in settings.items():
+        new = set_key(new, key, value)
     return [Change(path, raw, old, (BOM if old.startswith(BOM) else "") + new)]
 
 
@@ -181,8 +208,9 @@ def _report(found: FolderClips, proposals: Sequence[Proposal], changes: Sequence
             print("".join(_diff(change, found.folder) for change in changes), end="")
     where = " and ".join(str(change.path) for change in changes)
     if arguments.write and changes:
-        print(printable(f"contextdb: {plural(n_marks, 'mark')} written to {where}."), file=sys.stderr)
-    elif not n_marks:
+        what = plural(n_marks, "mark") if n_marks else ROOT_KEY
+        print(printable(f"contextdb: {what} written to {where}."), file=sys.stderr)
+    elif not changes:
         print("contextdb: nothing to propose.", file=sys.stderr)
 
 
@@ -191,10 +219,13 @@ def _reasons(proposals: Sequence[Proposal]) -> Iterator[str]:
     together: dict[tuple[str, str | None], list[Proposal]] = {}
     for i, each in enumerate(proposals):
         key = (each.asset, each.tag) if each.kind == "contacts" else (each.asset, f"{each.tag} {i}")
-        together.setdefault(key, []).append(each)
+        together.setdefault(("", "roots") if each.kind == "roots" else key, []).append(each)
     for (asset, _), own in together.items():
         first = own[0]
-        if first.kind == "contacts":
+        if first.kind == "roots":
+            most = max(own, key=lambda each: each.measure)
+            yield f"# {plural(len(own), 'clip')}: {ROOT_KEY}: hips sway about the body's path, most {most.asset}: {most.reason}"
+        elif first.kind == "contacts":
             yield f"# {asset}: {first.tag}: {plural(len(own), 'stance')}, {sum(each.measure for each in own):.2f} s"
         else:
             what = "cut" if first.tag is None else first.tag

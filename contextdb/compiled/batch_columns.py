@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from contextdb.cells.conditions import Condition
 from contextdb.cells.fact_columns import as_series, plain_numbers
 from contextdb.cells.facts import read_fact
-from contextdb.cells.mirroring import kept_fact, mirrored_fact
+from contextdb.cells.mirroring import kept_fact, mirrored_fact, partner_of
 from contextdb.cells.sets import Cell
 from contextdb.compiled.classes import ValueMasks
 from contextdb.compiled.text_arrays import classes_of_texts, is_text_array
@@ -83,7 +83,12 @@ def _kept(given: Any, is_tags: bool) -> Any:
 
 def mirrored_columns(columns: Mapping[str, Any], conditions: Mapping[str, Condition]) -> dict[str, Any]:
     """Columns of facts that can be read, those of `conditions` as a mirror shows them."""
-    return {name: mirrored_column(given, conditions[name]) if name in conditions else given for name, given in columns.items()}
+    partners = {name: partner for name, condition in conditions.items() if (partner := partner_of(condition)) is not None}
+    swapped = {name: columns[partner] for name, partner in partners.items() if partner in columns}
+    own = {name: given for name, given in columns.items() if name not in partners}
+    return swapped | {
+        name: mirrored_column(given, conditions[name]) if name in conditions else given for name, given in own.items()
+    }
 
 
 def mirrored_column(given: Any, condition: Condition) -> Any:

@@ -22,7 +22,7 @@ from contextdb import bitmask
 from contextdb.bitmask import Words
 from contextdb.cells.arguments import require_kind
 from contextdb.cells.conditions import Condition
-from contextdb.cells.mirroring import changed_in_mirror, mirrored_fact
+from contextdb.cells.mirroring import changed_in_mirror, mirrored_fact, partner_of
 from contextdb.cells.sets import Cell, NumberSet, TagMeet, TagSet
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.assumed import Opened, opened
@@ -259,9 +259,15 @@ class _Boxes:
 
     def _is_symmetric(self, sides: Sides) -> bool:
         """Whether a box is the same in a mirror."""
-        changed = [(at, c) for at, c in enumerate(self.space.conditions) if changed_in_mirror([c])]
-        held = ((Cell(accepts), c) for at, c in changed if (accepts := self.space.accepted(at, sides)) is not None)
-        return all(_mirrored_cell(cell, condition) == cell for cell, condition in held)
+        places = {condition.name: at for at, condition in enumerate(self.space.conditions)}
+        for condition in changed_in_mirror(self.space.conditions).values():
+            own, other = (
+                self.space.accepted(places[name], sides) for name in (condition.name, partner_of(condition) or condition.name)
+            )
+            seen = None if other is None else _mirrored_cell(Cell(other), condition).accepts
+            if own != seen:
+                return False
+        return True
 
     def _closed(self, f: int, side: int) -> int:
         """A side with the classes of no measure beside its own: a number at which two intervals touch is in both."""
@@ -302,7 +308,13 @@ def _cells(compiled: CompiledData, row: int) -> dict[str, Cell]:
 def _in_mirror(cells: Mapping[str, Cell], compiled: CompiledData, free: Collection[str]) -> dict[str, Cell]:
     """The contexts whose mirrored facts some cells accept, without conditions that nobody can mirror."""
     known = {condition.name: condition for condition in compiled.conditions}
-    return {name: _mirrored_cell(cell, known[name]) for name, cell in cells.items() if name not in free}
+    changed = changed_in_mirror(known.values())
+    found = {}
+    for name, cell in cells.items():
+        if name not in free:
+            partner = partner_of(known[name]) if name in changed else None
+            found[partner or name] = _mirrored_cell(cell, known[name])
+    return found
 
 
 def _mirrored_cell(cell: Cell, condition: Condition) -> Cell:

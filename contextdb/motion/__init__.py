@@ -38,7 +38,16 @@ from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.hit import JointHit
 from contextdb.motion.joint.searcher import JointSearcher
 from contextdb.motion.made.joint import JOINT_RECIPES, make_joint_clip, write_joint_clips
-from contextdb.motion.made.recipes import RECIPES, Description, MadeClip, descriptions, made_clips, make_clip, write_made_clips
+from contextdb.motion.made.recipes import (
+    ABOUT_TURNS,
+    RECIPES,
+    Description,
+    MadeClip,
+    descriptions,
+    made_clips,
+    make_clip,
+    write_made_clips,
+)
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import ANY_TAGS, Mark, Marks, TagFilter
 from contextdb.motion.markup.markup import Markup
@@ -55,6 +64,7 @@ from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
 from contextdb.motion.nodes.warping import Target, WarpShare
 from contextdb.motion.output.bank import PoseBank, Sample
+from contextdb.motion.output.retargeting import retargeted
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
@@ -79,7 +89,7 @@ from contextdb.motion.storage.config import MotionConfig, SelectorSettings
 from contextdb.motion.storage.database_settings import DatabaseSettings
 from contextdb.motion.storage.pose_files import open_or_build_poses, open_poses, poses_path, save_poses
 from contextdb.motion.storage.stored import inputs_of, open_database, save_database
-from contextdb.motion.storage.written_poses import write_poses
+from contextdb.motion.storage.written_poses import write_arrays, write_poses
 from contextdb.motion.trace.reasked import Reasked
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.reasked_search import ReaskedSearch
@@ -89,14 +99,17 @@ from contextdb.motion.trace.stats import SessionStats
 from contextdb.motion.trace.what_if import ChangedChoice, WhatIf
 from contextdb.motion.trace.why_not import WhyNot
 from contextdb.motion.trace.winning_changes import Change, ChangePart
+from contextdb.motion.walking.baked import baked_cycle
 from contextdb.motion.walking.blending import Gait
 from contextdb.motion.walking.cycle import Cycle
 from contextdb.motion.walking.footsteps import Footstep
 from contextdb.motion.walking.stances import Stances
 from contextdb.motion.walking.transitions import Missing, Transitions
+from contextdb.motion.walking.walked import walked_clips
 from contextdb.motion.walking.walker import Walker, WalkSettings, WalkState
 
 __all__ = [
+    "ABOUT_TURNS",
     "ANY_TAGS",
     "FACTS",
     "JOINT_RECIPES",
@@ -213,6 +226,7 @@ __all__ = [
     "WarpShare",
     "WhatIf",
     "WhyNot",
+    "baked_cycle",
     "best_start",
     "build",
     "build_all",
@@ -251,6 +265,7 @@ __all__ = [
     "query_from",
     "query_from_pose",
     "resampled",
+    "retargeted",
     "root_trajectory",
     "save_database",
     "save_poses",
@@ -258,8 +273,10 @@ __all__ = [
     "steady_path",
     "steered_path",
     "steered_paths",
+    "walked_clips",
     "with_path",
     "with_paths",
+    "write_arrays",
     "write_bvh",
     "write_joint_clips",
     "write_made_clips",

@@ -53,6 +53,7 @@ def view_of(
     settings: PoseSettings,
     reasked: Reasked | None = None,
     measured: Measured | None = None,
+    poses: Sequence[Pose] | None = None,
 ) -> SessionView:
     """A session as the page shows it.
 
@@ -66,6 +67,8 @@ def view_of(
         The session asked again: without it the page shows no candidates.
     measured : mapping of str to (str, str), optional
         Measures by name: of the session, and of the raw clips.
+    poses : sequence of Pose, optional
+        Those that were shown, one for each decision, such as on ground that is not flat. Default: they are made again.
 
     Raises
     ------
@@ -75,7 +78,7 @@ def view_of(
     decisions = list(trace.brief())
     if not decisions:
         raise MotionError(Fault("the session has no decision.", "one with at least an update"))
-    poses = measure.poses_of(decisions, banks, settings)
+    poses = measure.poses_of(decisions, banks, settings) if poses is None else poses
     played = shown.with_poses(shown.of_decisions(decisions), shown.of_poses(poses, 1.0)).with_contacts(Clips.of(banks))
     assert played.positions is not None, "was just made"
     assert played.roots is not None, "was just made"

@@ -19,7 +19,7 @@ from typing import Any, cast
 from contextdb.cells.conditions import Condition, Mirror
 from contextdb.cells.domains import NUMBER, Domain
 from contextdb.cells.kinds import KINDS, Kind, names_where
-from contextdb.cells.mirroring import sided_pairs, swap_faults, swapped_tag
+from contextdb.cells.mirroring import partner_of, sided_pairs, swap_faults, swapped_tag
 from contextdb.cells.notebook import one_line
 from contextdb.cells.output_types import OutputValue
 from contextdb.cells.outputs import Output
@@ -138,6 +138,8 @@ class Schema:
     controllers: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     output: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     file: str | None = None
+    transitions: str = ""
+    """How clips that lead from one state to another are named, such as "{from}_to_{to}"; "" where that is not declared."""
 
     def __repr__(self) -> str:
         told = f"{plural(len(self.conditions), 'condition')}, {plural(len(self.tables), 'table')}"
@@ -251,6 +253,7 @@ def _document_faults(document: Section) -> Iterator[Found]:
             yield from _section_faults(name, section)
         else:
             yield (name,), _no_section(name, section)
+    yield from _partner_faults(_parts(document, "conditions"))
     conditions = _parts(document, "conditions").keys()
     for name, part in _parts(document, "tables").items():
         yield from _column_faults(("tables", name), _fitting("tables", part), conditions)
@@ -430,8 +433,6 @@ def _mirror_faults(path: Path, fitting: Section) -> Iterator[Found]:
     elif mirror == "negate" and not kind.is_negated:
         mend = _said("mirror", sided_pairs(values or ()) or {"Left": "Right"})
         yield key, Fault(f"{said}: a condition of type {kind.name} has no sign.", 'names that change places, or "none"', mend)
-    elif mirror != "negate" and not kind.is_swapped:
-        yield key, Fault(f"{said}: a condition of type {kind.name} has no names.", '"negate" or "none"', _said("mirror", "negate"))
     elif mirror != "negate":
         yield from (
             (key, Fault(f"{said}: {in_quotes(name)}: {why}.", _EACH_ONCE)) for name, why in swap_faults(mirror, kind.is_tags)
@@ -439,6 +440,27 @@ def _mirror_faults(path: Path, fitting: Section) -> Iterator[Found]:
         yield from (
             (key, replace(fault, found=f"{said}: {fault.found}")) for fault in _unknown_partners(mirror, kind.is_tags, values)
         )
+
+
+def _partner_faults(conditions: Mapping[str, Section]) -> Iterator[Found]:
+    """Of conditions without names that change places by their own names: those whose partner is not one of the same kind."""
+    fitting = {name: _fitting("conditions", part) for name, part in conditions.items()}
+    partners: dict[str, str | None] = {}
+    for name, part in fitting.items():
+        is_pair = part.get("type") in KINDS and not KINDS[part["type"]].is_swapped and isinstance(part.get("mirror"), Mapping)
+        if is_pair and "expr" not in part:
+            partners[name] = partner_of(Condition(name, Domain(part["type"]), mirror=_mirror(part["mirror"])))
+    for name, partner in partners.items():
+        path = ("conditions", name)
+        said = f"{_header(path)} {_said('mirror', fitting[name]['mirror'])}"
+        if partner is None:
+            accepted = 'a name in that of the condition, as Left is in "LeftFoot.Down"; "negate" or "none"'
+            yield (*path, "mirror"), Fault(f"{said}: none of these is in the name {in_quotes(name)}.", accepted)
+        elif partners.get(partner) != name or fitting[partner].get("type") != fitting[name].get("type"):
+            found = f"{said}: {in_quotes(partner)}, with which it changes places, does not change places with it."
+            accepted = f"a condition of type {fitting[name]['type']} with the same mirror"
+            mend = f"{_header(('conditions', partner))} with {_said('mirror', fitting[name]['mirror'])}"
+            yield (*path, "mirror"), Fault(found, accepted, mend)
 
 
 def _unknown_partners(mirror: Mapping[str, str], is_tags: bool, values: Sequence[str] | None) -> Iterator[Fault]:
@@ -544,6 +566,7 @@ def _schema(document: Section, file: str) -> Schema:
         _parts(document, "controllers"),
         _parts(document, "output"),
         file,
+        document.get("project", {}).get("transitions", ""),
     )
 
 

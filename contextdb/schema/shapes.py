@@ -197,6 +197,13 @@ def _meant_mirror(value: object) -> object:
     return None
 
 
+def _wrong_transitions(value: object) -> str | None:
+    if wrong := _wrong_text(value):
+        return wrong
+    is_pattern = re.fullmatch(r"[^{}]*\{from\}[^{}]+\{to\}[^{}]*", str(value))
+    return None if is_pattern else "this is no pattern of the names of transitions"
+
+
 def _one_of(words: Sequence[str], noun: str, synonyms: Mapping[str, str]) -> Shape:
     def wrong(value: object) -> str | None:
         return _wrong_text(value) or (None if value in words else f"there is no such {noun}")
@@ -230,8 +237,14 @@ MIRROR = Shape(
     '"negate" (the other sign), "none", or names that change places, such as { Left = "Right" }', _wrong_mirror, _meant_mirror
 )
 
+TRANSITIONS = Shape(
+    '{from} and {to}, each once, with text between them, such as "{from}_to_{to}"',
+    _wrong_transitions,
+    lambda value: "{from}_to_{to}",
+)
+
 SECTIONS: dict[str, Mapping[str, Shape] | None] = {
-    "project": {"name": TEXT},
+    "project": {"name": TEXT, "transitions": TRANSITIONS},
     "conditions": {
         "type": _one_of(tuple(KINDS), "type", KIND_SYNONYMS),
         "min": BOUND,

@@ -97,6 +97,27 @@ def _box(cells: Mapping[str, str]) -> cdb.CompiledTable:
     return cdb.Table.from_columns(columns, schema=CONDITIONS).compile()
 
 
+FOOT = {"type": "bool", "mirror": {"Left": "Right"}}
+DOWN = st.sampled_from(["Any", "True", "False"])
+
+
+@given(st.lists(st.tuples(DOWN, DOWN), min_size=1, max_size=4))
+def test_conditions_that_change_places_change_them_in_the_boxes_of_mirrored_clips(rows: list[tuple[str, str]]):
+    names = "LeftFoot.Down", "RightFoot.Down"
+    columns = {"Asset": [f"clip{i}" for i in range(len(rows))]} | dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+    table = cdb.Table.from_columns(columns, schema=dict.fromkeys(names, FOOT))
+    compiled, expected = table.compile(), Counter[Key]()
+    for left, right in product([True, False], repeat=2):
+        matches = compiled.query({"LeftFoot.Down": left, "RightFoot.Down": right})
+        if matches or matches.mirrored:
+            expected[frozenset(matches.assets), frozenset(matches.mirrored.assets)] += 1
+    found = clip_contexts(table, mirrored=table.assets)
+    assert told(found) == pytest.approx({key: n / 4.0 for key, n in expected.items()})
+    for each in found.contexts:
+        changed = {b: each.cells.get(a, "Any") for a, b in (names, names[::-1])}
+        assert each.is_symmetric == (changed == {name: each.cells.get(name, "Any") for name in names})
+
+
 def test_clips_that_the_table_has_no_clip_of_make_no_difference():
     table = table_of([("Any", "Any", "Any", "Any"), (">0", "Any", "Any", "Any")])
     assert told(clip_contexts(table, ["clip0"])) == {(frozenset(["clip0"]), frozenset()): 1.0}

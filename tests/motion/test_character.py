@@ -72,6 +72,13 @@ def gait(stick):
     return {"gait": "Idle" if not speed else "Walk" if speed < 2.0 else "Run"}
 
 
+def test_a_character_and_its_copy_stand_on_the_ground_that_they_are_given():
+    flat, high = character(), character(ground=lambda x, z: (0.3, (0.0, 1.0, 0.0)))
+    driven(flat, 10), driven(high, 10)
+    for one, other in zip(driven(flat, 30), driven(high.copy(), 30), strict=True):
+        np.testing.assert_allclose(other.pose.positions - one.pose.positions, np.tile([0.0, 0.3, 0.0], (19, 1)), atol=1e-3)
+
+
 def driven(one, ticks, begin=0):
     return [one.update(DT, stick_at(tick), gait(stick_at(tick))) for tick in range(begin, begin + ticks)]
 

@@ -82,7 +82,8 @@ REFUSED = {
     ),
     "a misspelt key": (
         {**POINTS, "rat": 3},
-        '[features.loco] has no key "rat". Accepted: "rate", "channels", "root", "facing", "facing_smooth_s", "mirror", '
+        '[features.loco] has no key "rat". Accepted: "rate", "channels", "root", "facing", "facing_smooth_s", "root_smooth_s", '
+        '"mirror", '
         '"feet", "heels", "toes". '
         'Did you mean "rate"?',
     ),

@@ -9,9 +9,21 @@ import numpy as np
 import pytest
 
 from contextdb.errors import MotionError
-from contextdb.motion import RECIPES, descriptions, load_bvh, made_clips, make_clip, poses_of, write_made_clips
+from contextdb.motion import (
+    ABOUT_TURNS,
+    RECIPES,
+    Cycle,
+    descriptions,
+    load_bvh,
+    made_clips,
+    make_clip,
+    poses_of,
+    root_trajectory,
+    write_made_clips,
+)
+from contextdb.motion.clips.quaternions import rotate
 
-MADE = {made.name: made for made in made_clips()}
+MADE = {made.name: made for made in (*made_clips(), *map(make_clip, ABOUT_TURNS))}
 STEADY = [name for name, made in MADE.items() if made.recipe.change == "steady" and made.recipe.gait != "Idle"]
 FEET = ("LeftFoot", "RightFoot")
 EVERY = pytest.mark.parametrize("name", MADE)
@@ -104,6 +116,33 @@ def test_starts_and_stops_stand_still_with_both_feet_down(change):
         assert np.ptp(hips[:, [0, 2]], axis=0).max() < 0.005
         time_s = 0.1 if change == "start" else made.clip.duration_s - 0.1
         assert all(made.footfalls.is_down(foot, time_s) for foot in FEET)
+
+
+@pytest.mark.parametrize("name", STEADY)
+def test_each_cycle_of_a_steady_clip_ends_as_it_began(name):
+    assert Cycle.of(MADE[name].clip, most_m=0.01, most_deg=2.0).speed_mps > 0.0
+
+
+@pytest.mark.parametrize("name", ABOUT_TURNS)
+def test_a_turn_about_goes_off_the_other_way_at_the_pace_it_came(name):
+    hips, pace = places(name, "Hips")[:, [0, 2]], RECIPES[name.split("_")[0]].pace
+    cycle = round(30.0 / pace.cycles_per_s)
+    came, went = (hips[cycle] - hips[0]) * 30.0 / cycle, (hips[-1] - hips[-1 - cycle]) * 30.0 / cycle
+    assert np.linalg.norm(came) == pytest.approx(pace.speed_mps, abs=0.05)
+    assert went == pytest.approx(-came, abs=0.03)
+    assert MADE[name].clip.values[-1, 3] - MADE[name].clip.values[0, 3] == pytest.approx(
+        180.0 if "left" in name else -180.0, abs=0.5
+    )
+
+
+@pytest.mark.parametrize("name", ABOUT_TURNS)
+def test_no_foot_stands_twisted_far_from_its_body_in_a_turn_about(name):
+    poses = poses_of(MADE[name].clip)
+    headings = root_trajectory(poses).headings
+    for foot in FEET:
+        ahead = rotate(poses.rotations[:, poses.skeleton.index(foot)], np.array([0.0, 0.0, 1.0]))
+        twisted = np.rad2deg(np.abs((np.arctan2(ahead[:, 0], ahead[:, 2]) - headings + np.pi) % (2.0 * np.pi) - np.pi))
+        assert twisted.max() < 60.0
 
 
 # ---- what a table says of them

@@ -62,6 +62,17 @@ def test_starts_play_as_a_whole_and_stands_are_not_entered():
     assert of("noise") == of("duplicates") == of("turns") == []
 
 
+def test_clips_that_come_to_a_stand_may_be_bent_to_a_target_until_they_stand_and_entered_before_they_slow_down():
+    for made in (made for made in MADE if made.recipe.change == "stop"):
+        own = {each.tag: each for each in of("targets") if each.asset == made.name}
+        entered, bent = own[ReservedTag.MATCH_RANGE], own[ReservedTag.WARP_POSITION]
+        way_m = np.linalg.norm(np.diff(motion.root_trajectory(motion.poses_of(made.clip)).positions, axis=0), axis=1).sum()
+        assert bent.measure == pytest.approx(way_m, abs=0.15)
+        assert entered.from_s is bent.from_s is None
+        assert made.clip.duration_s - 0.5 >= bent.to_s > entered.to_s > made.clip.duration_s - 0.5 - 1.1  # a rest, a ramp
+    assert {each.asset for each in of("targets")} == {made.name for made in MADE if made.recipe.change == "stop"}
+
+
 def test_a_cut_that_is_proposed_makes_a_loop():
     for each in of("cuts"):
         clip = CLIPS[each.asset]

@@ -14,7 +14,7 @@ from contextdb.motion import RECIPES, Clip, Cycle, LocalPoses, MotionError, Stan
 from contextdb.motion.walking.places import joined, moved, movement_of, movement_to, undone
 from contextdb.motion.walking.stances import blended_stances
 
-STEADY = [name for name, recipe in RECIPES.items() if recipe.change == "steady" and recipe.gait != "Idle" and "slow" not in name]
+STEADY = [name for name, recipe in RECIPES.items() if recipe.change == "steady" and recipe.gait != "Idle"]
 PHASES = st.floats(0.0, 1.0, exclude_max=True)
 METRES = st.floats(-5.0, 5.0)
 PLACES = st.tuples(METRES, METRES, st.floats(-3.0, 3.0))
@@ -119,9 +119,12 @@ def test_a_clip_whose_ends_differ_is_refused_with_the_joint():
 
 def test_wider_limits_take_a_clip_that_was_refused_and_close_it():
     made = make_clip("walk_slow")
+    leaning = made.clip.values.copy()
+    leaning[:, 6] += np.linspace(0.0, 30.0, made.clip.n_frames)  # the spine, more and more
+    clip = Clip("walk_slow", made.clip.skeleton, made.clip.frame_time_s, leaning, made.clip.metres_per_unit)
     with pytest.raises(MotionError, match="at most 3 cm and 5°"):
-        Cycle.of(made.clip)
-    cycle = Cycle.of(made.clip, most_m=0.1, most_deg=15.0)
+        Cycle.of(clip)
+    cycle = Cycle.of(clip, most_m=0.2, most_deg=15.0)
     assert cycle.speed_mps == pytest.approx(made.recipe.pace.speed_mps, abs=1e-6)
     np.testing.assert_allclose(cycle.at(0.0)[1], cycle.at(1.0)[1], atol=1e-9)
 

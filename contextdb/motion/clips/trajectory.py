@@ -106,9 +106,8 @@ def root_trajectory(
     if pair is None:
         ahead = quaternions.rotate(poses.rotations[:, hips], np.array([0.0, 0.0, 1.0]))[:, [0, 2]]
     else:
-        left = poses.positions[:, pair[0]] - poses.positions[:, pair[1]]
-        ahead = np.stack((-left[:, 2], left[:, 0]), axis=-1)
-    headings = smoothed(_headings(ahead), facing_smooth_s * poses.rate)
+        ahead = ahead_of(poses, pair)
+    headings = smoothed(headings_of(ahead), facing_smooth_s * poses.rate)
     return Trajectory(poses.rate, poses.positions[:, hips][:, [0, 2]], headings)
 
 
@@ -223,7 +222,13 @@ def _blended(values: Floats, frames: Floats) -> Floats:
     return np.asarray(values[before] * (1.0 - shares) + values[after] * shares)
 
 
-def _headings(ahead: Floats) -> Floats:
+def ahead_of(poses: Poses, pair: tuple[int, int]) -> Floats:
+    """At right angles to the line from a right to a left joint: ground vectors [F, 2]."""
+    left = poses.positions[:, pair[0]] - poses.positions[:, pair[1]]
+    return np.stack((-left[:, 2], left[:, 0]), axis=-1)
+
+
+def headings_of(ahead: Floats) -> Floats:
     """Unwrapped headings of ground vectors [F, 2]; where one is too short to point anywhere, the last that did counts."""
     points = np.flatnonzero(np.linalg.norm(ahead, axis=-1) > 1e-6)
     if not len(points):

@@ -22,7 +22,7 @@ from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.poses import Poses, poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.clips.trajectory import Trajectory, after_seconds, along_path, rates_of_change, root_trajectory, to_own_frame
+from contextdb.motion.clips.trajectory import Trajectory, after_seconds, along_path, rates_of_change, to_own_frame
 from contextdb.motion.features.channels import DEFAULT_AXIS, Channel
 from contextdb.motion.features.path_features import point_features, write_paths
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
@@ -90,13 +90,13 @@ def clip_features(
     _check_size(poses, clip)
     if mirrored:
         poses = mirror.mirrored(poses, schema.mirror)
-    path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
+    path = schema.path_of(poses)
     root = np.column_stack((path.positions, path.headings)).astype(np.float32)
     own, marks = slice(None), (contacts[1], contacts[0]) if mirrored else contacts
     if looping:
         marks = rounds_of(marks, 3, (poses.n_frames - 1) / poses.rate)
         poses, own = three_rounds(poses, path)
-        path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
+        path = schema.path_of(poses)
     blocks = [_channel_features(channel, poses, path, schema, clip.name, marks)[own] for channel in schema.channels]
     features = np.concatenate(blocks, axis=1).astype(np.float32)
     return ClipFeatures(clip.name, mirrored, features, root)

@@ -28,7 +28,7 @@ from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE, Poses
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.clips.trajectory import PathPoints, Trajectory, after_seconds, along_path, root_trajectory
+from contextdb.motion.clips.trajectory import PathPoints, Trajectory, after_seconds, along_path
 from contextdb.motion.features.channels import Channel
 from contextdb.motion.features.extraction import Features, block_of, require_features
 from contextdb.motion.features.path_features import point_features
@@ -188,7 +188,7 @@ def query_from_pose(schema: FeatureSchema, pose: HasPose, history: PoseHistory) 
     positions, rotations, headings = history.with_pose(pose, plan.n_frames)
     query = np.empty(schema.n_features, np.float32)
     poses = Poses(history.skeleton, history.rate, positions, rotations)
-    path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
+    path = schema.path_of(poses)
     plan.put_plain(query, positions, path)
     if plan.trajectories:
         _put_trajectories(query, plan, path)
@@ -270,7 +270,10 @@ def _plan(schema: FeatureSchema, skeleton: Skeleton, rate: float) -> _Plan:
 
 def _frames_needed(schema: FeatureSchema, rate: float) -> int:
     """How many poses a query looks at; for channels that need all there is, as many as can be kept."""
-    if any(c.along or c.type in ("phase", "custom") for c in schema.channels) or schema.facing_smooth_s > 0.0:
+    if (
+        any(c.along or c.type in ("phase", "custom") for c in schema.channels)
+        or max(schema.facing_smooth_s, schema.root_smooth_s) > 0.0
+    ):
         return round(LONGEST_S * MOST_RATE)
     back_s = max((-seconds for c in schema.channels for seconds in c.at), default=0.0)
     return PATH_FRAMES + max(0, math.ceil(back_s * rate - 1e-9)) + 1

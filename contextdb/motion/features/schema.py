@@ -18,9 +18,10 @@ from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.clips.foot_bones import FootBones, Pair
 from contextdb.motion.clips.mirror import Pairs, pattern_fault
 from contextdb.motion.clips.poses import Poses
+from contextdb.motion.clips.prepared_root import prepared_path
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
-from contextdb.motion.clips.trajectory import Trajectory
+from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.features.channels import Channel, What, check_together, is_pair, read_channel, read_pair
 from contextdb.motion.reading import Mapped, Section
 
@@ -31,7 +32,7 @@ CustomFunction = Callable[[Poses, Trajectory], Floats]
 
 PathChannels = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[What | None, slice], ...]]
 
-SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "mirror", "feet", "heels", "toes")
+SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "root_smooth_s", "mirror", "feet", "heels", "toes")
 MOST_RATE = 1000.0
 ABOUT_S = 0.5
 """How fast a path goes is the mean of about so many seconds."""
@@ -58,6 +59,10 @@ class FeatureSchema:
     facing_smooth_s : float
         Evens out the facing's sway with each step: the standard deviation in seconds of a Gaussian about each frame, which shifts
         nothing in time. Default: 0, the facing as it is.
+    root_smooth_s : float
+        Above 0, the body's path is made from capture whose hips sway: ahead from the hips, sideways from the feet, heading by hips
+        and chest, and this is the standard deviation in seconds of what evens it out. Starts and stops stay when they are.
+        Default: 0, the hips as they are.
     mirror : tuple of (left, right)
         Pairs of bones that change places when a clip is mirrored; a `*` on both sides matches the same rest of the name.
     feet, heels, toes : (left bone, right bone), optional
@@ -72,6 +77,7 @@ class FeatureSchema:
     root: str | None = None
     facing: tuple[str, str] | None = None
     facing_smooth_s: float = 0.0
+    root_smooth_s: float = 0.0
     mirror: Pairs = ()
     feet: Pair | None = None
     heels: Pair | None = None
@@ -141,6 +147,13 @@ class FeatureSchema:
         named += [bone for pair in (self.facing, self.feet, self.heels, self.toes) for bone in pair or ()]
         return tuple(dict.fromkeys(bone for bone in named if bone is not None))
 
+    def path_of(self, poses: Poses) -> Trajectory:
+        """The path of a body; raises MotionError where the skeleton lacks `root` or a bone of `facing`."""
+        path = root_trajectory(poses, self.root, self.facing, self.facing_smooth_s)
+        if self.root_smooth_s <= 0.0:
+            return path
+        return prepared_path(poses, path, self.root_smooth_s, self.foot_bones(), is_facing_given=self.facing is not None)
+
     def foot_bones(self, feet: Pair | None = None) -> FootBones:
         """The declared bones of the feet; with `feet` of these, which then are what touches the ground."""
         return FootBones(self.feet, self.heels, self.toes) if feet in (None, self.feet) else FootBones(feet)
@@ -201,12 +214,12 @@ def _read_schema(
     channels = _read_channels(section)
     root = section.text("root", 'a bone, such as "Hips"') if "root" in mapping else None
     facing = read_pair(section, "facing", A_FACING) if "facing" in mapping else None
-    smooth_s = _read_smooth(section) if "facing_smooth_s" in mapping else 0.0
+    facing_s, root_s = (_read_smooth(section, key) if key in mapping else 0.0 for key in ("facing_smooth_s", "root_smooth_s"))
     mirror = _read_mirror(section) if "mirror" in mapping else ()
     feet, heels, toes = (read_pair(section, key, A_FOOT) if key in mapping else None for key in ("feet", "heels", "toes"))
-    if faults or rate is None or smooth_s is None:
+    if faults or rate is None or facing_s is None or root_s is None:
         return None
-    return cls(name, rate, tuple(channels), root, facing, smooth_s, mirror, feet, heels, toes)
+    return cls(name, rate, tuple(channels), root, facing, facing_s, root_s, mirror, feet, heels, toes)
 
 
 def _read_rate(section: Section) -> float | None:
@@ -214,8 +227,8 @@ def _read_rate(section: Section) -> float | None:
     return section.number("rate", accepted, 1.0, MOST_RATE) if section.has("rate", accepted) else None
 
 
-def _read_smooth(section: Section) -> float | None:
-    return section.number("facing_smooth_s", f"seconds, from 0 to {MOST_SMOOTH_S:g}, such as 0.2", 0.0, MOST_SMOOTH_S)
+def _read_smooth(section: Section, key: str) -> float | None:
+    return section.number(key, f"seconds, from 0 to {MOST_SMOOTH_S:g}, such as 0.2", 0.0, MOST_SMOOTH_S)
 
 
 def _read_mirror(section: Section) -> Pairs:

@@ -196,14 +196,17 @@ def _turn(yaw: Floats, pitch: Floats, roll: Floats) -> Floats:
 
 
 def _hips(way: Timeline, times: Floats, manner: Manner, rotations: Floats, feet: Mapping[str, _Foot]) -> Floats:
-    """Where the hips are: over the path, swaying over the standing leg, as high as the manner wants and both legs reach."""
+    """Where the hips are: over the path, swaying over the standing leg, as high as the manner wants and both legs reach.
+
+    They rise with the breath only as far as the body stands: a walking body's breath lifts its chest, and its cycles are alike.
+    """
     phases, effort = way.at(way.phases, times), np.sqrt(way.at(way.shares, times))
     cycle = 2.0 * np.pi * phases
     headings = way.at(way.headings, times)
     sway = manner.sway_m * effort * np.cos(cycle)
     ground = way.at(way.places, times) + sway[:, None] * heading_vectors(headings + np.pi / 2.0)
     bob = manner.bob_m * effort * np.cos(2.0 * cycle) * (-1.0 if manner.is_run else 1.0)
-    breath = manner.breath_m * (np.cos(_breaths(way, times)) - 1.0)
+    breath = manner.breath_m * (1.0 - effort) * (np.cos(_breaths(way, times)) - 1.0)
     wanted = HIPS_M - manner.crouch_m * effort - manner.bob_m * effort + bob + breath
     limits = [wanted, *(_reach(ground, rotations, sign, feet[side].ankle) for side, sign in SIDES.items())]
     return np.stack((ground[:, 0], _soft_minimum(np.stack(limits)), ground[:, 1]), axis=-1)

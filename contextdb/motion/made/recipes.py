@@ -1,8 +1,8 @@
 """Made clips: walks, runs, turns, starts, stops and idling, computed by formulas. Made, not captured: nobody moved for them.
 
 They stand for real clips in samples, tests and the demo. All cycles begin with the left foot down, mid-stride, so that all are in
-phase; feet do not slide; the body itself travels. `RECIPES` lists them, and `describe` measures from a clip's root motion what a
-table of assets says of it.
+phase; feet do not slide; the body itself travels. `RECIPES` lists those of the sample tables, `ABOUT_TURNS` turns on the way by 180
+degrees, which no table names. `describe` measures from a clip's root motion what a table of assets says of it.
 
 Source: Forsyth, "How a Character Should Walk", Game Tech 2004.
 """
@@ -27,7 +27,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, to_own_frame
 from contextdb.motion.made.body import SIDES, STEP_WIDTH_M, Manner, made_skeleton, made_values
-from contextdb.motion.made.steps import RATE, Change, Pace, Steps, steps_of, timeline
+from contextdb.motion.made.steps import RATE, Change, Pace, Steps, about_turn, steps_of, timeline
 
 Gait = Literal["Idle", "Walk", "Run"]
 Style = Literal["normal", "tired"]
@@ -45,6 +45,8 @@ class Recipe:
     turn_dps: float = 0.0
     change: Change = "steady"
     n_cycles: int = 4
+    turned_deg: float = 0.0
+    """How far a clip of the change "turn" turns, positive to the left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,7 @@ class Description:
     Attributes
     ----------
     asset, gait, style, change
-        `change`: "steady", "start" (from a stand) or "stop" (to one).
+        `change`: "steady", "start" (from a stand), "stop" (to one) or "turn" (about, on the way).
     speed_mps, start_mps, end_mps : float
         Over the ground: mean of the whole clip, of its first and of its last 0.2 s.
     direction_deg : float
@@ -154,17 +156,34 @@ def _tired(recipe: Recipe) -> Recipe:
     return replace(recipe, name=f"{recipe.name}_tired", pace=pace, manner=tired)
 
 
+def _about_turns() -> Iterable[Recipe]:
+    """About, on the way, to either side: at a walk and at a jog."""
+    for pace in ("walk", "jog"):
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            name = f"{pace}_about_{side}"
+            turn = _recipe(name, pace, change="turn")
+            yield replace(turn, n_cycles=turn.n_cycles + 1, turned_deg=sign * 180.0)
+
+
 RECIPES: dict[str, Recipe] = {recipe.name: recipe for recipe in _recipes()}
+ABOUT_TURNS: dict[str, Recipe] = {recipe.name: recipe for recipe in _about_turns()}
 
 
 def make_clip(name: str) -> MadeClip:
-    """Compute one made clip of `RECIPES`; the same every time. Raises MotionError for another name, with the nearest."""
-    if require_text(name, "name") not in RECIPES:
-        near = nearest(name, RECIPES)
-        known = f"one of {plural(len(RECIPES), 'made clip')}, the names of RECIPES"
-        raise MotionError(Fault(f"there is no made clip {in_quotes(name)}.", known, in_quotes(near) if near else ""))
-    recipe = RECIPES[name]
-    way = timeline(recipe.pace, recipe.turn_dps, recipe.change, recipe.n_cycles, RAMP_S[recipe.gait])
+    """Compute one made clip of `RECIPES` or `ABOUT_TURNS`; the same every time.
+
+    Raises MotionError for another name, with the nearest.
+    """
+    known = RECIPES | ABOUT_TURNS
+    if require_text(name, "name") not in known:
+        near = nearest(name, known)
+        accepted = f"one of {plural(len(known), 'made clip')}, the names of RECIPES and ABOUT_TURNS"
+        raise MotionError(Fault(f"there is no made clip {in_quotes(name)}.", accepted, in_quotes(near) if near else ""))
+    recipe = known[name]
+    if recipe.change == "turn":
+        way = about_turn(recipe.pace, recipe.turned_deg, recipe.n_cycles, RAMP_S[recipe.gait])
+    else:
+        way = timeline(recipe.pace, recipe.turn_dps, recipe.change, recipe.n_cycles, RAMP_S[recipe.gait])
     steps = {side: steps_of(way, recipe.pace, sign * STEP_WIDTH_M) for side, sign in SIDES.items()}
     values = made_values(way, steps, recipe.manner, recipe.turn_dps, recipe.pace.speed_mps)
     clip = Clip(name, _skeleton(), 1.0 / RATE, values, CENTIMETRE)

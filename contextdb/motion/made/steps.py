@@ -21,7 +21,7 @@ import numpy as np
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import heading_vectors
 
-Change = Literal["steady", "start", "stop"]
+Change = Literal["steady", "start", "stop", "turn"]
 
 RATE = 30.0
 """Frames a second of every made clip."""
@@ -31,6 +31,10 @@ MARGIN_S = 2.0
 """How long a timeline continues before and after its clip, for the steps that reach beyond it."""
 REST_S = 0.5
 """How long a body stands at least before it starts and after it has stopped."""
+TURN_S = 1.5
+"""How long a turn about takes."""
+TURN_SHARE = 0.15
+"""Of the full pace: how fast a body goes while it turns about."""
 FIRST_LIFT = 0.04
 LAST_LANDING = 0.06
 """Cycles after a start and before a stop at which the other foot leaves its place beside the standing one, and comes back to it."""
@@ -106,6 +110,25 @@ def timeline(pace: Pace, turn_dps: float, change: Change, n_cycles: int, ramp_s:
         begin = duration_s - full_s - ramp_s
         return _travel(pace, turn_dps, duration_s, lambda t: _smooth((t - begin) / ramp_s))
     return _travel(pace, turn_dps, _whole_frames(full_s + ramp_s + REST_S), lambda t: 1.0 - _smooth((t - full_s) / ramp_s))
+
+
+def about_turn(pace: Pace, turned_deg: float, n_cycles: int, ramp_s: float) -> Timeline:
+    """The way of a clip of some cycles that turns in its middle: slower within `ramp_s`, about with short steps, and off again.
+
+    The steps come as fast as at the full pace all the time, so that no foot stands long while the body turns over it.
+    """
+    duration_s = n_cycles / pace.cycles_per_s
+    middle = duration_s / 2.0
+
+    def share(t: Floats) -> Floats:
+        away = (np.abs(t - middle) - TURN_S / 4.0) / ramp_s
+        return np.asarray(TURN_SHARE + (1.0 - TURN_SHARE) * _smooth(away))
+
+    slow = _travel(pace, 0.0, duration_s, share)
+    headings = np.deg2rad(turned_deg) * _smooth((slow.times - middle) / TURN_S + 0.5)
+    velocities = (pace.speed_mps * slow.shares)[:, None] * heading_vectors(headings)
+    places = np.stack([_integral(column) for column in velocities.T], axis=-1)
+    return Timeline(duration_s, slow.times, pace.cycles_per_s * slow.times, places, headings, slow.shares)
 
 
 def steps_of(way: Timeline, pace: Pace, side: float) -> Steps:

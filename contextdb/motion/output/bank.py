@@ -30,7 +30,6 @@ from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, flat_feet_of
 from contextdb.motion.clips.poses import Poses, forward_kinematics, local_poses, resampled
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
-from contextdb.motion.clips.trajectory import root_trajectory
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.output.legs import leg_of, steps_of
@@ -356,7 +355,7 @@ class _Part:
             poses = forward_kinematics(local)
         if not np.isfinite(poses.positions).all() or np.abs(poses.positions).max() > FARTHEST_M:
             raise MotionError(Fault("its numbers are too large to be a body.", f"joints within {FARTHEST_M:g} m of the origin"))
-        path = root_trajectory(poses, schema.root, schema.facing, schema.facing_smooth_s)
+        path = schema.path_of(poses)
         root = np.column_stack((path.positions, path.headings)).astype(np.float32).astype(np.float64)
         rotations, positions = local.rotations, local.positions.copy()
         above = poses.skeleton.ancestors(poses.skeleton.hips)

@@ -5,7 +5,7 @@ T ticks, J joints.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,9 +41,17 @@ def clip_of_poses(poses: Sequence[Pose], bank: PoseBank, rate: float, *, name: s
     ContextError
         An argument of another type.
     """
-    listed, rig = checked_poses(poses, bank, rate), bank.skeleton
-    placed = sorted({0, *bank.moving.tolist()})
-    rotations, translations = local_tracks(listed, rig)
+    return clip_of_rig(checked_poses(poses, bank, rate), bank.skeleton, bank.moving.tolist(), rate, name)
+
+
+def clip_of_rig(poses: list[Pose], rig: Skeleton, moving: Iterable[int], rate: float, name: str) -> Clip:
+    """The same of a rig with offsets in metres, of which some joints move against their parents beside the first."""
+    return clip_of_tracks(*local_tracks(poses, rig), rig, moving, rate, name)
+
+
+def clip_of_tracks(rotations: Floats, translations: Floats, rig: Skeleton, moving: Iterable[int], rate: float, name: str) -> Clip:
+    """The same of joints against their parents: rotations [T, J, 4], translations [T, J, 3] in metres, the first in the world."""
+    placed = sorted({0, *moving})
     angles = np.rad2deg(quaternions.to_euler(AXES, rotations))
     columns: list[Floats] = []
     for joint in range(rig.n_joints):

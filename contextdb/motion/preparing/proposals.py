@@ -1,4 +1,4 @@
-"""Markup proposed for clips: contacts, loops, standing ends, noise, starts, turns, near-duplicates; each with reason and measure.
+"""What is proposed for clips: roots, contacts, loops, standing ends, noise, starts, turns, duplicates; each with its reason.
 
     clip ─► Look: poses against the body's own place, path, feet ─► proposals of each kind ─► less what the markup says already
 
@@ -24,16 +24,22 @@ from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.contacts import spans_of
 from contextdb.motion.clips.feet import Footfalls
+from contextdb.motion.clips.foot_bones import UNDECLARED
 from contextdb.motion.clips.poses import Poses, poses_of
+from contextdb.motion.clips.prepared_root import prepared_path
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.reserved import CONTACTS, ReservedTag
 from contextdb.motion.preparing.clip_facts import ENDS_S, SLOW_SHARE, STANDING_MPS, Moments, falls_of, require_finite, step_of
 
-Kind = Literal["contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "duplicates"]
+Kind = Literal["roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "targets", "duplicates"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
+ROOT_SMOOTH_S = 0.2
+"""What is proposed for `root_smooth_s`: it evens out a step, and keeps a start and a bend."""
+SWAY_M, SWAY_DEG = 0.01, 3.0
+"""Hips that are farther than this from the body's prepared path, or turned, for a twentieth of the time, sway."""
 LOOP_M, LOOP_MPS = 0.03, 0.3
 """A clip loops where its joints are so near at both ends, and so alike in speed: root mean squares."""
 LOOP_SHARE = 0.15
@@ -51,6 +57,8 @@ ENTRY_S = 0.2
 """The entry zone of a start and of a turn."""
 BENDING_DPS, TURNING_DPS, LEAST_TURN_DEG, LONGEST_TURN_S = 25.0, 50.0, 60.0, 3.0
 """A turn begins and ends at the first rate, and comes to the second."""
+LONGEST_ONE_OFF_S, LEAST_WAY_M = 6.0, 0.3
+"""A clip that is no longer, comes so far and then stands may bring a body to a target."""
 STEADY_DPS = 30.0
 """A clip whose middle turn is faster turns all the time, and is no turn to be played as a whole."""
 SPIKE_MPS, SPIKE = 8.0, 4.0
@@ -65,7 +73,7 @@ N_SAMPLES = 24
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A mark that is proposed, or a cut of the clip's file, which is no mark.
+    """A mark that is proposed; or a cut of the clip's file or a path of its own for its root, which are no marks.
 
     Attributes
     ----------
@@ -73,7 +81,7 @@ class Proposal:
     kind : str
         One of `KINDS`.
     tag : str or None
-        None for a cut.
+        None for a cut and for a root.
     from_s, to_s : float or None
         Seconds since the clip's start; None is its start or its end.
     value : float or None
@@ -186,14 +194,16 @@ def prepare(
     markup : Markup, optional
         What is said already: nothing is proposed where it has a mark of the same tag.
     kinds : sequence of str, optional
-        Of "contacts", "loops", "cuts", "tails", "noise", "starts", "turns" and "duplicates" those that are wanted. Default: all.
+        Of `KINDS` those that are wanted: "roots", "contacts", "loops", "cuts", "tails", "noise", "starts", "turns", "targets",
+        "duplicates". Default: all.
     progress : function, optional
         Called with the number of clips that are done, of all clips, and the name of the next.
 
     Returns
     -------
     list of Proposal
-        By clip, in their order. A cut has no tag: it says where the file would have to be cut for the clip to loop.
+        By clip, in their order. A cut has no tag: it says where the file would have to be cut for the clip to loop. Nor has a
+        root: it says that hips sway, which `root_smooth_s` of its features evens out.
 
     Raises
     ------
@@ -248,7 +258,18 @@ def _is_said(proposal: Proposal, markup: Markup) -> bool:
     return any(span.from_s <= last and first <= span.to_s for span in spans)
 
 
-# ---- feet
+# ---- hips and feet
+
+
+def _roots(look: Look) -> Iterator[Proposal]:
+    """Hips that sway about the path of the body."""
+    if look.usual_mps < STANDING_MPS or look.clip.duration_s < LEAST_LOOP_S:
+        return
+    path = prepared_path(look.poses, look.path, ROOT_SMOOTH_S, UNDECLARED)
+    metres = float(np.quantile(np.linalg.norm(path.positions - look.path.positions, axis=-1), 0.95))
+    degrees = float(np.rad2deg(np.quantile(np.abs(path.headings - look.path.headings), 0.95)))
+    if metres >= SWAY_M or degrees >= SWAY_DEG:
+        yield look.said("roots", None, None, None, f"its hips sway by {100.0 * metres:.1f} cm and {degrees:.0f}°", metres)
 
 
 def _contacts(look: Look) -> Iterator[Proposal]:
@@ -378,6 +399,23 @@ def _turns(look: Look) -> Iterator[Proposal]:
             yield look.said("turns", ReservedTag.NEXT_NATURAL_ONLY, first, last, reason, abs(turned))
 
 
+def _targets(look: Look) -> Iterator[Proposal]:
+    """Where a clip that comes to a stand may be entered, and where it may be bent towards the place at which a body is to stand."""
+    first, last = _moving(look)
+    if first is None or last is None or last >= look.poses.n_frames - 1 or (last - first) / look.rate > LONGEST_ONE_OFF_S:
+        return
+    metres = float(look.path.lengths[last] - look.path.lengths[first])
+    fast = np.flatnonzero(look.speeds[first : last + 1] >= AT_SPEED * look.usual_mps)
+    if metres < LEAST_WAY_M or not len(fast) or fast[-1] < 1:
+        return
+    slows = first + int(fast[-1])
+    begin = first or None
+    reason = f"from {slows / look.rate:.2f} s on it slows down to a stand"
+    yield look.said("targets", ReservedTag.MATCH_RANGE, begin, slows, reason, slows / look.rate)
+    reason = f"comes {metres:.2f} m far and then stands"
+    yield look.said("targets", ReservedTag.WARP_POSITION, begin, last, reason, metres)
+
+
 # ---- noise
 
 
@@ -440,6 +478,7 @@ def _differ(one: float, other: float) -> bool:
 
 
 _OF_ONE: dict[Kind, Callable[[Look], Iterator[Proposal]]] = {
+    "roots": _roots,
     "contacts": _contacts,
     "loops": _loops,
     "cuts": _cuts,
@@ -447,4 +486,5 @@ _OF_ONE: dict[Kind, Callable[[Look], Iterator[Proposal]]] = {
     "noise": _noise,
     "starts": _starts,
     "turns": _turns,
+    "targets": _targets,
 }

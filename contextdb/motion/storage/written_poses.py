@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.cells.arguments import require_path
+from contextdb.cells.arguments import require_mapping, require_path
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.errors import ArtefactError, Fault, FileError, MotionError, Place, in_quotes
+from contextdb.errors import ArtefactError, ContextError, Fault, FileError, MotionError, Place, in_quotes
 from contextdb.motion.clips.clip import write_bvh
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.stream import Pose
@@ -47,9 +47,28 @@ def write_poses(poses: Sequence[Pose], bank: PoseBank, path: str | PathLike[str]
     if target.suffix == GLB:
         write_atomic(target, glb_of_poses(poses, bank, rate, target.stem))
         return
-    whole = io.BytesIO()
+    write_arrays(pose_arrays(poses, bank, rate), target)
+
+
+def write_arrays(arrays: Mapping[str, NDArray[Any]], path: str | PathLike[str]) -> None:
+    """Write arrays by their names into a `.npz` file, as `numpy.load` reads it. The same arrays give the same bytes.
+
+    Raises
+    ------
+    FileError
+        The name has another ending, or the disk refuses; the old file is then whole.
+    ContextError
+        An argument of another type.
+    """
+    target, whole = require_path(path), io.BytesIO()
+    given = require_mapping(arrays, "arrays", "a mapping of names to arrays")
+    wrong = [name for name, array in given.items() if not isinstance(name, str) or np.asanyarray(array).dtype.hasobject]
+    if wrong:
+        raise ContextError(Fault(f"{wrong[0]!r} is no array of numbers or texts.", "a mapping of names to arrays"))
+    if target.suffix != NPZ:
+        raise FileError(Fault("arrays cannot be written to such a file.", f"a name that ends in {NPZ}", place=Place(str(target))))
     with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, array in pose_arrays(poses, bank, rate).items():
+        for name, array in given.items():
             entry = io.BytesIO()
             np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
             about = zipfile.ZipInfo(f"{name}.npy")  # of no date, unlike those of numpy.savez

@@ -1,0 +1,83 @@
+"""A clip on another rig: the same rig changes nothing, a larger one goes farther in the same way, and feet still stand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contextdb import motion
+from contextdb.errors import MotionError
+
+MADE = motion.make_clip("walk")
+CLIP, RIG = MADE.clip, MADE.clip.skeleton
+POSES = motion.poses_of(CLIP)
+
+
+def scaled(rig: motion.Skeleton, all_by: float, legs_by: float = 1.0) -> motion.Skeleton:
+    """A rig of other lengths; its legs are longer or shorter than the rest by a factor."""
+    offsets = rig.offsets * all_by
+    for bone in ("LeftLeg", "LeftFoot", "RightLeg", "RightFoot"):
+        offsets[rig.index(bone)] *= legs_by
+    return replace(rig, offsets=offsets)
+
+
+def without(rig: motion.Skeleton, bone: str) -> motion.Skeleton:
+    """A rig without one bone: its children hang on its parent."""
+    gone = rig.index(bone)
+    kept = [joint for joint in range(rig.n_joints) if joint != gone]
+    parents = [rig.parents[gone] if rig.parents[joint] == gone else rig.parents[joint] for joint in kept]
+    places = {joint: at for at, joint in enumerate(kept)}
+    offsets = np.array([rig.offsets[j] + (rig.offsets[gone] if rig.parents[j] == gone else 0.0) for j in kept])
+    return motion.Skeleton(
+        tuple(rig.names[joint] for joint in kept),
+        np.array([places.get(int(parent), -1) for parent in parents], np.int64),
+        offsets,
+        tuple(rig.channels[joint] for joint in kept),
+    )
+
+
+def test_on_its_own_rig_a_clip_stays_what_it_is():
+    again = motion.poses_of(motion.retargeted(CLIP, RIG))
+    np.testing.assert_allclose(again.positions, POSES.positions, atol=1e-6)
+
+
+def test_on_a_rig_twice_as_large_all_is_twice_as_large():
+    again = motion.poses_of(motion.retargeted(CLIP, scaled(RIG, 2.0)))
+    np.testing.assert_allclose(again.positions, 2.0 * POSES.positions, atol=1e-6)
+
+
+@pytest.mark.parametrize("legs_by", [0.8, 1.2])
+def test_with_other_legs_the_feet_stand_where_those_of_the_clip_do_by_scale(legs_by):
+    again = motion.poses_of(motion.retargeted(CLIP, scaled(RIG, 1.0, legs_by)))
+    for bone in ("LeftFoot", "RightFoot"):
+        ankle = RIG.index(bone)
+        np.testing.assert_allclose(again.positions[:, ankle], legs_by * POSES.positions[:, ankle], atol=0.01)
+        for begin, end in MADE.footfalls.down[bone]:
+            frames = slice(int(np.ceil(begin * 30.0)), int(end * 30.0) + 1)
+            assert np.ptp(again.positions[frames, ankle], axis=0).max() < 0.01
+    lengths = np.linalg.norm(again.positions[:, 1:] - again.positions[:, RIG.parents[1:]], axis=-1)
+    assert np.ptp(lengths, axis=0).max() < 1e-9
+
+
+def test_what_a_bone_turned_that_the_rig_has_not_is_in_the_bone_below_it():
+    rig = without(RIG, "Spine")
+    again = motion.poses_of(motion.retargeted(CLIP, rig))
+    chest = again.rotations[:, rig.index("Chest")], POSES.rotations[:, RIG.index("Chest")]
+    assert np.abs((chest[0] * chest[1]).sum(axis=-1)).min() > 1.0 - 1e-9
+
+
+def test_bones_of_other_names_are_named():
+    rig = replace(RIG, names=tuple("Pelvis" if name == "Hips" else name for name in RIG.names))
+    with pytest.raises(MotionError, match='no bone for "Pelvis" of the rig'):
+        motion.retargeted(CLIP, rig)
+    again = motion.poses_of(motion.retargeted(CLIP, rig, names={"Pelvis": "Hips"}))
+    np.testing.assert_allclose(again.positions, POSES.positions, atol=1e-6)
+    with pytest.raises(MotionError, match="Did you mean"):
+        motion.retargeted(CLIP, rig, names={"Pelvis": "Hip"})
+
+
+def test_a_rig_without_legs_is_refused():
+    with pytest.raises(MotionError):
+        motion.retargeted(CLIP, motion.Skeleton(("Hips",), np.array([-1]), np.zeros((1, 3)), (("Xposition",),)))

@@ -517,6 +517,8 @@ class AssetsPane(Pane):
             if answer.column is not None:
                 self.go_to_column(answer.column)
             self._show_columns("")
+            if answer.wants_sheet:
+                self.call_later(self.run_action, "screen.column_sheet")
 
         self.app.push_screen(ColumnsDialog(self.sheet), decided)
 

@@ -62,8 +62,8 @@ CELL_MENU = (
     "enable", "filter-same", "values", "nearest",
 )  # fmt: skip
 COLUMN_MENU = (
-    "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "mend-all", "rename-column", "add-column",
-    "column-left", "column-right", "delete-columns",
+    "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "column-sheet", "mend-all", "rename-column",
+    "add-column", "column-left", "column-right", "delete-columns",
 )  # fmt: skip
 """What the right button of the mouse offers."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
@@ -386,6 +386,18 @@ class MainScreen(Screen[None]):
 
         sheet = self.session.sheet
         self.app.push_screen(AddColumn(sheet.table, sheet.selection.column), self._answered)
+
+    def action_column_sheet(self) -> None:
+        """Change what contextdb.toml says of all columns, in a sheet; as one step."""
+        from tui.screens.column_sheet import ColumnSheetDialog
+
+        sheet = self.session.sheet
+
+        def decided(edit: Edit | None) -> None:
+            if edit is not None:
+                self.apply(edit)
+
+        self.app.push_screen(ColumnSheetDialog(sheet.table, sheet.selection.column, self.clipboard), decided)
 
     @on(RenameWanted)
     def _rename(self, event: RenameWanted) -> None:

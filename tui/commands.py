@@ -211,6 +211,8 @@ _OF_SCREEN = (
     Command("export", "", "Export", "Write the table for Excel or other tools.", "File", "export"),
     Command("history", "alt+z", "Undo history", "Every step; go back to any of them.", "Edit", "history"),
     Command("add-column", "alt+c", "Add column", "Add a condition or another column.", "Columns", "add_column"),
+    Command("rename-role", "", "Rename role", "Give the role of the column another name, everywhere.", "Columns", "rename_role"),
+    Command("rename-asset", "", "Rename asset", "Give the asset of the row another name, everywhere.", "Rows", "rename_asset"),
     Command("column-sheet", "", "Sheet of columns", "Types, units, values, outputs of all columns.", "Columns", "column_sheet"),
     Command("blueprints", "", "Blueprints", "Sets of columns to reuse.", "Columns", "blueprints"),
     Command("contexts", "f9", "Contexts", "Load a saved or recorded context.", "Test row", "contexts", in_footer=True),

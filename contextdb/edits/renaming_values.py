@@ -101,7 +101,7 @@ def value_renaming(table: Table, condition: str, old: str, new: str) -> Renaming
     for name, path in table_files(folder, schema):
         file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
         files += _rewritten_table(file, condition, old, new)
-    files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda said: _change(said, condition, old, new), None)
+    files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda said: _change(said, condition, old, new), {})
     return Renaming(old, new, tuple(files))
 
 
@@ -158,7 +158,8 @@ def _case_facts(table: Path, condition: str) -> Iterator[str]:
             yield from column.to_list()
 
 
-def _mapped(column: TextColumn, texts: Mapping[str, str]) -> TextColumn:
+def mapped(column: TextColumn, texts: Mapping[str, str]) -> TextColumn:
+    """A column with other texts; the same one where none of it is."""
     if all(texts.get(text, text) == text for text in column.texts):
         return column
     return TextColumn.of(column.name, [texts.get(text, text) for text in column.to_list()])
@@ -170,16 +171,16 @@ def _rewritten_table(file: TableFile, condition: str, old: str, new: str) -> Ite
     columns = []
     for column in file.columns:
         if column.name == condition and file.has_condition(condition):
-            columns.append(_mapped(column, {text: with_value(text, old, new) for text in column.texts}))
+            columns.append(mapped(column, {text: with_value(text, old, new) for text in column.texts}))
         elif rules is not None and column.name == rules.name:
-            columns.append(_mapped(column, {text: _with_text(text, condition, old, new) for text in column.texts}))
+            columns.append(mapped(column, {text: _with_text(text, condition, old, new) for text in column.texts}))
         else:
             columns.append(column)
     yield from rewritten(file.path, file.source, file.columns, columns)
     cases = cases_path(file.path)
     if cases.is_file() and condition not in CASE_COLUMNS:
         source, found = read_texts(cases)
-        after = [_mapped(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in found]
+        after = [mapped(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in found]
         yield from rewritten(cases, source, found, after)
 
 

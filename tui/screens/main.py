@@ -15,9 +15,7 @@ from textual.screen import Screen
 from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
-from contextdb.edits.renaming import Uses, uses_of
-from contextdb.edits.renaming_values import ValueUses, value_uses
-from contextdb.errors import ContextDBError, in_quotes, plural, some
+from contextdb.errors import ContextDBError, in_quotes, plural
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.clipboard import Clipboard
@@ -41,6 +39,7 @@ from tui.screens.asking import TestRow
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
 from tui.screens.export_table import Export
 from tui.screens.following import Followed, Following
+from tui.screens.renames import Renames
 from tui.screens.steps import StepsDialog
 from tui.widgets.bar import Bar, Item, StatusLine
 from tui.widgets.grid import Grid
@@ -59,11 +58,11 @@ class Answer(Protocol):
 TABS = ("assets", "options", "priorities", "coverage", "problems")
 CELL_MENU = (
     "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "insert-row", "insert-below", "duplicate", "delete-rows",
-    "enable", "filter-same", "values", "nearest",
+    "enable", "filter-same", "values", "rename-asset", "nearest",
 )  # fmt: skip
 COLUMN_MENU = (
     "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "column-sheet", "mend-all", "rename-column",
-    "add-column", "column-left", "column-right", "delete-columns",
+    "rename-role", "add-column", "column-left", "column-right", "delete-columns",
 )  # fmt: skip
 """What the right button of the mouse offers."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
@@ -94,6 +93,7 @@ class MainScreen(Screen[None]):
         self.coverage = CoverageRun()
         self.test_row = TestRow(self)
         self.following = Following(self)
+        self.renames = Renames(self)
         self.came_from = ""
         """The table from a row of which this one was gone into."""
         self.renamed = ""
@@ -166,7 +166,8 @@ class MainScreen(Screen[None]):
         self.say(event.text, event.level)
 
     @on(Edited)
-    def _edited(self, event: Edited) -> None:
+    def edited(self, event: Edited) -> None:
+        """Show the sheet again, and say what was done."""
         done = event.done
         text = " ".join([f"{done.name}." if done.name else "", *done.notes, *done.warnings]).strip()
         self.say(text, "warning" if done.warnings else "information")
@@ -235,7 +236,7 @@ class MainScreen(Screen[None]):
 
         def chosen(position: int | None) -> None:
             if position is not None:
-                self._edited(Edited(self.session.sheet.go_to_step(position)))
+                self.edited(Edited(self.session.sheet.go_to_step(position)))
 
         self.app.push_screen(StepsDialog(history.names, history.position), chosen)
 
@@ -401,61 +402,23 @@ class MainScreen(Screen[None]):
 
     @on(RenameWanted)
     def _rename(self, event: RenameWanted) -> None:
-        """Rename a column; where others speak of its condition, ask whether they go along."""
-        sheet, old, new = self.session.sheet, event.old, event.new
-        uses = uses_of(sheet.table, old) if sheet.path is not None and old in sheet.query.wanted.conditions else Uses()
-        if not uses.text:
-            self.try_to(lambda: self._edited(Edited(sheet.rename_column(new))))
-            return
-        written = (
-            "A rename is written to the files at once, and earlier steps can then no longer be undone. To undo it, rename back."
-        )
-        lines = ["Rename everywhere: in all that uses it"]
-        lines += [f"Only here: this table, its rules and saved contexts; others keep {old}"] if uses.is_elsewhere else []
-
-        def chosen(at: int | None) -> None:
-            if at is not None and at < len(lines):
-                self.try_to(lambda: self._rename_files(old, new, at == 1))
-
-        title, about = f"Rename {old} to {new}", f"{old} is used by {uses.text}.\n{written}"
-        self.app.push_screen(ChooseDialog(title, [*lines, "Cancel"], about=about), chosen)
+        self.renames.column(event)
 
     @on(ValueRenameWanted)
     def _rename_value(self, event: ValueRenameWanted) -> None:
-        """Rename a value; where others speak of it, ask whether they go along."""
-        sheet, old, new = self.session.sheet, event.old, event.new
-        condition = next((c.condition for c in sheet.table.conditions if c.condition.name == event.column), None)
-        is_declared = condition is not None and condition.is_declared and old in (condition.domain.values or ())
-        uses = value_uses(sheet.table, event.column, old) if is_declared else ValueUses()
-        if not uses.text:
-            self.try_to(lambda: self._edited(Edited(sheet.rename_value(old, new))))
-            return
-        lines = [
-            "Rename everywhere: in all that uses it, written to the files at once",
-            f"Only here: the cells of this table; {old} stays a value for others",
-            "Cancel",
-        ]
+        self.renames.value(event)
 
-        def chosen(at: int | None) -> None:
-            if at == 0:
-                self.try_to(lambda: self._rename_value_files(event))
-            elif at == 1:
-                self.try_to(lambda: self._edited(Edited(sheet.rename_value(old, new, keeps_old=True))))
+    @on(Grid.RenameUndoWanted)
+    def _undo_rename(self, event: Grid.RenameUndoWanted) -> None:
+        self.renames.undo(event.is_redo)
 
-        named = f"\nTables: {', '.join(uses.tables)}." if uses.tables else ""
-        about = f"{old} of {event.column} is used by {uses.text}.{named}"
-        self.app.push_screen(ChooseDialog(f"Rename {old} to {new}", lines, about=about), chosen)
+    def action_rename_role(self) -> None:
+        """Give the role of the cursor's column another name."""
+        self.renames.role()
 
-    def _rename_value_files(self, event: ValueRenameWanted) -> None:
-        files = self.workspace.rename_value(self.table_name, event.column, event.old, event.new)
-        self.app.open_table(self.table_name)
-        self.app.say_renamed(f"Renamed {event.old} to {event.new} everywhere, in {some(files)}. To undo it, rename it back.")
-
-    def _rename_files(self, old: str, new: str, only_here: bool) -> None:
-        files = self.workspace.rename(self.table_name, old, new, only_here)
-        self.app.open_table(self.table_name)
-        where = "here" if only_here else "everywhere"
-        self.app.say_renamed(f"Renamed {old} to {new} {where}, in {some(files)}. To undo it, rename it back.")
+    def action_rename_asset(self) -> None:
+        """Give the asset of the cursor's row another name."""
+        self.renames.asset()
 
     def action_blueprints(self) -> None:
         """Insert the conditions of a blueprint, or keep the selected ones as one."""
@@ -480,7 +443,7 @@ class MainScreen(Screen[None]):
 
         def made() -> None:
             done = self.session.sheet.apply(edit)
-            self._edited(Edited(replace(done, warnings=(*done.warnings, *notes))))
+            self.edited(Edited(replace(done, warnings=(*done.warnings, *notes))))
 
         self.try_to(made)
 
@@ -582,7 +545,7 @@ class MainScreen(Screen[None]):
     def _fill_gap(self, event: FillGap) -> None:
         sheet = self.session.sheet
         done = sheet.insert_rows(below=True, texts=[dict(event.cells)])
-        self._edited(Edited(done))
+        self.edited(Edited(done))
         self.go_to_cell(GoToCell(sheet.row_number(sheet.cursor[0]) - 1, sheet.table.asset_column))
         self.say("A new row fills the gap: enter its asset.")
 

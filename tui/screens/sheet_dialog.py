@@ -154,6 +154,11 @@ class SheetDialog(Dialog[Answer]):
         event.stop()
         self.grid.paste(self.clipboard.paste())
 
+    @on(Grid.RenameUndoWanted)
+    def _nothing_to_undo(self, event: Grid.RenameUndoWanted) -> None:
+        event.stop()
+        self.show_sheet(f"There is nothing to {'redo' if event.is_redo else 'undo'}.")
+
     @on(Edited)
     def _edited(self, event: Edited) -> None:
         event.stop()

@@ -57,6 +57,12 @@ class Grid(GridView, can_focus=True):
         """The row of the file, from 0."""
 
     @dataclass
+    class RenameUndoWanted(Message):
+        """There is no step of the table: take back a rename that was written to files, or make it again."""
+
+        is_redo: bool
+
+    @dataclass
     class CopyWanted(Message):
         """Put a text on the clipboard."""
 
@@ -260,7 +266,11 @@ class Grid(GridView, can_focus=True):
     def action_undo(self, is_redo: bool) -> None:
         """Undo, or redo: in the test row a fact, else a step of the table."""
         if not self.is_in_test_row:
-            self._do(self.sheet.redo if is_redo else self.sheet.undo)
+            history = self.sheet.history
+            if (history.redo_name if is_redo else history.undo_name) is None:
+                self.post_message(self.RenameUndoWanted(is_redo))
+            else:
+                self._do(self.sheet.redo if is_redo else self.sheet.undo)
             return
         verb = "redo" if is_redo else "undo"
         name = self.sheet.undo_fact(is_redo)

@@ -18,6 +18,7 @@ from contextdb.tables.table import Table
 from tui.commands import BY_ID, COMMANDS, bindings, key_names
 from tui.editor import Editor
 from tui.editor_settings import EditorSettings
+from tui.messages import GoToCell
 from tui.model.conflicted import conflicts_in, write_decided
 from tui.model.importing import Import
 from tui.model.session import Session
@@ -92,6 +93,10 @@ class EditorApp(Editor):
     def say_renamed(self, text: str) -> None:
         """Say on the screen that is shown now that a condition was renamed, also after its next change."""
         self.main.renamed = text
+
+    def go_to_cell(self, place: GoToCell) -> None:
+        """Go to a cell of the table that was just opened, once it is seen."""
+        self.main.call_after_refresh(self.main.go_to_cell, place)
 
     def begun_with(self, answer: Import) -> None:
         """Put rows into the table that was just opened, once it is seen."""

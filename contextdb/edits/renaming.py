@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from contextdb.columns import TextColumn
-from contextdb.disk import ACTORS_SUFFIX, read_bytes, write_atomic
+from contextdb.disk import ACTORS_SUFFIX, NOTES_SUFFIX, read_bytes, write_atomic
 from contextdb.edits.schema_file import schema_path
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
@@ -232,6 +232,22 @@ def rewritten_table(
         renamed = [c.renamed(of_cases[c.name]) if c.name in of_cases else c for c in found]
         _require_free(cases, renamed)
         yield from rewritten(cases, source, found, renamed)
+    yield from rewritten_notes(file.path, "Column", names)
+
+
+def rewritten_notes(table: Path, column: str, names: Mapping[str, str]) -> Iterator[Rewrite]:
+    """The notes on a table with other names in one of their columns."""
+    path = table.with_name(table.stem + NOTES_SUFFIX)
+    if path.is_file():
+        source, found = read_texts(path)
+        yield from rewritten(path, source, found, [with_texts(c, names) if c.name == column else c for c in found])
+
+
+def with_texts(column: TextColumn, texts: Mapping[str, str]) -> TextColumn:
+    """A column with other texts; the same one where none of it is."""
+    if all(texts.get(text, text) == text for text in column.texts):
+        return column
+    return TextColumn.of(column.name, [texts.get(text, text) for text in column.to_list()])
 
 
 def _rewritten_with_actors(file: TableFile, old: str, new: str) -> Iterator[Rewrite]:

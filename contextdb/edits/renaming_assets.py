@@ -13,8 +13,8 @@ from typing import Any
 
 from contextdb.columns import TextColumn
 from contextdb.disk import read_bytes
-from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_toml
-from contextdb.edits.renaming_values import mapped, with_value
+from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_notes, rewritten_toml, with_texts
+from contextdb.edits.renaming_values import with_value
 from contextdb.errors import ContextDBError, Fault, TableError, in_quotes, plural
 from contextdb.files.texts import read_texts
 from contextdb.schema.settings import Schema, TableSettings
@@ -133,17 +133,20 @@ def _rewritten_table(file: TableFile, old: str, new: str) -> Iterator[Rewrite]:
     if assets is not None and old in assets.texts and new in assets.texts:
         found = f"{in_quotes(new)} is an asset of {file.name} already: the two would be one."
         raise TableError(Fault(found, "a name that no asset has yet"))
-    columns = [mapped(c, {old: new}) if c is assets else c for c in file.columns]
+    columns = [with_texts(c, {old: new}) if c is assets else c for c in file.columns]
     yield from rewritten(file.path, file.source, file.columns, columns)
     cases = cases_path(file.path)
     if cases.is_file():
         yield from _rewritten_columns(cases, EXPECTED, None, old, new)
+    yield from rewritten_notes(file.path, "Asset", {old: new})
 
 
 def _rewritten_columns(path: Path, column: str, texts: Mapping[str, str] | None, old: str = "", new: str = "") -> Iterator[Rewrite]:
     """A file with other texts in one column: those of a mapping, or lists of names with one of them renamed."""
     source, found = read_texts(path)
-    after = [mapped(c, texts or {text: with_value(text, old, new) for text in c.texts}) if c.name == column else c for c in found]
+    after = [
+        with_texts(c, texts or {text: with_value(text, old, new) for text in c.texts}) if c.name == column else c for c in found
+    ]
     yield from rewritten(path, source, found, after)
 
 

@@ -25,8 +25,9 @@ from contextdb.edits.renaming import (
     rewritten_table,
     rewritten_toml,
     uses_of,
+    with_texts,
 )
-from contextdb.edits.renaming_values import mapped, with_value
+from contextdb.edits.renaming_values import with_value
 from contextdb.errors import Fault, SchemaError, in_quotes, plural
 from contextdb.schema.settings import Schema, TableSettings
 from contextdb.schema.shapes import wrong_name
@@ -102,7 +103,7 @@ def _rewritten(file: TableFile, names: Mapping[str, str], old: str, new: str) ->
     def slots(column: TextColumn) -> TextColumn:
         if column.name not in SLOT_COLUMNS or column.name not in file.settings.outputs:
             return column
-        return mapped(column, {text: with_value(text, old, new) for text in column.texts})
+        return with_texts(column, {text: with_value(text, old, new) for text in column.texts})
 
     yield from rewritten_table(file, names, slots)
     yield from _rewritten_actors(actors_path(file.path), names, old, new)

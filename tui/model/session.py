@@ -28,6 +28,7 @@ from contextdb.tables.table import Table
 from tui.model.journal import Journal, finish_save, recover, set_aside
 from tui.model.kept_columns import keep_columns, kept_columns
 from tui.model.lock import Holder, Lock
+from tui.model.notes import Notes
 from tui.model.read_only import why_read_only
 from tui.model.schemas import under_schema, with_settings
 from tui.model.sheet import Done, Sheet
@@ -93,6 +94,7 @@ class Session:
         self.sheet = Sheet(self._history.table, self.journal if self.holder is None else None, self._history)
         self._kept_columns = kept_columns(self.path)
         self.sheet.show_columns(self._kept_columns)
+        self.sheet.marks = Notes.beside(self.path)
 
     # ---- what others do
 

@@ -57,8 +57,8 @@ class Answer(Protocol):
 
 TABS = ("assets", "options", "priorities", "coverage", "problems")
 CELL_MENU = (
-    "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "insert-row", "insert-below", "duplicate", "delete-rows",
-    "enable", "filter-same", "values", "rename-asset", "nearest",
+    "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "note", "insert-row", "insert-below",
+    "insert-copied", "duplicate", "delete-rows", "enable", "colour-rows", "filter-same", "values", "rename-asset", "nearest",
 )  # fmt: skip
 COLUMN_MENU = (
     "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "column-sheet", "mend-all", "rename-column",
@@ -446,6 +446,17 @@ class MainScreen(Screen[None]):
             self.edited(Edited(replace(done, warnings=(*done.warnings, *notes))))
 
         self.try_to(made)
+
+    def action_find_everywhere(self) -> None:
+        """Find a text in all tables of the folder, and go to one of its places."""
+        from tui.screens.find_everywhere import FindEverywhere, FoundCell
+
+        def chosen(answer: FoundCell | None) -> None:
+            if answer is not None:
+                self.app.open_table(answer.table)
+                self.app.go_to_cell(GoToCell(answer.row, answer.column))
+
+        self.app.push_screen(FindEverywhere(self.workspace, self.table_name), chosen)
 
     # ---- the test row
 

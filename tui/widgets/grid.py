@@ -412,8 +412,18 @@ class Grid(GridView, can_focus=True):
     def on_mouse_move(self, event: events.MouseMove) -> None:
         self._pointer.move(event)
 
-    def on_mouse_up(self) -> None:
-        self._pointer.release()
+    def on_mouse_up(self, event: events.MouseUp) -> None:
+        self._pointer.release(event)
+
+    def put_down(self, what: str, row: int, column: int) -> None:
+        """Move the selected rows or columns to a place, or fill up to it."""
+        sheet = self.sheet
+        verbs: dict[str, Callable[[], Done]] = {
+            "move rows": lambda: sheet.move_rows_to(row),
+            "move columns": lambda: sheet.move_columns_to(column),
+            "fill": lambda: sheet.fill_to(row, column),
+        }
+        self._do(verbs[what])
 
     def on_click(self, event: events.Click) -> None:
         if event.chain == 2:

@@ -31,14 +31,11 @@ class SmallGrid(Grid):
     has_new_row: ClassVar[bool] = False
 
     class Left(Message):
-        """Esc was pressed with one cell selected."""
+        """Esc was pressed."""
 
     def action_leave(self) -> None:
-        """Back to one cell; from one cell out of the dialog."""
-        if self.sheet.block.n_cells > 1:
-            super().action_leave()
-        else:
-            self.post_message(self.Left())
+        """Out of the dialog, also with several cells selected, as after a paste."""
+        self.post_message(self.Left())
 
 
 class SheetDialog(Dialog[Answer]):
@@ -163,6 +160,7 @@ class SheetDialog(Dialog[Answer]):
     def _edited(self, event: Edited) -> None:
         event.stop()
         done = event.done
+        self.grid.forget_widths()
         self.show_sheet(" ".join([f"{done.name}." if done.name else "", *done.notes, *done.warnings]).strip())
 
     @on(Told)

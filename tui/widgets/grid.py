@@ -371,8 +371,10 @@ class Grid(GridView, can_focus=True):
         elif self.is_in_new_row:
             self._do(lambda: self.sheet.paste_below(text))
             self.goes_to_new_row = False
+            self.forget_widths()
         else:
             self._do(lambda: self.sheet.paste(text))
+            self.forget_widths()
 
     def on_paste(self, event: events.Paste) -> None:
         event.stop()

@@ -170,3 +170,15 @@ def test_a_sorted_view_moves_no_rows(path):
     assets, told = with_editor(path, script)
     assert assets == ["Dodge_v1", "b", "c", "d"]
     assert "sorted" in told
+
+
+def test_a_warning_goes_when_one_goes_on(path):
+    async def script(app, pilot):
+        await press(pilot, "right", "alt+s", "alt+m")
+        warned = said(app)
+        await press(pilot, "down", "down")
+        return warned, said(app)
+
+    warned, after = with_editor(path, script)
+    assert "sorted" in warned
+    assert after == ""

@@ -99,6 +99,10 @@ class MainScreen(Screen[None]):
         self.renamed = ""
         """What is said of a rename, after which the table was opened again."""
         self._said = ("", "information")
+        self._warned_at: tuple[int, int] | None = None
+        """Where the cursor was when a warning of a verb was first seen: the next cell takes it away."""
+        self._is_of_verb = False
+        """What is said, not quietly, is of something that was done."""
         self.care = DiskCare(self, self.session, self.say, self.show)
         self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
 
@@ -154,6 +158,7 @@ class MainScreen(Screen[None]):
     def say(self, text: str, level: str = "information") -> None:
         """Say something in the line over the footer; nothing takes away what was said."""
         is_quiet = level == "information"
+        self._is_of_verb = False
         self.query_one(StatusLine).show(text if is_quiet else "")
         if (text, level) != self._said:
             self._said = (text, level)
@@ -164,6 +169,7 @@ class MainScreen(Screen[None]):
     @on(Told)
     def _told(self, event: Told) -> None:
         self.say(event.text, event.level)
+        self._is_of_verb, self._warned_at = event.level != "information", None
 
     @on(Edited)
     def edited(self, event: Edited) -> None:
@@ -171,12 +177,17 @@ class MainScreen(Screen[None]):
         done = event.done
         text = " ".join([f"{done.name}." if done.name else "", *done.notes, *done.warnings]).strip()
         self.say(text, "warning" if done.warnings else "information")
+        self._is_of_verb, self._warned_at = bool(done.warnings), None
         self.show()
 
     @on(Grid.Moved)
     @on(Grid.FactChanged)
     def _moved(self) -> None:
         self._show_bars()
+        cursor = self.session.sheet.cursor
+        if self._is_of_verb and self._warned_at not in (None, cursor):
+            self.say("")  # one has gone on
+        self._warned_at = cursor
 
     @on(Bar.Pressed)
     async def _pressed(self, event: Bar.Pressed) -> None:

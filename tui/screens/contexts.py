@@ -203,7 +203,8 @@ class ContextsDialog(Dialog[Loaded]):
         return "" if i is None else detail_of(self.contexts, i)
 
     def _keys(self) -> str:
-        named = [("load", "Enter Load"), ("next_without", "F3 No row"), ("open_file", "F4 Open"), ("keep", "F6 Save")]
+        named = [("load", "Enter Load"), *([] if self.contexts.cases else [("next_without", "F3 No row")])]
+        named += [("open_file", "F4 Open"), ("keep", "F6 Save")]
         if self.contexts.cases:
             named += [("update", "F5 Save here"), ("rename", "F2 Rename"), ("delete", "Del Delete")]
         return "   ".join(f"[@click=screen.{action}]{label}[/]" for action, label in named)

@@ -28,10 +28,8 @@ from tui.model.new_table import make_table, name_fault
 from tui.model.session import Session
 from tui.model.workspace import Workspace
 from tui.panes.assets import AssetsPane
-from tui.panes.coverage import CoveragePane
 from tui.panes.options import OptionsPane
 from tui.panes.pane import Pane
-from tui.panes.priorities import PrioritiesPane
 from tui.panes.problems import ProblemsPane
 from tui.panes.why import WIDE
 from tui.screens.ask import AskDialog, ChooseDialog
@@ -226,10 +224,14 @@ class MainScreen(Screen[None]):
         if name == "options":
             return OptionsPane(sheet, id=name)
         if name == "priorities":
+            from tui.panes.priorities import PrioritiesPane  # with all of motion
+
             return PrioritiesPane(sheet, id=name)
         return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
 
-    def _coverage_pane(self, name: str) -> CoveragePane:
+    def _coverage_pane(self, name: str) -> Pane:
+        from tui.panes.coverage import CoveragePane
+
         return CoveragePane(self.session.sheet, self.coverage, lambda: self.following.kept, self.workspace.folder, id=name)
 
     async def action_next_tab(self, by: int) -> None:

@@ -18,7 +18,8 @@ from contextdb.tables.table import Table
 from tui.commands import BY_ID, COMMANDS, bindings, key_names
 from tui.editor import Editor
 from tui.editor_settings import EditorSettings
-from tui.model.conflicted import conflicts_in, write_decided
+from tui.messages import GoToCell
+from tui.model.conflicted import conflicts_in, sides_in, write_decided
 from tui.model.importing import Import
 from tui.model.session import Session
 from tui.model.workspace import Workspace
@@ -40,6 +41,14 @@ class EditorApp(Editor):
     BINDINGS: ClassVar[list[BindingType]] = bindings([BY_ID["palette"]])
     CSS: ClassVar[str] = """
     CommandPalette SearchIcon { display: none; }
+    CommandPalette > Vertical, CommandPalette:dark > Vertical {
+        width: 76; max-width: 96%; height: auto; max-height: 86%; margin-top: 2; padding: 0 1; visibility: visible;
+        background: $surface; border: round $primary;
+    }
+    CommandPalette #--input, CommandPalette #--input.--list-visible { border: none; height: 1; }
+    CommandPalette CommandInput, CommandPalette CommandInput:focus { border: none; height: 1; padding: 0; background: $surface; }
+    CommandPalette #--results { overlay: none; background: $surface; margin: 1 0 0 0; }
+    CommandPalette CommandList, CommandPalette CommandList:focus { border: none; background: $surface; max-height: 60vh; }
     OptionList { min-width: 8; }
     Button.-textual-compact {
         width: auto; min-width: 0; padding: 0 1; margin: 0 1 0 0; background: $panel; text-style: bold;
@@ -92,6 +101,10 @@ class EditorApp(Editor):
     def say_renamed(self, text: str) -> None:
         """Say on the screen that is shown now that a condition was renamed, also after its next change."""
         self.main.renamed = text
+
+    def go_to_cell(self, place: GoToCell) -> None:
+        """Go to a cell of the table that was just opened, once it is seen."""
+        self.main.call_after_refresh(self.main.go_to_cell, place)
 
     def begun_with(self, answer: Import) -> None:
         """Put rows into the table that was just opened, once it is seen."""
@@ -157,8 +170,9 @@ class EditorApp(Editor):
                 return
             write_decided(path, merged.resolved(sides))
             self.open_table(name)
+            self.say_renamed(f"{path.name} is written without marks. git add {path.name} tells git that it is solved.")
 
-        self.push_screen(ConflictsDialog(merged.conflicts, path.name), decided)
+        self.push_screen(ConflictsDialog(merged.conflicts, path.name, sides_in(path)), decided)
 
     def _refused(self, text: str) -> None:
         if any(isinstance(one, MainScreen) for one in self.screen_stack):
@@ -171,7 +185,7 @@ class EditorApp(Editor):
         for command in COMMANDS if has_table else ():
             if command.is_listed and command.id != "palette":
                 keys = key_names(self.settings.keys.get(command.id, command.keys))
-                about = f"{command.about}  {keys[0]}" if keys else command.about
+                about = f"{keys[0] if keys else '':<11} {command.about}"
                 yield SystemCommand(command.label, about, partial(self._run, command.id))
         yield SystemCommand("Theme", "Other colours.", self.action_change_theme)
         yield SystemCommand("Screenshot", "Keep a picture of the screen as SVG.", self.deliver_screenshot)

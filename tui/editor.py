@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 
 from tui.editor_settings import EditorSettings
+from tui.messages import GoToCell
 from tui.model.importing import Import
 from tui.one_key import OneKeyAtATime
 
@@ -30,6 +31,10 @@ class Editor(OneKeyAtATime):
     @abstractmethod
     def say_renamed(self, text: str) -> None:
         """Say on the screen that is shown now that a condition was renamed, also after its next change."""
+
+    @abstractmethod
+    def go_to_cell(self, place: GoToCell) -> None:
+        """Go to a cell of the table that was just opened, once it is seen."""
 
     @abstractmethod
     def begun_with(self, answer: Import) -> None:

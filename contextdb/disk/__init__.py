@@ -26,6 +26,8 @@ CONTEXT_SUFFIXES = (*TABLE_SUFFIXES, ".jsonl")
 """What files of contexts end in: tables, and the lines of a link (see `contextdb.telemetry.link`)."""
 CASES_SUFFIX = ".cases.csv"
 """What the file of a table's saved contexts ends in: no table itself."""
+NOTES_SUFFIX = ".notes.csv"
+"""What the file of the notes on a table ends in: no table itself, either."""
 ACTORS_SUFFIX = ".actors.json"
 """What the file of the actors for a table's roles ends in."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -56,10 +58,10 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def names_a_table(name: str) -> bool:
-    """Whether a file of this name in a folder of tables is a table: no saved contexts, and nothing hidden, as macOS and editors put
-    next to a file."""
+    """Whether a file of this name in a folder of tables is a table: no saved contexts, no notes, and nothing hidden, as macOS and
+    editors put next to a file."""
     folded = name.lower()
-    return folded.endswith(TABLE_SUFFIXES) and not folded.endswith(CASES_SUFFIX) and not folded.startswith(".")
+    return folded.endswith(TABLE_SUFFIXES) and not folded.endswith((CASES_SUFFIX, NOTES_SUFFIX)) and not folded.startswith(".")
 
 
 def write_atomic(path: str | Path, data: Data, was: Was = "any", syncs: bool = True) -> bool:

@@ -217,6 +217,18 @@ def move_column(table: Table, column: str, to: int) -> Edit:
     return Edit(f"Move the column {shown(column)}", (Columns(tuple(layout)),))
 
 
+def move_columns(table: Table, columns: Sequence[str], to: int) -> Edit:
+    """Move columns to before what is now column number `to`; their order among each other stays."""
+    if len(columns) == 1:
+        return move_column(table, columns[0], to)
+    layout = list(_layout(table))
+    _require_place(table, to, len(layout), is_asset=table.asset_column in columns)
+    moved = [pair for pair in layout if pair[0] in columns]
+    before = [pair for pair in layout[:to] if pair not in moved]
+    behind = [pair for pair in layout[to:] if pair not in moved]
+    return Edit(f"Move {plural(len(moved), 'column')}", (Columns((*before, *moved, *behind)),))
+
+
 def rename_column(table: Table, column: str, name: str, keep_declared: bool = True) -> Edit:
     """Give a column another name. What contextdb.toml declares of it holds for the new name, unless that is declared itself.
 

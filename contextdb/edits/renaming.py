@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from contextdb.columns import TextColumn
-from contextdb.disk import ACTORS_SUFFIX, read_bytes, write_atomic
+from contextdb.disk import ACTORS_SUFFIX, NOTES_SUFFIX, read_bytes, write_atomic
 from contextdb.edits.schema_file import schema_path
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
 from contextdb.expressions.names import names_in, with_names
@@ -79,11 +79,16 @@ class Rewrite:
 
 @dataclass(frozen=True)
 class Renaming:
-    """The files of a project under another name of a condition."""
+    """The files of a project under another name of a condition, a value, a role or an asset."""
 
     old: str
     new: str
     files: tuple[Rewrite, ...]
+
+    @property
+    def reversed(self) -> Renaming:
+        """What takes it back."""
+        return Renaming(self.new, self.old, tuple(Rewrite(file.path, file.after, file.before) for file in self.files))
 
     def write(self) -> None:
         """Replace the files.
@@ -95,7 +100,7 @@ class Renaming:
         """
         for file in self.files:
             if read_bytes(file.path) != file.before:
-                fault = Fault("the file was changed while the condition was renamed.", "a file at rest", "to do it again")
+                fault = Fault("the file was changed since the rename was worked out.", "a file at rest", "to do it again")
                 raise FileError(fault.at(Place(str(file.path))))
         for at, file in enumerate(self.files):
             try:
@@ -176,11 +181,11 @@ def renaming(table: Table, old: str, new: str, only_here: bool = False) -> Renam
     for name, path in table_files(folder, on_disk):
         is_own = path.resolve() == table.path.resolve()
         if is_own or not only_here:
-            files += _rewritten_table(TableFile.read(name, path, on_disk.tables.get(name, TableSettings(name))), old, new)
+            files += _rewritten_with_actors(TableFile.read(name, path, on_disk.tables.get(name, TableSettings(name))), old, new)
     own = next((n for n, p in table_files(folder, on_disk) if p.resolve() == table.path.resolve()), table.name)
     if raw:
-        change = (lambda said: _only_here(said, old, new, own)) if only_here else (lambda said: _everywhere(said, old, new))
-        files += rewritten_toml(folder / SCHEMA_FILE, raw, change, (old, new) if not only_here else None)
+        change = (lambda said: only_here_in(said, {old: new}, own)) if only_here else (lambda said: everywhere_in(said, {old: new}))
+        files += rewritten_toml(folder / SCHEMA_FILE, raw, change, {} if only_here else {old: new})
     return Renaming(old, new, tuple(files))
 
 
@@ -213,19 +218,46 @@ def _n_cases(table: Path, condition: str) -> int:
 # ---- files under the new name
 
 
-def _rewritten_table(file: TableFile, old: str, new: str) -> Iterator[Rewrite]:
-    """The table and its saved contexts, where they speak of the condition."""
-    columns = [c.renamed(new) if c.name == old and file.has_condition(old) else c for c in file.columns]
+def rewritten_table(
+    file: TableFile, names: Mapping[str, str], change: Callable[[TextColumn], TextColumn] = lambda column: column
+) -> Iterator[Rewrite]:
+    """The table and its saved contexts, where they speak of conditions, under other names; `change` is of its other columns."""
+    columns = [c.renamed(names[c.name]) if c.name in names and file.has_condition(c.name) else change(c) for c in file.columns]
     _require_free(file.path, columns)
-    columns = [_with_rules(c, old, new) if file.rules is not None and c.name == file.rules.name else c for c in columns]
+    columns = [_with_rules(c, names) if file.rules is not None and c.name == file.rules.name else c for c in columns]
     yield from rewritten(file.path, file.source, file.columns, columns)
-    cases = cases_path(file.path)
-    if cases.is_file() and old not in CASE_COLUMNS:
+    cases, of_cases = cases_path(file.path), {old: new for old, new in names.items() if old not in CASE_COLUMNS}
+    if cases.is_file() and of_cases:
         source, found = read_texts(cases)
-        renamed = [c.renamed(new) if c.name == old else c for c in found]
+        renamed = [c.renamed(of_cases[c.name]) if c.name in of_cases else c for c in found]
         _require_free(cases, renamed)
         yield from rewritten(cases, source, found, renamed)
-    yield from _rewritten_actors(file.path.with_name(file.path.stem + ACTORS_SUFFIX), old, new)
+    yield from rewritten_notes(file.path, "Column", names)
+
+
+def rewritten_notes(table: Path, column: str, names: Mapping[str, str]) -> Iterator[Rewrite]:
+    """The notes on a table with other names in one of their columns."""
+    path = table.with_name(table.stem + NOTES_SUFFIX)
+    if path.is_file():
+        source, found = read_texts(path)
+        yield from rewritten(path, source, found, [with_texts(c, names) if c.name == column else c for c in found])
+
+
+def with_texts(column: TextColumn, texts: Mapping[str, str]) -> TextColumn:
+    """A column with other texts; the same one where none of it is."""
+    if all(texts.get(text, text) == text for text in column.texts):
+        return column
+    return TextColumn.of(column.name, [texts.get(text, text) for text in column.to_list()])
+
+
+def _rewritten_with_actors(file: TableFile, old: str, new: str) -> Iterator[Rewrite]:
+    yield from rewritten_table(file, {old: new})
+    yield from _rewritten_actors(actors_path(file.path), old, new)
+
+
+def actors_path(table: Path) -> Path:
+    """The file of the actors for a table's roles."""
+    return table.with_name(table.stem + ACTORS_SUFFIX)
 
 
 def _rewritten_actors(path: Path, old: str, new: str) -> Iterator[Rewrite]:
@@ -244,8 +276,8 @@ def _rewritten_actors(path: Path, old: str, new: str) -> Iterator[Rewrite]:
         yield Rewrite(path, raw, (json.dumps({**teams, role: renamed}, ensure_ascii=False, indent=2) + "\n").encode())
 
 
-def _with_rules(column: TextColumn, old: str, new: str) -> TextColumn:
-    texts = [text if has_no_rule(text) else with_names(text, {old: new}) for text in column.texts]
+def _with_rules(column: TextColumn, names: Mapping[str, str]) -> TextColumn:
+    texts = [text if has_no_rule(text) else with_names(text, names) for text in column.texts]
     return column if texts == list(column.texts) else TextColumn.of(column.name, [texts[code] for code in column.codes.tolist()])
 
 
@@ -266,35 +298,35 @@ def rewritten(path: Path, source: AnySource, before: Sequence[TextColumn], after
 # ---- contextdb.toml
 
 
-def _everywhere(said: dict[str, Any], old: str, new: str) -> None:
+def everywhere_in(said: dict[str, Any], names: Mapping[str, str]) -> None:
     """Change what the file says, as plain data."""
     conditions = said.get("conditions", {})
-    if old in conditions:
-        said["conditions"] = {new if name == old else name: part for name, part in conditions.items()}
+    if any(name in conditions for name in names):
+        said["conditions"] = {names.get(name, name): part for name, part in conditions.items()}
     for part in said.get("conditions", {}).values():
         if isinstance(part.get("expr"), str):
-            part["expr"] = with_names(part["expr"], {old: new})
+            part["expr"] = with_names(part["expr"], names)
     for part in said.get("tables", {}).values():
-        _assume(part, old, new)
+        _assume(part, names)
     for part in said.get("blueprints", {}).values():
-        part["conditions"] = [new if name == old else name for name in part.get("conditions", [])]
+        part["conditions"] = [names.get(name, name) for name in part.get("conditions", [])]
 
 
-def _only_here(said: dict[str, Any], old: str, new: str, table: str) -> None:
+def only_here_in(said: dict[str, Any], names: Mapping[str, str], table: str) -> None:
+    """Change what the file says of one table; new names are declared as the old ones are."""
     conditions = said.get("conditions", {})
-    if old in conditions and new not in conditions:
-        conditions[new] = deepcopy(conditions[old])
-    _assume(said.get("tables", {}).get(table, {}), old, new)
+    for old, new in names.items():
+        if old in conditions and new not in conditions:
+            conditions[new] = deepcopy(conditions[old])
+    _assume(said.get("tables", {}).get(table, {}), names)
 
 
-def _assume(part: dict[str, Any], old: str, new: str) -> None:
+def _assume(part: dict[str, Any], names: Mapping[str, str]) -> None:
     if "assume" in part:
-        part["assume"] = [with_names(text, {old: new}) for text in part["assume"]]
+        part["assume"] = [with_names(text, names) for text in part["assume"]]
 
 
-def rewritten_toml(
-    path: Path, raw: bytes, change: Callable[[dict[str, Any]], None], moved: tuple[str, str] | None
-) -> Iterator[Rewrite]:
+def rewritten_toml(path: Path, raw: bytes, change: Callable[[dict[str, Any]], None], moved: Mapping[str, str]) -> Iterator[Rewrite]:
     """contextdb.toml with a change; only the keys that say something else are written, and a section that moves keeps its lines."""
     bom = _BOM if raw.startswith(_BOM) else b""
     text = raw.removeprefix(_BOM).decode()
@@ -302,13 +334,12 @@ def rewritten_toml(
     change(wanted)
     if wanted == before:
         return
-    if moved is not None:
-        paths = (("conditions", moved[0]), ("conditions", moved[1]))
-        text = toml_edit.rename_section(text, *paths) or text
+    for old, new in moved.items():
+        text = toml_edit.rename_section(text, ("conditions", old), ("conditions", new)) or text
     for section in ("conditions", "tables", "blueprints"):
         text = _with_section(text, section, tomllib.loads(text).get(section, {}), wanted.get(section, {}))
     if tomllib.loads(text) != wanted:
-        found = "the condition cannot be renamed without changing more of the file."
+        found = "this cannot be renamed without changing more of the file."
         mend = "to rename it in a text editor"
         raise SchemaError(Fault(found, "sections such as [conditions.NAME]", mend, Place(str(path))))
     read_schema(text, str(path))  # refuses what no project can be

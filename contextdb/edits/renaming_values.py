@@ -7,7 +7,7 @@ assumptions. An edge, as `contextdb.edits.renaming`: it reads the files of a fol
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 from contextdb.cells.words import quoted
 from contextdb.columns import TextColumn
 from contextdb.disk import read_bytes
-from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_toml
+from contextdb.edits.renaming import Renaming, Rewrite, TableFile, folder_of, rewritten, rewritten_toml, with_texts
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes, plural
 from contextdb.expressions.faults import Refusal
 from contextdb.expressions.names import names_in
@@ -101,7 +101,7 @@ def value_renaming(table: Table, condition: str, old: str, new: str) -> Renaming
     for name, path in table_files(folder, schema):
         file = TableFile.read(name, path, schema.tables.get(name, TableSettings(name)))
         files += _rewritten_table(file, condition, old, new)
-    files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda said: _change(said, condition, old, new), None)
+    files += rewritten_toml(folder / SCHEMA_FILE, raw, lambda said: _change(said, condition, old, new), {})
     return Renaming(old, new, tuple(files))
 
 
@@ -158,28 +158,22 @@ def _case_facts(table: Path, condition: str) -> Iterator[str]:
             yield from column.to_list()
 
 
-def _mapped(column: TextColumn, texts: Mapping[str, str]) -> TextColumn:
-    if all(texts.get(text, text) == text for text in column.texts):
-        return column
-    return TextColumn.of(column.name, [texts.get(text, text) for text in column.to_list()])
-
-
 def _rewritten_table(file: TableFile, condition: str, old: str, new: str) -> Iterator[Rewrite]:
     """The table and its saved contexts with the value under its other name."""
     rules = file.rules
     columns = []
     for column in file.columns:
         if column.name == condition and file.has_condition(condition):
-            columns.append(_mapped(column, {text: with_value(text, old, new) for text in column.texts}))
+            columns.append(with_texts(column, {text: with_value(text, old, new) for text in column.texts}))
         elif rules is not None and column.name == rules.name:
-            columns.append(_mapped(column, {text: _with_text(text, condition, old, new) for text in column.texts}))
+            columns.append(with_texts(column, {text: _with_text(text, condition, old, new) for text in column.texts}))
         else:
             columns.append(column)
     yield from rewritten(file.path, file.source, file.columns, columns)
     cases = cases_path(file.path)
     if cases.is_file() and condition not in CASE_COLUMNS:
         source, found = read_texts(cases)
-        after = [_mapped(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in found]
+        after = [with_texts(c, {text: with_value(text, old, new) for text in c.texts}) if c.name == condition else c for c in found]
         yield from rewritten(cases, source, found, after)
 
 

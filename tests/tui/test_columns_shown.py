@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from terminal import press, said, screen_text, with_editor
 
 from tui.model.columns_shown import ColumnsShown, prefix_of
+from tui.model.kept_columns import kept_columns, kept_path
 from tui.model.layout import layout
+from tui.model.session import Session
 
 NAMES = ["Asset", "Defender.Depth", "Defender.Facing", "gait", "Catcher.Depth", "Defender.Late"]
 RAW = ",".join(NAMES) + "\na,CB,True,Walk,1,x\nb,FS,Any,Run,2,y\n"
@@ -146,3 +148,24 @@ def test_problems_go_to_a_hidden_column_and_show_it(path):
         return app.main.session.sheet.cursor
 
     assert with_editor(path, script) == (1, 3)
+
+
+def test_what_is_hidden_folded_and_frozen_is_kept_for_the_next_time(path):
+    wanted = ColumnsShown(frozenset(["gait"]), frozenset(["Defender."]), "Defender.Depth")
+    session = Session(path)
+    session.sheet.show_columns(wanted)
+    session.close()
+    again = Session(path)
+    kept, cursor = again.sheet.columns_shown, again.sheet.cursor
+    again.sheet.show_columns(ColumnsShown())
+    again.close()
+    assert (kept, cursor) == (wanted, (0, 0))
+    assert not kept_path(path).exists()
+    assert path.read_text() == RAW
+
+
+@pytest.mark.parametrize("raw", [b"no", b"[]", b'{"hidden": 3}', b"\xff"])
+def test_a_file_of_kept_columns_that_is_none_hides_nothing(path, raw):
+    kept_path(path).parent.mkdir()
+    kept_path(path).write_bytes(raw)
+    assert kept_columns(path) == ColumnsShown()

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from terminal import press, said, screen_text, with_editor
 
 from contextdb.errors import TableError
-from tui.model.conflicted import conflicts_in, write_decided
+from tui.model.conflicted import conflicts_in, sides_in, write_decided
 from tui.model.session import Session
 
 RAW = b"Asset,speed\r\nwalk,0..5\r\n<<<<<<< HEAD\r\nrun,1..2\r\n=======\r\nrun,3..4\r\n>>>>>>> other\r\njump,\r\n"
@@ -42,3 +43,20 @@ def test_a_file_without_marks_or_without_tables_between_them_has_no_choices(path
 def test_a_file_that_is_not_there_has_no_choices(path):
     path.unlink()
     assert conflicts_in(path) is None
+
+
+def test_the_sides_are_called_as_git_calls_them(path):
+    assert sides_in(path) == ("Ours (HEAD)", "Theirs (other)")
+
+
+def test_the_editor_asks_in_gits_words_and_says_what_git_wants_then(path):
+    async def script(app, pilot):
+        asked = screen_text(app)
+        await press(pilot, "right", "enter")
+        return asked, said(app)
+
+    asked, told = with_editor(path, script, (110, 30))
+    assert "The file holds a merge conflict" in asked
+    assert "Theirs (other)" in asked
+    assert "changed on both sides" in asked
+    assert "git add t.csv" in told

@@ -303,6 +303,15 @@ def test_a_recording_that_goes_away_while_it_is_shown_is_told(table: Table, reco
     assert app.answer == "none yet"
 
 
+def test_a_recording_says_how_many_rows_are_valid_and_f3_goes_to_a_moment_without_one(table: Table, tmp_path: Path):
+    (tmp_path / "few.csv").write_text("speed,gait\n1,Walk\n1,Walk\n-5,Walk\n1,Walk\n")
+    app = Stage(table, contexts=ContextList.open(tmp_path / "few.csv", table))
+    text = pressed(app, "f3")
+    assert app.chosen == 2
+    assert "none" in next(line for line in text.splitlines() if "row 3" in line)
+    assert "No further one" in pressed(Stage(table, contexts=ContextList.open(tmp_path / "few.csv", table)), "f3", "f3")
+
+
 # ---- room
 
 

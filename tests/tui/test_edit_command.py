@@ -134,3 +134,9 @@ def test_a_terminal_of_few_colours_shows_its_own(monkeypatch, term, colorterm, s
     monkeypatch.setenv("TERM", term)
     monkeypatch.setenv("COLORTERM", colorterm)
     assert _theme_for(EditorSettings(theme=settings_theme)) == theme
+
+
+def test_the_editor_starts_without_what_the_first_screen_does_not_need(tmp_path):
+    code = "import sys, tui.app; print([m for m in sys.modules if m.startswith(('contextdb.motion', 'numba', 'openpyxl'))])"
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", check=True)
+    assert run.stdout.strip() == "[]"

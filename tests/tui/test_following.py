@@ -341,9 +341,14 @@ def test_a_recording_is_opened_played_and_scrubbed(path):
             await press(pilot, "f8")
             seen.append(app.main.session.sheet.query.texts["speed"])
         await press(pilot, "alt+8")
-        return [*seen, app.main.session.sheet.query.texts["speed"], screen_text(app)]
+        seen += [app.main.session.sheet.query.texts["speed"], screen_text(app)]
+        await press(pilot, "alt+4", "l")
+        pane = app.main._pane("coverage")
+        await until(pilot, lambda: not pane.played.reading)
+        return [pane.played.result.headline, *seen]
 
-    *speeds, screen = with_editor(path, script, (100, 24))
+    headline, *speeds, screen = with_editor(path, script, (100, 24))
+    assert headline.startswith("the recording s.jsonl · player: 100 % of 4 recorded moments")
     assert speeds == ["0.5", "1.5", "2.5", "3.5", "0.5"]
     assert "s.jsonl · player" in screen
 

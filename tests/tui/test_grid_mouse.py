@@ -170,10 +170,10 @@ def test_a_click_on_a_row_number_selects_the_row_and_a_drag_more_of_them(path):
         x = app.main.assets.grid.content_region.x
         await click(pilot, (x, at(app, 3, 0)[1]))
         one = block(app)
-        await drag(pilot, (x, at(app, 3, 0)[1]), (x, at(app, 5, 0)[1]))
+        await drag(pilot, (x, at(app, 4, 0)[1]), (x, at(app, 6, 0)[1]))
         return one, block(app)
 
-    assert with_editor(path, script) == (Block(3, 0, 4, 3), Block(3, 0, 6, 3))
+    assert with_editor(path, script) == (Block(3, 0, 4, 3), Block(4, 0, 7, 3))
 
 
 def test_the_sign_of_a_header_sorts_up_then_down_then_as_in_the_file(path):

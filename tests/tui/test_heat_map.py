@@ -64,11 +64,12 @@ NUMBERS = [str(i) for i in range(10)]
 def test_numbers_stand_in_the_squares_and_the_chosen_one_in_brackets():
     screen = played(MapApp(NAMES[:3], NUMBERS[:3]), "down", "right")
     assert screen.splitlines()[:4] == [
-        "         0    1    2",
-        "name0    0    1    2",
-        "name1   10  [11]  12",
-        "name2   20   21   22",
+        "             0        1        2",
+        "name0        0        1        2",
+        "name1       10      [11]      12",
+        "name2       20       21       22",
     ]
+    assert screen.splitlines()[5].split()[:5] == ["0", "<20", "<40", "<60", "<80"]
 
 
 @pytest.mark.parametrize(
@@ -77,12 +78,12 @@ def test_numbers_stand_in_the_squares_and_the_chosen_one_in_brackets():
         (Square(None), "·", "none"),
         (Square(0.0, 0.0, 0.0), "0", "empty"),
         (Square(1.0, 1.0, 1.0), "100", "full"),
-        (Square(0.999, 0.999, 0.999), ">99", "high"),
-        (Square(0.001, 0.001, 0.001), "<1", "low"),
-        (Square(0.5, 0.5, 0.5), "50", "middle"),
-        (Square(0.0, 0.0, 0.031), "<4", "low"),
-        (Square(1.0, 0.969, 1.0), ">96", "high"),
-        (Square(0.42, 0.3, 0.6), "42", "low"),
+        (Square(0.999, 0.999, 0.999), ">99", "step-4"),
+        (Square(0.001, 0.001, 0.001), "<1", "step-0"),
+        (Square(0.5, 0.5, 0.5), "50", "step-2"),
+        (Square(0.0, 0.0, 0.031), "<4", "step-0"),
+        (Square(1.0, 0.969, 1.0), ">96", "step-4"),
+        (Square(0.42, 0.3, 0.6), "42", "step-2"),
     ],
 )
 def test_a_square_says_0_or_100_only_where_that_is_known(square, text, level):

@@ -94,18 +94,19 @@ def test_a_file_that_is_not_there_is_said(path, name):
 
 def test_the_last_minute_of_a_game_is_read_too(path):
     moments = [Moment(i / 30, {"speed": speed, "gait": gait}, 0, 0) for i, (speed, gait) in enumerate(MOMENTS)]
+    with_actors = Moment(9.0, {"speed": 1.0}, 0, 0, actors={"Defender": [{"id": 1}]})
 
     async def script(app, pilot):
         await press(pilot, "alt+4", "l")
         nobody = said(app)
         pane = app.main._pane("coverage")
-        pane.live = lambda: ("game · player", moments)
+        pane.live = lambda: ("the last minute of game · player", lambda: [*moments, with_actors])
         await press(pilot, "l")
         await until(pilot, lambda: not pane.played.reading)
         return nobody, screen_text(app), pane.played.result
 
     nobody, screen, result = with_editor(path, script, (120, 30))
-    assert "No game is followed" in nobody
-    assert "the last minute of game · player: 50.00 % of 6 recorded moments" in screen
+    assert "No game and no recording is followed" in nobody
+    assert "the last minute of game · player (1 moment with actors left out): 50.00 % of 6 recorded moments" in screen
     plain = observe(cdb.load(path), path.with_name("play.csv")).to_json()
     assert json.dumps(result.observed.to_json()["gaps"]) == json.dumps(plain["gaps"])

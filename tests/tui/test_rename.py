@@ -6,6 +6,7 @@ import pytest
 from terminal import press, said, screen_text, with_editor
 from test_renaming import FILES, texts, write
 
+from contextdb.edits.renaming import renaming
 from contextdb.errors import TableError
 from tui.model.workspace import Workspace
 
@@ -47,15 +48,19 @@ def test_a_rename_is_written_at_once_keeps_the_test_row_and_says_how_to_take_it_
         await press(pilot, *keys)
         sheet = app.main.session.sheet
         found = said(app), sheet.query.texts, sheet.query.n_valid, sheet.is_modified
-        await press(pilot, "ctrl+z")
-        return found, said(app)
+        now = texts(folder)
+        await press(pilot, "ctrl+z", "ctrl+z")
+        nothing = said(app)
+        await press(pilot, "ctrl+y", "ctrl+z")
+        return found, said(app), now, nothing
 
-    (told, facts, n_valid, is_modified), undone = with_editor(folder / "a.csv", script)
+    (told, facts, n_valid, is_modified), undone, now, nothing = with_editor(folder / "a.csv", script)
+    assert nothing == "There is nothing to undo."
+    assert {name: text for name, text in texts(folder).items() if name in FILES} == FILES
     assert told.startswith("Renamed speed to velocity")
-    assert "rename it back" in told
+    assert "Ctrl+Z takes it back" in told
     assert (facts, n_valid, is_modified) == ({"velocity": "5", "target": "1"}, 1, False)
-    assert undone == "There is nothing to undo."
-    now = texts(folder)
+    assert undone == "Undo: Rename speed to velocity."
     assert now["contextdb.toml"].count("[conditions.speed]") == toml - 1
     assert ("velocity" in now["b.csv"]) == (toml == 1)
 
@@ -66,7 +71,7 @@ def test_a_rename_with_unsaved_edits_asks_to_save_first(folder):
     session.sheet.go(0, 0)
     session.sheet.type_text("sprint")
     with pytest.raises(TableError, match="unsaved edits"):
-        workspace.rename("a", "speed", "velocity")
+        workspace.rename("a", renaming(session.sheet.table, "speed", "velocity"), {})
     assert texts(folder)["b.csv"] == FILES["b.csv"]
     workspace.close()
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from contextdb.disk import read_bytes, write_atomic
-from contextdb.edits.diffing.markers import versions_of
+from contextdb.edits.diffing.markers import names_of, versions_of
 from contextdb.errors import ContextDBError
 from contextdb.tables.merging.merging import Merge, merge
 from contextdb.tables.merging.reading import merged_bytes, table_of
@@ -28,6 +28,12 @@ def conflicts_in(path: str | Path) -> Merge[Table] | None:
     except ContextDBError:
         return None
     return merge(base, ours, theirs)
+
+
+def sides_in(path: str | Path) -> tuple[str, str]:
+    """What the marks of a file call its two sides."""
+    ours, theirs = names_of(read_bytes(path))
+    return (f"Ours ({ours})" if ours else "Ours"), (f"Theirs ({theirs})" if theirs else "Theirs")
 
 
 def write_decided(path: str | Path, decided: Merge[Table]) -> None:

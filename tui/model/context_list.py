@@ -35,7 +35,7 @@ from contextdb.checks.cases import (
 )
 from contextdb.compiled.data import CompiledData
 from contextdb.disk import CASES_SUFFIX
-from contextdb.errors import CellError, ContextError, Fault, Place, TableError, some
+from contextdb.errors import CellError, ContextDBError, ContextError, Fault, Place, TableError, some
 from contextdb.tables.compiling import compile_table
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.table import Table
@@ -280,6 +280,16 @@ class ContextList:
             raise ContextError(*verdict.faults)
         valid = set(verdict.extra)
         return [asset for asset in dict.fromkeys(compiled.assets) if asset in valid]
+
+    def n_valid(self, i: int) -> int | None:
+        """How many rows are valid for a context; None where it, or a table inside, cannot be read."""
+        try:
+            compiled, readable = self.compiled
+            facts = {name: text for name, text in self.facts(i).items() if name in self.conditions}
+            verdict = judge(compiled, Case("", facts, NONE), readable)
+        except ContextDBError:
+            return None
+        return None if verdict.faults else verdict.n_valid
 
     def valid_now(self, facts: Mapping[str, str]) -> str:
         """What `Expected` says for exactly the assets that are valid now; raises ContextError as `valid_assets` does."""

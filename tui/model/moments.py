@@ -104,6 +104,11 @@ class Track(Protocol):
         """When a moment was; that of the nearest one that is kept."""
         ...
 
+    @property
+    def kept(self) -> list[Moment]:
+        """All moments that are kept."""
+        ...
+
 
 class LiveTrack:
     """The last minute of a character. One thread adds moments, others read them."""
@@ -202,6 +207,11 @@ class RecordedTrack:
         except (OSError, ValueError, KeyError):
             return None
         return replace(found, pick=self._picks[at]) if at in self._picks else found
+
+    @property
+    def kept(self) -> list[Moment]:
+        """All moments, as long as the file is there."""
+        return [moment for at in range(self.stop) if (moment := self.moment(at)) is not None]
 
     def time(self, at: int) -> float:
         """When a moment was."""

@@ -14,7 +14,7 @@ from threading import Thread
 import numpy as np
 
 from contextdb.cells.grammar import parse_cell
-from contextdb.errors import ContextDBError, plural
+from contextdb.errors import ContextDBError, Fault, TableError, plural
 from contextdb.tables.nesting.flat import FlatTable
 from contextdb.tables.table import Table
 from contextdb.telemetry import Observed, observe
@@ -64,25 +64,20 @@ class PlayedRun:
 
     def start(self, table: Table, pattern: str, name: str, tell: Callable[[], None]) -> None:
         """Read files, in a thread; `tell` is called there when that is done."""
-        self._turn += 1
-        self.problem, self.reading = "", name
-        self._thread = Thread(target=self._work, args=(self._turn, table, pattern, name, tell), daemon=True)
-        self._thread.start()
+        self._start(table, lambda: (pattern, name), name, tell)
 
-    def start_live(self, table: Table, moments: Sequence[Moment], name: str, tell: Callable[[], None]) -> None:
-        """Read the moments of a game that are kept."""
+    def start_live(self, table: Table, moments: Callable[[], Sequence[Moment]], name: str, tell: Callable[[], None]) -> None:
+        """Read the moments that are kept of a game, or a recording."""
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="contextdb-")
         path = Path(self._folder.name) / LIVE
-        conditions = sorted({fact for moment in moments for fact in moment.facts})
-        tables = {table.name: {"version": None, "conditions": dict.fromkeys(conditions, "")}}
-        lines: list[dict[str, object]] = [{"line": HEADER, "format": FORMAT, "game": name, "pid": 0, "tables": tables}]
-        lines += [
-            {"line": ASK, "t": m.t, "who": None, "table": table.name, "facts": m.facts, "rows": f"{m.rows:x}", "valid": m.n_valid}
-            for m in moments
-        ]
-        path.write_bytes(b"".join(map(dumped, lines)))
-        self.start(table, str(path), name, tell)
+        self._start(table, lambda: (str(path), _kept(path, table, moments(), name)), name, tell)
+
+    def _start(self, table: Table, source: Callable[[], tuple[str, str]], name: str, tell: Callable[[], None]) -> None:
+        self._turn += 1
+        self.problem, self.reading = "", name
+        self._thread = Thread(target=self._work, args=(self._turn, table, source, tell), daemon=True)
+        self._thread.start()
 
     def close(self) -> None:
         """Forget everything."""
@@ -91,8 +86,9 @@ class PlayedRun:
             self._folder.cleanup()
             self._folder = None
 
-    def _work(self, turn: int, table: Table, pattern: str, name: str, tell: Callable[[], None]) -> None:
+    def _work(self, turn: int, table: Table, source: Callable[[], tuple[str, str]], tell: Callable[[], None]) -> None:
         try:
+            pattern, name = source()
             files = context_files(pattern)
             found, problem = _of_file(table, name, files, observe(table.flat(), files)), ""
         except ContextDBError as error:
@@ -100,6 +96,24 @@ class PlayedRun:
         if turn == self._turn:
             self.result, self.problem, self.reading = found or self.result, problem, ""
             tell()
+
+
+def _kept(path: Path, table: Table, moments: Sequence[Moment], name: str) -> str:
+    """Write moments as a recording; gives how they are called. One with actors is left out: it is counted by facts alone."""
+    plain = [moment for moment in moments if not moment.actors]
+    if not plain:
+        why = "each was asked with actors" if moments else "nothing was asked yet"
+        raise TableError(Fault(f"{name} has no moment to count: {why}.", "moments that were asked without actors"))
+    conditions = sorted({fact for moment in plain for fact in moment.facts})
+    tables = {table.name: {"version": None, "conditions": dict.fromkeys(conditions, "")}}
+    lines: list[dict[str, object]] = [{"line": HEADER, "format": FORMAT, "game": name, "pid": 0, "tables": tables}]
+    lines += [
+        {"line": ASK, "t": m.t, "who": None, "table": table.name, "facts": m.facts, "rows": f"{m.rows:x}", "valid": m.n_valid}
+        for m in plain
+    ]
+    path.write_bytes(b"".join(map(dumped, lines)))
+    n_left = len(moments) - len(plain)
+    return f"{name} ({plural(n_left, 'moment')} with actors left out)" if n_left else name
 
 
 def _of_file(table: Table, name: str, files: Sequence[Path], observed: Observed) -> Played:

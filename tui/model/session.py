@@ -26,7 +26,9 @@ from contextdb.tables.project import SCHEMA_FILE, load_table, schema_for
 from contextdb.tables.saving import require_related
 from contextdb.tables.table import Table
 from tui.model.journal import Journal, finish_save, recover, set_aside
+from tui.model.kept_columns import keep_columns, kept_columns
 from tui.model.lock import Holder, Lock
+from tui.model.notes import Notes
 from tui.model.read_only import why_read_only
 from tui.model.schemas import under_schema, with_settings
 from tui.model.sheet import Done, Sheet
@@ -90,6 +92,9 @@ class Session:
         if self.holder is None:
             self._begin_journal()
         self.sheet = Sheet(self._history.table, self.journal if self.holder is None else None, self._history)
+        self._kept_columns = kept_columns(self.path)
+        self.sheet.show_columns(self._kept_columns)
+        self.sheet.marks = Notes.beside(self.path)
 
     # ---- what others do
 
@@ -233,8 +238,11 @@ class Session:
 
     def close(self, keep_journal: bool = False) -> None:
         """Let go of the table. Unsaved edits are gone then, unless the journal is kept for the next time."""
-        if not keep_journal and self.holder is None and self.lock.taken_by() is None:
-            self.journal.discard()
+        if self.holder is None and self.lock.taken_by() is None:
+            if self.sheet.columns_shown != self._kept_columns:
+                keep_columns(self.path, self.sheet.columns_shown)
+            if not keep_journal:
+                self.journal.discard()
         self.lock.release()
 
     # ---- parts

@@ -189,6 +189,58 @@ class Sheet(ShownTable):
         cut = f"{plural(n_cut, 'column')} left out: the sheet ends here. Add columns and paste again."
         return replace(done, warnings=((cut,) if n_cut else ()) + done.warnings)
 
+    def insert_copied(self, text: str) -> Done:
+        """Put tab-separated text into new rows above the selection, from the column of the cursor on."""
+        texts, names = parse_tsv(text), [c.name for c in self.table.columns[self.selection.column :]]
+        if not texts:
+            return Done(notes=("The clipboard is empty.",))
+        done = self.insert_rows(texts=[dict(zip(names, row, strict=False)) for row in texts])
+        n_cut = max(max(map(len, texts)) - len(names), 0)
+        cut = f"{plural(n_cut, 'column')} left out: the sheet ends here."
+        return replace(done, warnings=((cut,) if n_cut else ()) + done.warnings)
+
+    def fill_to(self, row: int, column: int) -> Done:
+        """Fill from the selection down to a row, or right to a column, as the handle at its corner does: a series where the cells
+        name assets or data, or two of them tell a step; else copies."""
+        block = self.block
+        if row >= block.bottom:
+            self._select(self.selection.at(block.top, block.left, self.shape))
+            self._select(self.selection.at(row, block.right - 1, self.shape, extend=True))
+            cells: list[tuple[int, int, str]] = []
+            for at in range(block.left, block.right):
+                texts = [self.text(r, at) for r in range(block.top, block.bottom)]
+                is_step = len(texts) > 1 and tells_step(texts[-2], texts[-1])
+                begun = texts[-2:] if is_step else texts[-1:]
+                n_more = row + 1 - block.bottom
+                is_series = is_step or (len(texts) == 1 and self.condition(at) is None)
+                more = continued(begun, n_more) if is_series else [texts[i % len(texts)] for i in range(n_more)]
+                cells += [(block.bottom + i, at, text) for i, text in enumerate(more)]
+            return self._set(cells, f"Fill {len(cells)} down")
+        if column >= block.right:
+            self._select(self.selection.at(block.top, block.left, self.shape))
+            self._select(self.selection.at(block.bottom - 1, column, self.shape, extend=True))
+            width = block.right - block.left
+            places = [(r, c) for r in range(block.top, block.bottom) for c in range(block.right, column + 1)]
+            filled = [(r, c, self.text(r, block.left + (c - block.left) % width)) for r, c in places]
+            return self._set(filled, f"Fill {len(places)} right")
+        return Done()
+
+    def move_rows_to(self, row: int) -> Done:
+        """Move the selected rows to where a row of the view is; not in a sorted view, as `move_rows`."""
+        self._require_unsorted()
+        block, rows = self.block, self.selected_rows
+        if block.top <= row < block.bottom:
+            return Done()
+        to = int(self.view.rows[row]) + (row >= block.bottom)
+        return self._do(edits.move_rows(self.table, rows, to))
+
+    def move_columns_to(self, column: int) -> Done:
+        """Move the selected columns to where a column is."""
+        block = self.block
+        if block.left <= column < block.right:
+            return Done()
+        return self._do(edits.move_columns(self.table, self.selected_columns, column + (column >= block.right)))
+
     # ---- edits of rows
 
     def append_rows(self, texts: Sequence[Mapping[str, str]]) -> Done:
@@ -223,10 +275,7 @@ class Sheet(ShownTable):
 
     def move_rows(self, down: int) -> Done:
         """Move the selected rows past the next shown row: down 1 or up -1. Not in a sorted view, whose order is not the file's."""
-        if self.view.is_sorted:
-            raise TableError(
-                Fault("the rows are shown sorted.", "the order of the file", "to show them as in the file: Alt+S, again")
-            )
+        self._require_unsorted()
         block, rows = self.block, self.selected_rows
         beside = block.top - 1 if down < 0 else block.bottom
         if not 0 <= beside < len(self.view):
@@ -358,6 +407,12 @@ class Sheet(ShownTable):
         return self._do(edit)
 
     # ---- parts
+
+    def _require_unsorted(self) -> None:
+        if self.view.is_sorted:
+            raise TableError(
+                Fault("the rows are shown sorted.", "the order of the file", "to show them as in the file: Alt+S, again")
+            )
 
     def _went(self, step_of: Callable[[], Step | None], verb: str) -> Done:
         before = self.table

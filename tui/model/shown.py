@@ -29,6 +29,7 @@ from tui.model.alignment import indent_of, shared_end
 from tui.model.asked import Offered
 from tui.model.columns_shown import ColumnsShown
 from tui.model.fact_steps import FactSteps
+from tui.model.notes import Notes
 from tui.model.query_row import QueryRow
 from tui.model.selection import Block, Selection, Shape
 from tui.model.views import Filter, Sort, View, shown_rows
@@ -72,6 +73,8 @@ class ShownTable:
         self.view = View.of(self.table)
         self.columns_shown = ColumnsShown()
         self.version = 0
+        self.marks = Notes()
+        """Notes on cells, and colours of rows."""
         self.played: int | None = None
         """The row of the file that a game which is followed has picked."""
         self._places: dict[str, tuple[TextColumn, int]] = {}
@@ -271,6 +274,13 @@ class ShownTable:
             if at is not None:
                 found[at] = actor
         return found
+
+    def marked(self, row: int, column: int) -> str:
+        """The note on a cell of a row of the file, and the colour of the row, in words."""
+        asset = self.table.columns[self.asset_at][row]
+        note = self.marks.texts.get((asset, self.table.columns[column].name), "")
+        colour = self.marks.colours.get(asset, "")
+        return " · ".join(filter(None, (f"note: {note}" if note else "", f"marked {colour}" if colour else "")))
 
     def said_of(self, row: int) -> str:
         """Who is cast for a row of the file, whether it is picked, and how much is valid of the table that it is for."""

@@ -18,12 +18,11 @@ from contextdb.errors import ContextError, Fault, FileError, Place, in_quotes
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.table import Table
 from contextdb.telemetry.recordings import fact_text
-from tui.model.sheet import Done, Sheet
+from tui.model.roomy_sheet import RoomySheet
 from tui.model.shown import Header
 from tui.model.wanted import wanted_by
 
 NAME = "Actor"
-FIXED = "The facts of a role are columns of the table, and stay as they are here."
 
 
 def roles_of(table: Table) -> dict[str, list[Condition]]:
@@ -36,8 +35,11 @@ def roles_of(table: Table) -> dict[str, list[Condition]]:
     return found
 
 
-class TeamSheet(Sheet):
-    """The actors of one role, being edited. There is always an empty row to write the next one in."""
+class TeamSheet(RoomySheet):
+    """The actors of one role, being edited."""
+
+    fixed = "The facts of a role are columns of the table, and stay as they are here."
+    no_enabling = "Delete the row of an actor who is not to be offered."
 
     def __init__(self, role: str, conditions: Sequence[Condition], rows: Sequence[Mapping[str, str]] = ()) -> None:
         """`rows` are actors as texts, by `NAME` and by the names of the facts."""
@@ -47,8 +49,6 @@ class TeamSheet(Sheet):
         texts = {name: [*(row.get(name, "") for row in rows), ""] for name in names}
         settings = TableSettings(role, asset=NAME, outputs=tuple(self.facts))
         super().__init__(Table.from_columns(texts, settings=settings, name=role))
-        self._room: set[int] = set()
-        """The steps that only added an empty row: they are taken back with the one before."""
 
     def of_column(self, column: int) -> Condition | None:
         """The condition that a column holds facts of."""
@@ -58,10 +58,6 @@ class TeamSheet(Sheet):
         """What stands over a column."""
         found = self.of_column(column)
         return Header(NAME, "name") if found is None else Header(super().header(column).name, found.domain.kind, found.unit)
-
-    def check(self, text: str) -> Fault | None:
-        """What would be wrong with a text in the cell of the cursor."""
-        return self.fault_of(self.selection.column, text) or super().check(text)
 
     def fault_of(self, column: int, text: str) -> Fault | None:
         """Why a text of a column cannot be read."""
@@ -73,36 +69,6 @@ class TeamSheet(Sheet):
         except ContextError as error:
             return error.faults[0]
         return None
-
-    def with_room(self) -> Done:
-        """Add an empty row where the last one is none."""
-        last = self.table.n_rows - 1
-        if last >= 0 and not any(c[last].strip() for c in self.table.columns):
-            return Done()
-        selection = self.selection
-        self.go(max(last, 0), 0)
-        done = self.insert_rows(below=True)
-        self.select(lambda _, shape: selection.within(shape))
-        self._room = {step for step in self._room if step < self.history.position} | {self.history.position}
-        return done
-
-    def undo(self) -> Done:
-        """Take back the last step that a person made."""
-        if self.history.position in self._room:
-            super().undo()
-        return super().undo()
-
-    def delete_columns(self) -> Done:
-        """Nothing: the facts are those of the role."""
-        return Done(notes=(FIXED,))
-
-    def enable_rows(self, is_enabled: bool | None = None) -> Done:
-        """Nothing: whoever is not to be offered is deleted."""
-        return Done(notes=("Delete the row of an actor who is not to be offered.",))
-
-    def move_column(self, right: int) -> Done:
-        """Nothing, too."""
-        return Done(notes=(FIXED,))
 
     @property
     def texts(self) -> list[dict[str, str]]:

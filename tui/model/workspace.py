@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from contextdb.edits.renaming import Renaming, renaming
-from contextdb.edits.renaming_values import value_renaming
+from contextdb.edits.renaming import Renaming
 from contextdb.errors import ContextDBError, Fault, FileError, TableError, some
 from contextdb.tables.nesting.links import Neighbours
 from contextdb.tables.places import table_path
@@ -52,6 +51,10 @@ class Workspace:
             The folder of the path does not exist, or its contextdb.toml cannot be read.
         """
         self.sessions: dict[str, Session] = {}
+        self._renames: list[tuple[Renaming, dict[str, str]]] = []
+        """The renames that were written, each with the names of facts that it changed."""
+        self._n_renamed = 0
+        """So many of them hold now; the others were taken back."""
         self.beginning: Beginning | None = None
         """How to begin, where the path is that of no table."""
         where = _found(path)
@@ -112,28 +115,34 @@ class Workspace:
         del self.sessions[name]
         self.files[other] = path
 
-    def rename(self, name: str, old: str, new: str, only_here: bool = False) -> tuple[str, ...]:
-        """Give a condition of a table another name, in the files of the project or of this table; gives which were written.
+    def rename(self, name: str, found: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
+        """Write a rename into the files of the project; gives which were written. `names`: the other names of facts of test rows.
 
-        The tables whose files are written are opened again: what was edited before cannot be taken back any more.
-
-        Raises
-        ------
-        TableError, SchemaError, FileError
-            A table that is to be written has unsaved edits; else as `contextdb.edits.renaming`. Nothing has changed then.
-        """
-        found = renaming(self.sessions[name].sheet.table, old, new, only_here)
-        return self._write_renaming(name, found, {old: new})
-
-    def rename_value(self, name: str, condition: str, old: str, new: str) -> tuple[str, ...]:
-        """Give a declared value of a condition another name in the files of the project; gives which were written.
+        The tables whose files are written are opened again: what was edited before cannot be taken back any more, but for the
+        rename itself.
 
         Raises
         ------
-        TableError, SchemaError, FileError
-            As of `rename`; else as `contextdb.edits.renaming_values`. Nothing has changed then.
+        TableError, FileError
+            A table that is to be written has unsaved edits, or is read-only; else as `Renaming.write`. Nothing has changed then.
         """
-        return self._write_renaming(name, value_renaming(self.sessions[name].sheet.table, condition, old, new), {})
+        files = self._write_renaming(name, found, names)
+        self._renames = [*self._renames[: self._n_renamed], (found, dict(names))]
+        self._n_renamed += 1
+        return files
+
+    def undo_rename(self, name: str, is_redo: bool = False) -> Renaming | None:
+        """Take the last rename back, or make it again; None where there is none. Errors as of `rename`."""
+        at = self._n_renamed if is_redo else self._n_renamed - 1
+        if not 0 <= at < len(self._renames):
+            return None
+        found, names = self._renames[at]
+        if is_redo:
+            self._write_renaming(name, found, names)
+        else:
+            self._write_renaming(name, found.reversed, {new: old for old, new in names.items()})
+        self._n_renamed += 1 if is_redo else -1
+        return found
 
     def _write_renaming(self, name: str, found: Renaming, names: Mapping[str, str]) -> tuple[str, ...]:
         paths = {file.path.resolve() for file in found.files}

@@ -22,12 +22,13 @@ from tui.model.asked import Offered
 from tui.model.column_values import selection_said
 from tui.model.columns_shown import prefix_of
 from tui.model.find import PatternError, Search
+from tui.model.notes import COLOURS, Notes
 from tui.model.problems import findings_at_once
 from tui.model.sheet import Done, Sheet
 from tui.model.views import CellTest, Filter, Sort
 from tui.panes.pane import Pane
 from tui.panes.why import WhyPane
-from tui.screens.ask import AskDialog
+from tui.screens.ask import AskDialog, ChooseDialog
 from tui.widgets.bar import Bar, CellLine, Item
 from tui.widgets.cell_editor import CellEditor
 from tui.widgets.find_bar import FilterBar, FindBar, SheetBar
@@ -156,7 +157,8 @@ class AssetsPane(Pane):
             self.query_one(CellLine).show(f"new row · {name}", "", "", about or "type or paste here to add rows")
         elif len(sheet.view):
             place = f"row {sheet.row_number(row)} · {name}"
-            said = sheet.said_of(int(sheet.view.rows[row])) or about
+            file_row = int(sheet.view.rows[row])
+            said = " · ".join(filter(None, (sheet.marked(file_row, column), sheet.said_of(file_row)))) or about
             self.query_one(CellLine).show(place, sheet.text(row, column), _short(sheet.fault(row, column)), said)
         else:
             self.query_one(CellLine).show(name, "", "", about)
@@ -371,6 +373,10 @@ class AssetsPane(Pane):
         event.stop()
         self.grid.paste(self.clipboard.paste())
 
+    async def action_insert_copied(self) -> None:
+        """Put what was copied into new rows above the cursor's."""
+        self._try(lambda: self.sheet.insert_copied(self.clipboard.paste()))
+
     # ---- find
 
     def action_find(self) -> None:
@@ -422,6 +428,53 @@ class AssetsPane(Pane):
         """Open the bar."""
         self.query_one(FindBar).remove_class("-open")
         self.query_one(FilterBar).open()
+
+    def action_note(self) -> None:
+        """Ask for a note on the cell of the cursor."""
+        sheet = self.sheet
+        if not len(sheet.view):
+            return
+        row, column = sheet.cursor
+        asset, name = sheet.text(row, sheet.asset_at), sheet.table.columns[column].name
+        before = sheet.marks.texts.get((asset, name), "")
+
+        def noted(text: str | None) -> None:
+            if text is not None and text.strip() != before:
+                self._mark(lambda marks: marks.with_note(asset, name, text), "Note kept." if text.strip() else "Note taken away.")
+
+        question = f"A note on {name} of {asset}, for people; empty takes it away"
+        self.app.push_screen(AskDialog("Note", question, before, lambda _: ""), noted)
+
+    def action_colour_rows(self) -> None:
+        """Ask for a colour of the selected rows."""
+        sheet = self.sheet
+        assets = [sheet.table.columns[sheet.asset_at][row] for row in sheet.selected_rows]
+        words = [*COLOURS, "none"]
+
+        def chosen(at: int | None) -> None:
+            if at is not None:
+                colour = "" if words[at] == "none" else words[at]
+                said = f"{plural(len(assets), 'row')} {f'marked {colour}' if colour else 'without a colour'}."
+                self._mark(lambda marks: marks.with_colour(assets, colour), said)
+
+        if assets:
+            now = sheet.marks.colours.get(assets[0], "none")
+            self.app.push_screen(ChooseDialog("Colour of the rows", words, words.index(now)), chosen)
+
+    def _mark(self, change: Callable[[Notes], Notes], said: str) -> None:
+        """Change the notes as they are on the disk now, so that nobody else's are lost."""
+        sheet = self.sheet
+        if sheet.path is None:
+            return
+        try:
+            marks = change(Notes.beside(sheet.path))
+            marks.write(sheet.path)
+        except ContextDBError as error:
+            self.post_message(Told(str(error), "error"))
+            return
+        sheet.marks = marks
+        self.show()
+        self.post_message(Told(said))
 
     def action_filter_same(self) -> None:
         """Only rows whose cell in this column has the text under the cursor."""
@@ -517,6 +570,8 @@ class AssetsPane(Pane):
             if answer.column is not None:
                 self.go_to_column(answer.column)
             self._show_columns("")
+            if answer.wants_sheet:
+                self.call_later(self.run_action, "screen.column_sheet")
 
         self.app.push_screen(ColumnsDialog(self.sheet), decided)
 

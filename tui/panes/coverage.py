@@ -96,7 +96,7 @@ class CoveragePane(Pane):
         self,
         sheet: Sheet,
         run: CoverageRun,
-        live: Callable[[], tuple[str, list[Moment]] | None] = lambda: None,
+        live: Callable[[], tuple[str, Callable[[], list[Moment]]] | None] = lambda: None,
         folder: Path = Path(),
         *,
         id: str | None = None,  # noqa: A002
@@ -324,10 +324,10 @@ class CoveragePane(Pane):
     def action_read_live(self) -> None:
         """Take the moments of the game that the test row follows."""
         found = self.live()
-        if found is None or not found[1]:
-            self.post_message(Told("No game is followed. Alt+U shows the games that run.", "warning"))
+        if found is None:
+            self.post_message(Told("No game and no recording is followed. Alt+U shows the games that run.", "warning"))
             return
-        self.played.start_live(self.sheet.table, found[1], f"the last minute of {found[0]}", self._tell)
+        self.played.start_live(self.sheet.table, found[1], found[0], self._tell)
         self.action_section(SECTIONS.index("played"))
         self._show_state()
 

@@ -22,6 +22,8 @@ class ColumnsAnswer:
 
     shown: ColumnsShown
     column: str | None = None
+    wants_sheet: bool = False
+    """All of them are to be shown as a sheet, to change what they are."""
 
 
 class ColumnsDialog(Dialog[ColumnsAnswer]):
@@ -31,6 +33,7 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
         Binding("space", "hide", "Hide", show=False),
         Binding("g", "fold", "Fold", show=False),
         Binding("f", "freeze", "Freeze", show=False),
+        Binding("e", "sheet", "Edit", show=False),
     ]
     DEFAULT_CSS = """
     ColumnsDialog {
@@ -40,7 +43,7 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
     }
     """
     title_text = "Columns"
-    keys_text = "Enter go there · Space hide · G fold the group · F freeze · Esc"
+    keys_text = "Enter go there · Space hide · G fold · F freeze · E edit all · Esc"
 
     def __init__(self, sheet: ShownTable) -> None:
         super().__init__()
@@ -93,6 +96,10 @@ class ColumnsDialog(Dialog[ColumnsAnswer]):
     def action_freeze(self) -> None:
         """Freeze up to a column; only the assets where that is so."""
         self._show(replace(self.shown, frozen=None if self.shown.frozen == self._here else self._here))
+
+    def action_sheet(self) -> None:
+        """Change what the columns are."""
+        self.dismiss(ColumnsAnswer(self.shown, self._here, wants_sheet=True))
 
     @on(LineList.Chosen)
     def _chosen(self) -> None:

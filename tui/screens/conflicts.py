@@ -71,8 +71,14 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
     title_text = "The file was changed on disk"
     keys_text = "← mine · → on disk · M D all · Enter merge · Esc cancel"
 
-    def __init__(self, conflicts: Sequence[Conflict], file: str = "") -> None:
+    def __init__(self, conflicts: Sequence[Conflict], file: str = "", sides: tuple[str, str] | None = None) -> None:
+        """`sides`: what the two sides of a merge of git are called; None: the sheet and the disk."""
         super().__init__()
+        self.names = sides or ("Mine", "On disk")
+        self._is_git = sides is not None
+        if self._is_git:
+            self.title_text = "The file holds a merge conflict"
+            self.keys_text = "← ours · → theirs · M D all · Enter merge · Esc cancel"
         self.conflicts = tuple(conflicts)
         self.sides: dict[int, Side] = {}
         self._file = file
@@ -80,11 +86,9 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
     def compose_body(self) -> ComposeResult:
         """How many there are, the list, the texts of the chosen one in full, and what can be clicked."""
         where = f" in {shown(self._file)}" if self._file else ""
-        yield Static(
-            Content(f"{plural(len(self.conflicts), 'place')}{where} changed both here and on disk. Everything else is merged.")
-        )
+        yield Static(Content(f"{plural(len(self.conflicts), 'place')}{where} changed {self._both}. Everything else is merged."))
         columns = [ListColumn("Asset", WHERE_WIDTH, 2), ListColumn("Column", WHERE_WIDTH, 1)]
-        texts = [ListColumn(title, TEXT_WIDTH, 2) for title in ("Before", "Mine", "On disk")]
+        texts = [ListColumn(title, TEXT_WIDTH, 2) for title in ("Before", *self.names)]
         yield ConflictLines([*columns, *texts])
         yield Static(id="conflict-texts")
         yield Static(id="conflict-choices")
@@ -103,6 +107,15 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
     @property
     def _lines(self) -> ConflictLines:
         return self.query_one(ConflictLines)
+
+    @property
+    def _both(self) -> str:
+        return "on both sides" if self._is_git else "both here and on disk"
+
+    @property
+    def _all(self) -> list[tuple[str, str]]:
+        ours, theirs = ("All ours", "All theirs") if self._is_git else ("All mine", "All on disk")
+        return [("take_all('ours')", ours), ("take_all('theirs')", theirs)]
 
     @property
     def n_open(self) -> int:
@@ -173,7 +186,7 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         self._show_texts()
         status = f"{self.n_open:,} of {len(self.conflicts):,} to decide" if self.n_open else "All decided"
         status = f"Decide {self.n_open:,} first" if is_asked else status
-        parts = [("merge", "Merge"), ("take_all('ours')", "All mine"), ("take_all('theirs')", "All on disk"), ("cancel", "Cancel")]
+        parts = [("merge", "Merge"), *self._all, ("cancel", "Cancel")]
         links = "   ".join(f"[@click=screen.{action}]{text}[/]" for action, text in parts)
         self.query_one("#conflict-choices", Static).update(Content.from_markup(f"{links}     $status", status=status))
 
@@ -181,7 +194,9 @@ class ConflictsDialog(Dialog[Mapping[int, Side]]):
         if not self.conflicts:
             return
         one = self.conflicts[max(self._lines.index, 0)]
-        lines = [("Before ", told(one.base, "(new)")), ("Mine   ", told(one.ours)), ("On disk", told(one.theirs))]
+        width = max(len("Before"), *map(len, self.names))
+        texts_of = zip(("Before", *self.names), (told(one.base, "(new)"), told(one.ours), told(one.theirs)), strict=True)
+        lines = [(f"{name:<{width}}", text) for name, text in texts_of]
         place = Content.styled(shown(one.place, 200), "bold")
         texts = [Content(f"{name}  {text}") for name, text in lines]
         self.query_one("#conflict-texts", Static).update(Content("\n").join([place, *texts]))

@@ -32,6 +32,9 @@ WIDTHS = (32, 24, 18, 14, 12)
 
 LEAST, GAP = 8, 2
 
+LOOKED_THROUGH = 2000
+"""So many contexts are looked through at a time for one without a valid row."""
+
 
 @dataclass(frozen=True)
 class Loaded:
@@ -81,6 +84,7 @@ class ContextsDialog(Dialog[Loaded]):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f2", "rename", "Rename"),
+        Binding("f3", "next_without", "Next without a row"),
         Binding("f4,ctrl+o", "open_file", "Open a file"),
         Binding("f5", "update", "Save in this place"),
         Binding("f6,insert", "keep", "Save the test row"),
@@ -199,7 +203,8 @@ class ContextsDialog(Dialog[Loaded]):
         return "" if i is None else detail_of(self.contexts, i)
 
     def _keys(self) -> str:
-        named = [("load", "Enter Load"), ("open_file", "F4 Open"), ("keep", "F6 Save")]
+        named = [("load", "Enter Load"), *([] if self.contexts.cases else [("next_without", "F3 No row")])]
+        named += [("open_file", "F4 Open"), ("keep", "F6 Save")]
         if self.contexts.cases:
             named += [("update", "F5 Save here"), ("rename", "F2 Rename"), ("delete", "Del Delete")]
         return "   ".join(f"[@click=screen.{action}]{label}[/]" for action, label in named)
@@ -225,6 +230,19 @@ class ContextsDialog(Dialog[Loaded]):
             return
         self.contexts.go(i)
         self.dismiss(Loaded(self.contexts))
+
+    def action_next_without(self) -> None:
+        """Go to the next context that no row is valid for; it is looked for a piece at a time."""
+        start, n_lines = self.lines.index + 1, self.lines.n_lines
+        stop = min(start + LOOKED_THROUGH, n_lines)
+        lines = (line if self.found is None else int(self.found[line]) for line in range(start, stop))
+        at = next((start + n for n, i in enumerate(lines) if self.contexts.n_valid(i) == 0), None)
+        self.lines.go(stop - 1 if at is None else at)
+        self._told_at = self.lines.index
+        self.message = (
+            "" if at is not None else "No further one is without a valid row." if stop == n_lines else "None so far: F3 goes on."
+        )
+        self._say()
 
     def action_cancel(self) -> None:
         """Take the filter off, or leave."""
@@ -391,7 +409,7 @@ def columns_of(contexts: ContextList, shown: Mapping[str, int]) -> tuple[ListCol
 def _head(contexts: ContextList) -> tuple[ListColumn, ...]:
     widest = max((cell_len(case.name) for case in contexts.cases), default=len(f"row {len(contexts):,}"))
     name = ListColumn("Context", min(max(widest, 8), 28))
-    return (name, ListColumn("Expected", 9)) if contexts.cases else (name,)
+    return (name, ListColumn("Expected", 9) if contexts.cases else ListColumn("Valid", 6, 0, True))
 
 
 def cells_of(contexts: ContextList, i: int, shown: Mapping[str, int]) -> list[ListCell]:
@@ -400,6 +418,9 @@ def cells_of(contexts: ContextList, i: int, shown: Mapping[str, int]) -> list[Li
     head: list[ListCell] = [contexts.rows.name(i)]
     if contexts.cases:
         head.append(("✗ unread", "error") if verdict and verdict.faults else MARKS[verdict.holds if verdict else None])
+    else:
+        n_valid = contexts.n_valid(i)
+        head.append(("?", "error") if n_valid is None else ("none", "warning") if n_valid == 0 else f"{n_valid:,}")
     try:
         facts = contexts.facts(i)
     except ContextDBError:

@@ -18,7 +18,7 @@ from tui.model.asked import Offered
 from tui.model.context_list import ContextList
 from tui.model.game_answer import GameAnswer, played_row
 from tui.model.listening import Listening
-from tui.model.moments import Key, LiveTrack, Moment, Session, Track
+from tui.model.moments import Key, Moment, RecordedTrack, Session, Track
 from tui.model.session import Session as TableSession
 from tui.screens.context_forms import KeepDialog, Kept
 from tui.widgets.bar import Item
@@ -141,12 +141,14 @@ class Following:
             self._timer.pause()
 
     @property
-    def kept(self) -> tuple[str, list[Moment]] | None:
-        """Who is followed, and the moments that are kept of a running game; None where none is followed."""
+    def kept(self) -> tuple[str, Callable[[], list[Moment]]] | None:
+        """What is followed, in words, and what reads its moments: the last minute of a game, a whole recording; None where nothing
+        is followed."""
         track = self.followed.track if self.followed is not None else None
-        if self.followed is None or not isinstance(track, LiveTrack):
+        if self.followed is None or track is None:
             return None
-        return self.followed.name, track.kept
+        what = "the recording" if isinstance(track, RecordedTrack) else "the last minute of"
+        return f"{what} {self.followed.name}", lambda: track.kept
 
     # ---- moments
 

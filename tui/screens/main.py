@@ -15,9 +15,7 @@ from textual.screen import Screen
 from textual.widgets import ContentSwitcher, Static
 
 from contextdb.disk import write_atomic
-from contextdb.edits.renaming import Uses, uses_of
-from contextdb.edits.renaming_values import ValueUses, value_uses
-from contextdb.errors import ContextDBError, in_quotes, plural, some
+from contextdb.errors import ContextDBError, in_quotes, plural
 from contextdb.tables.changes import Edit
 from contextdb.tables.table import Table
 from tui.clipboard import Clipboard
@@ -30,10 +28,8 @@ from tui.model.new_table import make_table, name_fault
 from tui.model.session import Session
 from tui.model.workspace import Workspace
 from tui.panes.assets import AssetsPane
-from tui.panes.coverage import CoveragePane
 from tui.panes.options import OptionsPane
 from tui.panes.pane import Pane
-from tui.panes.priorities import PrioritiesPane
 from tui.panes.problems import ProblemsPane
 from tui.panes.why import WIDE
 from tui.screens.ask import AskDialog, ChooseDialog
@@ -41,6 +37,7 @@ from tui.screens.asking import TestRow
 from tui.screens.disk_care import LOOK_EVERY_S, DiskCare
 from tui.screens.export_table import Export
 from tui.screens.following import Followed, Following
+from tui.screens.renames import Renames
 from tui.screens.steps import StepsDialog
 from tui.widgets.bar import Bar, Item, StatusLine
 from tui.widgets.grid import Grid
@@ -58,12 +55,12 @@ class Answer(Protocol):
 
 TABS = ("assets", "options", "priorities", "coverage", "problems")
 CELL_MENU = (
-    "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "insert-row", "insert-below", "duplicate", "delete-rows",
-    "enable", "filter-same", "values", "nearest",
+    "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "note", "insert-row", "insert-below",
+    "insert-copied", "duplicate", "delete-rows", "enable", "colour-rows", "filter-same", "values", "rename-asset", "nearest",
 )  # fmt: skip
 COLUMN_MENU = (
-    "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "mend-all", "rename-column", "add-column",
-    "column-left", "column-right", "delete-columns",
+    "values", "sort", "sort-then", "hide-columns", "fold", "freeze", "columns", "column-sheet", "mend-all", "rename-column",
+    "rename-role", "add-column", "column-left", "column-right", "delete-columns",
 )  # fmt: skip
 """What the right button of the mouse offers."""
 TOOLS = ("add-column", "blueprints", "import", "export", "refresh", "autofit", "history", "palette")
@@ -94,11 +91,16 @@ class MainScreen(Screen[None]):
         self.coverage = CoverageRun()
         self.test_row = TestRow(self)
         self.following = Following(self)
+        self.renames = Renames(self)
         self.came_from = ""
         """The table from a row of which this one was gone into."""
         self.renamed = ""
         """What is said of a rename, after which the table was opened again."""
         self._said = ("", "information")
+        self._warned_at: tuple[int, int] | None = None
+        """Where the cursor was when a warning of a verb was first seen: the next cell takes it away."""
+        self._is_of_verb = False
+        """What is said, not quietly, is of something that was done."""
         self.care = DiskCare(self, self.session, self.say, self.show)
         self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
 
@@ -154,6 +156,7 @@ class MainScreen(Screen[None]):
     def say(self, text: str, level: str = "information") -> None:
         """Say something in the line over the footer; nothing takes away what was said."""
         is_quiet = level == "information"
+        self._is_of_verb = False
         self.query_one(StatusLine).show(text if is_quiet else "")
         if (text, level) != self._said:
             self._said = (text, level)
@@ -164,18 +167,25 @@ class MainScreen(Screen[None]):
     @on(Told)
     def _told(self, event: Told) -> None:
         self.say(event.text, event.level)
+        self._is_of_verb, self._warned_at = event.level != "information", None
 
     @on(Edited)
-    def _edited(self, event: Edited) -> None:
+    def edited(self, event: Edited) -> None:
+        """Show the sheet again, and say what was done."""
         done = event.done
         text = " ".join([f"{done.name}." if done.name else "", *done.notes, *done.warnings]).strip()
         self.say(text, "warning" if done.warnings else "information")
+        self._is_of_verb, self._warned_at = bool(done.warnings), None
         self.show()
 
     @on(Grid.Moved)
     @on(Grid.FactChanged)
     def _moved(self) -> None:
         self._show_bars()
+        cursor = self.session.sheet.cursor
+        if self._is_of_verb and self._warned_at not in (None, cursor):
+            self.say("")  # one has gone on
+        self._warned_at = cursor
 
     @on(Bar.Pressed)
     async def _pressed(self, event: Bar.Pressed) -> None:
@@ -214,10 +224,14 @@ class MainScreen(Screen[None]):
         if name == "options":
             return OptionsPane(sheet, id=name)
         if name == "priorities":
+            from tui.panes.priorities import PrioritiesPane  # with all of motion
+
             return PrioritiesPane(sheet, id=name)
         return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
 
-    def _coverage_pane(self, name: str) -> CoveragePane:
+    def _coverage_pane(self, name: str) -> Pane:
+        from tui.panes.coverage import CoveragePane
+
         return CoveragePane(self.session.sheet, self.coverage, lambda: self.following.kept, self.workspace.folder, id=name)
 
     async def action_next_tab(self, by: int) -> None:
@@ -235,7 +249,7 @@ class MainScreen(Screen[None]):
 
         def chosen(position: int | None) -> None:
             if position is not None:
-                self._edited(Edited(self.session.sheet.go_to_step(position)))
+                self.edited(Edited(self.session.sheet.go_to_step(position)))
 
         self.app.push_screen(StepsDialog(history.names, history.position), chosen)
 
@@ -387,63 +401,37 @@ class MainScreen(Screen[None]):
         sheet = self.session.sheet
         self.app.push_screen(AddColumn(sheet.table, sheet.selection.column), self._answered)
 
+    def action_column_sheet(self) -> None:
+        """Change what contextdb.toml says of all columns, in a sheet; as one step."""
+        from tui.screens.column_sheet import ColumnSheetDialog
+
+        sheet = self.session.sheet
+
+        def decided(edit: Edit | None) -> None:
+            if edit is not None:
+                self.apply(edit)
+
+        self.app.push_screen(ColumnSheetDialog(sheet.table, sheet.selection.column, self.clipboard), decided)
+
     @on(RenameWanted)
     def _rename(self, event: RenameWanted) -> None:
-        """Rename a column; where others speak of its condition, ask whether they go along."""
-        sheet, old, new = self.session.sheet, event.old, event.new
-        uses = uses_of(sheet.table, old) if sheet.path is not None and old in sheet.query.wanted.conditions else Uses()
-        if not uses.text:
-            self.try_to(lambda: self._edited(Edited(sheet.rename_column(new))))
-            return
-        written = (
-            "A rename is written to the files at once, and earlier steps can then no longer be undone. To undo it, rename back."
-        )
-        lines = ["Rename everywhere: in all that uses it"]
-        lines += [f"Only here: this table, its rules and saved contexts; others keep {old}"] if uses.is_elsewhere else []
-
-        def chosen(at: int | None) -> None:
-            if at is not None and at < len(lines):
-                self.try_to(lambda: self._rename_files(old, new, at == 1))
-
-        title, about = f"Rename {old} to {new}", f"{old} is used by {uses.text}.\n{written}"
-        self.app.push_screen(ChooseDialog(title, [*lines, "Cancel"], about=about), chosen)
+        self.renames.column(event)
 
     @on(ValueRenameWanted)
     def _rename_value(self, event: ValueRenameWanted) -> None:
-        """Rename a value; where others speak of it, ask whether they go along."""
-        sheet, old, new = self.session.sheet, event.old, event.new
-        condition = next((c.condition for c in sheet.table.conditions if c.condition.name == event.column), None)
-        is_declared = condition is not None and condition.is_declared and old in (condition.domain.values or ())
-        uses = value_uses(sheet.table, event.column, old) if is_declared else ValueUses()
-        if not uses.text:
-            self.try_to(lambda: self._edited(Edited(sheet.rename_value(old, new))))
-            return
-        lines = [
-            "Rename everywhere: in all that uses it, written to the files at once",
-            f"Only here: the cells of this table; {old} stays a value for others",
-            "Cancel",
-        ]
+        self.renames.value(event)
 
-        def chosen(at: int | None) -> None:
-            if at == 0:
-                self.try_to(lambda: self._rename_value_files(event))
-            elif at == 1:
-                self.try_to(lambda: self._edited(Edited(sheet.rename_value(old, new, keeps_old=True))))
+    @on(Grid.RenameUndoWanted)
+    def _undo_rename(self, event: Grid.RenameUndoWanted) -> None:
+        self.renames.undo(event.is_redo)
 
-        named = f"\nTables: {', '.join(uses.tables)}." if uses.tables else ""
-        about = f"{old} of {event.column} is used by {uses.text}.{named}"
-        self.app.push_screen(ChooseDialog(f"Rename {old} to {new}", lines, about=about), chosen)
+    def action_rename_role(self) -> None:
+        """Give the role of the cursor's column another name."""
+        self.renames.role()
 
-    def _rename_value_files(self, event: ValueRenameWanted) -> None:
-        files = self.workspace.rename_value(self.table_name, event.column, event.old, event.new)
-        self.app.open_table(self.table_name)
-        self.app.say_renamed(f"Renamed {event.old} to {event.new} everywhere, in {some(files)}. To undo it, rename it back.")
-
-    def _rename_files(self, old: str, new: str, only_here: bool) -> None:
-        files = self.workspace.rename(self.table_name, old, new, only_here)
-        self.app.open_table(self.table_name)
-        where = "here" if only_here else "everywhere"
-        self.app.say_renamed(f"Renamed {old} to {new} {where}, in {some(files)}. To undo it, rename it back.")
+    def action_rename_asset(self) -> None:
+        """Give the asset of the cursor's row another name."""
+        self.renames.asset()
 
     def action_blueprints(self) -> None:
         """Insert the conditions of a blueprint, or keep the selected ones as one."""
@@ -468,9 +456,20 @@ class MainScreen(Screen[None]):
 
         def made() -> None:
             done = self.session.sheet.apply(edit)
-            self._edited(Edited(replace(done, warnings=(*done.warnings, *notes))))
+            self.edited(Edited(replace(done, warnings=(*done.warnings, *notes))))
 
         self.try_to(made)
+
+    def action_find_everywhere(self) -> None:
+        """Find a text in all tables of the folder, and go to one of its places."""
+        from tui.screens.find_everywhere import FindEverywhere, FoundCell
+
+        def chosen(answer: FoundCell | None) -> None:
+            if answer is not None:
+                self.app.open_table(answer.table)
+                self.app.go_to_cell(GoToCell(answer.row, answer.column))
+
+        self.app.push_screen(FindEverywhere(self.workspace, self.table_name), chosen)
 
     # ---- the test row
 
@@ -570,7 +569,7 @@ class MainScreen(Screen[None]):
     def _fill_gap(self, event: FillGap) -> None:
         sheet = self.session.sheet
         done = sheet.insert_rows(below=True, texts=[dict(event.cells)])
-        self._edited(Edited(done))
+        self.edited(Edited(done))
         self.go_to_cell(GoToCell(sheet.row_number(sheet.cursor[0]) - 1, sheet.table.asset_column))
         self.say("A new row fills the gap: enter its asset.")
 

@@ -57,6 +57,12 @@ class Grid(GridView, can_focus=True):
         """The row of the file, from 0."""
 
     @dataclass
+    class RenameUndoWanted(Message):
+        """There is no step of the table: take back a rename that was written to files, or make it again."""
+
+        is_redo: bool
+
+    @dataclass
     class CopyWanted(Message):
         """Put a text on the clipboard."""
 
@@ -260,7 +266,11 @@ class Grid(GridView, can_focus=True):
     def action_undo(self, is_redo: bool) -> None:
         """Undo, or redo: in the test row a fact, else a step of the table."""
         if not self.is_in_test_row:
-            self._do(self.sheet.redo if is_redo else self.sheet.undo)
+            history = self.sheet.history
+            if (history.redo_name if is_redo else history.undo_name) is None:
+                self.post_message(self.RenameUndoWanted(is_redo))
+            else:
+                self._do(self.sheet.redo if is_redo else self.sheet.undo)
             return
         verb = "redo" if is_redo else "undo"
         name = self.sheet.undo_fact(is_redo)
@@ -361,8 +371,10 @@ class Grid(GridView, can_focus=True):
         elif self.is_in_new_row:
             self._do(lambda: self.sheet.paste_below(text))
             self.goes_to_new_row = False
+            self.forget_widths()
         else:
             self._do(lambda: self.sheet.paste(text))
+            self.forget_widths()
 
     def on_paste(self, event: events.Paste) -> None:
         event.stop()
@@ -402,8 +414,18 @@ class Grid(GridView, can_focus=True):
     def on_mouse_move(self, event: events.MouseMove) -> None:
         self._pointer.move(event)
 
-    def on_mouse_up(self) -> None:
-        self._pointer.release()
+    def on_mouse_up(self, event: events.MouseUp) -> None:
+        self._pointer.release(event)
+
+    def put_down(self, what: str, row: int, column: int) -> None:
+        """Move the selected rows or columns to a place, or fill up to it."""
+        sheet = self.sheet
+        verbs: dict[str, Callable[[], Done]] = {
+            "move rows": lambda: sheet.move_rows_to(row),
+            "move columns": lambda: sheet.move_columns_to(column),
+            "fill": lambda: sheet.fill_to(row, column),
+        }
+        self._do(verbs[what])
 
     def on_click(self, event: events.Click) -> None:
         if event.chain == 2:

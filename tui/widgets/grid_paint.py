@@ -30,6 +30,10 @@ AT_LEFT, AT_RIGHT = "«", "»"
 HIDES = "║"
 """Stands behind a column after which others are hidden."""
 UP, DOWN, UNSORTED = "▲", "▼", "↕"
+NOTED = "▪"
+"""Stands before the text of a cell with a note."""
+HANDLE = "■"
+"""Stands at the lower right corner of several cells that are selected: dragged, it fills."""
 COMPUTED = "="
 """Stands before a fact of the test row that is computed from others."""
 OPENS = "▸"
@@ -234,6 +238,8 @@ class Painter:
         cursor = None if is_away or self.sheet.cursor[0] != row else self.sheet.cursor[1]
 
         n_columns = len(self.sheet.table.columns)
+        noted, colours, names = self.sheet.marks.texts, self.sheet.marks.colours, [c.name for c in self.sheet.table.columns]
+        name = self.sheet.text(row, asset) if noted or colours else ""
 
         def cell(column: int) -> Iterator[Segment]:
             if column >= n_columns:
@@ -250,6 +256,7 @@ class Painter:
                 under = "selected"
             note, width = window.note(row, column), look.layout.widths[column] - 1
             mark = OPENS if note is not None and column == asset and kind == "text" else MARKS[kind]
+            mark = NOTED if mark == " " and (name, names[column]) in noted else mark
             n_shared = self.sheet.shared_end if column == asset else None
             room = width - cell_len(note) - 1 if note else width
             if note and room >= min(cell_len(text), LEAST_BESIDE):
@@ -261,14 +268,16 @@ class Painter:
             else:
                 yield Segment(mark + _shortened(text, width, n_shared), self.style(under, meant))
 
+        corner = block.right - 1 if block is not None and row == block.bottom - 1 and self.sheet.selection.kind == "cells" else None
         number = f"{seen.number:>{look.layout.gutter - 3}}"
-        style = self.style("gutter", "valid" if seen.is_valid else "name" if cursor is not None else "muted")
-        plays = Segment(PLAYS if seen.is_played else " ", self.style("gutter", "name"))
+        tint = f"tint-{colours[name]}" if name in colours else "gutter"
+        style = self.style(tint, "valid" if seen.is_valid else "name" if tint != "gutter" or cursor is not None else "muted")
+        plays = Segment(PLAYS if seen.is_played else " ", self.style(tint, "name"))
         if seen.mark != " " or not seen.n_failing:
-            return self._joined([Segment(number, style), plays, Segment(f"{seen.mark} ", style)], cell, look, ground)
+            return self._joined([Segment(number, style), plays, Segment(f"{seen.mark} ", style)], cell, look, ground, (), corner)
         count = MARKS["failing"] + (str(seen.n_failing) if seen.n_failing < 10 else "+")
-        gutter = [Segment(number, style), Segment(count, self.style("gutter", "failing")), plays]
-        return self._joined(gutter, cell, look, ground, window.failing(row))
+        gutter = [Segment(number, style), Segment(count, self.style(tint, "failing")), plays]
+        return self._joined(gutter, cell, look, ground, window.failing(row), corner)
 
     def _window_at(self, row: int, look: Look) -> Window:
         if self._window is None or not self._window.holds(row):
@@ -350,21 +359,22 @@ class Painter:
         look: Look,
         ground: str,
         failing: Collection[int] = (),
+        corner: int | None = None,
     ) -> Strip:
         """The gutter, the frozen columns and those that are scrolled, each followed by its separator; an arrow stands at an edge
         behind which columns fail."""
-        layout = look.layout
+        layout, handle = look.layout, Segment(HANDLE, self.style(ground, "name"))
         bar, double = Segment("│", self.style(ground, "line")), Segment(HIDES, self.style(ground, "muted"))
         hides = layout.hides
         line = list(gutter)
         for column in range(layout.n_frozen):
             if layout.widths[column]:
-                line += [*cell(column), double if column in hides else bar]
+                line += [*cell(column), handle if column == corner else double if column in hides else bar]
         moving: list[Segment] = []
         columns = layout.visible(look.left)
         for column in columns:
             if layout.widths[column]:
-                moving += [*cell(column), double if column in hides else bar]
+                moving += [*cell(column), handle if column == corner else double if column in hides else bar]
         start = look.left - (layout.starts[columns.start] - layout.frozen) if len(columns) else 0
         if any(layout.n_frozen <= column < columns.start + (start > 0) for column in failing):
             line[-1] = _ending(line[-1], AT_LEFT, self.style(ground, "failing"))

@@ -24,7 +24,7 @@ from tui.widgets.grid_paint import Look, Painter
 
 GROUNDS = (
     "row", "row-valid", "row-picked", "frozen", "header", "header-kind", "header-leaves", "header-chosen", "gutter", "test",
-    "selected", "cursor", "cursor-away", "flash",
+    "selected", "cursor", "cursor-away", "flash", "tint-red", "tint-amber", "tint-green", "tint-blue", "tint-violet",
 )  # fmt: skip
 MEANT = ("text", "any", "muted", "name", "failing", "fault", "disabled", "valid", "line", "on-cursor")
 FLASH_S = 0.4
@@ -51,6 +51,11 @@ class GridView(ScrollView, inherit_bindings=False):
         .grid--header-leaves { background: $panel; text-style: underline; }
         .grid--header-chosen { background: $primary 40%; }
         .grid--gutter { background: $panel; }
+        .grid--tint-red { background: red 45%; }
+        .grid--tint-amber { background: orange 45%; }
+        .grid--tint-green { background: green 50%; }
+        .grid--tint-blue { background: dodgerblue 45%; }
+        .grid--tint-violet { background: violet 40%; }
         .grid--test { background: $boost; text-style: bold; }
         .grid--selected { background: $primary 35%; }
         .grid--cursor { background: $block-cursor-background; color: $block-cursor-foreground; text-style: bold; }

@@ -23,6 +23,10 @@ from textual.strip import Strip
 
 from tui.widgets.fitted import fitted
 
+ROOMY = 9
+"""Where there is room a square takes so many."""
+STEPS = ("<20", "<40", "<60", "<80", "<100")
+LEGEND = (("empty", "0"), *((f"step-{at}", text) for at, text in enumerate(STEPS)), ("full", "100"))
 NARROW = 5
 """A square takes so many cells at least: "[100]"."""
 
@@ -51,13 +55,13 @@ class Square:
 
     @property
     def level(self) -> str:
-        """In which of five colours it is."""
+        """In which of the colours it is: 0, five steps of twenty, 100; "none" where there is no share."""
         if self.share is None:
             return "none"
         if self.share <= 0.0 or self.share >= 1.0:
             is_known = self.lower == self.upper
-            return ("empty" if is_known else "low") if self.share <= 0.0 else ("full" if is_known else "high")
-        return "low" if self.share < 0.5 else "middle" if self.share < 0.9 else "high"
+            return ("empty" if is_known else "step-0") if self.share <= 0.0 else ("full" if is_known else "step-4")
+        return f"step-{min(int(self.share * 5), 4)}"
 
 
 def short_percent(share: float) -> str:
@@ -87,9 +91,7 @@ class HeatMap(ScrollView, can_focus=True):
         "heat-map--here",
         "heat-map--none",
         "heat-map--empty",
-        "heat-map--low",
-        "heat-map--middle",
-        "heat-map--high",
+        *(f"heat-map--step-{at}" for at in range(5)),
         "heat-map--full",
     }
     DEFAULT_CSS = """
@@ -100,15 +102,17 @@ class HeatMap(ScrollView, can_focus=True):
         & .heat-map--here { color: $foreground; text-style: bold; }
         & .heat-map--none { color: $text-muted; }
         & .heat-map--empty { background: $error 55%; color: $foreground; }
-        & .heat-map--low { background: $error 28%; color: $foreground; }
-        & .heat-map--middle { background: $warning 28%; color: $foreground; }
-        & .heat-map--high { background: $success 22%; color: $foreground; }
-        & .heat-map--full { background: $success 45%; color: $foreground; }
+        & .heat-map--step-0 { background: $error 36%; color: $foreground; }
+        & .heat-map--step-1 { background: $error 22%; color: $foreground; }
+        & .heat-map--step-2 { background: $warning 34%; color: $foreground; }
+        & .heat-map--step-3 { background: $warning 18%; color: $foreground; }
+        & .heat-map--step-4 { background: $success 22%; color: $foreground; }
+        & .heat-map--full { background: $success 50%; color: $foreground; }
         &:ansi {
             & .heat-map--empty { background: ansi_default; color: ansi_red; text-style: bold; }
-            & .heat-map--low { background: ansi_default; color: ansi_red; }
-            & .heat-map--middle { background: ansi_default; color: ansi_yellow; }
-            & .heat-map--high { background: ansi_default; color: ansi_green; }
+            & .heat-map--step-0, & .heat-map--step-1 { background: ansi_default; color: ansi_red; }
+            & .heat-map--step-2, & .heat-map--step-3 { background: ansi_default; color: ansi_yellow; }
+            & .heat-map--step-4 { background: ansi_default; color: ansi_green; }
             & .heat-map--full { background: ansi_default; color: ansi_green; text-style: bold; }
         }
     }
@@ -177,7 +181,7 @@ class HeatMap(ScrollView, can_focus=True):
         """How wide a square is: as its column's label needs, where there is room."""
         longest = max((cell_len(label) + 2 for label in self.columns), default=0)
         room = (self.scrollable_content_region.width - self.label_width) // max(1, len(self.columns))
-        return max(NARROW, min(longest, self._most_wide, room))
+        return max(NARROW, min(max(longest, ROOMY), max(self._most_wide, ROOMY), room))
 
     def go(self, row: int, column: int) -> None:
         """Choose a square."""
@@ -244,7 +248,7 @@ class HeatMap(ScrollView, can_focus=True):
         width, base = self.scrollable_content_region.width, self.rich_style
         row = y - 1 + self.scroll_offset.y
         if y > 0 and row >= len(self.rows):
-            return Strip.blank(width, base)
+            return self._legend(width, base) if self.rows and row == len(self.rows) + 1 else Strip.blank(width, base)
         labels = self.label_width
         head = self._label(self.rows[row], labels, row == self.place[0]) if y else self._label(self.corner, labels, False)
         wide = self.square_width
@@ -255,6 +259,14 @@ class HeatMap(ScrollView, can_focus=True):
         cut = self.scroll_offset.x - first * wide
         body = body.crop(cut, cut + max(0, width - labels))
         return Strip.join([Strip([head]), body]).adjust_cell_length(width, base)
+
+    def _legend(self, width: int, base: Style) -> Strip:
+        """What the colours mean, two lines below the squares where there is room."""
+        parts = [Segment(" " * self.label_width, base)]
+        for level, text in LEGEND:
+            parts += [Segment(f" {text} ", self.get_component_rich_style(f"heat-map--{level}")), Segment(" ", base)]
+        parts.append(Segment("% covered", self.get_component_rich_style("heat-map--label")))
+        return Strip(parts).adjust_cell_length(width, base)
 
     def _label(self, text: str, width: int, is_here: bool) -> Segment:
         kind = "heat-map--here" if is_here else "heat-map--label"

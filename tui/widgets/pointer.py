@@ -14,7 +14,9 @@ from tui.model.selection import Selection
 from tui.model.sheet import Sheet
 from tui.widgets.grid_paint import Look
 
-Dragged = Literal["cells", "rows", "columns", "width"]
+Dragged = Literal["cells", "rows", "columns", "width", "move rows", "move columns", "fill"]
+TAKEN = ("move rows", "move columns", "fill")
+"""Drags of what is selected to another place."""
 PULL_EVERY_S = 0.06
 """So often a drag that rests at an edge takes in one more row or column."""
 
@@ -46,6 +48,9 @@ class Pointed(Protocol):
 
     def sort_by(self, column: int) -> None:
         """Sort what is shown by a column."""
+
+    def put_down(self, what: str, row: int, column: int) -> None:
+        """Rows or columns, or the handle to fill from, were dragged to a place."""
 
     def action_edit(self) -> None:
         """Edit the cell."""
@@ -87,6 +92,8 @@ class Pointer:
         self._at = (0, 0)
         """Where the mouse is while it drags."""
         self._timer: Timer | None = None
+        self._is_moved = False
+        """The mouse has moved since it took something."""
 
     def press(self, event: events.MouseDown) -> None:
         """The button goes down: go there, select, or begin to drag."""
@@ -104,6 +111,9 @@ class Pointer:
             grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0], column), in_new_row=True)
         elif self._is_cell_line(event.y, look):
             grid.is_in_test_row = False
+            if taken := self._takes(event, row, look):
+                self._begin(taken)
+                return
             grid.moving(lambda: grid.sheet.go(row, column, event.shift))
             if self._is_opener(event.x, row, column, look):
                 grid.action_open_row()
@@ -130,6 +140,8 @@ class Pointer:
         grid, look = self.grid, self.grid.look
         if self._dragged == "width":
             grid.set_width(self._column, max(NARROWEST, event.x - look.layout.place(self._column, look.left)))
+        elif self._dragged in TAKEN:
+            self._is_moved = True
         elif self._dragged is not None:
             self._at = (event.x, event.y)
             self.pull()
@@ -155,9 +167,20 @@ class Pointer:
         else:
             self._pull_on(False)
 
-    def release(self) -> None:
-        """The button goes up."""
-        self._dragged = None
+    def release(self, event: events.MouseUp) -> None:
+        """The button goes up: what was taken is put down here."""
+        dragged, grid = self._dragged, self.grid
+        row, column = self._place_at(event.x, event.y)
+        column = min(column, grid.sheet.shape[1] - 1)
+        if dragged in TAKEN and self._is_moved:
+            grid.put_down(dragged, row, column)
+        elif dragged == "move rows":
+            grid.moving(lambda: grid.sheet.go(row, grid.sheet.cursor[1]))
+            grid.action_select_rows()
+        elif dragged == "move columns":
+            grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0], column))
+            grid.action_select_columns()
+        self._dragged, self._is_moved = None, False
         self._pull_on(False)
         self.grid.release_mouse()
 
@@ -182,11 +205,29 @@ class Pointer:
             grid.moving(lambda: grid.go_to_field(column))
         elif event.y == look.sort_line and event.x >= look.layout.place(column, look.left) + look.layout.widths[column] - 2:
             grid.sort_by(column)
+        elif (
+            grid.sheet.selection.kind == "columns" and not event.shift and grid.sheet.block.left <= column < grid.sheet.block.right
+        ):
+            self._begin("move columns")
         else:
             grid.is_in_test_row = False
             grid.moving(lambda: grid.sheet.go(grid.sheet.cursor[0], column, event.shift))
             grid.action_select_columns()
             self._begin("columns")
+
+    def _takes(self, event: events.MouseDown, row: int, look: Look) -> Dragged | None:
+        """What the mouse takes here to put it down elsewhere: the rows that are selected, or the handle to fill from."""
+        sheet, block = self.grid.sheet, self.grid.sheet.block
+        if event.shift or look.top + event.y - look.n_headers >= len(sheet.view):
+            return None
+        if event.x < look.layout.gutter:
+            return "move rows" if sheet.selection.kind == "rows" and block.top <= row < block.bottom else None
+        at_corner = row == block.bottom - 1 and look.layout.separator_at(event.x, look.left) == block.right - 1
+        return "fill" if at_corner else None
+
+    def _is_chosen_column(self, column: int) -> bool:
+        block = self.grid.sheet.block
+        return self.grid.sheet.selection.kind == "columns" and block.left <= column < block.right
 
     def _begin(self, what: Dragged) -> None:
         self._dragged = what

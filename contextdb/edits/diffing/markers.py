@@ -74,6 +74,15 @@ def versions_of(raw: bytes) -> Versions | None:
     return (base or ours.splitlines(keepends=True)[0] if ours else base), ours, theirs
 
 
+def names_of(raw: bytes) -> tuple[str, str]:
+    """What the first marks of a file call ours and theirs, such as HEAD and the name of a branch; empty where they say nothing."""
+    found = {OURS: "", THEIRS: ""}
+    for line in raw.splitlines():
+        if line[:7] in found and not found[line[:7]]:
+            found[line[:7]] = line[7:].decode("utf-8", "replace").strip()
+    return found[OURS], found[THEIRS]
+
+
 # ---- parts
 
 

@@ -1,0 +1,74 @@
+"""Notes on cells and colours of rows: for people, never for the game. An edge: it reads and writes `NAME.notes.csv` by a table.
+
+    Asset,Column,Note,Colour
+    jog,speed,ask Ana whether 3 is enough,
+    jog,,,amber
+
+A line is of one cell, or of one row where it names no column; lines are sorted, so that two people's notes merge. A row is meant by
+its asset, so the same is said of all rows of one asset.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from contextdb.disk import NOTES_SUFFIX, write_atomic
+from contextdb.errors import ContextDBError
+from contextdb.files.texts import read_texts
+
+COLOURS = ("red", "amber", "green", "blue", "violet")
+FIELDS = ("Asset", "Column", "Note", "Colour")
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What people wrote at the edge of a table."""
+
+    texts: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    """Asset and column to note."""
+    colours: Mapping[str, str] = field(default_factory=dict)
+    """Asset to colour."""
+
+    @classmethod
+    def beside(cls, table: Path) -> Notes:
+        """Those of a table's file; none where there is no file of them, or none that can be read."""
+        path = notes_path(table)
+        try:
+            columns = {c.name: c.to_list() for c in read_texts(path)[1]} if path.is_file() else {}
+        except ContextDBError:
+            return cls()
+        if not set(FIELDS) <= set(columns):
+            return cls()
+        lines = list(zip(*(columns[name] for name in FIELDS), strict=True))
+        texts = {(asset, column): note for asset, column, note, _ in lines if note.strip()}
+        return cls(texts, {asset: colour for asset, column, _, colour in lines if not column and colour in COLOURS})
+
+    def with_note(self, asset: str, column: str, text: str) -> Notes:
+        """With another note on a cell; an empty one takes it away."""
+        texts = {place: note for place, note in self.texts.items() if place != (asset, column)}
+        return replace(self, texts=texts | ({(asset, column): text.strip()} if text.strip() else {}))
+
+    def with_colour(self, assets: list[str], colour: str) -> Notes:
+        """With another colour of some rows; an empty one takes it away."""
+        others = {asset: one for asset, one in self.colours.items() if asset not in assets}
+        return replace(self, colours=others | (dict.fromkeys(assets, colour) if colour else {}))
+
+    def write(self, table: Path) -> None:
+        """Write the file; raises FileError where the disk refuses."""
+        lines = {(asset, column): [note, ""] for (asset, column), note in self.texts.items()}
+        for asset, colour in self.colours.items():
+            lines.setdefault((asset, ""), ["", ""])[1] = colour
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(FIELDS)
+        writer.writerows([*place, *said] for place, said in sorted(lines.items()))
+        write_atomic(notes_path(table), out.getvalue().encode())
+
+
+def notes_path(table: Path) -> Path:
+    """The file of the notes on a table's file."""
+    return table.with_name(table.stem + NOTES_SUFFIX)

@@ -1,0 +1,131 @@
+"""The dialog that finds a text in all tables of the folder: each place on a line, Enter goes there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from typing import ClassVar
+
+import numpy as np
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.widgets import Input, Static
+
+from contextdb.errors import ContextDBError, plural
+from contextdb.tables.project import load_table
+from contextdb.tables.table import Table
+from tui.model.find import Search, find
+from tui.model.layout import cut_middle
+from tui.model.workspace import Workspace
+from tui.screens.dialog import Dialog
+from tui.widgets.line_list import LineList, ListCell, ListColumn
+
+MOST = 1000
+"""So many places are listed."""
+
+
+@dataclass(frozen=True)
+class FoundCell:
+    """A cell with the text: its table, its row of the file from 0, its column, and what stands there."""
+
+    table: str
+    row: int
+    column: str
+    text: str
+
+
+class FindEverywhere(Dialog[FoundCell]):
+    """Find in all tables."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("down", "move(1)", show=False),
+        Binding("up", "move(-1)", show=False),
+        Binding("pagedown", "move(10)", show=False),
+        Binding("pageup", "move(-10)", show=False),
+    ]
+    DEFAULT_CSS = """
+    FindEverywhere {
+        & > #dialog { width: 110; height: 92%; }
+        & > #dialog > #dialog-body { height: 1fr; }
+        & LineList { height: 1fr; margin: 1 0; }
+        & #found-said { height: 1; color: $text-muted; }
+    }
+    """
+    title_text = "Find in all tables"
+    keys_text = "↑↓ choose · Enter go there · Esc"
+
+    def __init__(self, workspace: Workspace, first: str) -> None:
+        """`first`: the table that is looked through first."""
+        super().__init__()
+        self.workspace = workspace
+        self.names = [first, *(name for name in workspace.files if name != first)]
+        self.found: list[FoundCell] = []
+        self._read: dict[str, Table | None] = {}
+
+    def compose_body(self) -> ComposeResult:
+        """The text, its places, how many there are."""
+        yield Input(compact=True, placeholder="a text; upper and lower case are the same")
+        columns = [ListColumn("Table", 14), ListColumn("Row", 5, 0, True), ListColumn("Column", 12, 1), ListColumn("Text", 20, 3)]
+        yield LineList(columns, empty="Nothing is found.")
+        yield Static(id="found-said")
+
+    def on_mount(self) -> None:
+        """Take the text."""
+        self.query_one(Input).focus()
+        self._show("")
+
+    @on(Input.Changed)
+    def _typed(self, event: Input.Changed) -> None:
+        event.stop()
+        self._show(event.value)
+
+    def _show(self, text: str) -> None:
+        self.found = list(islice(self._places(Search(text)), MOST)) if text.strip() else []
+        self.query_one(LineList).show(len(self.found), self._line, 0)
+        n_tables = len({one.table for one in self.found})
+        more = "at least " if len(self.found) == MOST else ""
+        unread = [name for name, table in self._read.items() if table is None]
+        said = f"{more}{plural(len(self.found), 'cell')} in {plural(n_tables, 'table')}" if self.found else ""
+        self.query_one("#found-said", Static).update(f"{said}{f' · not read: {unread[0]}' if unread else ''}")
+
+    def _line(self, at: int) -> Sequence[ListCell]:
+        one = self.found[at]
+        return one.table, f"{one.row + 1:,}", (one.column, "muted"), partial(cut_middle, one.text)
+
+    def _places(self, search: Search) -> Iterator[FoundCell]:
+        for name in self.names:
+            table = self._table(name)
+            if table is None:
+                continue
+            columns = [c.name for c in table.columns]
+            for row, column in np.argwhere(find(table, search, np.arange(table.n_rows), columns)).tolist():
+                yield FoundCell(name, row, columns[column], table.columns[column][row])
+
+    def _table(self, name: str) -> Table | None:
+        """A table as it is edited, else as it is in its file; None for one that cannot be read."""
+        if name in self.workspace.sessions:
+            return self.workspace.sessions[name].sheet.table
+        if name not in self._read:
+            try:
+                self._read[name] = load_table(self.workspace.files[name], strict=False)
+            except ContextDBError:
+                self._read[name] = None
+        return self._read[name]
+
+    def action_move(self, by: int) -> None:
+        """Through the list, while one types."""
+        self.query_one(LineList).action_move(by)
+
+    @on(Input.Submitted)
+    def _submitted(self, event: Input.Submitted) -> None:
+        event.stop()
+        if self.found:
+            self.dismiss(self.found[self.query_one(LineList).index])
+
+    @on(LineList.Chosen)
+    def _chosen(self, event: LineList.Chosen) -> None:
+        event.stop()
+        self.dismiss(self.found[event.index])

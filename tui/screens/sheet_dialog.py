@@ -1,0 +1,169 @@
+"""What dialogs with a small sheet share: a grid in a box, its cell editor, the clipboard, and a line that says what was done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from textual import on
+from textual.binding import Binding, BindingType
+from textual.content import Content
+from textual.geometry import Size
+from textual.message import Message
+from textual.widgets import Static
+
+from tui.clipboard import Clipboard
+from tui.messages import Edited, Told
+from tui.model.roomy_sheet import RoomySheet
+from tui.screens.dialog import Answer, Dialog
+from tui.widgets.cell_editor import CellEditor
+from tui.widgets.grid import Grid
+
+
+class SmallGrid(Grid):
+    """The grid of a dialog."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("tab", "move(0, 1, False)", show=False),
+        Binding("shift+tab", "move(0, -1, False)", show=False),
+    ]
+    has_test_row: ClassVar[bool] = False
+    has_new_row: ClassVar[bool] = False
+
+    class Left(Message):
+        """Esc was pressed."""
+
+    def action_leave(self) -> None:
+        """Out of the dialog, also with several cells selected, as after a paste."""
+        self.post_message(self.Left())
+
+
+class SheetDialog(Dialog[Answer]):
+    """A dialog with a sheet that is edited with the keys of the grid."""
+
+    DEFAULT_CSS = """
+    SheetDialog {
+        & > #dialog { width: 96%; max-width: 150; height: 92%; padding: 0 1; }
+        & > #dialog > #dialog-body { height: 1fr; }
+        & .sheet--about { height: auto; max-height: 3; padding: 0 1; color: $text-muted; }
+        & SmallGrid { height: 1fr; margin: 1 0; }
+        & .sheet--said { height: auto; max-height: 4; padding: 0 1; }
+        & .sheet--keys { height: auto; max-height: 2; padding: 0 1; color: $text-muted; }
+    }
+    """
+
+    clipboard: Clipboard
+
+    @property
+    def sheet(self) -> RoomySheet:
+        """The sheet that is seen."""
+        raise NotImplementedError
+
+    @property
+    def grid(self) -> SmallGrid:
+        """The grid of it."""
+        return self.query_one(SmallGrid)
+
+    @property
+    def editor(self) -> CellEditor | None:
+        """The editor that is open over a cell."""
+        return next(iter(self.query(CellEditor)), None)
+
+    def is_fact(self, column: int) -> bool:
+        """Whether a column holds facts, not cells."""
+        return False
+
+    def show_sheet(self, said: str = "") -> None:
+        """Show the sheet as it is now, and say something."""
+        self.sheet.with_room()
+        self.grid.changed()
+        self.query_one(".sheet--said", Static).update(Content(said))
+
+    def show_keys(self, keys: Sequence[tuple[str, str]]) -> None:
+        """Say what can be done: actions with their labels, which a click runs too."""
+        said = "   ".join(f"[@click={action}]{label}[/]" for action, label in keys)
+        self.query_one(".sheet--keys", Static).update(Content.from_markup(said))
+
+    # ---- what the grid asks for
+
+    @on(Grid.EditWanted)
+    def _open_editor(self, event: Grid.EditWanted) -> None:
+        event.stop()
+        if self.editor is not None:
+            return
+        sheet, (_, column) = self.sheet, self.sheet.cursor
+        editor = CellEditor(
+            sheet.of_column(column),
+            sheet.header(column).kind,
+            event.text,
+            check=lambda text: sheet.fault_of(column, text),
+            known=sheet.known(column),
+            is_fact=self.is_fact(column),
+            is_typing=event.is_typing,
+            open_list=event.opens_list,
+        )
+        self.query_one("#dialog-body").mount(editor)
+        self._place_editor()
+        editor.focus()
+
+    def on_resize(self) -> None:
+        self.call_after_refresh(self._place_editor)
+
+    def _place_editor(self) -> None:
+        if self.editor is not None:
+            self.editor.place(self.grid.cell_region(), Size(self.size.width, self.size.height))
+
+    @on(CellEditor.Committed)
+    def _commit(self, event: CellEditor.Committed) -> None:
+        event.stop()
+        if event.is_fill:
+            self.sheet.fill(event.text)
+        elif fault := self.sheet.type_text(event.text):
+            if self.editor is not None:
+                self.editor.refuse(fault)
+            return
+        self._close_editor()
+        self.sheet.with_room()
+        row, column = self.sheet.cursor
+        if event.down > 0 and column == len(self.sheet.table.columns) - 1 and self.sheet.block.n_cells == 1:
+            self.sheet.go(row + 1, 0)  # the next actor
+        elif not event.is_fill:
+            self.sheet.select(lambda s, shape: s.next_cell(event.down, event.right, shape))
+        self.show_sheet()
+
+    @on(CellEditor.Cancelled)
+    def _cancelled(self, event: CellEditor.Cancelled) -> None:
+        event.stop()
+        self._close_editor()
+
+    def _close_editor(self) -> None:
+        if self.editor is not None:
+            self.editor.remove()
+        self.grid.focus()
+
+    @on(Grid.CopyWanted)
+    def _copy(self, event: Grid.CopyWanted) -> None:
+        event.stop()
+        self.show_sheet(self.clipboard.copy(event.text) or "Copied.")
+
+    @on(Grid.PasteWanted)
+    def _paste(self, event: Grid.PasteWanted) -> None:
+        event.stop()
+        self.grid.paste(self.clipboard.paste())
+
+    @on(Grid.RenameUndoWanted)
+    def _nothing_to_undo(self, event: Grid.RenameUndoWanted) -> None:
+        event.stop()
+        self.show_sheet(f"There is nothing to {'redo' if event.is_redo else 'undo'}.")
+
+    @on(Edited)
+    def _edited(self, event: Edited) -> None:
+        event.stop()
+        done = event.done
+        self.grid.forget_widths()
+        self.show_sheet(" ".join([f"{done.name}." if done.name else "", *done.notes, *done.warnings]).strip())
+
+    @on(Told)
+    def _told(self, event: Told) -> None:
+        event.stop()
+        self.show_sheet(event.text)

@@ -21,6 +21,8 @@ MODULES: dict[str, ModuleType] = {"contextdb": contextdb, "motion": motion, "tel
 SPELT = {"cdb": "contextdb", "motion": "motion", "telemetry": "telemetry"}
 """What the pages call each module."""
 WIDTH = 100
+MODULE = re.compile(r"\b(?:[a-z_]+\.)+(?=[A-Z])")
+"""What stands before the name of a type: `collections.abc.Mapping`."""
 SECTION = re.compile(r"(?m)^(\w+)\n-{3,}\n")
 """The heading of a section of a docstring, with a line below it; names follow, and what they mean, indented."""
 ITEM = re.compile(r"(?m)^(\S.*)\n?((?:^(?: .*)?(?:\n|\Z))*)")
@@ -91,7 +93,7 @@ def signature(name: Name) -> str:
         return f"class {name.path}({value.__mro__[1].__name__})"
     if isinstance(value, type) or inspect.isroutine(value) or isinstance(value, (classmethod, staticmethod)):
         return _call(name)
-    return f"{name.path} = {textwrap.shorten(repr(value), WIDTH)}"
+    return f"{name.path} = {textwrap.shorten(re.sub(MODULE, '', repr(value)), WIDTH)}"
 
 
 def _call(name: Name) -> str:
@@ -111,6 +113,8 @@ def _call(name: Name) -> str:
         parts.append(f"{star}{p.name}{_typed(p.annotation)}{default}")
     result = "" if isinstance(value, type) or found.return_annotation is found.empty else f" -> {_type(found.return_annotation)}"
     kind = "class " if isinstance(value, type) else ""
+    if kind and not parts:
+        return f"{kind}{name.path}"  # made by others
     line = f"{kind}{name.path}({', '.join(parts)}){result}"
     if len(line) <= WIDTH:
         return line

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
+import json
+import os
 import re
+import shutil
+import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -87,7 +91,7 @@ def test_a_page_begins_with_what_it_is_for(page: Path):
     title, blank, first = page.read_text(encoding="utf-8").splitlines()[:3]
     assert title.startswith("# ")
     assert blank == ""
-    assert first[0].isalpha() or first[0] in "`["
+    assert re.match(r"`?[\w\[]", first), "a sentence, before any block"
 
 
 def test_the_pages_of_names_have_every_public_name_with_its_docstring(names: ModuleType):
@@ -135,3 +139,36 @@ def test_the_site_and_its_first_page_are_small():
     first = SITE / "index.html"
     loaded = {first, *(SITE / source.partition("?")[0] for source in read(first).loaded)}
     assert sum(file.stat().st_size for file in loaded) < 300_000
+
+
+# ---- axe, where it is
+
+
+AXE = os.environ.get("AXE", "")
+BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+ASK = """<script>document.body.dataset.theme = "{theme}";</script><script src="{axe}"></script><script>
+addEventListener("load", () => axe.run(document, {{resultTypes: ["violations"]}}).then(
+  (told) => parent.postMessage(JSON.stringify(told.violations.map((each) => [each.impact, each.id])), "*")));
+</script></body>"""
+FRAME = """<iframe src="{page}" style="width: {width}px; height: 900px"></iframe><pre></pre>
+<script>addEventListener("message", (told) => document.querySelector("pre").textContent = told.data);</script>"""
+
+
+@made
+@pytest.mark.skipif(not (AXE and BROWSER), reason="AXE names no file of axe-core, or there is no Chromium")
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("name", ["index", "format", "recipes", "names-motion"])
+def test_axe_finds_nothing_serious(name: str, theme: str, width: int, tmp_path: Path):
+    assert BROWSER
+    copy = Path(shutil.copytree(SITE, tmp_path / "site"))
+    text = (SITE / f"{name}.html").read_text(encoding="utf-8")
+    asked = ASK.format(theme=theme, axe=Path(AXE).resolve().as_uri())
+    (copy / "asked.html").write_text(text.replace("</body>", asked), encoding="utf-8")
+    (copy / "frame.html").write_text(FRAME.format(page="asked.html", width=width), encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", "--virtual-time-budget=20000"]
+    command = [BROWSER, *options, "--dump-dom", (copy / "frame.html").as_uri()]
+    seen = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=120, check=True).stdout
+    found = re.search(r"<pre>(.+?)</pre>", seen, re.DOTALL)
+    assert found, "axe did not answer"
+    assert [each for each in json.loads(found[1]) if each[0] in ("serious", "critical")] == []

@@ -134,6 +134,15 @@ def test_the_search_needs_no_network():
 
 
 @made
+def test_what_scrolls_can_be_reached_with_the_keyboard_and_headings_have_levels():
+    """What docs/site/build.py mends in the pages of the theme; it finds them by their text."""
+    for page in SITE.glob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        assert text.count('role="heading" aria-level="2"') == text.count('role="heading"') == len(GROUPS)
+        assert re.findall(r'<pre>|<aside class=|docutils container">', text) == []
+
+
+@made
 def test_the_site_and_its_first_page_are_small():
     assert sum(file.stat().st_size for file in SITE.rglob("*") if file.is_file()) < 15_000_000
     first = SITE / "index.html"

@@ -34,8 +34,8 @@ SITE_ONLY = {"Start": ["live-pages"], "Reference": NAMES, "Project": ["changelog
 
 MENDS = {
     'role="heading"': 'role="heading" aria-level="2"',
-    '<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="Pages">',
-    '<aside class="toc-drawer">': '<aside class="toc-drawer" aria-label="On this page">',
+    '<aside class="sidebar-drawer': '<aside aria-label="Pages" class="sidebar-drawer',
+    '<aside class="toc-drawer': '<aside aria-label="On this page" class="toc-drawer',
     '<div class="highlight"><pre>': '<div class="highlight"><pre tabindex="0">',
     'colwidths-auto docutils container"': 'colwidths-auto docutils container" tabindex="0"',
 }

@@ -101,6 +101,8 @@ def test_the_pages_of_names_have_every_public_name_with_its_docstring(names: Mod
             assert f"\n## {name}\n" in page
     assert "### Table.compile\n\n```py\nTable.compile(" in names.page("contextdb")
     assert "-> CompiledTable\n```\n\n" in names.page("contextdb")
+    assert "\n**Raises**\n\n- `ContextError`: " in names.page("contextdb")
+    assert "Never" not in names.page("contextdb")
 
 
 def test_a_name_is_shown_with_a_line_that_the_pages_run(names: ModuleType):

@@ -102,7 +102,8 @@ def _call(name: Name) -> str:
         found = inspect.signature(value)
     except ValueError:
         return name.path
-    parameters = [p for p in found.parameters.values() if p.name not in ("self", "cls") and not p.name.startswith("_")]
+    hidden = [p.name for p in found.parameters.values() if p.name.startswith("_") or p.annotation == "Never"]
+    parameters = [p for p in found.parameters.values() if p.name not in ("self", "cls", *hidden)]
     parts, is_keyword = [], False
     for p in parameters:
         if p.kind is p.KEYWORD_ONLY and not is_keyword:
@@ -138,9 +139,15 @@ def _markdown(text: str) -> str:
     about, *sections = SECTION.split(text)
     parts = [about.strip()]
     for heading, body in zip(sections[::2], sections[1::2], strict=True):
-        items = [f"- `{name}`: {' '.join(said.split())}".removesuffix(": ") for name, said in ITEM.findall(body)]
-        parts += [f"**{heading}**", "\n".join(items)]
-    return "\n\n".join(parts).replace("<", "&lt;")
+        parts += [f"**{heading}**", "\n".join(_item(name, said) for name, said in ITEM.findall(body))]
+    return "\n\n".join(parts)
+
+
+def _item(name: str, said: str) -> str:
+    """A name and what it means; a line with nothing indented below it is a sentence, unless it declares a name."""
+    if said.strip():
+        return f"- `{name}`: {' '.join(said.split())}"
+    return f"- `{name}`" if " : " in name or " " not in name else f"\n{name}"
 
 
 # ---- where a name is used, in what the tests of the pages run

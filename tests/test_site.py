@@ -102,6 +102,7 @@ def test_the_pages_of_names_have_every_public_name_with_its_docstring(names: Mod
     assert "### Table.compile\n\n```py\nTable.compile(" in names.page("contextdb")
     assert "-> CompiledTable\n```\n\n" in names.page("contextdb")
     assert "\n**Raises**\n\n- `ContextError`: " in names.page("contextdb")
+    assert "class Action(StrEnum):\n    START = 'starts'" in names.page("motion")
     assert "Never" not in names.page("contextdb")
 
 

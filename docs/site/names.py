@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import enum
 import functools
 import inspect
 import re
@@ -91,6 +92,9 @@ def signature(name: Name) -> str:
         return f"{name.path}: {_type(inspect.signature(getter).return_annotation)}"
     if isinstance(value, type) and issubclass(value, BaseException):
         return f"class {name.path}({value.__mro__[1].__name__})"
+    if isinstance(value, type) and issubclass(value, enum.Enum):
+        members = [f"    {member.name} = {member.value!r}" for member in value]
+        return "\n".join([f"class {name.path}({value.__mro__[1].__name__}):", *members])
     if isinstance(value, type) or inspect.isroutine(value) or isinstance(value, (classmethod, staticmethod)):
         return _call(name)
     return f"{name.path} = {textwrap.shorten(re.sub(MODULE, '', repr(value)), WIDTH)}"

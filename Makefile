@@ -20,7 +20,7 @@ INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
 .DEFAULT_GOAL := help
 # A set-up that failed half-way is done again from its start.
 .DELETE_ON_ERROR:
-.PHONY: help demo test cover check format docs bench fuzz clean
+.PHONY: help demo test cover check format docs site bench fuzz clean
 
 help:
 	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
@@ -29,6 +29,7 @@ help:
 	@$(info make check    formatting, lint, types and import contracts)
 	@$(info make format   format the code and mend what lint can mend)
 	@$(info make docs     run the commands of README.md and docs/ and write down what they print now)
+	@$(info make site     the pages of docs/ as a site in build/site, with a search; open build/site/index.html)
 	@$(info make fuzz     damage files at random for SECONDS=60 and read them; SEED=1 tries the same ones again)
 	@$(info make bench    measure against other engines)
 	@$(info make clean    remove what was made, .venv too)
@@ -59,7 +60,11 @@ docs: $(VENV)/.dev
 	$(PY) tests/test_docs.py --update
 	$(PY) tests/test_api.py --update
 	$(PY) docs/keys.py
+	$(PY) docs/commands.py
 	$(PY) docs/pictures.py
+
+site: $(VENV)/.site
+	$(PY) docs/site/build.py
 
 fuzz: $(VENV)/.dev
 	$(PY) tests/fuzz.py --seconds $(or $(SECONDS),60) $(if $(SEED),--seed $(SEED))
@@ -97,6 +102,10 @@ $(VENV)/.dev: pyproject.toml | $(VENV)/pyvenv.cfg
 # What numba compiles is kept in its cache. Two workers of the tests that found nothing there would both compile everything.
 $(VENV)/.kernels: $(wildcard contextdb/*kernels.py contextdb/*/*kernels.py contextdb/*/*/*kernels.py) | $(VENV)/.dev
 	$(PY) tests/kernels.py
+	$(STAMP)
+
+$(VENV)/.site: pyproject.toml | $(VENV)/pyvenv.cfg
+	$(INSTALL) ".[site]"
 	$(STAMP)
 
 $(VENV)/.bench: pyproject.toml | $(VENV)/pyvenv.cfg

@@ -317,6 +317,9 @@ def test_the_json_of_the_sample_tables_is_what_the_page_holds(monkeypatch: pytes
     assert [t["table"] for t in document["tables"]] == ["hit_mid_air", "contested_catch", "locomotion"]
     page = run("coverage", "tables", "--format", "html").out
     assert all(f">{t['table']}</h2>" in page for t in document["tables"])
+    squares = re.findall(r'aria-label="([^"]+)">([^<]+)</button>', page)
+    assert squares
+    assert all(said.startswith(seen) for said, seen in squares), "a square is named otherwise than it shows"
 
 
 def test_recorded_moments_are_held_to_their_own_bar(here: Path):

@@ -222,14 +222,16 @@ def test_a_console_block_refuses_a_command_that_it_does_not_know():
         updated(["```console", "$ rm -r tables", "```"])
 
 
-def test_the_page_of_keys_lists_the_commands_of_the_editor():
+@pytest.mark.parametrize("page", ["keys", "commands"])
+def test_a_page_made_of_the_code_is_as_the_code_is_now(page: str):
     wanted = subprocess.run(
-        [sys.executable, "-c", "import keys; print(keys.page(), end='')"],
+        [sys.executable, "-c", f"import {page}; print({page}.page(), end='')"],
         cwd=ROOT / "docs",
+        env=UTF8,
         stdout=subprocess.PIPE,
         encoding="utf-8",
     )
-    assert (ROOT / "docs" / "keys.md").read_text(encoding="utf-8") == wanted.stdout, "run: make docs"
+    assert (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8") == wanted.stdout, "run: make docs"
 
 
 def test_the_settings_that_the_editors_page_shows_are_taken(tmp_path: Path):

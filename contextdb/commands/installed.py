@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from importlib import metadata
 
-NOT_FOR_USERS = {"dev", "bench"}
+NOT_FOR_USERS = {"dev", "bench", "site"}
 """Extras for those who build contextdb."""
 WITHOUT = {"numba": "not installed; large batches and searches of motion take several times longer"}
 _REQUIRED = re.compile(r"([\w.-]+)(?:\[.*?\])?[^;]*(?:;(.*))?")

@@ -28,6 +28,7 @@ function sortBy(table, at) {
 
 for (const table of document.querySelectorAll("table.sortable")) {
   Array.from(table.tHead.rows[0].cells).forEach((cell, at) => {
+    if (cell.textContent === "") return;
     const button = element("button", cell.textContent);
     button.type = "button";
     button.addEventListener("click", () => sortBy(table, at));

@@ -56,7 +56,7 @@ def _square(pairs: PairTable, one: int, other: int, number: int) -> str:
     told = escape(printable(f"{names}: {_sentence(worst) if worst else 'nothing was measured'}"))
     label, colour = ("·", "none") if worst is None else (short_percent(worst), colour_of(worst))
     button = f'<button type="button" class="{colour}" data-pair="{number}" aria-pressed="false"'
-    return f'<td>{button} title="{told}" aria-label="{told}">{escape(label)}</button></td>'
+    return f'<td>{button} title="{told}" aria-label="{escape(label)} · {told}">{escape(label)}</button></td>'
 
 
 def _data(pairs: PairTable, order: list[int], squares: list[tuple[int, int]]) -> str:

@@ -37,6 +37,8 @@ from contextdb.motion.clips.trajectory import Trajectory, to_own_frame
 from contextdb.motion.features.extraction import Features, with_path
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.output.bank import Place3, PoseBank
+from contextdb.motion.output.ground import A_GROUND
+from contextdb.motion.output.stages import Ground as GroundBelow
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.asked import Among, OfPenalties, OfTags, OfValid
@@ -133,10 +135,12 @@ class Character:
         plays next.
     unknown : {"error", "any", "never"}
         How tables treat missing facts; see `CompiledTable.query`.
+    ground : function, optional
+        Of x and z: the height of the ground and its normal, as for `PoseStream.update`. Default: flat.
 
     Attributes
     ----------
-    controller, schema, tables, stream, own_facts, pose, unknown
+    controller, schema, tables, stream, own_facts, pose, unknown, ground
         As given, and may be exchanged between updates.
 
     Raises
@@ -156,6 +160,7 @@ class Character:
         own_facts: Mapping[str, FactOf] = FACTS,
         pose: PoseOf | None = None,
         unknown: Unknown = "error",
+        ground: GroundBelow | None = None,
     ) -> None:
         require_kind(controller, Controller, "controller", "a Controller")
         require_kind(schema, FeatureSchema, "schema", "a FeatureSchema")
@@ -168,8 +173,10 @@ class Character:
             require_callable(pose, "pose")
         if not isinstance(unknown, str) or unknown not in UNKNOWN:
             raise ContextError(Fault(f"unknown is {unknown!r}.", some(UNKNOWN)))
+        if ground is not None and not callable(ground):
+            raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
-        self.own_facts, self.unknown = own_facts, unknown
+        self.own_facts, self.unknown, self.ground = own_facts, unknown, ground
         self.tables = tables
         self._own: tuple[object, object, Mapping[str, FactOf]] = (None, None, {})
         self._body, self._apart = body, NO_MOTION
@@ -218,7 +225,7 @@ class Character:
     def copy(self) -> Character:
         """Another character that stands where this one does, with the same tables, databases and poses, and no recorder."""
         stream = None if self.stream is None else copy(self.stream)
-        options = {"own_facts": self.own_facts, "pose": self.pose, "unknown": self.unknown}
+        options = {"own_facts": self.own_facts, "pose": self.pose, "unknown": self.unknown, "ground": self.ground}
         copied = Character(self.controller.copy(), self.schema, self.tables, stream, self._body, **options)  # type: ignore[arg-type]
         copied.restore(self.state)
         return copied
@@ -390,7 +397,7 @@ class Character:
         pose, body, apart = None, step.body, NO_MOTION
         if self.stream is not None:
             try:
-                pose = self.stream.update(decision, step.dt_s, body)
+                pose = self.stream.update(decision, step.dt_s, body, self.ground)
             except Exception:
                 self.controller.restore(before)
                 raise

@@ -1,0 +1,245 @@
+"""What the window shows of the game: the ground, characters as capsules, paths, contacts and the ball. It changes nothing.
+
+Colours are flat and few: warm is the player, blue the rival, white the wish, yellow the clip, green what holds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from direct.showbase.ShowBase import ShowBase
+from numpy.typing import NDArray
+from panda3d.core import AmbientLight, DirectionalLight, LMatrix4, LVector3, Material, NodePath
+
+from contextdb import motion
+from examples.playground import shapes, world
+from examples.playground.actor import Actor
+from examples.playground.game import Game
+from examples.playground.shapes import here
+
+Floats = NDArray[np.float64]
+Colour = tuple[float, float, float, float]
+
+
+def colour(code: str, alpha: float = 1.0) -> Colour:
+    """A colour written as in CSS."""
+    red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return red, green, blue, alpha
+
+
+def mixed(one: Colour, other: Colour, share: float) -> Colour:
+    """A colour with a share of another."""
+    red, green, blue = (a + share * (b - a) for a, b in zip(one[:3], other[:3], strict=True))
+    return red, green, blue, 1.0
+
+
+SKY, FLOOR, GRID, STONE, SHADOW = (colour(code) for code in ("#20242e", "#39404f", "#4b5466", "#76809a", "#2a303c"))
+PLAYER, RIVAL, WISH, CLIP, HOLDS, BALL = (
+    colour(code) for code in ("#f2a65a", "#6cb4ee", "#ffffff", "#ffd84d", "#7ee08a", "#f25f5c")
+)
+SUN = LVector3(0.45, 0.35, -1.0)
+N_DOTS, DOT_EVERY_S = 10, 0.1
+HEAD = 0.6
+"""By so much of the neck the head is beyond its joint."""
+THICK = {
+    **{"head": 0.1, "neck": 0.055, "spine": 0.125, "chest": 0.12, "hip": 0.12, "upleg": 0.085, "thigh": 0.085, "foot": 0.05},
+    **{"toe": 0.042, "leg": 0.062, "forearm": 0.045, "hand": 0.045, "arm": 0.055, "shoulder": 0.06},
+}
+"""Radii in metres of the bones whose names contain a word; the first that fits."""
+
+
+class Body:
+    """A character: a capsule for each bone, its shadow, discs below feet that hold, dots along two paths."""
+
+    def __init__(self, root: NodePath, actor: Actor, own: Colour) -> None:
+        self.actor = actor
+        rig = actor.stock.banks[next(iter(actor.stock.banks))]
+        self.feet = [rig.skeleton.names.index(foot) for foot in rig.feet]
+        self.node = root.attachNewNode(actor.name)
+        self.bones = list(_bones(rig.skeleton))
+        self.head = next((i for i, name in enumerate(rig.skeleton.names) if "head" in name.lower()), -1)
+        self.capsules = []
+        for _, joint, length, radius in self.bones:
+            node = shapes.capsule(length, radius)
+            is_left = rig.skeleton.names[joint].lower().startswith("left")
+            self.capsules.append(_solid(self.node, node, mixed(own, SHADOW, 0.2) if is_left else own))
+        self.shadow = root.attachNewNode("shadow")
+        self.node.instanceTo(self.shadow)
+        self.shadow.setColor(SHADOW, 1)
+        self.shadow.setLightOff(1)
+        self.shadow.setMaterialOff(1)
+        self.contacts = [_flat(root, shapes.disc(0.16, 0.1), HOLDS) for _ in self.feet]
+        self.wish = [_flat(root, shapes.disc(0.055), WISH) for _ in range(N_DOTS)]
+        self.clip = [_flat(root, shapes.disc(0.055), CLIP) for _ in range(N_DOTS)]
+
+    def show(self) -> None:
+        """The pose as it is now."""
+        pose, positions = self.actor.pose, self.actor.pose.positions
+        for (parent, joint, length, _), node in zip(self.bones, self.capsules, strict=True):
+            if length:
+                node.setPos(*here(positions[parent]))
+                node.lookAt(self.node, *here(positions[joint]))
+            else:
+                node.setPos(*here(positions[joint] + HEAD * (joint == self.head) * (positions[joint] - positions[parent])))
+        height, normal = world.ground(pose.root[0], pose.root[1])
+        self.shadow.setMat(_onto((pose.root[0], height + 0.012, pose.root[1]), normal))
+        for joint, down, node in zip(self.feet, pose.contacts, self.contacts, strict=True):
+            _put(node, positions[joint][0], positions[joint][2], bool(down))
+        path = self.actor.moved.path
+        _dots(self.wish, path.positions[path.now :], path.rate, 0.025)
+        _dots(self.clip, self._clip_s_path(), path.rate, 0.03)
+
+    def _clip_s_path(self) -> Floats:
+        """Where the clip would lead: its own movement from here on."""
+        playing, pose = self.actor.pose.playing, self.actor.pose
+        if playing is None:
+            return np.empty((0, 2))
+        database = self.actor.stock.databases[playing.database]
+        assert database.root is not None
+        frames = np.arange(playing.frame, min(playing.frame + 31, int(database.stops[playing.range])))
+        ahead = database.root[frames].astype(float)
+        first = motion.RootMotion(*pose.root)
+        sin, cos = math.sin(-ahead[0, 2]), math.cos(-ahead[0, 2])
+        x, z = (ahead[:, :2] - ahead[0, :2]).T
+        steps = [first.then(motion.RootMotion(a, b, 0.0)) for a, b in zip(cos * x + sin * z, cos * z - sin * x, strict=True)]
+        return np.array([(step.left_m, step.ahead_m) for step in steps])
+
+
+class Scene:
+    """All that is drawn in three dimensions."""
+
+    def __init__(self, base: ShowBase, game: Game) -> None:
+        self.base, self.game, root = base, game, base.render
+        base.setBackgroundColor(*SKY)
+        base.camLens.setFov(55.0)
+        base.camLens.setNearFar(0.3, 80.0)
+        _light(root)
+        edge = int(world.EDGE_M) + 2
+        corners = [(-edge, -edge, 0.0), (edge, -edge, 0.0), (edge, edge, 0.0), (-edge, edge, 0.0)]
+        _solid(root, shapes.prism(corners, -0.5), FLOOR).setDepthOffset(-1)
+        lines = shapes.grid(edge, GRID)
+        lines.reparentTo(root)
+        lines.setLightOff()
+        for box in world.FLOORS:
+            _solid(root, shapes.prism(_corners(box)), STONE).setDepthOffset(-1)
+        self.wall = _solid(root, shapes.prism(_corners(world.WALL)), STONE)
+        self.bodies = [Body(root, actor, own) for actor, own in zip(game.actors, (PLAYER, RIVAL), strict=False)]
+        self.ball = _solid(root, shapes.capsule(0.0, 0.13), BALL)
+        self.ring = _flat(root, shapes.disc(0.5, 0.42, 40), BALL)
+        self.turn, self.tilt, self.away = 0.0, 18.0, 5.5
+
+    def show(self) -> None:
+        """The game as it is now, from behind the player."""
+        for body in self.bodies:
+            body.show()
+        gate = self.game.gate
+        seen = None if gate is None else gate.seen
+        is_over = self.game.player.once is not None
+        tint = HOLDS if is_over or (seen and seen.is_open) else CLIP if seen and seen.hit else STONE
+        _paint(self.wall, mixed(STONE, tint, 0.4))
+        self._show_ball()
+        x, y, z = here(self.game.player.pose.positions[0])
+        turn, tilt = math.radians(self.turn), math.radians(self.tilt)
+        back = self.away * math.cos(tilt)
+        self.base.camera.setPos(x + back * math.sin(turn), y - back * math.cos(turn), z + self.away * math.sin(tilt))
+        self.base.camera.lookAt(x, y, z + 0.15)
+
+    def _show_ball(self) -> None:
+        ball = self.game.ball
+        if ball is None:
+            self.ball.hide()
+            self.ring.hide()
+        elif ball.holder is None:
+            self.ball.setPos(*here((ball.spot[0], ball.height_m, ball.spot[1])))
+            _put(self.ring, *ball.spot)
+        else:
+            names = self.game.player.stock.banks["moves"].skeleton.names
+            self.ball.setPos(*here(ball.holder.pose.positions[names.index("RightHand")]))
+            self.ring.hide()
+
+
+def _light(root: NodePath) -> None:
+    sun, sky = DirectionalLight("sun"), AmbientLight("sky")
+    sun.setDirection(SUN)
+    sun.setColor((0.8, 0.78, 0.74, 1.0))
+    sky.setColor((0.42, 0.44, 0.5, 1.0))
+    for light in (sun, sky):
+        root.setLight(root.attachNewNode(light))
+
+
+def _bones(skeleton: motion.Skeleton) -> Iterator[tuple[int, int, float, float]]:
+    """From which joint to which each capsule goes, how long it is and how thick; a ball at the ends."""
+    scale = 0.01 if float(np.abs(skeleton.offsets).max()) > 5.0 else 1.0
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        name = skeleton.names[joint].lower()
+        if parent > 0 or (parent == 0 and "spine" in name) or "upleg" in name:
+            own = skeleton.names[parent].lower() if parent else name
+            is_joined = "arm" in name and "arm" not in own
+            yield parent, joint, scale * float(np.linalg.norm(skeleton.offsets[joint])), 0.075 if is_joined else _thick(own)
+        if joint not in skeleton.parents:
+            yield parent, joint, 0.0, _thick(name)
+
+
+def _thick(name: str) -> float:
+    return next((radius for word, radius in THICK.items() if word in name), 0.05)
+
+
+def _solid(root: NodePath, node: NodePath, own: Colour) -> NodePath:
+    node.reparentTo(root)
+    _paint(node, own)
+    return node
+
+
+def _paint(node: NodePath, own: Colour) -> None:
+    material = Material()
+    material.setAmbient(own)
+    material.setDiffuse(own)
+    node.setMaterial(material)
+
+
+def _flat(root: NodePath, node: NodePath, own: Colour) -> NodePath:
+    """A mark on the ground, which no light changes."""
+    node.reparentTo(root)
+    node.setColor(own)
+    node.setLightOff()
+    node.hide()
+    return node
+
+
+def _put(node: NodePath, x: float, z: float, is_shown: bool = True, over_m: float = 0.025) -> None:
+    """Lay a mark on the ground."""
+    if not is_shown:
+        node.hide()
+        return
+    height, normal = world.ground(x, z)
+    node.setPos(*here((x, height + over_m, z)))
+    node.setP(math.degrees(math.atan2(-normal[2], normal[1])))
+    node.show()
+
+
+def _dots(nodes: list[NodePath], places: Floats, rate: float, over_m: float) -> None:
+    for i, node in enumerate(nodes):
+        frame = min(round((i + 1) * DOT_EVERY_S * rate), len(places))
+        x, z = places[frame] if frame < len(places) else (0.0, 0.0)
+        _put(node, float(x), float(z), frame < len(places), over_m)
+
+
+def _corners(box: world.Box) -> list[shapes.Point]:
+    """The upper corners of a box, anticlockwise from above."""
+    (left, right), (near, far) = box.x, box.z
+    return [
+        here(each)
+        for each in ((right, box.near_m, near), (left, box.near_m, near), (left, box.far_m, far), (right, box.far_m, far))
+    ]
+
+
+def _onto(place: tuple[float, float, float], normal: world.Normal) -> LMatrix4:
+    """What casts a shadow along the sun onto the plane at a place."""
+    n, p, sun = np.array(here(normal)), np.array(here(place)), np.array(SUN)
+    along = np.outer(n, sun) / (n @ sun)
+    matrix = np.eye(4)
+    matrix[:3, :3] -= along
+    matrix[3, :3] = p @ along
+    return LMatrix4(*matrix.ravel().tolist())

@@ -27,10 +27,10 @@ GATE, GATE_CLOSES = 1.0, 1.5
 class Game:
     """All of it. Use it in a `with`: it opens a link under `link`, where a name is given."""
 
-    def __init__(self, folder: Path, link: str | None = None, settle_s: float = 0.1) -> None:
+    def __init__(self, folder: Path, link: str | None = None, settle_s: float = 0.1, stock: Stock | None = None) -> None:
         self.watch = cdb.watch(folder, self._reloaded, self._refused, poll_s=None, settle_s=settle_s)
         self.folder, self.trouble, self.time_s, self.asking = self.watch.folder, "", 0.0, ""
-        stock = Stock.of(self.watch.project)
+        stock = Stock.of(self.watch.project) if stock is None else stock
         moves = self._moves = next(iter(self.watch.snapshot().values()))
         self.player = Actor("player", stock, moves, (0.0, 0.0, 0.0))
         self.actors = [self.player]

@@ -8,10 +8,12 @@ import sys
 import tempfile
 import webbrowser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from direct.showbase.ShowBase import ShowBase
-from panda3d.core import Filename, InputDevice, loadPrcFileData
+from numpy.typing import NDArray
+from panda3d.core import ClockObject, Filename, InputDevice, loadPrcFileData
 
 from contextdb import motion
 from examples.playground.drawing import Scene
@@ -47,13 +49,18 @@ class Window:
     """The game on a screen."""
 
     def __init__(self, game: Game, is_offscreen: bool = False, size: tuple[int, int] = (1280, 720)) -> None:
-        self.game, self.base = game, opened(is_offscreen, size)
+        self.game, self.base, self.is_offscreen = game, opened(is_offscreen, size), is_offscreen
         self.scene, self.screen = Scene(self.base, game), Screen(self.base, game)
         self.is_slow, self.held = False, set[str]()
-        self.mouse: tuple[float, float] | None = None
+        self.paging: tuple[subprocess.Popen[str], Path] | None = None
 
     def play(self) -> None:
         """Until the window is closed."""
+        self.begin()
+        self.base.run()
+
+    def begin(self) -> None:
+        """Listen to the keys, and update the game in each frame."""
         base = self.base
         base.disableMouse()
         for name, keys in KEYS.items():
@@ -63,25 +70,28 @@ class Window:
                 base.accept(f"{key}-up", self.held.discard, [name])
         for key, does in (("f1", self._help), ("f2", self._slow), ("f3", self._page), ("f4", self._record), ("escape", sys.exit)):
             base.accept(key, does)
-        for device in base.devices.getDevices(InputDevice.DeviceClass.gamepad):
+        for device in self._gamepads():
             base.attachInputDevice(device)
         base.taskMgr.add(self._frame, "game")
-        base.run()
 
-    def _frame(self, task: object) -> int:
-        dt = min(self.base.clock.getDt() if hasattr(self.base, "clock") else LONGEST_FRAME_S / 3.0, LONGEST_FRAME_S)
+    def _frame(self, task: Any) -> Any:
+        dt = min(ClockObject.getGlobalClock().getDt(), LONGEST_FRAME_S)
         self._look(dt)
+        self._turn_page()
         self.game.update(dt * (SLOW if self.is_slow else 1.0), self._stick())
         self.show()
-        return 1  # again in the next frame
+        return task.cont
+
+    def _gamepads(self) -> list[Any]:
+        return list(self.base.devices.getDevices(InputDevice.DeviceClass.gamepad))
 
     def show(self) -> None:
         """Bring what is drawn up to date."""
         self.scene.show()
         self.screen.show()
 
-    def picture(self) -> np.ndarray:
-        """What is drawn now: uint8 [height, width, 3]."""
+    def picture(self) -> NDArray[np.uint8]:
+        """What is drawn now: [height, width, 3]."""
         self.show()
         self.base.graphicsEngine.renderFrame()
         texture = self.base.win.getScreenshot()
@@ -100,7 +110,7 @@ class Window:
         ahead = ("ahead" in self.held) - ("back" in self.held) + 0.0
         left = ("left" in self.held) - ("right" in self.held) + 0.0
         run, strafe = "run" in self.held, "strafe" in self.held
-        for device in self.base.devices.getDevices(InputDevice.DeviceClass.gamepad):
+        for device in self._gamepads():
             ahead += device.findAxis(InputDevice.Axis.left_y).value
             left -= device.findAxis(InputDevice.Axis.left_x).value
             run = run or device.findAxis(InputDevice.Axis.right_trigger).value > 0.5
@@ -110,16 +120,15 @@ class Window:
         return Stick(left * cos + ahead * sin, ahead * cos - left * sin, run, strafe, camera)
 
     def _look(self, dt: float) -> None:
-        """Turn the camera with the mouse, or with the right stick."""
-        watcher = self.base.mouseWatcherNode
-        if watcher.hasMouse():
-            place = watcher.getMouseX() * 640.0, watcher.getMouseY() * 360.0
-            if self.mouse is not None:
-                self.scene.turn -= TURN_PER_PIXEL * (place[0] - self.mouse[0])
-                self.scene.tilt = min(60.0, max(4.0, self.scene.tilt - TURN_PER_PIXEL * (place[1] - self.mouse[1])))
-            self.mouse = place
-        for device in self.base.devices.getDevices(InputDevice.DeviceClass.gamepad):
-            self.scene.turn -= dt * TURN_DPS * device.findAxis(InputDevice.Axis.right_x).value
+        """Turn the camera with the mouse, which stays in the middle of a window that is in front, or with the right stick."""
+        scene, window = self.scene, self.base.win
+        if not self.is_offscreen and window.getProperties().getForeground():
+            pointer, x, y = window.getPointer(0), window.getXSize() // 2, window.getYSize() // 2
+            if window.movePointer(0, x, y):
+                scene.turn -= TURN_PER_PIXEL * (pointer.getX() - x)
+                scene.tilt = min(60.0, max(4.0, scene.tilt + TURN_PER_PIXEL * (pointer.getY() - y)))
+        for device in self._gamepads():
+            scene.turn -= dt * TURN_DPS * device.findAxis(InputDevice.Axis.right_x).value
 
     # ---- the F keys
 
@@ -131,13 +140,23 @@ class Window:
         self.screen.notice = "slow motion" if self.is_slow else ""
 
     def _page(self) -> None:
-        """The debugger's page of the last minute, in the browser."""
+        """Have the debugger's page of the last minute written, by another process."""
         session = Path(tempfile.mkdtemp(prefix="playground-")) / "last_minute.parquet"
         self.game.player.recorders.minute.save(session)
         page = session.with_suffix(".html")
         words = ["motion", "replay", str(session), "--project", str(self.game.folder), "--html", str(page)]
-        done = subprocess.run([sys.executable, "-m", "contextdb", *words], capture_output=True, text=True)
-        self.screen.notice = f"written: {page}" if done.returncode == 0 else done.stderr.strip()
+        done = subprocess.Popen(
+            [sys.executable, "-m", "contextdb", *words], text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
+        self.paging, self.screen.notice = (done, page), "the page of the last minute is being written"
+
+    def _turn_page(self) -> None:
+        """Show the page when it is there, or say why there is none."""
+        if self.paging is None or self.paging[0].poll() is None:
+            return
+        done, page = self.paging
+        self.paging, said = None, done.communicate()[1].strip()
+        self.screen.notice = f"written: {page}" if done.returncode == 0 else said
         if done.returncode == 0:
             webbrowser.open(page.as_uri())
 

@@ -112,6 +112,13 @@ def test_an_update_is_what_its_parts_do_by_hand():
         np.testing.assert_allclose(updated.pose.positions, expected.positions, rtol=0.0, atol=1e-9)
 
 
+def test_a_character_stands_on_the_ground_that_it_is_given():
+    flat, high = character(), character(ground=lambda x, z: (0.5, (0.0, 1.0, 0.0)))
+    below = [moved.pose.positions[0][1] for moved in driven(flat, 40)]
+    above = [moved.pose.positions[0][1] for moved in driven(high.copy(), 40)]
+    assert above == pytest.approx([height + 0.5 for height in below])
+
+
 def test_a_search_hears_where_the_animation_really_is():
     one = character()
     driven(one, 50)

@@ -352,6 +352,7 @@ CALLS: dict[str, Call] = {
     "Character(own_facts)": lambda x: motion.Character(PLAYER.controller, SCHEMA, own_facts=x),
     "Character(pose)": lambda x: motion.Character(PLAYER.controller, SCHEMA, pose=x),
     "Character(unknown)": lambda x: motion.Character(PLAYER.controller, SCHEMA, unknown=x),
+    "Character(ground)": lambda x: motion.Character(PLAYER.controller, SCHEMA, ground=x),
     "Character.of(project)": lambda x: motion.Character.of(x, "player"),
     "Character.record(n_candidates)": lambda x: PLAYER.copy().record(x),
     "Character.body": lambda x: setattr(PLAYER.copy(), "body", x),

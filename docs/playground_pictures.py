@@ -22,6 +22,7 @@ from examples.playground.actor import Actor
 from examples.playground.clips import write_clips
 from examples.playground.game import Game
 from examples.playground.headless import RATE
+from examples.playground.screen import SIZE
 from examples.playground.stick import REST, Stick
 from examples.playground.window import Window
 
@@ -96,7 +97,7 @@ def film() -> list[Picture]:
     """The pictures of the film, 480 pixels wide."""
     with Game(TABLES) as game:
         put(game.player, (-1.5, -5.0, 0.0))
-        window, found = drawn_by(game), []
+        window, found = drawn_by(game, words=0.075), []
         window.scene.tilt, window.scene.away = 12.0, 5.2
         every, frame = round(RATE / PER_SECOND), 0
         for seconds, stick in FILM:
@@ -109,14 +110,14 @@ def film() -> list[Picture]:
         return found
 
 
-def drawn_by(game: Game) -> Window:
+def drawn_by(game: Game, words: float = SIZE) -> Window:
     """A picture in memory of a game; there is one at a time."""
     import builtins
 
     base = getattr(builtins, "base", None)
     if base is not None:
         base.destroy()
-    return Window(game, is_offscreen=True, size=(1920, 1080))
+    return Window(game, is_offscreen=True, size=(1920, 1080), words=words)
 
 
 def main(folder: Path = FOLDER) -> None:

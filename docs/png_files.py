@@ -43,27 +43,32 @@ def write_png(path: Path, *pictures: Picture, per_second: int = 12) -> None:
 
 
 def palette_of(pictures: Sequence[Picture]) -> Picture:
-    """The colours that most pixels have, told apart by their five highest bits: [256, 3]."""
+    """The colours that most pixels have, half of them told apart finely and half coarsely, so that none is far: [256, 3]."""
     pixels = np.concatenate([picture.reshape(-1, 3) for picture in pictures])
-    keys = _keys(pixels)
-    counts = np.bincount(keys, minlength=1 << 15)
-    common = np.argsort(-counts, kind="stable")[:N_COLOURS]
-    sums = np.stack([np.bincount(keys, pixels[:, i], 1 << 15)[common] for i in range(3)], axis=1)
+    return np.concatenate([_common(pixels, 5), _common(pixels, 3)])
+
+
+def _common(pixels: Picture, bits: int) -> Picture:
+    """The 128 most common colours, of those with the same highest bits the mean."""
+    keys = _keys(pixels, bits)
+    counts = np.bincount(keys, minlength=1 << 3 * bits)
+    common = np.argsort(-counts, kind="stable")[: N_COLOURS // 2]
+    sums = np.stack([np.bincount(keys, pixels[:, i], len(counts))[common] for i in range(3)], axis=1)
     return np.asarray(np.round(sums / np.maximum(counts[common], 1)[:, None]), np.uint8)
 
 
 def indexed(picture: Picture, palette: Picture) -> Picture:
     """The nearest colour of a palette for each pixel: [height, width]."""
-    keys = _keys(picture.reshape(-1, 3))
+    keys = _keys(picture.reshape(-1, 3), 5)
     used, places = np.unique(keys, return_inverse=True)
     shades = np.stack([used >> 10, used >> 5 & 31, used & 31], axis=1) * 8.0 + 4.0
     apart = ((shades[:, None, :] - palette[None].astype(float)) ** 2).sum(axis=2)
     return np.asarray(apart.argmin(axis=1)[places].reshape(picture.shape[:2]), np.uint8)
 
 
-def _keys(pixels: Picture) -> NDArray[np.int64]:
-    red, green, blue = (pixels[:, i].astype(np.int64) >> 3 for i in range(3))
-    return red << 10 | green << 5 | blue
+def _keys(pixels: Picture, bits: int) -> NDArray[np.int64]:
+    red, green, blue = (pixels[:, i].astype(np.int64) >> 8 - bits for i in range(3))
+    return red << 2 * bits | green << bits | blue
 
 
 def _packed(rows: Picture) -> bytes:

@@ -279,7 +279,7 @@ def test_keys_steer_and_the_f_keys_do_what_the_help_says(window: Any, tmp_path: 
     step(2)
     assert window.game.player.moved.facts["gait"] == "Run"
     assert "F3 page of the last minute" in window.screen.middle.getText()
-    for key in ("w-up", "shift-up", "f2", "f4", "f3"):
+    for key in ("w-up", "shift-up", "f2", "f3", "f4"):
         base.messenger.send(key)
     step(2)
     assert window.is_slow

@@ -13,7 +13,6 @@ from examples.playground.stick import REST, Stick
 
 LAST_MINUTE = 3600
 """Decisions that are always kept: a minute at 60 a second."""
-CLOSE_M = 2.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,22 +38,6 @@ class Stock:
         return motion.Character(controller, schema, moves, stream, unknown="any", ground=world.ground)
 
 
-class Recorders:
-    """Hands each decision to the trace of the last minute, and to the one that is recorded, if any."""
-
-    def __init__(self, minute: motion.Trace) -> None:
-        self.minute, self.recording = minute, None
-        self.n_candidates = minute.n_candidates
-
-    recording: motion.Trace | None
-
-    def record(self, decision: motion.Decision) -> None:
-        """Take one decision."""
-        self.minute.record(decision)
-        if self.recording is not None:
-            self.recording.record(decision)
-
-
 class Actor:
     """A character of the game."""
 
@@ -63,8 +46,7 @@ class Actor:
         self.character = stock.character(name, moves)
         self.character.body = motion.Steered(position=place[:2], heading=place[2])
         self.stream = self.character.stream
-        self.recorders = Recorders(motion.Trace(5, self.character.controller.selector.databases, most=LAST_MINUTE))
-        self.character.controller.recorder = self.recorders
+        self.keep(LAST_MINUTE)
         self.stamina, self.is_tired = 1.0, False
         self.once: motion.MatchPlay | None = None
         self.origin = motion.RootMotion(0.0, 0.0, 0.0)
@@ -103,6 +85,11 @@ class Actor:
         self.pose = self.stream.update(play.decision("once"), dt, body, world.ground)
         if play.is_done:
             self.once, self.character.stream = None, self.stream
+
+    def keep(self, most: int) -> None:
+        """Keep so many decisions from now on, the last ones, for a session."""
+        self.trace = motion.Trace(5, self.character.controller.selector.databases, most=most)
+        self.character.controller.recorder = self.trace
 
     def begin(self, play: motion.MatchPlay) -> None:
         """Play a one-off from where the body is."""

@@ -43,11 +43,7 @@ SUN = LVector3(0.45, 0.35, -1.0)
 N_DOTS, DOT_EVERY_S = 10, 0.1
 HEAD = 0.6
 """By so much of the neck the head is beyond its joint."""
-THICK = {
-    **{"head": 0.1, "neck": 0.055, "spine": 0.125, "chest": 0.12, "hip": 0.12, "upleg": 0.085, "thigh": 0.085, "foot": 0.05},
-    **{"toe": 0.042, "leg": 0.062, "forearm": 0.045, "hand": 0.045, "arm": 0.055, "shoulder": 0.06},
-}
-"""Radii in metres of the bones whose names contain a word; the first that fits."""
+TRUNK, LEG = ("hip", "spine", "chest"), ("upleg", "thigh")
 
 
 class Body:
@@ -98,13 +94,9 @@ class Body:
             return np.empty((0, 2))
         database = self.actor.stock.databases[playing.database]
         assert database.root is not None
-        frames = np.arange(playing.frame, min(playing.frame + 31, int(database.stops[playing.range])))
-        ahead = database.root[frames].astype(float)
-        first = motion.RootMotion(*pose.root)
-        sin, cos = math.sin(-ahead[0, 2]), math.cos(-ahead[0, 2])
-        x, z = (ahead[:, :2] - ahead[0, :2]).T
-        steps = [first.then(motion.RootMotion(a, b, 0.0)) for a, b in zip(cos * x + sin * z, cos * z - sin * x, strict=True)]
-        return np.array([(step.left_m, step.ahead_m) for step in steps])
+        x, z, headings = database.root[playing.frame : min(playing.frame + 31, int(database.stops[playing.range]))].T
+        way = (z - z[0] + 1j * (x - x[0])) * np.exp(1j * (pose.root[2] - headings[0]))
+        return np.stack((pose.root[0] + way.imag, pose.root[1] + way.real), axis=1)
 
 
 class Scene:
@@ -171,19 +163,19 @@ def _light(root: NodePath) -> None:
 
 def _bones(skeleton: motion.Skeleton) -> Iterator[tuple[int, int, float, float]]:
     """From which joint to which each capsule goes, how long it is and how thick; a ball at the ends."""
-    scale = 0.01 if float(np.abs(skeleton.offsets).max()) > 5.0 else 1.0
     for joint, parent in enumerate(skeleton.parents.tolist()):
         name = skeleton.names[joint].lower()
         if parent > 0 or (parent == 0 and "spine" in name) or "upleg" in name:
-            own = skeleton.names[parent].lower() if parent else name
-            is_joined = "arm" in name and "arm" not in own
-            yield parent, joint, scale * float(np.linalg.norm(skeleton.offsets[joint])), 0.075 if is_joined else _thick(own)
+            own = name if not parent or "arm" in name else skeleton.names[parent].lower()
+            yield parent, joint, float(np.linalg.norm(skeleton.offsets[joint])), _thick(own)
         if joint not in skeleton.parents:
             yield parent, joint, 0.0, _thick(name)
 
 
 def _thick(name: str) -> float:
-    return next((radius for word, radius in THICK.items() if word in name), 0.05)
+    """The radius of a bone, in metres."""
+    words = {TRUNK: 0.12, ("head",): 0.1, LEG: 0.085, ("leg",): 0.062, ("arm",): 0.055}
+    return next((radius for known, radius in words.items() if any(word in name for word in known)), 0.045)
 
 
 def _solid(root: NodePath, node: NodePath, own: Colour) -> NodePath:

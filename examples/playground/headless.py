@@ -10,6 +10,8 @@ from examples.playground.game import Game
 from examples.playground.stick import REST, StickFile
 
 RATE = 60.0
+LONGEST = 216_000
+"""Decisions of an hour: more are not recorded."""
 
 
 def played(game: Game, seconds: float, stick: StickFile | None = None, rate: float = RATE) -> Iterator[Game]:
@@ -22,18 +24,14 @@ def played(game: Game, seconds: float, stick: StickFile | None = None, rate: flo
 def run(games: Iterable[Game], poses: Path | None = None, record: Path | None = None, picture: Path | None = None) -> None:
     """Play to the end, and write what is asked for: all poses of the player, the session, a picture of the last moment."""
     shown: list[motion.Pose] = []
-    game: Game | None = None
     for game in games:
-        if game.player.recorders.recording is None and record is not None:
-            game.player.recorders.recording = motion.Trace(databases=game.player.character.controller.selector.databases)
-        if poses is not None:
-            shown.append(game.player.pose)
-    if game is None:
-        return
+        if not shown:
+            game.player.keep(LONGEST)
+        shown.append(game.player.pose)
     if poses is not None:
         motion.write_poses(shown, next(iter(game.player.stock.banks.values())), poses, RATE)
-    if record is not None and game.player.recorders.recording is not None:
-        game.player.recorders.recording.save(record, timings=False)
+    if record is not None:
+        game.player.trace.save(record, timings=False)
     if picture is not None:
         from examples.playground.window import Window
 

@@ -8,6 +8,7 @@ from typing import Any
 from direct.showbase.ShowBase import ShowBase
 from panda3d.core import NodePath, TextNode, TextProperties, TextPropertiesManager
 
+from examples.playground.actor import LAST_MINUTE
 from examples.playground.game import Game
 
 EXPLAIN_EVERY_S = 0.25
@@ -66,7 +67,8 @@ class Words:
     @property
     def facts(self) -> str:
         """What the table was asked."""
-        return "  ".join(f"{name} {_short(value)}" for name, value in self.game.player.moved.facts.items())
+        player = self.game.player
+        return "  ".join(f"{name} {_short(player.moved.facts.get(name))}" for name in player.moves.asked)
 
     @property
     def rows(self) -> list[tuple[str, bool]]:
@@ -88,8 +90,8 @@ class Words:
             lines.append(game.ball.said if holder is not None else "the ball is free")
         if game.link is not None:
             lines.append(f"link  {game.link.name}, {'followed' if game.link.is_heard else 'nobody follows'}")
-        if game.player.recorders.recording is not None:
-            lines.append(f"recording  {len(game.player.recorders.recording)} moments")
+        if game.player.trace.most > LAST_MINUTE:
+            lines.append(f"recording  {len(game.player.trace)} moments")
         if game.trouble:
             lines.append(f"not loaded: {game.trouble}")
         return lines
@@ -102,7 +104,7 @@ def _short(value: Any) -> str:
 class Screen:
     """The words, on the screen."""
 
-    def __init__(self, base: ShowBase, game: Game) -> None:
+    def __init__(self, base: ShowBase, game: Game, size: float = SIZE) -> None:
         self.words, self.notice, self.shows_help = Words(game), "", False
         for name, shade in SHADES.items():
             properties = TextProperties()
@@ -111,9 +113,9 @@ class Screen:
             TextPropertiesManager.getGlobalPtr().setProperties(name, properties)
         wide = base.getAspectRatio()
         TextNode.getDefaultFont().setLineHeight(1.15)
-        self.top = _text(base.aspect2d, -wide + 0.09, 0.87)
-        self.state = _text(base.aspect2d, -wide + 0.09, -0.68)
-        self.middle = _text(base.aspect2d, -0.1, 0.87)
+        self.top = _text(base.aspect2d, -wide + 0.09, 0.92 - size, size)
+        self.state = _text(base.aspect2d, -wide + 0.09, -0.68, size)
+        self.middle = _text(base.aspect2d, -0.1, 0.92 - size, size)
 
     def show(self) -> None:
         """Write what is so now."""
@@ -130,14 +132,14 @@ def _in(style: str, text: str) -> str:
     return f"\1{style}\1{text}\2"
 
 
-def _text(parent: NodePath, x: float, y: float) -> TextNode:
+def _text(parent: NodePath, x: float, y: float, size: float) -> TextNode:
     """Words on a dark card."""
     node = TextNode("")
-    node.setWordwrap(1.4 / SIZE)
+    node.setWordwrap(1.4 / size)
     node.setCardColor(0.08, 0.09, 0.12, 0.72)
     node.setCardAsMargin(0.7, 0.7, 0.5, 0.4)
     node.setCardDecal(True)
     path = parent.attachNewNode(node)
-    path.setScale(SIZE)
+    path.setScale(size)
     path.setPos(x, 0.0, y)
     return node

@@ -15,10 +15,11 @@ from direct.showbase.ShowBase import ShowBase
 from numpy.typing import NDArray
 from panda3d.core import ClockObject, Filename, InputDevice, loadPrcFileData
 
-from contextdb import motion
+from examples.playground.actor import LAST_MINUTE
 from examples.playground.drawing import Scene
 from examples.playground.game import Game
-from examples.playground.screen import Screen
+from examples.playground.headless import LONGEST
+from examples.playground.screen import SIZE, Screen
 from examples.playground.stick import Stick
 
 LONGEST_FRAME_S = 0.05
@@ -33,24 +34,25 @@ KEYS = {
     "strafe": ("mouse3", "q"),
 }
 
+OFFSCREEN = ("load-display p3tinydisplay", "audio-library-name null", "print-pipe-types false")
+ONSCREEN = ("framebuffer-multisample 1", "multisamples 4")
+
 
 def opened(is_offscreen: bool, size: tuple[int, int] = (1280, 720)) -> ShowBase:
     """A window, or a picture in memory that Panda's software renderer draws, without a screen and a graphics card."""
-    settings = [f"win-size {size[0]} {size[1]}", "window-title contextdb playground", "framebuffer-multisample 1", "multisamples 4"]
-    if is_offscreen:
-        settings += ["load-display p3tinydisplay", "audio-library-name null", "notify-level-device fatal"]
-        settings += ["notify-level-x11display fatal", "notify-level-display error"]
-    quiet = [f"notify-level-{each} error" for each in ("text", "linmath")]
-    loadPrcFileData("", "\n".join([*settings, *quiet, "text-pixels-per-unit 60"]))
+    settings = [f"win-size {size[0]} {size[1]}", "window-title contextdb playground", "text-pixels-per-unit 60"]
+    settings += [f"notify-level-{each} fatal" for each in ("text", "linmath", *(("device", "x11display") if is_offscreen else ()))]
+    settings += OFFSCREEN if is_offscreen else ONSCREEN
+    loadPrcFileData("", "\n".join(settings))
     return ShowBase(windowType="offscreen" if is_offscreen else "onscreen")
 
 
 class Window:
     """The game on a screen."""
 
-    def __init__(self, game: Game, is_offscreen: bool = False, size: tuple[int, int] = (1280, 720)) -> None:
+    def __init__(self, game: Game, is_offscreen: bool = False, size: tuple[int, int] = (1280, 720), words: float = SIZE) -> None:
         self.game, self.base, self.is_offscreen = game, opened(is_offscreen, size), is_offscreen
-        self.scene, self.screen = Scene(self.base, game), Screen(self.base, game)
+        self.scene, self.screen = Scene(self.base, game), Screen(self.base, game, words)
         self.is_slow, self.held = False, set[str]()
         self.paging: tuple[subprocess.Popen[str], Path] | None = None
 
@@ -142,7 +144,7 @@ class Window:
     def _page(self) -> None:
         """Have the debugger's page of the last minute written, by another process."""
         session = Path(tempfile.mkdtemp(prefix="playground-")) / "last_minute.parquet"
-        self.game.player.recorders.minute.save(session)
+        self.game.player.trace.save(session)
         page = session.with_suffix(".html")
         words = ["motion", "replay", str(session), "--project", str(self.game.folder), "--html", str(page)]
         done = subprocess.Popen(
@@ -162,10 +164,11 @@ class Window:
 
     def _record(self) -> None:
         """Record a session, or write the one that is recorded."""
-        recorders = self.game.player.recorders
-        if recorders.recording is None:
-            recorders.recording = motion.Trace(databases=self.game.player.character.controller.selector.databases)
+        player = self.game.player
+        if player.trace.most == LAST_MINUTE:
+            player.keep(LONGEST)
             return
         path = Path(f"playground-{round(self.game.time_s)}s.parquet")
-        recorders.recording.save(path)
-        recorders.recording, self.screen.notice = None, f"written: {path}"
+        player.trace.save(path)
+        self.screen.notice = f"written: {path}"
+        player.keep(LAST_MINUTE)

@@ -42,6 +42,18 @@ def write_png(path: Path, *pictures: Picture, per_second: int = 12) -> None:
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts) + _chunk(b"IEND", b""))
 
 
+def read_png(path: Path) -> Picture:
+    """The first picture of a file that `write_png` wrote."""
+    raw, at, parts = path.read_bytes(), 8, dict[bytes, bytes]()
+    while at < len(raw):
+        size = int.from_bytes(raw[at : at + 4])
+        parts.setdefault(raw[at + 4 : at + 8], raw[at + 8 : at + 8 + size])
+        at += 12 + size
+    width, height = struct.unpack(">II", parts[b"IHDR"][:8])
+    rows = np.frombuffer(zlib.decompress(parts[b"IDAT"]), np.uint8).reshape(height, width + 1)
+    return np.asarray(np.frombuffer(parts[b"PLTE"], np.uint8).reshape(-1, 3)[rows[:, 1:]])
+
+
 def palette_of(pictures: Sequence[Picture]) -> Picture:
     """The colours that most pixels have, half of them told apart finely and half coarsely, so that none is far: [256, 3]."""
     pixels = np.concatenate([picture.reshape(-1, 3) for picture in pictures])

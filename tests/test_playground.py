@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import shutil
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -24,8 +26,10 @@ from examples.playground.headless import RATE, played, run
 from examples.playground.screen import Words
 from examples.playground.stick import REST, Stick, StickFile
 
-SECONDS = 60.0 if IS_FULL else 10.0
 ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "docs"))
+png_files = importlib.import_module("png_files")
+SECONDS = 60.0 if IS_FULL else 10.0
 BARS = {"jumps_per_s": 2.0, "skate_cm_s": 20.0, "path_rms_m": 0.1, "heading_rms_deg": 20.0, "accel_p99": 80.0}
 """What `motion measure` may say of walking, turning, running and strafing."""
 
@@ -82,12 +86,13 @@ def test_a_save_every_second_changes_what_may_play_at_once_and_no_row_is_wrong(t
     )
     assert second != first
     seen = []
+    seconds = SECONDS / 2.0
     with play.opened(tables) as game:
-        for frame, _ in enumerate(play.checked(game, SECONDS, turned(play.stick(tmp_path), SECONDS))):
+        for frame, _ in enumerate(play.checked(game, seconds, turned(play.stick(tmp_path), seconds))):
             if frame % round(RATE) == round(RATE) - 1:
                 seen.append(game.watch.snapshot().number)
                 moves.write_text(second if len(seen) % 2 else first)
-    assert seen == list(range(1, round(SECONDS) + 1))
+    assert seen == list(range(1, round(seconds) + 1))
 
 
 def test_what_cannot_be_read_is_said_and_the_game_plays_on(tmp_path: Path):
@@ -98,6 +103,24 @@ def test_what_cannot_be_read_is_said_and_the_game_plays_on(tmp_path: Path):
         push(game, 0.5, REST)
         assert game.player.playing == "idle"
         assert any(line.startswith("not loaded") and "Idel" in line for line in Words(game).state)
+
+
+@pytest.mark.parametrize(
+    ("name", "was", "becomes"),
+    [
+        ("contextdb.toml", '"Walk", "Run"', '"Walk"'),
+        ("vaults.csv", "speed,wall", "pace,wall"),
+        ("catches.csv", "Other plays", "Plays"),
+    ],
+)
+def test_tables_that_do_not_fit_the_game_end_no_game(tmp_path: Path, name: str, was: str, becomes: str):
+    file = play.copied(tmp_path / "tables") / name
+    with play.opened(file.parent) as game:
+        file.write_text(file.read_text().replace(was, becomes))
+        put(game, -3.0, 1.0)
+        push(game, 1.5, Stick(0.0, 1.0, run=True))
+        assert game.player.playing
+        assert game.trouble
 
 
 def test_who_runs_at_the_wall_vaults_it_when_the_gate_opens(game: Game):
@@ -115,8 +138,8 @@ def test_who_runs_at_the_wall_vaults_it_when_the_gate_opens(game: Game):
 
 
 def test_who_only_stands_before_the_wall_stays_before_it(game: Game):
-    put(game, -4.9, 4.0)
-    push(game, 4.0, Stick(0.0, 1.0))
+    put(game, -4.9, 4.6)
+    push(game, 2.0, Stick(0.0, 1.0))
     assert game.player.root.ahead_m < world.WALL.z[0]
 
 
@@ -137,17 +160,17 @@ def test_two_contest_the_ball_and_the_table_says_what_each_plays(game: Game):
 def test_who_runs_too_long_is_tired_and_plays_tired_clips(game: Game):
     put(game, -10.0, -15.0)
     game.player.stamina = 0.06
-    push(game, 4.0, Stick(0.2, 1.0, run=True))
+    push(game, 2.5, Stick(0.2, 1.0, run=True))
     assert game.player.moved.facts["style"] == "tired"
     assert game.player.playing.endswith("_tired")
 
 
 def test_feet_stand_on_the_ramp_and_on_the_steps(game: Game):
-    put(game, 4.5, 1.0)
+    put(game, 4.5, 4.0)
     game.rival.character.body = replace(game.rival.character.body, position=(-10.0, -10.0))
     foot = [game.player.stock.banks["moves"].skeleton.names.index(name) for name in ("LeftToe", "RightToe")]
     above = []
-    for _ in range(round(8.0 * RATE)):
+    for _ in range(round(6.0 * RATE)):
         game.update(1.0 / RATE, Stick(0.0, 1.0))
         places = game.player.pose.positions[foot]
         above.append(min(y - world.ground(x, z)[0] for x, y, z in places))
@@ -209,6 +232,21 @@ def test_any_folder_of_clips_plays(tmp_path: Path, tables: Path):
             assert game.player.playing
         assert game.ball is None
         assert game.player.speed > 1.0
+
+
+def test_a_picture_file_holds_the_picture(tmp_path: Path):
+    picture = np.zeros((4, 6, 3), np.uint8)
+    picture[:2], picture[2, 3:] = (240, 30, 30), (20, 200, 90)
+    png_files.write_png(tmp_path / "a.png", np.repeat(np.repeat(picture, 20, 0), 20, 1), np.zeros((80, 120, 3), np.uint8))
+    assert np.abs(png_files.read_png(tmp_path / "a.png")[::20, ::20].astype(int) - picture).max() < 8
+
+
+@pytest.mark.skipif(not IS_FULL, reason="EXAMPLES=full draws a picture of the page again")
+def test_the_pictures_of_the_page_show_what_is_drawn_now():
+    pytest.importorskip("panda3d", reason="the extra `playground` is not installed")
+    drawn = importlib.import_module("playground_pictures").moment("playground-gap").astype(int)
+    kept = png_files.read_png(ROOT / "docs" / "pictures" / "playground-gap.png")
+    assert np.abs(drawn - kept).mean() < 4.0, "run: make docs"
 
 
 def test_the_pages_name_what_there_is():
@@ -278,7 +316,7 @@ def test_keys_steer_and_the_f_keys_do_what_the_help_says(window: Any, tmp_path: 
     base.messenger.send("f1")
     step(2)
     assert window.game.player.moved.facts["gait"] == "Run"
-    assert "F3 page of the last minute" in window.screen.middle.getText()
+    assert "the page of the last minute" in window.screen.middle.getText()
     for key in ("w-up", "shift-up", "f2", "f3", "f4"):
         base.messenger.send(key)
     step(2)

@@ -62,7 +62,7 @@ class Ball:
         self.holder, self.since_s = cast["Catcher"], 0.0
         game.play_once(cast["Catcher"], pick.asset, *self.spot)
         self.said = f"{cast['Catcher'].name} catches the ball: {pick.asset}"
-        if "Other" in cast and (misses := pick.outputs["Other plays"]):
+        if "Other" in cast and (misses := pick.outputs.get("Other plays")):
             game.play_once(cast["Other"], str(misses), *self.spot, BESIDE_M)
             self.said += f"; {cast['Other'].name} misses it: {misses}"
 

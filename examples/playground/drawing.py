@@ -23,10 +23,10 @@ Floats = NDArray[np.float64]
 Colour = tuple[float, float, float, float]
 
 
-def colour(code: str, alpha: float = 1.0) -> Colour:
+def colour(code: str) -> Colour:
     """A colour written as in CSS."""
     red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
-    return red, green, blue, alpha
+    return red, green, blue, 1.0
 
 
 def mixed(one: Colour, other: Colour, share: float) -> Colour:
@@ -43,6 +43,7 @@ SUN = LVector3(0.45, 0.35, -1.0)
 N_DOTS, DOT_EVERY_S = 10, 0.1
 HEAD = 0.6
 """By so much of the neck the head is beyond its joint."""
+FLAT = world.Box((-20.0, 20.0), (-20.0, 20.0), 0.0, 0.0)
 TRUNK, LEG = ("hip", "spine", "chest"), ("upleg", "thigh")
 
 
@@ -108,15 +109,12 @@ class Scene:
         base.camLens.setFov(55.0)
         base.camLens.setNearFar(0.3, 80.0)
         _light(root)
-        edge = int(world.EDGE_M) + 2
-        corners = [(-edge, -edge, 0.0), (edge, -edge, 0.0), (edge, edge, 0.0), (-edge, edge, 0.0)]
-        _solid(root, shapes.prism(corners, -0.5), FLOOR).setDepthOffset(-1)
-        lines = shapes.grid(edge, GRID)
+        lines = shapes.grid(int(FLAT.x[1]), GRID)
         lines.reparentTo(root)
         lines.setLightOff()
-        for box in world.FLOORS:
-            _solid(root, shapes.prism(_corners(box)), STONE).setDepthOffset(-1)
-        self.wall = _solid(root, shapes.prism(_corners(world.WALL)), STONE)
+        for box in (FLAT, *world.FLOORS):
+            _solid(root, shapes.block(box), FLOOR if box is FLAT else STONE).setDepthOffset(-1)
+        self.wall = _solid(root, shapes.block(world.WALL), STONE)
         self.bodies = [Body(root, actor, own) for actor, own in zip(game.actors, (PLAYER, RIVAL), strict=False)]
         self.ball = _solid(root, shapes.capsule(0.0, 0.13), BALL)
         self.ring = _flat(root, shapes.disc(0.5, 0.42, 40), BALL)
@@ -127,9 +125,8 @@ class Scene:
         for body in self.bodies:
             body.show()
         gate = self.game.gate
-        seen = None if gate is None else gate.seen
-        is_over = self.game.player.once is not None
-        tint = HOLDS if is_over or (seen and seen.is_open) else CLIP if seen and seen.hit else STONE
+        may_vault = gate is not None and gate.seen is not None and bool(gate.seen.hit)
+        tint = HOLDS if self.game.player.once is not None else CLIP if may_vault else STONE
         _paint(self.wall, mixed(STONE, tint, 0.4))
         self._show_ball()
         x, y, z = here(self.game.player.pose.positions[0])
@@ -216,15 +213,6 @@ def _dots(nodes: list[NodePath], places: Floats, rate: float, over_m: float) -> 
         frame = min(round((i + 1) * DOT_EVERY_S * rate), len(places))
         x, z = places[frame] if frame < len(places) else (0.0, 0.0)
         _put(node, float(x), float(z), frame < len(places), over_m)
-
-
-def _corners(box: world.Box) -> list[shapes.Point]:
-    """The upper corners of a box, anticlockwise from above."""
-    (left, right), (near, far) = box.x, box.z
-    return [
-        here(each)
-        for each in ((right, box.near_m, near), (left, box.near_m, near), (left, box.far_m, far), (right, box.far_m, far))
-    ]
 
 
 def _onto(place: tuple[float, float, float], normal: world.Normal) -> LMatrix4:

@@ -16,7 +16,7 @@ from contextdb import motion
 from examples.playground import world
 from examples.playground.actor import Actor, Stock
 from examples.playground.ball import Ball
-from examples.playground.stick import REST, Stick
+from examples.playground.stick import GAITS, REST, Stick
 
 LOOK_EVERY_S = 0.2
 """How often the files of the tables are looked at."""
@@ -31,7 +31,7 @@ class Game:
         self.watch = cdb.watch(folder, self._reloaded, self._refused, poll_s=None, settle_s=settle_s)
         self.folder, self.trouble, self.time_s, self.asking = self.watch.folder, "", 0.0, ""
         stock = Stock.of(self.watch.project) if stock is None else stock
-        moves = self._moves = next(iter(self.watch.snapshot().values()))
+        moves = next(iter(self.watch.snapshot().values()))  # the first that contextdb.toml declares
         self.player = Actor("player", stock, moves, (0.0, 0.0, 0.0))
         self.actors = [self.player]
         self.ball, self.gate = None, None
@@ -60,9 +60,12 @@ class Game:
             self.asking = actor.name
             actor.update(dt, stick if actor is self.player else self._rival_s_stick())
             self._tell(actor)
-        self._vault(self.player)
-        if self.ball is not None:
-            self.ball.update(dt, self)
+        try:
+            self._vault(self.player)
+            if self.ball is not None:
+                self.ball.update(dt, self)
+        except cdb.ContextDBError as error:
+            self._refused(error)
 
     def _tell(self, actor: Actor) -> None:
         """Let the editor mark the row that plays: for a table, what plays is what was picked."""
@@ -112,14 +115,20 @@ class Game:
     # ---- tables that change
 
     def _reloaded(self, snapshot: cdb.Snapshot) -> None:
-        """The designer has saved."""
+        """The designer has saved: obey the new table, if it takes what the game says."""
+        moves = next(iter(snapshot.values()))
+        try:
+            for gait in GAITS:
+                moves.query({**self.player.moved.facts, "gait": gait}, unknown="any")
+        except cdb.ContextDBError as error:
+            self._refused(error)
+            return
         self.trouble = ""
-        self._moves = next(iter(snapshot.values()))
         for actor in self.actors:
-            actor.exchange(self._moves)
+            actor.exchange(moves)
 
     def _refused(self, error: cdb.ContextDBError) -> None:
-        """What was saved cannot be used: the last good version plays on."""
+        """What was saved cannot be used: what was good plays on."""
         self.trouble = str(error.faults[0])
 
     def close(self) -> None:

@@ -16,16 +16,19 @@ MOST_ROWS = 6
 SIZE = 0.048
 YELLOW = (1.0, 0.85, 0.3, 1.0)
 SHADES = {"big": YELLOW, "plays": YELLOW, "dim": (0.68, 0.72, 0.8, 1.0), "alarm": (1.0, 0.5, 0.45, 1.0)}
-HELP = (
-    "W A S D, arrows, left stick   walk",
-    "Shift, trigger                run (until you are tired)",
-    "Right mouse, left shoulder    strafe: keep facing ahead",
-    "Mouse, right stick            look round",
-    "run at the wall               vault, when the gate opens",
-    "F1 help    F2 slow motion    F3 page of the last minute",
-    "F4 record  Esc quit",
-    "beside it: contextdb edit examples/playground/tables",
-)
+HELP = """\
+W A S D, arrows, left stick\twalk
+Shift, right trigger\trun, until you are tired
+right mouse, Q, left shoulder\tstrafe: keep facing ahead
+mouse, right stick\tlook round
+run or walk at the wall\tvault it
+F1\tthis help
+F2\tslow motion
+F3\tthe page of the last minute
+F4\trecord, and write what was recorded
+Esc\tquit
+
+beside it: contextdb edit examples/playground/tables"""
 
 
 @dataclass
@@ -125,7 +128,7 @@ class Screen:
         heads = [_in("big", words.title), words.why, "", _in("dim", "valid rows of moves")]
         self.top.setText("\n".join([*heads, *listed, "", _in("dim", words.facts)]))
         self.state.setText("\n".join(words.state if not self.notice else [*words.state, _in("plays", self.notice)]))
-        self.middle.setText("\n".join(HELP) if self.shows_help else "")
+        self.middle.setText(HELP if self.shows_help else "")
 
 
 def _in(style: str, text: str) -> str:
@@ -136,6 +139,7 @@ def _text(parent: NodePath, x: float, y: float, size: float) -> TextNode:
     """Words on a dark card."""
     node = TextNode("")
     node.setWordwrap(1.4 / size)
+    node.setTabWidth(15.0)
     node.setCardColor(0.08, 0.09, 0.12, 0.72)
     node.setCardAsMargin(0.7, 0.7, 0.5, 0.4)
     node.setCardDecal(True)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from panda3d import core
 from panda3d.core import LVector3, NodePath
 
+from examples.playground.world import Box
+
 Point = tuple[float, float, float]
 N_ROUND, N_CAP = 14, 5
+LOWEST_M = -0.5
 
 
 def here(place: Sequence[float]) -> Point:
@@ -36,48 +39,29 @@ def mesh(points: Sequence[Point], normals: Sequence[Point], triangles: Sequence[
 
 def capsule(length: float, radius: float) -> NodePath:
     """A capsule along y, from 0 to its length; a ball where that is 0."""
-    points: list[Point] = []
-    normals: list[Point] = []
-    rings = list(_rings())
-    for along, around in rings:
-        for i in range(N_ROUND + 1):
-            turn = math.tau * i / N_ROUND
-            normal = (around * math.cos(turn), along, around * math.sin(turn))
-            normals.append(normal)
-            points.append((radius * normal[0], radius * along + (length if along > 0.0 else 0.0), radius * normal[2]))
-    wide = N_ROUND + 1
-    quads = [(row * wide + i, row * wide + i + 1) for row in range(len(rings) - 1) for i in range(N_ROUND)]
-    triangles = [each for a, b in quads for each in ((a, a + wide, b), (b, a + wide, b + wide))]
+    angles = [0.5 * math.pi * max(i / N_CAP, 1e-3) for i in range(N_CAP + 1)]
+    rings = [(-math.sin(a), math.cos(a)) for a in reversed(angles)] + [(math.sin(a), math.cos(a)) for a in angles]
+    turns = [math.tau * i / N_ROUND for i in range(N_ROUND + 1)]
+    normals = [(wide * math.cos(turn), along, wide * math.sin(turn)) for along, wide in rings for turn in turns]
+    points = [(radius * x, radius * y + (length if y > 0.0 else 0.0), radius * z) for x, y, z in normals]
+    n = N_ROUND + 1
+    quads = [(row * n + i, row * n + i + 1) for row in range(len(rings) - 1) for i in range(N_ROUND)]
+    triangles = [each for a, b in quads for each in ((a, a + n, b), (b, a + n, b + n))]
     return mesh(points, normals, triangles)
 
 
-def _rings() -> Iterator[tuple[float, float]]:
-    """The rings of a ball, in two halves: how far along, and how wide."""
-    for end in (-1.0, 1.0):
-        for i in range(N_CAP + 1):
-            share = i / N_CAP if end > 0.0 else 1.0 - i / N_CAP
-            angle = 0.5 * math.pi * max(share, 1e-3)
-            yield end * math.sin(angle), math.cos(angle)
-
-
-def prism(corners: Sequence[Point], height_of_floor: float = 0.0) -> NodePath:
-    """What stands on the floor below four corners, given as Panda has them and anticlockwise seen from above."""
-    points: list[Point] = []
+def block(box: Box) -> NodePath:
+    """A part of the ground, with its sides."""
+    (left, right), (near, far) = box.x, box.z
+    high = [here((x, box.height(z), z)) for x, z in ((right, near), (left, near), (left, far), (right, far))]
+    low = [(x, y, LOWEST_M) for x, y, _ in high]
+    faces = [high, *([low[i], low[(i + 1) % 4], high[(i + 1) % 4], high[i]] for i in range(4))]
     normals: list[Point] = []
-    triangles: list[tuple[int, int, int]] = []
-    low = [(x, y, height_of_floor) for x, y, _ in corners]
-    sides = [(low[i], low[(i + 1) % 4], corners[(i + 1) % 4], corners[i]) for i in range(4)]
-    for face in (tuple(corners), *sides):
-        a, b, d = (LVector3(*face[i]) for i in (0, 1, 3))
-        normal = (b - a).cross(d - a)
-        if normal.lengthSquared() < 1e-12:  # a side that is a line, such as the foot of a ramp
-            normal = (b - a).cross(LVector3(*face[2]) - a)
-        normal.normalize()
-        first = len(points)
-        points += face
-        normals += [tuple(normal)] * 4
-        triangles += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
-    return mesh(points, normals, triangles)
+    for a, b, c, d in ([LVector3(*corner) for corner in face] for face in faces):
+        x, y, z = (c - a).cross(d - b).normalized()
+        normals += [(x, y, z)] * 4
+    triangles = [each for i in range(0, 20, 4) for each in ((i, i + 1, i + 2), (i, i + 2, i + 3))]
+    return mesh([corner for face in faces for corner in face], normals, triangles)
 
 
 def disc(radius: float, hole: float = 0.0, n: int = 24) -> NodePath:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 Ground = tuple[float, float]
 WALK_MPS, RUN_MPS, TIRED_MPS = 1.4, 3.6, 2.6
+GAITS = ("Idle", "Walk", "Run")
 DEAD = 0.15
 """A stick that is pushed less than this is at rest."""
 
@@ -32,7 +33,7 @@ class Stick:
     @property
     def gait(self) -> str:
         """The fact of this name."""
-        return "Idle" if self.is_at_rest else "Run" if self.run else "Walk"
+        return GAITS[0 if self.is_at_rest else 2 if self.run else 1]
 
     def velocity(self, tired: bool = False) -> Ground:
         """The velocity over the ground that it asks for, m/s."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from examples.playground.stick import REST, Stick
 from examples.playground.window import Window
 
 FOLDER = Path(__file__).parent / "pictures"
-PER_SECOND, FILM_S = 12, 7.0
+PER_SECOND = 12
 Sticks = list[tuple[float, Stick]]
 """For so many seconds each."""
 
@@ -80,10 +81,9 @@ def put(actor: Actor, place: tuple[float, float, float]) -> None:
 def moment(name: str) -> Picture:
     """The picture of a moment, 960 pixels wide."""
     wanted = MOMENTS[name]
-    with Game(TABLES) as game:
+    with Game(TABLES) as game, drawn(game) as window:
         put(game.player, wanted.place)
         game.player.stamina = wanted.stamina
-        window = drawn_by(game)
         window.scene.turn, window.scene.tilt, window.scene.away = wanted.turn, wanted.tilt, wanted.away
         for seconds, stick in wanted.sticks:
             for _ in range(round(seconds * RATE)):
@@ -95,9 +95,9 @@ def moment(name: str) -> Picture:
 
 def film() -> list[Picture]:
     """The pictures of the film, 480 pixels wide."""
-    with Game(TABLES) as game:
+    with Game(TABLES) as game, drawn(game, words=0.075) as window:
         put(game.player, (-1.5, -5.0, 0.0))
-        window, found = drawn_by(game, words=0.075), []
+        found: list[Picture] = []
         window.scene.tilt, window.scene.away = 12.0, 5.2
         every, frame = round(RATE / PER_SECOND), 0
         for seconds, stick in FILM:
@@ -110,14 +110,14 @@ def film() -> list[Picture]:
         return found
 
 
-def drawn_by(game: Game, words: float = SIZE) -> Window:
-    """A picture in memory of a game; there is one at a time."""
-    import builtins
-
-    base = getattr(builtins, "base", None)
-    if base is not None:
-        base.destroy()
-    return Window(game, is_offscreen=True, size=(1920, 1080), words=words)
+@contextmanager
+def drawn(game: Game, words: float = SIZE) -> Iterator[Window]:
+    """A picture in memory of a game; Panda has one at a time."""
+    window = Window(game, is_offscreen=True, size=(1920, 1080), words=words)
+    try:
+        yield window
+    finally:
+        window.base.destroy()
 
 
 def main(folder: Path = FOLDER) -> None:

@@ -44,6 +44,8 @@ class Game:
         self.link = None if link is None else cdb.link(link)
         if self.link is not None:
             self.link.watch(self.watch, lambda: self.asking)
+            for actor in self.actors:
+                self.link.watch(actor.character.controller, actor.name)
         self._look_in_s = 0.0
 
     ball: Ball | None

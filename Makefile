@@ -20,10 +20,11 @@ INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check --editable
 .DEFAULT_GOAL := help
 # A set-up that failed half-way is done again from its start.
 .DELETE_ON_ERROR:
-.PHONY: help demo test cover check format docs site bench fuzz clean
+.PHONY: help demo play test cover check format docs site bench fuzz clean
 
 help:
 	@$(info make demo     the whole way on the sample tables: read, ask, explain, search)
+	@$(info make play     open the playground: a game whose characters obey tables that you edit beside it)
 	@$(info make test     run the tests; EXAMPLES=full draws all examples from a new seed, SEED=1 draws the same ones again)
 	@$(info make cover    run the tests and list the lines and branches of the code that none of them reaches)
 	@$(info make check    formatting, lint, types and import contracts)
@@ -37,6 +38,9 @@ help:
 
 demo: $(VENV)/.runtime
 	@$(PY) -m contextdb demo
+
+play: $(VENV)/.playground
+	@$(PY) -m examples.playground $(if $(CLIPS),--clips "$(CLIPS)")
 
 test: export EXAMPLES := $(EXAMPLES)
 test: export PYTHONDONTWRITEBYTECODE :=
@@ -62,6 +66,7 @@ docs: $(VENV)/.dev
 	$(PY) docs/keys.py
 	$(PY) docs/commands.py
 	$(PY) docs/pictures.py
+	$(PY) docs/playground_pictures.py
 
 site: $(VENV)/.site
 	$(PY) docs/site/build.py
@@ -80,6 +85,7 @@ bench: $(VENV)/.bench
 	$(PY) benchmarks/crowd.py
 	$(PY) benchmarks/poses.py
 	$(PY) benchmarks/motion_quality.py
+	$(PY) benchmarks/playground.py
 	$(PY) benchmarks/editor.py
 	$(PY) benchmarks/start.py
 	$(PY) benchmarks/no_numba.py
@@ -93,6 +99,10 @@ $(VENV)/pyvenv.cfg:
 
 $(VENV)/.runtime: pyproject.toml | $(VENV)/pyvenv.cfg
 	$(INSTALL) .
+	$(STAMP)
+
+$(VENV)/.playground: pyproject.toml | $(VENV)/pyvenv.cfg
+	$(INSTALL) ".[playground]"
 	$(STAMP)
 
 $(VENV)/.dev: pyproject.toml | $(VENV)/pyvenv.cfg

@@ -174,9 +174,8 @@ class Character:
             raise ContextError(Fault(f"unknown is {unknown!r}.", some(UNKNOWN)))
         if ground is not None:
             require_callable(ground, "ground")
-        self.ground = ground
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
-        self.own_facts, self.unknown = own_facts, unknown
+        self.own_facts, self.unknown, self.ground = own_facts, unknown, ground
         self.tables = tables
         self._own: tuple[object, object, Mapping[str, FactOf]] = (None, None, {})
         self._body, self._apart = body, NO_MOTION

@@ -1,0 +1,132 @@
+"""Draw the pictures of docs/playground.md, without a screen and a graphics card: six moments, and a short film for the README.
+
+    python docs/playground_pictures.py [FOLDER]
+
+The game is played from the same sticks each time, and drawn by Panda's software renderer.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from png_files import Picture, halved, write_png
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from examples.playground.__main__ import TABLES
+from examples.playground.actor import Actor
+from examples.playground.clips import write_clips
+from examples.playground.game import Game
+from examples.playground.headless import RATE
+from examples.playground.screen import SIZE
+from examples.playground.stick import REST, Stick
+from examples.playground.window import Window
+
+FOLDER = Path(__file__).parent / "pictures"
+PER_SECOND = 12
+Sticks = list[tuple[float, Stick]]
+"""For so many seconds each."""
+
+
+def pushed(degrees: float, run: bool = False, strafe: bool = False) -> Stick:
+    """A stick that is pushed in one direction."""
+    return Stick(math.sin(math.radians(degrees)), math.cos(math.radians(degrees)), run, strafe)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Where the player begins, how the stick is moved, when the picture is taken, and from where."""
+
+    place: tuple[float, float, float]
+    sticks: Sticks
+    turn: float = 0.0
+    tilt: float = 14.0
+    away: float = 5.0
+    until: Callable[[Game], bool] | None = None
+    stamina: float = 1.0
+
+
+def is_over_the_wall(game: Game) -> bool:
+    """The highest point of a vault."""
+    return game.player.once is not None and game.player.playing.startswith("vault") and game.player.pose.positions[0][1] > 1.6
+
+
+def is_caught(game: Game) -> bool:
+    """The ball has been contested a moment ago."""
+    return "misses" in game.ball.said and game.ball.since_s > 0.55 if game.ball is not None else False
+
+
+MOMENTS = {
+    "playground-turn": Moment((1.5, -3.0, 0.0), [(1.6, pushed(0)), (0.5, pushed(80))], turn=-25.0),
+    "playground-vault": Moment((-3.0, -2.0, 0.0), [(5.0, pushed(0, run=True))], 70.0, until=is_over_the_wall),
+    "playground-ramp": Moment((4.5, 0.6, 0.0), [(3.2, pushed(0))], -50.0, 15.0, 4.6),
+    "playground-contest": Moment((-1.4, -1.5, 0.0), [(2.2, pushed(0)), (6.0, REST)], 55.0, 12.0, 5.5, until=is_caught),
+    "playground-tired": Moment((0.0, -9.0, 0.0), [(3.0, pushed(0, run=True))], 50.0, 10.0, 4.4, stamina=0.06),
+    "playground-gap": Moment((0.0, 0.0, 0.0), [(1.2, pushed(0)), (1.2, pushed(180, strafe=True))], 25.0),
+}
+FILM: Sticks = [(0.6, pushed(0)), (1.0, pushed(70)), (2.2, pushed(-35, True)), (2.6, pushed(0, True)), (1.0, pushed(0))]
+
+
+def put(actor: Actor, place: tuple[float, float, float]) -> None:
+    """Put somebody elsewhere, at rest."""
+    actor.character.body = replace(actor.character.body, position=place[:2], velocity=(0.0, 0.0), heading=place[2])
+    actor.update(1.0 / RATE, REST)
+
+
+def moment(name: str) -> Picture:
+    """The picture of a moment, 960 pixels wide."""
+    wanted = MOMENTS[name]
+    with Game(TABLES) as game, drawn(game) as window:
+        put(game.player, wanted.place)
+        game.player.stamina = wanted.stamina
+        window.scene.turn, window.scene.tilt, window.scene.away = wanted.turn, wanted.tilt, wanted.away
+        for seconds, stick in wanted.sticks:
+            for _ in range(round(seconds * RATE)):
+                game.update(1.0 / RATE, stick)
+                if wanted.until is not None and wanted.until(game):
+                    return halved(window.picture())
+        return halved(window.picture())
+
+
+def film() -> list[Picture]:
+    """The pictures of the film, 480 pixels wide."""
+    with Game(TABLES) as game, drawn(game, words=0.075) as window:
+        put(game.player, (-1.5, -5.0, 0.0))
+        found: list[Picture] = []
+        window.scene.tilt, window.scene.away = 12.0, 5.2
+        every, frame = round(RATE / PER_SECOND), 0
+        for seconds, stick in FILM:
+            for _ in range(round(seconds * RATE)):
+                game.update(1.0 / RATE, stick)
+                window.scene.turn += 0.08
+                if frame % every == 0:
+                    found.append(halved(halved(window.picture())))
+                frame += 1
+        return found
+
+
+@contextmanager
+def drawn(game: Game, words: float = SIZE) -> Iterator[Window]:
+    """A picture in memory of a game; Panda has one at a time."""
+    window = Window(game, is_offscreen=True, size=(1920, 1080), words=words)
+    try:
+        yield window
+    finally:
+        window.base.destroy()
+
+
+def main(folder: Path = FOLDER) -> None:
+    """Draw all of them."""
+    write_clips(TABLES / "clips")
+    for name in MOMENTS:
+        write_png(folder / f"{name}.png", moment(name))
+    write_png(folder / "playground.png", *film(), per_second=PER_SECOND)
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))

@@ -1,0 +1,142 @@
+"""One character of the game: a `motion.Character`, its stamina, and the one-off that it plays now and then."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import contextdb as cdb
+from contextdb import motion
+from examples.playground import world
+from examples.playground.stick import REST, Stick
+
+LAST_MINUTE = 3600
+"""Decisions that are always kept: a minute at 60 a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stock:
+    """What all characters share: the settings, and the frames and poses of all clips."""
+
+    config: motion.MotionConfig
+    databases: Mapping[str, motion.MotionDatabase]
+    banks: Mapping[str, motion.PoseBank]
+
+    @classmethod
+    def of(cls, project: cdb.Project) -> Stock:
+        """Read the clips. No table is named, so that a database holds every clip, with a row or without."""
+        config = motion.MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
+        databases = motion.open_or_build(config, project.folder)
+        return cls(config, databases, motion.open_or_build_poses(config, project.folder))
+
+    def character(self, name: str, moves: cdb.CompiledTable) -> motion.Character:
+        """A character of one of the controllers."""
+        controller = self.config.controller(name, self.databases)
+        schema = self.config.features[self.config.databases[controller.selector.names[0]].features]
+        stream = motion.PoseStream(self.banks, self.config.output_of(name))
+        return motion.Character(controller, schema, moves, stream, unknown="any", ground=world.ground)
+
+
+class Actor:
+    """A character of the game."""
+
+    def __init__(self, name: str, stock: Stock, moves: cdb.CompiledTable, place: tuple[float, float, float]) -> None:
+        self.name, self.stock, self.moves = name, stock, moves
+        self.character = stock.character(name, moves)
+        self.character.body = motion.Steered(position=place[:2], heading=place[2])
+        self.stream = self.character.stream
+        self.keep(LAST_MINUTE)
+        self.stamina, self.is_tired = 1.0, False
+        self.once: motion.MatchPlay | None = None
+        self.origin = motion.RootMotion(0.0, 0.0, 0.0)
+        self.update(0.0, REST)
+        self.why = self.moved.decision.why
+
+    def update(self, dt: float, stick: Stick) -> None:
+        """One frame of the game."""
+        self._tire(dt, stick)
+        self.stick = stick
+        facts = {"gait": stick.gait, "style": self.style, "strafe": stick.strafe}
+        wanted, facing = stick.velocity(self.is_tired), stick.camera if stick.strafe else None
+        before = self.character.body
+        if self.once is None:
+            body = world.moved(before, before.moved(dt, wanted, facing))
+            self.moved = self.character.update(dt, wanted, facts, facing, body=body)
+            assert self.moved.pose is not None
+            self.pose = self.moved.pose
+        else:
+            self._play_once(dt, wanted, facts)
+        if self.moved.decision.action in (motion.Action.START, motion.Action.JUMP):
+            self.why = self.moved.decision.why
+        self.valid = self.moves.query(self.moved.facts, unknown="any")
+
+    def _play_once(self, dt: float, wanted: tuple[float, float], facts: Mapping[str, object]) -> None:
+        """The one-off moves the body; what would play without it goes on below, so that it fits when the one-off is over."""
+        play, before = self.once, self.character.body
+        assert play is not None
+        assert self.stream is not None
+        place = self.origin.then(play.advance(dt))
+        x, z = place.left_m, place.ahead_m
+        velocity = ((x - before.position[0]) / dt, (z - before.position[1]) / dt)
+        body = replace(before, position=(x, z), velocity=velocity, heading=place.turn_rad, acceleration=(0.0, 0.0))
+        self.character.stream = None
+        self.moved = self.character.update(dt, wanted, facts, body=body)
+        self.pose = self.stream.update(play.decision("once"), dt, body, world.ground)
+        if play.is_done:
+            self.once, self.character.stream = None, self.stream
+
+    def keep(self, most: int) -> None:
+        """Keep so many decisions from now on, the last ones, for a session."""
+        self.trace = motion.Trace(5, self.character.controller.selector.databases, most=most)
+        self.character.controller.recorder = self.trace
+
+    def begin(self, play: motion.MatchPlay) -> None:
+        """Play a one-off from where the body is."""
+        self.once, self.origin = play, self.root
+
+    def exchange(self, moves: cdb.CompiledTable) -> None:
+        """Obey another version of the table from now on."""
+        self.moves = self.character.tables = moves
+
+    @property
+    def root(self) -> motion.RootMotion:
+        """Where the animation is."""
+        return motion.RootMotion(*self.pose.root)
+
+    @property
+    def speed(self) -> float:
+        """m/s."""
+        return math.hypot(*self.character.body.velocity)
+
+    @property
+    def playing(self) -> str:
+        """The asset that is shown."""
+        shown = self.pose.playing
+        return "" if shown is None else shown.asset
+
+    @property
+    def features(self) -> object:
+        """The pose, as a query for a one-off."""
+        playing = self.moved.decision.playing
+        assert playing is not None
+        return self.stock.databases[playing.database].raw(playing.frame)
+
+    @property
+    def style(self) -> str:
+        """The fact of this name: one that the table knows."""
+        known = self.moves.asked["style"].domain.values if "style" in self.moves.asked else None
+        wanted = "tired" if self.is_tired else "normal"
+        return wanted if not known or wanted in known else str(next(iter(known)))
+
+    def _tire(self, dt: float, stick: Stick) -> None:
+        """Running costs breath; who has none left is tired until most of it is back."""
+        self.stamina += dt * (-0.09 if stick.gait == "Run" else 0.05 if stick.gait == "Walk" else 0.12)
+        self.stamina = min(1.0, max(0.0, self.stamina))
+        self.is_tired = self.stamina < (0.6 if self.is_tired else 0.05)
+
+    def sees(self, x: float, z: float) -> tuple[float, float]:
+        """How far away a place is, and in which direction: metres, and degrees to the left."""
+        here = self.root
+        dx, dz = x - here.left_m, z - here.ahead_m
+        return math.hypot(dx, dz), math.degrees(math.remainder(math.atan2(dx, dz) - here.turn_rad, math.tau))

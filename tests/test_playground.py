@@ -1,0 +1,331 @@
+"""examples/playground: it plays without a window, no row is wrong, a save changes it at once, and it can be looked at."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlparse
+
+import numpy as np
+import play
+import pytest
+from strategies import IS_FULL
+
+from contextdb import motion
+from examples.playground import world
+from examples.playground.__main__ import main
+from examples.playground.clips import ONCE, project_of_clips
+from examples.playground.game import Game
+from examples.playground.headless import RATE, played, run
+from examples.playground.screen import Words
+from examples.playground.stick import REST, Stick, StickFile
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "docs"))
+png_files = importlib.import_module("png_files")
+SECONDS = 60.0 if IS_FULL else 10.0
+BARS = {"jumps_per_s": 2.0, "skate_cm_s": 20.0, "path_rms_m": 0.1, "heading_rms_deg": 20.0, "accel_p99": 80.0}
+"""What `motion measure` may say of walking, turning, running and strafing."""
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return play.copied(tmp_path_factory.mktemp("playground") / "tables")
+
+
+@pytest.fixture
+def game(tables: Path) -> Iterator[Game]:
+    with play.opened(tables) as game:
+        yield game
+
+
+def put(game: Game, x: float, z: float, heading: float = 0.0) -> None:
+    body = game.player.character.body
+    game.player.character.body = replace(body, position=(x, z), velocity=(0.0, 0.0), heading=heading)
+
+
+def push(game: Game, seconds: float, stick: Stick) -> None:
+    for _ in range(round(seconds * RATE)):
+        game.update(1.0 / RATE, stick)
+
+
+def turned(stick: StickFile, seconds: float) -> StickFile:
+    """The same again and again, there and back."""
+    length_s = 9.0
+    back = [replace(each, x=-each.x, z=-each.z) for each in stick.sticks]
+    times = math.ceil(seconds / length_s)
+    sticks = [each for i in range(times) for each in (back if i % 2 else stick.sticks)]
+    return StickFile([i * length_s + t for i in range(times) for t in stick.times_s], sticks)
+
+
+def test_a_session_keeps_the_bars_of_motion_measure_and_no_row_is_wrong(game: Game, tmp_path: Path):
+    stick = turned(play.stick(tmp_path), SECONDS)
+    run(play.checked(game, SECONDS, stick), tmp_path / "poses.npz", tmp_path / "session.parquet")
+    banks = {name: game.player.stock.banks[name] for name in ("moves", "tired")}
+    session = motion.Trace.load(tmp_path / "session.parquet")
+    measures = motion.measure(session, banks, databases=game.player.character.controller.selector.databases)
+    assert measures.seconds == pytest.approx(SECONDS, abs=0.1)
+    told = {name: getattr(measures, name) for name in BARS}
+    assert all(told[name] is not None and told[name] <= bar for name, bar in BARS.items()), told
+    with np.load(tmp_path / "poses.npz") as poses:
+        assert len(poses["positions"]) == round(SECONDS * RATE)
+
+
+def test_a_save_every_second_changes_what_may_play_at_once_and_no_row_is_wrong(tmp_path: Path):
+    tables = play.copied(tmp_path / "tables")
+    moves = tables / "moves.csv"
+    first = moves.read_text()
+    second = first.replace("walk,Walk,0.9..1.7,-40..40,Any,False", "walk,Walk,0.9..1.1,-40..40,Any,False").replace(
+        "walk_fast,Walk,1.5..", "walk_fast,Walk,1.1.."
+    )
+    assert second != first
+    seen = []
+    seconds = SECONDS / 2.0
+    with play.opened(tables) as game:
+        for frame, _ in enumerate(play.checked(game, seconds, turned(play.stick(tmp_path), seconds))):
+            if frame % round(RATE) == round(RATE) - 1:
+                seen.append(game.watch.snapshot().number)
+                moves.write_text(second if len(seen) % 2 else first)
+    assert seen == list(range(1, round(seconds) + 1))
+
+
+def test_what_cannot_be_read_is_said_and_the_game_plays_on(tmp_path: Path):
+    tables = play.copied(tmp_path / "tables")
+    with play.opened(tables) as game:
+        moves = tables / "moves.csv"
+        moves.write_text(moves.read_text().replace("idle,Idle", "idle,Idel"))
+        push(game, 0.5, REST)
+        assert game.player.playing == "idle"
+        assert any(line.startswith("not loaded") and "Idel" in line for line in Words(game).state)
+
+
+@pytest.mark.parametrize(
+    ("name", "was", "becomes"),
+    [
+        ("contextdb.toml", '"Walk", "Run"', '"Walk"'),
+        ("vaults.csv", "speed,wall", "pace,wall"),
+        ("catches.csv", "Other plays", "Plays"),
+    ],
+)
+def test_tables_that_do_not_fit_the_game_end_no_game(tmp_path: Path, name: str, was: str, becomes: str):
+    file = play.copied(tmp_path / "tables") / name
+    with play.opened(file.parent) as game:
+        file.write_text(file.read_text().replace(was, becomes))
+        put(game, -3.0, 1.0)
+        push(game, 1.5, Stick(0.0, 1.0, run=True))
+        assert game.player.playing
+        assert game.trouble
+
+
+def test_who_runs_at_the_wall_vaults_it_when_the_gate_opens(game: Game):
+    put(game, -3.0, -2.0)
+    heights = []
+    for _ in range(300):
+        game.update(1.0 / RATE, Stick(0.0, 1.0, run=True))
+        x, z, _ = game.player.pose.root
+        if world.WALL.holds(x, z):
+            assert game.player.playing == "vault_run"
+            heights.append(game.player.pose.positions[:, 1].min())
+    assert game.player.root.ahead_m > world.WALL.z[1]
+    assert heights
+    assert min(heights) > world.WALL.near_m
+
+
+def test_who_only_stands_before_the_wall_stays_before_it(game: Game):
+    put(game, -4.9, 4.6)
+    push(game, 2.0, Stick(0.0, 1.0))
+    assert game.player.root.ahead_m < world.WALL.z[0]
+
+
+def test_two_contest_the_ball_and_the_table_says_what_each_plays(game: Game):
+    assert game.ball is not None
+    x, z = game.ball.spot
+    put(game, x, z - 1.4)
+    for _ in range(400):
+        game.update(1.0 / RATE, REST)
+        if game.ball.holder is not None:
+            break
+    assert game.ball.holder is game.rival
+    assert game.ball.said == "rival catches the ball: catch_contested; player misses it: catch_miss"
+    push(game, 0.2, REST)
+    assert {actor.name: actor.playing for actor in game.actors} == {"player": "catch_miss", "rival": "catch_contested"}
+
+
+def test_who_runs_too_long_is_tired_and_plays_tired_clips(game: Game):
+    put(game, -10.0, -15.0)
+    game.player.stamina = 0.06
+    push(game, 2.5, Stick(0.2, 1.0, run=True))
+    assert game.player.moved.facts["style"] == "tired"
+    assert game.player.playing.endswith("_tired")
+
+
+def test_feet_stand_on_the_ramp_and_on_the_steps(game: Game):
+    put(game, 4.5, 4.0)
+    game.rival.character.body = replace(game.rival.character.body, position=(-10.0, -10.0))
+    foot = [game.player.stock.banks["moves"].skeleton.names.index(name) for name in ("LeftToe", "RightToe")]
+    above = []
+    for _ in range(round(6.0 * RATE)):
+        game.update(1.0 / RATE, Stick(0.0, 1.0))
+        places = game.player.pose.positions[foot]
+        above.append(min(y - world.ground(x, z)[0] for x, y, z in places))
+    assert game.player.root.ahead_m > world.STEPS[-1].z[1]
+    assert np.percentile(np.abs(above), 90) < 0.08
+
+
+def test_where_no_row_is_valid_the_screen_says_so_and_what_is_missing(game: Game):
+    push(game, 0.2, Stick(0.0, -1.0, strafe=True))
+    words = Words(game)
+    assert words.rows == []
+    assert words.gap.startswith("walk_strafe: direction is 180")
+
+
+def test_the_screen_says_what_plays_why_and_which_rows_are_valid(game: Game):
+    push(game, 1.5, Stick(0.0, 1.0))
+    words = Words(game)
+    assert words.title.startswith("walk")
+    assert "walk at" in words.why
+    assert ("  5  walk", True) in words.rows
+    assert words.gap == ""
+    assert "gait Walk" in words.facts
+    assert words.state[0].startswith("stamina")
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "free"),
+    [
+        ((0.0, 0.0), (0.0, 0.05), True),
+        ((-3.0, 5.4), (-3.0, 5.6), False),
+        ((4.5, 1.9), (4.5, 2.1), True),
+        ((2.9, 6.0), (3.1, 6.0), False),
+        ((3.1, 6.0), (2.9, 6.0), True),
+        ((4.5, 9.4), (4.5, 9.5), True),
+        ((0.0, 17.9), (0.0, 18.1), False),
+    ],
+    ids=["flat", "wall", "ramp", "side of the ramp", "down from it", "step", "edge"],
+)
+def test_a_body_goes_where_it_may(here: tuple[float, float], there: tuple[float, float], free: bool):
+    assert world.is_free(here, there) is free
+
+
+def test_a_stick_that_is_pushed_sideways_asks_for_its_pace():
+    assert Stick(1.0, 1.0).velocity() == pytest.approx((0.99, 0.99), abs=0.01)
+    assert Stick(0.1, 0.0).velocity() == (0.0, 0.0)
+    assert Stick(0.0, 1.0, run=True).velocity(tired=True)[1] < Stick(0.0, 1.0, run=True).velocity()[1]
+
+
+def test_the_clips_of_a_folder_that_has_none_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["--clips", str(tmp_path), "--headless", "1"]) == 2
+    assert "there is no BVH clip. Accepted: a folder with files *.bvh" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not IS_FULL, reason="EXAMPLES=full makes a project of other clips")
+def test_any_folder_of_clips_plays(tmp_path: Path, tables: Path):
+    project_of_clips(tables / "clips", tmp_path)
+    with Game(tmp_path, settle_s=0.0) as game:
+        for _ in played(game, 4.0, play.stick(tmp_path)):
+            assert game.player.playing
+        assert game.ball is None
+        assert game.player.speed > 1.0
+
+
+def test_a_picture_file_holds_the_picture(tmp_path: Path):
+    picture = np.zeros((4, 6, 3), np.uint8)
+    picture[:2], picture[2, 3:] = (240, 30, 30), (20, 200, 90)
+    png_files.write_png(tmp_path / "a.png", np.repeat(np.repeat(picture, 20, 0), 20, 1), np.zeros((80, 120, 3), np.uint8))
+    assert np.abs(png_files.read_png(tmp_path / "a.png")[::20, ::20].astype(int) - picture).max() < 8
+
+
+@pytest.mark.skipif(not IS_FULL, reason="EXAMPLES=full draws a picture of the page again")
+def test_the_pictures_of_the_page_show_what_is_drawn_now():
+    pytest.importorskip("panda3d", reason="the extra `playground` is not installed")
+    drawn = importlib.import_module("playground_pictures").moment("playground-gap").astype(int)
+    kept = png_files.read_png(ROOT / "docs" / "pictures" / "playground-gap.png")
+    assert np.abs(drawn - kept).mean() < 4.0, "run: make docs"
+
+
+def test_the_pages_name_what_there_is():
+    page = (ROOT / "docs" / "playground.md").read_text(encoding="utf-8")
+    for name in (
+        "playground-turn",
+        "playground-vault",
+        "playground-ramp",
+        "playground-contest",
+        "playground-tired",
+        "playground-gap",
+    ):
+        assert f"pictures/{name}.png" in page
+        assert (ROOT / "docs" / "pictures" / f"{name}.png").stat().st_size < 150_000
+    assert (ROOT / "docs" / "pictures" / "playground.png").stat().st_size < 1_500_000
+    assert "docs/pictures/playground.png" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert set(ONCE) >= {"vault_run", "catch_contested"}
+
+
+@pytest.fixture
+def window(game: Game) -> Iterator[Any]:
+    pytest.importorskip("panda3d", reason="the extra `playground` is not installed")
+    from panda3d.core import ClockObject
+
+    from examples.playground.window import Window
+
+    window = Window(game, is_offscreen=True, size=(640, 360))
+    yield window
+    ClockObject.getGlobalClock().setMode(ClockObject.M_normal)
+    window.base.destroy()
+
+
+def test_the_picture_shows_the_player_and_what_is_said_without_a_screen(window: Any):
+    push(window.game, 0.3, REST)
+    picture = window.picture().astype(int)
+    assert picture.shape == (360, 640, 3)
+    red, blue = picture[..., 0], picture[..., 2]
+    warm = np.argwhere(red - blue > 60)
+    assert 1000 < len(warm) < 40_000
+    assert abs(warm[:, 1].mean() - 320) < 120
+    words = (picture[:120, :300].min(axis=2) > 200).mean()
+    assert 0.002 < words < 0.3
+
+
+def test_keys_steer_and_the_f_keys_do_what_the_help_says(window: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    from panda3d.core import ClockObject
+
+    shown: list[str] = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("webbrowser.open", shown.append)
+    window.begin()
+    base = window.base
+    clock = ClockObject.getGlobalClock()
+    clock.setMode(ClockObject.M_non_real_time)
+    clock.setDt(1.0 / RATE)
+
+    def step(times: int) -> None:
+        for _ in range(times):
+            base.taskMgr.step()
+
+    base.messenger.send("f4")
+    base.messenger.send("w")
+    step(60)
+    assert window.game.player.moved.facts["gait"] == "Walk"
+    assert window.game.player.root.ahead_m > 0.3
+    base.messenger.send("shift")
+    base.messenger.send("f1")
+    step(2)
+    assert window.game.player.moved.facts["gait"] == "Run"
+    assert "the page of the last minute" in window.screen.middle.getText()
+    for key in ("w-up", "shift-up", "f2", "f3", "f4"):
+        base.messenger.send(key)
+    step(2)
+    assert window.is_slow
+    assert window.game.player.moved.facts["gait"] == "Idle"
+    assert len(motion.Trace.load(next(tmp_path.glob("playground-*.parquet")))) > 50
+    window.paging[0].wait(60)
+    step(1)
+    assert window.screen.notice.startswith("written: ")
+    page = Path(unquote(urlparse(shown[0]).path))
+    assert "walk" in page.read_text(encoding="utf-8")
+    shutil.rmtree(page.parent)

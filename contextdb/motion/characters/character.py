@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import TypedDict, Unpack
@@ -89,15 +89,19 @@ class Updated:
     path : Trajectory
         The path that was wished for.
     decision : Decision
-    pose : Pose or None
-        None for a character without a stream.
     """
 
     body: Steered
     facts: Facts
     path: Trajectory
     decision: Decision
-    pose: Pose | None
+    poses: Sequence[Pose] = ()
+    at: int = 0
+
+    @property
+    def pose(self) -> Pose | None:
+        """The pose, made of the arrays of a crowd when it is asked for; None for a character without a stream."""
+        return self.poses[self.at] if self.poses else None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -387,19 +391,27 @@ class Character:
 
     def answer(self, step: Step, wished: Trajectory, decision: Decision, before: ControllerState) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""
-        pose, body, apart = None, step.body, NO_MOTION
+        poses: Sequence[Pose] = ()
         if self.stream is not None:
             try:
-                pose = self.stream.update(decision, step.dt_s, body)
+                poses = (self.stream.update(decision, step.dt_s, step.body),)
             except Exception:
                 self.controller.restore(before)
                 raise
+        return self.shown(step, wished, decision, poses, 0, poses[0].root if poses else None)
+
+    def shown(
+        self, step: Step, wished: Trajectory, decision: Decision, poses: Sequence[Pose], at: int, root: Place3 | None
+    ) -> Updated:
+        """What an update gave, once the pose of a number is shown with its root."""
+        body, apart = step.body, NO_MOTION
+        if root is not None and self.stream is not None:
             if self.stream.settings.root == "animation":
-                body = replace(body, position=pose.root[:2], heading=pose.root[2])
+                body = replace(body, position=root[:2], heading=root[2])
             else:
-                apart = apart_of(pose.root, (*body.position, body.heading))
+                apart = apart_of(root, (*body.position, body.heading))
         self._body, self._apart, self._trail = body, apart, step.trail
-        return Updated(body, step.facts, wished, decision, pose)
+        return Updated(body, step.facts, wished, decision, poses, at)
 
     def _trail_after(self, dt_s: float, place: Place3) -> tuple[tuple[float, Place3], ...]:
         """Where the animation was, and how many seconds ago, from the oldest that a search must know to now."""

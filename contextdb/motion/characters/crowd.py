@@ -25,8 +25,13 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.features.extraction import with_path
 from contextdb.motion.features.many_queries import with_paths
+from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.pose import Pose
+from contextdb.motion.output.stream import PoseStream
+from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.selection.asked import OfValid
 from contextdb.motion.selection.controller_group import ControllerGroup
+from contextdb.motion.selection.decision import Decision
 
 FactsOfMany = Mapping[str, Any] | Sequence[Facts]
 
@@ -130,16 +135,46 @@ class Crowd(Sequence[Character]):
         group = ControllerGroup(character.controller for character in self)
         queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
         valid = self._valid(steps)
-        before = self.states
+        before = group.states
         decisions = group.update(
             dt, queries, valid, contexts=[step.facts or None for step in steps], body=[step.body for step in steps]
         )
         try:
-            together = zip(self, steps, paths, decisions, before, strict=True)
-            return [each.answer(step, path, decision, state.controller) for each, step, path, decision, state in together]
+            shown = self._shown(dt, decisions, np.column_stack((bodies.positions, bodies.headings)))
         except Exception:
-            self.restore(before)
+            group.restore(before)
             raise
+        together = zip(self, steps, paths, decisions, shown, strict=True)
+        return [each.shown(step, path, decision, *pose) for each, step, path, decision, pose in together]
+
+    def _shown(self, dt: float, decisions: list[Decision], places: Floats) -> list[tuple[Sequence[Pose], int, Place3 | None]]:
+        """The poses that each one's is among, its number there, and its root; those of equal streams are worked out together."""
+        shown: list[tuple[Sequence[Pose], int, Place3 | None]] = [((), 0, None)] * len(self)
+        found = []
+        for numbers in self._equal_streams():
+            streams = PoseStreams(stream for i in numbers if (stream := self[i].stream) is not None)
+            poses, rows = streams.updated([decisions[i] for i in numbers], dt, places[numbers])
+            found.append((streams, rows))
+            for at, (i, (x, z, heading)) in enumerate(zip(numbers, poses.roots.tolist(), strict=True)):
+                shown[i] = poses, at, (x, z, heading)
+        for streams, rows in found:
+            streams.go_on(rows)
+        return shown
+
+    def _equal_streams(self) -> list[list[int]]:
+        """The numbers of the characters with a stream, those together that have the same banks and settings."""
+        found: list[tuple[PoseStream, list[int]]] = []
+        for i, character in enumerate(self):
+            stream = character.stream
+            if stream is None:
+                continue
+            for other, numbers in found:
+                if stream.pipeline.is_like(other.pipeline):
+                    numbers.append(i)
+                    break
+            else:
+                found.append((stream, [i]))
+        return [numbers for _, numbers in found]
 
     def _queries(
         self, dt: float, group: ControllerGroup, steps: list[Step], bodies: ManySteered, sticks: Floats, facing: Floats | None

@@ -478,6 +478,12 @@ class MotionDatabase(Searched):
         """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`."""
         return self._filters.make(valid, **options)
 
+    def may_play(self, range_number: int, valid: Valid | None = None, **options: Unpack[SearchOptions]) -> bool:
+        """Whether a search with these arguments may choose from a range."""
+        are_given = any(not (each is None or (isinstance(each, tuple) and not each)) for each in options.values())
+        flags = self.filter(valid, **options).ranges if are_given else self._filters.ranges_of(valid)
+        return bool(flags[range_number])
+
     def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
         """What the masks of n characters mean to this database, see `search_many`: each serves as `valid` of `search`."""
         return self._filters.valid_of_each(valid, n)

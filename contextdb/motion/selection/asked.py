@@ -50,12 +50,12 @@ class Asked:
 
     def __post_init__(self) -> None:
         for what in ("bias", "skip", "penalties"):
-            if not isinstance(given := getattr(self, what), (NoneType, dict, Mapping)):
+            if (given := getattr(self, what)) is not None and not isinstance(given, (dict, Mapping)):
                 accepted = f"{'a mapping of assets to costs, or ' if what == 'penalties' else ''}a mapping of databases"
                 raise QueryError(Fault(f"{what} is a {type(given).__name__}.", accepted))
-        if not isinstance(self.tags, (NoneType, TagFilter, Mapping)):
+        if self.tags is not None and not isinstance(self.tags, (TagFilter, Mapping)):
             raise QueryError(Fault(f"tags is a {type(self.tags).__name__}.", "a TagFilter, or a mapping of databases"))
-        if not isinstance(self.current, (Choice, NoneType)) and not _is_pair(self.current):
+        if self.current is not None and not isinstance(self.current, Choice) and not _is_pair(self.current):
             raise QueryError(Fault(f"what plays now is {self.current!r}.", 'a Choice, or such as ("jog", 120)'))
 
     def of(self, name: str) -> dict[str, Any]:

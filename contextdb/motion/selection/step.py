@@ -231,10 +231,10 @@ class Step:
 def _standing(ongoing: Ongoing, asked: Asked) -> Standing:
     """Whether the playing asset is still valid. A mask that does not fit is refused here, also where nothing hangs on it."""
     database, at, given = ongoing.head.database, ongoing.head.range, asked.of(ongoing.database)
-    if database.filter(**given).ranges[at]:
+    if database.may_play(at, **given):
         return Standing.VALID
     wide = widened_of(given["valid"])
-    is_widened = wide is not None and database.filter(wide).ranges[at]
+    is_widened = wide is not None and database.may_play(at, wide)
     return Standing.WIDENED if is_widened else Standing.NOT_VALID
 
 

@@ -4,8 +4,8 @@
 
 A controller follows a stick over all made clips for a minute; its decisions are then played by streams with more and more stages,
 in turn, round by round. A figure is the median of the rounds. The controller's own cost stands beside them, its path and its query
-not in it, and what a pose costs each of a thousand characters, one by one and together. Then whole updates, path, query, search and pose in them: of one
-character, and of a crowd of a thousand; as every third update searches, these are means of such threes.
+not in it, and what a pose costs each of a thousand characters, one by one and together. Then whole updates, path, query, search and
+pose in them: of one character, and of a crowd of a thousand; as every third update searches, these are means of such threes.
 """
 
 from __future__ import annotations

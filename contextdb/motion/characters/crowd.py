@@ -135,9 +135,7 @@ class Crowd(Sequence[Character]):
         queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
         valid = self._valid(steps)
         before = group.states
-        decisions = group.update(
-            dt, queries, valid, contexts=[step.facts or None for step in steps], body=[step.body for step in steps]
-        )
+        decisions = group.update(dt, queries, valid, contexts=[step.facts or None for step in steps], body=bodies)
         try:
             poses, roots = self._shown(dt, decisions, np.column_stack((bodies.positions, bodies.headings)))
         except Exception:

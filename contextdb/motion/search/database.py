@@ -478,11 +478,9 @@ class MotionDatabase(Searched):
         """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`."""
         return self._filters.make(valid, **options)
 
-    def may_play(self, range_number: int, valid: Valid | None = None, **options: Unpack[SearchOptions]) -> bool:
-        """Whether a search with these arguments may choose from a range."""
-        are_given = any(not (each is None or (isinstance(each, tuple) and not each)) for each in options.values())
-        flags = self.filter(valid, **options).ranges if are_given else self._filters.ranges_of(valid)
-        return bool(flags[range_number])
+    def ranges_of(self, valid: Valid | None) -> Flags:
+        """Which ranges a search may choose from that is given nothing else: bool [R]."""
+        return self._filters.ranges_of(valid)
 
     def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
         """What the masks of n characters mean to this database, see `search_many`: each serves as `valid` of `search`."""

@@ -61,13 +61,22 @@ class Asked:
     def of(self, name: str) -> dict[str, Any]:
         """What one database is given, by the names of the parameters of `MotionDatabase.search`."""
         return {
-            "valid": self.valid.get(name) if isinstance(self.valid, (dict, Mapping)) else self.valid,
+            "valid": self.valid_of(name),
             "tags": self.tags if isinstance(self.tags, (NoneType, TagFilter)) else self.tags.get(name),
             "current": self._current_in(name),
             "bias": self.bias.get(name) if self.bias else None,
             "skip": self.skip.get(name, ()) if self.skip else (),
             "penalties": self._penalties_of(name),
         }
+
+    def valid_of(self, name: str) -> Valid | None:
+        """What may play of one database."""
+        return self.valid.get(name) if isinstance(self.valid, (dict, Mapping)) else self.valid
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing but what may play is given to a database."""
+        return self.tags is None and self.current is None and self.bias is None and self.skip is None and self.penalties is None
 
     def options(self) -> Options:
         """The same as keyword arguments."""

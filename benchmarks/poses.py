@@ -4,8 +4,8 @@
 
 A controller follows a stick over all made clips for a minute; its decisions are then played by streams with more and more stages,
 in turn, round by round. A figure is the median of the rounds. The controller's own cost stands beside them, its path and its query
-not in it, and what a pose costs each of a thousand characters. Then whole updates, path, query, search and pose in them: of one
-character, and of a crowd of a thousand; as every third update searches, these are means of such threes.
+not in it, and what a pose costs each of a thousand characters, one by one and together. Then whole updates, path, query, search and
+pose in them: of one character, and of a crowd of a thousand; as every third update searches, these are means of such threes.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ from contextdb.motion import (
     PoseBank,
     PoseSettings,
     PoseStream,
+    PoseStreams,
     Selector,
     Steered,
 )
@@ -81,8 +82,9 @@ def main() -> None:
                 times[name].append(us)
     rows = [(name, f"{statistics.median(each):.1f}", f"{min(each):.1f}") for name, each in times.items()]
     rows.append(("controller, on the mean", f"{statistics.mean(controller_us[100:]):.1f}", ""))
-    crowd = crowd_microseconds(bank, played)
-    rows.append((f"all but ground, {CROWD:,} characters", f"{statistics.median(crowd):.1f}", f"{min(crowd):.1f}"))
+    for together, what in ((False, "one by one"), (True, "together")):
+        crowd = crowd_microseconds(bank, played, together=together)
+        rows.append((f"all but ground, {CROWD:,} streams {what}", f"{statistics.median(crowd):.1f}", f"{min(crowd):.1f}"))
     selector = Selector([Entry("loco", database)])
     for n, poses, what in ((1, True, ""), (CROWD, False, " without poses"), (CROWD, True, "")):
         whole = update_microseconds(motion.Character(Controller(selector), schema, None, PoseStream(bank) if poses else None), n)
@@ -116,14 +118,18 @@ def decisions(database: MotionDatabase, schema: FeatureSchema, times_us: list[fl
     return found
 
 
-def crowd_microseconds(bank: PoseBank, played: Sequence[tuple[Decision, Steered]]) -> list[float]:
-    """Of processor time, a character, in each of ten frames of a crowd."""
-    streams, found = [motion.PoseStream(bank) for _ in range(CROWD)], []
-    for frame in range(10):
+def crowd_microseconds(bank: PoseBank, played: Sequence[tuple[Decision, Steered]], *, together: bool) -> list[float]:
+    """Of processor time, a character, in each of twenty frames of a crowd: of streams one by one, or together."""
+    streams, found = PoseStreams([motion.PoseStream(bank) for _ in range(CROWD)]), []
+    for frame in range(20):
+        now = [played[(i + frame) % len(played)] for i in range(CROWD)]
+        decided, bodies = [decision for decision, _ in now], [body for _, body in now]
         began = time.process_time()
-        for i, stream in enumerate(streams):
-            decision, body = played[(i + frame) % len(played)]
-            stream.update(decision, 1.0 / RATE, body)
+        if together:
+            streams.update(decided, 1.0 / RATE, bodies)
+        else:
+            for stream, decision, body in zip(streams, decided, bodies, strict=True):
+                stream.update(decision, 1.0 / RATE, body)
         found.append((time.process_time() - began) / CROWD * 1e6)
     return found[1:]
 
@@ -134,7 +140,7 @@ def update_microseconds(first: Character, n: int) -> list[float]:
     speeds, ways = 0.3 + np.arange(n) % 37 / 10.0, np.arange(n) % 61 / 10.0
     sticks = np.column_stack((speeds * np.sin(ways), speeds * np.cos(ways)))
     found = []
-    for _ in range(200 if n == 1 else 10):
+    for _ in range(200 if n == 1 else 25):
         began = time.process_time()
         for _ in range(3):
             if n == 1:

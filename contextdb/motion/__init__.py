@@ -4,7 +4,7 @@
     markup ───────────────────────┘   Selector: priority databases in order ─► Choice
                                       Controller: one character in time ─► Decision ─► Trace
                                       PoseStream: its decisions as poses, from a PoseBank ─► Pose
-                                      ControllerGroup: a crowd of them, searched for at once
+                                      ControllerGroup, PoseStreams: a crowd of either, worked out together
                                       Character, Crowd: stick, body, facts, table and all of this in one update
                                       MatchNode, MatchGate: one-offs that end at a target
                                       JointSearcher, JointNode: clips of several characters, cast and played as one
@@ -64,9 +64,11 @@ from contextdb.motion.nodes.match_node import MatchCosts, MatchNode, MatchPlay
 from contextdb.motion.nodes.pose_match import best_start, pose_schema
 from contextdb.motion.nodes.warping import Target, WarpShare
 from contextdb.motion.output.bank import PoseBank, Sample
+from contextdb.motion.output.pose import CrowdPoses, Pose
 from contextdb.motion.output.retargeting import retargeted
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stream import Pose, PoseState, PoseStream
+from contextdb.motion.output.stream import PoseState, PoseStream
+from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.output.track import clip_of_poses, pose_arrays
 from contextdb.motion.preparing.clip_facts import ClipFacts, Spread
 from contextdb.motion.preparing.describing import Described, describe
@@ -139,6 +141,7 @@ __all__ = [
     "ControllerSettings",
     "ControllerState",
     "Crowd",
+    "CrowdPoses",
     "CustomFunction",
     "Cycle",
     "DatabaseSettings",
@@ -188,6 +191,7 @@ __all__ = [
     "PoseSettings",
     "PoseState",
     "PoseStream",
+    "PoseStreams",
     "Poses",
     "Proposal",
     "QueryError",

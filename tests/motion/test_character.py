@@ -351,6 +351,7 @@ def test_a_crowd_plays_what_each_plays_alone(more):
     members[2].tables = table().live()
     members[3].tables = {"all": table()}
     members[4].own_facts = {**motion.FACTS, "speed": lambda moment: 1.0}
+    members[5].ground = lambda x, z: (0.2, (0.0, 1.0, 0.0))
     crowd, alone = crowd_of(members)
     for tick in range(70):
         sticks = [stick_at(tick + 9 * i) for i in range(6)]

@@ -315,6 +315,15 @@ CALLS: dict[str, Call] = {
         x is None or callable(x) or motion.PoseStream(BANK, BY_CLIP).update(DECISION, 0.1, None, x)
     ),
     "PoseStream.restore(state)": lambda x: motion.PoseStream(BANK).restore(x),
+    "PoseStreams(streams)": lambda x: motion.PoseStreams(x),
+    "PoseStreams(streams), one": lambda x: motion.PoseStreams([x]),
+    "PoseStreams.update(decisions)": lambda x: motion.PoseStreams([motion.PoseStream(BANK, BY_CLIP)]).update(x, 0.1),
+    "PoseStreams.update(dt)": lambda x: motion.PoseStreams([motion.PoseStream(BANK, BY_CLIP)]).update([DECISION], x),
+    "PoseStreams.update(bodies)": lambda x: x is None or motion.PoseStreams([motion.PoseStream(BANK)]).update([DECISION], 0.1, x),
+    "PoseStreams.update(ground)": lambda x: (
+        x is None or callable(x) or motion.PoseStreams([motion.PoseStream(BANK, BY_CLIP)]).update([DECISION], 0.1, None, x)
+    ),
+    "PoseStreams.restore(states)": lambda x: motion.PoseStreams([motion.PoseStream(BANK)]).restore(x),
     "clip_of_poses(poses)": lambda x: motion.clip_of_poses(x, BANK, 30.0),
     "clip_of_poses(poses), one": lambda x: motion.clip_of_poses([x], BANK, 30.0),
     "clip_of_poses(bank)": lambda x: motion.clip_of_poses(POSED, x, 30.0),

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import TypedDict, Unpack
@@ -31,6 +31,7 @@ from contextdb.motion.characters.paths import ahead_s, apart_of, back_s, path_fr
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
 from contextdb.motion.characters.tables import Facts, Tables, Unknown
+from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, to_own_frame
@@ -50,6 +51,7 @@ from contextdb.motion.trace.session import Trace
 
 AT_REST = Steered()
 UNKNOWN = ("error", "any", "never")
+Paths = ManyTrajectories | Sequence[Trajectory]
 PoseOf = Callable[["Character", float], ArrayLike]
 """Gives the pose features of a query, as all features of the schema: of a character and the seconds since its last update."""
 
@@ -87,18 +89,29 @@ class Updated:
         Where the game has the body.
     facts : mapping of str to object
         Those of the game and the character's own.
-    path : Trajectory
-        The path that was wished for.
+    paths, poses : sequence of Trajectory, of Pose
+        Those of the crowd that is updated together.
     decision : Decision
-    pose : Pose or None
-        None for a character without a stream.
+    at : int
+        Which of them are this one's.
     """
 
     body: Steered
     facts: Facts
-    path: Trajectory
+    paths: Paths
     decision: Decision
-    pose: Pose | None
+    poses: Sequence[Pose | None] = ()
+    at: int = 0
+
+    @property
+    def path(self) -> Trajectory:
+        """The path that was wished for."""
+        return self.paths[self.at]
+
+    @property
+    def pose(self) -> Pose | None:
+        """The pose, made of the arrays of a crowd when it is asked for; None for a character without a stream."""
+        return self.poses[self.at] if self.poses else None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -393,19 +406,27 @@ class Character:
 
     def answer(self, step: Step, wished: Trajectory, decision: Decision, before: ControllerState) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""
-        pose, body, apart = None, step.body, NO_MOTION
-        if self.stream is not None:
-            try:
-                pose = self.stream.update(decision, step.dt_s, body, self.ground)
-            except Exception:
-                self.controller.restore(before)
-                raise
+        if self.stream is None:
+            return self.shown(step, (wished,), decision, (), 0, None)
+        try:
+            pose = self.stream.update(decision, step.dt_s, step.body, self.ground)
+        except Exception:
+            self.controller.restore(before)
+            raise
+        return self.shown(step, (wished,), decision, (pose,), 0, pose.root)
+
+    def shown(
+        self, step: Step, paths: Paths, decision: Decision, poses: Sequence[Pose | None], at: int, root: Place3 | None
+    ) -> Updated:
+        """What an update gave, once the pose of a number among some is shown, with its root."""
+        body, apart = step.body, NO_MOTION
+        if root is not None and self.stream is not None:
             if self.stream.settings.root == "animation":
-                body = replace(body, position=pose.root[:2], heading=pose.root[2])
+                body = replace(body, position=root[:2], heading=root[2])
             else:
-                apart = apart_of(pose.root, (*body.position, body.heading))
+                apart = apart_of(root, (*body.position, body.heading))
         self._body, self._apart, self._trail = body, apart, step.trail
-        return Updated(body, step.facts, wished, decision, pose)
+        return Updated(body, step.facts, paths, decision, poses, at)
 
     def _trail_after(self, dt_s: float, place: Place3) -> tuple[tuple[float, Place3], ...]:
         """Where the animation was, and how many seconds ago, from the oldest that a search must know to now."""

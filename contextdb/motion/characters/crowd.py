@@ -16,17 +16,21 @@ from contextdb.cells.arguments import require_kind, require_many_of, require_map
 from contextdb.errors import ContextError, Fault, MotionError, in_quotes, plural
 from contextdb.motion.arguments import HasAssets
 from contextdb.motion.characters import tables as asking
-from contextdb.motion.characters.character import Character, CharacterState, Step, Updated
+from contextdb.motion.characters.character import Character, CharacterState, Paths, Step, Updated
 from contextdb.motion.characters.paths import MOST_TURN_RAD, ahead_s, back_s, shares_left
 from contextdb.motion.characters.tables import Facts, Table
 from contextdb.motion.clips.many_paths import ManyTrajectories
 from contextdb.motion.clips.many_steered import ManySteered, steered_paths
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.trajectory import Trajectory
 from contextdb.motion.features.extraction import with_path
 from contextdb.motion.features.many_queries import with_paths
+from contextdb.motion.output.bank import Place3
+from contextdb.motion.output.pose import Pose
+from contextdb.motion.output.stream import PoseStream
+from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.selection.asked import OfValid
 from contextdb.motion.selection.controller_group import ControllerGroup
+from contextdb.motion.selection.decision import Decision
 
 FactsOfMany = Mapping[str, Any] | Sequence[Facts]
 
@@ -130,20 +134,54 @@ class Crowd(Sequence[Character]):
         group = ControllerGroup(character.controller for character in self)
         queries, paths = self._queries(dt, group, steps, bodies, wanted, headings)
         valid = self._valid(steps)
-        before = self.states
-        decisions = group.update(
-            dt, queries, valid, contexts=[step.facts or None for step in steps], body=[step.body for step in steps]
-        )
+        before = group.states
+        decisions = group.update(dt, queries, valid, contexts=[step.facts or None for step in steps], body=bodies)
         try:
-            together = zip(self, steps, paths, decisions, before, strict=True)
-            return [each.answer(step, path, decision, state.controller) for each, step, path, decision, state in together]
+            poses, roots = self._shown(dt, decisions, np.column_stack((bodies.positions, bodies.headings)))
         except Exception:
-            self.restore(before)
+            group.restore(before)
             raise
+        together = enumerate(zip(self, steps, decisions, roots, strict=True))
+        return [each.shown(step, paths, decision, poses, i, root) for i, (each, step, decision, root) in together]
+
+    def _shown(
+        self, dt: float, decisions: list[Decision], places: Floats
+    ) -> tuple[Sequence[Pose | None], list[Place3] | list[Place3 | None]]:
+        """The poses of all and their roots, None without a stream; those of equal streams are worked out together."""
+        found = []
+        for numbers in self._equal_streams():
+            streams = PoseStreams(stream for i in numbers if (stream := self[i].stream) is not None)
+            grounds = [self[i].ground for i in numbers]
+            below = grounds if any(grounds) else None
+            found.append((numbers, streams, *streams.updated([decisions[i] for i in numbers], dt, places[numbers], below)))
+        for _, streams, _, rows in found:
+            streams.go_on(rows)
+        if found and len(found[0][0]) == len(self):
+            return found[0][2], [(x, z, heading) for x, z, heading in found[0][2].roots.tolist()]
+        shown: list[Pose | None] = [None] * len(self)
+        for numbers, _, poses, _ in found:
+            for i, pose in zip(numbers, poses, strict=True):
+                shown[i] = pose
+        return shown, [None if pose is None else pose.root for pose in shown]
+
+    def _equal_streams(self) -> list[list[int]]:
+        """The numbers of the characters with a stream, those together that have the same banks and settings."""
+        found: list[tuple[PoseStream, list[int]]] = []
+        for i, character in enumerate(self):
+            stream = character.stream
+            if stream is None:
+                continue
+            for other, numbers in found:
+                if stream.pipeline.is_like(other.pipeline):
+                    numbers.append(i)
+                    break
+            else:
+                found.append((stream, [i]))
+        return [numbers for _, numbers in found]
 
     def _queries(
         self, dt: float, group: ControllerGroup, steps: list[Step], bodies: ManySteered, sticks: Floats, facing: Floats | None
-    ) -> tuple[Floats, list[Trajectory]]:
+    ) -> tuple[Floats, Paths]:
         """The query of each, and its wished path."""
         schema = self[0].schema
         if any(character.schema is not schema and character.schema != schema for character in self):
@@ -159,7 +197,7 @@ class Crowd(Sequence[Character]):
             paths = [each.wished(step, steered[i]) for i, (each, step) in enumerate(zip(self, steps, strict=True))]
             return np.array([with_path(schema, own, path) for own, path in zip(features, paths, strict=True)]), paths
         wished = _paths_from(np.array([step.place for step in steps]), steered)
-        return with_paths(schema, features, wished).astype(np.float64), [wished[i] for i in range(len(self))]
+        return with_paths(schema, features, wished).astype(np.float64), wished
 
     def _valid(self, steps: list[Step]) -> Any:
         """What may play of each, every table asked once with the facts of all who have it."""

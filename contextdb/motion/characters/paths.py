@@ -43,7 +43,7 @@ def ahead_s(schema: FeatureSchema, speed_mps: float, halflife_s: float) -> float
 def back_s(schema: FeatureSchema) -> float:
     """How many seconds of the way back a search must be given; 0 where no feature looks back."""
     seconds, metres = schema.path_reaches
-    back = max((0.0, *(-second for second in seconds)))
+    back = 0.0 - min((0.0, *seconds))
     return max(back, LEAST_BACK_S) if min((0.0, *metres)) < 0.0 else back
 
 
@@ -106,5 +106,6 @@ def apart_of(place: Place3, body: Place3) -> RootMotion:
 
 def place_beside(body: Place3, apart: RootMotion) -> Place3:
     """The place that the body sees so."""
-    found = RootMotion(*body).then(apart)
-    return found.left_m, found.ahead_m, found.turn_rad
+    sin, cos = math.sin(body[2]), math.cos(body[2])
+    left, ahead = apart.left_m, apart.ahead_m
+    return body[0] + cos * left + sin * ahead, body[1] - sin * left + cos * ahead, body[2] + apart.turn_rad

@@ -13,6 +13,8 @@ play rate has not made up for it. `contextdb.motion.output.feet` bends the legs 
 Source: orientation and stride warping of Unreal's Animation Warping; the alignment of strafes in Remedy's talk.
 """
 
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return"
+
 from __future__ import annotations
 
 import math
@@ -23,9 +25,21 @@ import numpy as np
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.output import kernels
-from contextdb.motion.output.bank import Place3, PoseBank, tops_of
-from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import UNWARPED, Posture, Tick, Warp, damping
+from contextdb.motion.output.bank import PoseBank, tops_of
+from contextdb.motion.output.kernels import compiled, remainder
+from contextdb.motion.output.root import rotation_share
+from contextdb.motion.output.stages import (
+    HAS_VELOCITY,
+    PATH,
+    RATE,
+    STRIDE,
+    STRIDE_SPEED,
+    TRAVEL,
+    TURN,
+    TURN_SPEED,
+    VELOCITY,
+    WEIGHT,
+)
 
 LEAST_MPS = 0.2
 """What goes slower goes nowhere: neither turn nor stride are wanted of it."""
@@ -43,52 +57,44 @@ class Spine:
     left: Floats
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Alignment:
-    """The stage; its state is the `Warp`."""
+@compiled
+def align(to, bones, given, heading, dt, before, row, rotations, positions):
+    """Write how the body is bent, and turn its hips by that; a rig without a spine is left as it is."""
+    row[TURN], row[TURN_SPEED], row[STRIDE], row[STRIDE_SPEED] = 0.0, 0.0, 1.0, 0.0
+    if not to.is_warping or bones.spine.shape[0] == 0:
+        return
+    turn, stride = _wanted(to, given, heading, row)
+    row[TURN], row[TURN_SPEED] = _followed(before[TURN], before[TURN_SPEED], turn, to.turn_damping, dt)
+    row[STRIDE], row[STRIDE_SPEED] = _followed(before[STRIDE], before[STRIDE_SPEED], stride, to.turn_damping, dt)
+    if row[TURN] != 0.0:
+        kernels.align(
+            bones.parents, bones.tops, bones.top_places, bones.spine, bones.left, row[TURN], rotations, positions
+        )  # fmt: skip
 
-    settings: PoseSettings
-    parents: Ints
-    spine: Spine | None
 
-    @classmethod
-    def of(cls, settings: PoseSettings, bank: PoseBank) -> Alignment:
-        """For a rig; one without feet, or without a spine, is left as it is."""
-        return cls(settings, bank.skeleton.parents, spine_of(bank))
+@compiled
+def _wanted(to, given, heading, row):
+    """The turn and the stride that the game's velocity asks for; 0 and 1 where either body stands."""
+    left, ahead = given[RATE] * given[TRAVEL], given[RATE] * given[TRAVEL + 1]
+    sway = given[TRAVEL + 2] * rotation_share(to, given[WEIGHT])
+    x = row[VELOCITY] if row[HAS_VELOCITY] != 0.0 else 0.0
+    z = row[VELOCITY + 1] if row[HAS_VELOCITY] != 0.0 else 0.0
+    own, wanted = math.hypot(left, ahead), math.hypot(x, z)
+    if own < LEAST_MPS or wanted < LEAST_MPS:
+        return 0.0, 1.0
+    turn = remainder(math.atan2(x, z) - (heading - sway) - math.atan2(left, ahead))
+    if abs(turn) > MOST_TURN:
+        return 0.0, 1.0
+    stride = 1.0 if to.root == PATH else wanted / own
+    return min(max(turn, -to.turn_limit), to.turn_limit), min(max(stride, to.min_stride), to.max_stride)
 
-    def begin(self, posture: Posture, body: Place3 | None) -> Warp:
-        """Nothing is turned."""
-        return UNWARPED
 
-    def apply(self, posture: Posture, tick: Tick, state: object) -> tuple[Posture, Warp]:
-        """The posture with its hips turned, and its warp."""
-        assert isinstance(state, Warp)
-        if self.spine is None:
-            return posture, UNWARPED
-        y = damping(self.settings.alignment_halflife_s)
-        turn, stride = self._wanted(posture.root[2], tick)
-        warp = Warp(
-            *_followed(state.turn, state.turn_speed, turn, y, tick.dt_s),
-            *_followed(state.stride, state.stride_speed, stride, y, tick.dt_s),
-        )
-        if warp.turn == 0.0:
-            return Posture(posture.rotations, posture.positions, posture.root, warp), warp
-        rotations, positions, spine = posture.rotations.copy(), posture.positions.copy(), self.spine
-        kernels.align(self.parents, spine.tops, spine.places, spine.joints, spine.left, warp.turn, rotations, positions)
-        return Posture(rotations, positions, posture.root, warp), warp
-
-    def _wanted(self, heading: float, tick: Tick) -> tuple[float, float]:
-        """The turn and the stride that the game's velocity asks for; 0 and 1 where either body stands."""
-        (left, ahead, sway), (x, z) = tick.travel, tick.velocity or (0.0, 0.0)
-        own, wanted = math.hypot(left, ahead), math.hypot(x, z)
-        if own < LEAST_MPS or wanted < LEAST_MPS:
-            return 0.0, 1.0
-        turn = math.remainder(math.atan2(x, z) - (heading - sway) - math.atan2(left, ahead), math.tau)
-        if abs(turn) > MOST_TURN:
-            return 0.0, 1.0
-        limit = math.radians(self.settings.alignment_limit_deg) if self.settings.path_alignment else 0.0
-        stride = 1.0 if self.settings.root == "path" else wanted / own
-        return min(max(turn, -limit), limit), min(max(stride, self.settings.min_stride), self.settings.max_stride)
+@compiled
+def _followed(value, speed, goal, y, dt_s):
+    """A number that comes to a goal as a critically damped spring, and its change a second."""
+    apart = value - goal
+    pushed, fade = speed + apart * y, math.exp(-y * dt_s)
+    return goal + fade * (apart + pushed * dt_s), fade * (speed - pushed * y * dt_s)
 
 
 def spine_of(bank: PoseBank) -> Spine | None:
@@ -120,10 +126,3 @@ def _below(rig: Skeleton, joint: int) -> list[int]:
 def _size(rig: Skeleton, joint: int) -> int:
     """How many joints hang on a joint, itself among them."""
     return 1 + sum(_size(rig, other) for other in _below(rig, joint))
-
-
-def _followed(value: float, speed: float, goal: float, y: float, dt_s: float) -> tuple[float, float]:
-    """A number that comes to a goal as a critically damped spring, and its change a second."""
-    apart = value - goal
-    pushed, fade = speed + apart * y, math.exp(-y * dt_s)
-    return goal + fade * (apart + pushed * dt_s), fade * (speed - pushed * y * dt_s)

@@ -11,11 +11,11 @@ first, and those that do not keep their offset in every clip. All others lie at 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,21 @@ class Moment:
     travel: Place3
     contacts: Flags
     frame: int
+
+
+class Frames(NamedTuple):
+    """A bank as loops read it: its arrays, root and travel of each frame [N, 6], and of each range the first frame, the steps to
+    the last, and whether it loops."""
+
+    rotations: Singles
+    positions: Singles
+    root: Singles
+    ways: Floats
+    contacts: Flags
+    starts: Ints
+    n_steps: Ints
+    looping: Flags
+    rate: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,6 +305,14 @@ class PoseBank:
         return np.column_stack((self.root, travels(self.root, self.starts, self.stops, self.looping, self.rate)))
 
     @cached_property
+    def frames(self) -> Frames:
+        """What the loops over many characters read."""
+        starts = np.asarray(self.starts, np.int64)
+        steps, ways = np.asarray(self.stops, np.int64) - starts - 1, np.ascontiguousarray(self._ways, np.float64)
+        arrays = self.rotations, self.positions, self.root, ways, np.ascontiguousarray(self.contacts)
+        return Frames(*arrays, starts, steps, np.asarray(self.looping), float(self.rate))
+
+    @cached_property
     def _spans(self) -> list[tuple[int, int, bool]]:
         """First frame, steps to the last and whether it loops, of each range."""
         steps = (self.stops - self.starts - 1).tolist()
@@ -301,13 +324,8 @@ class PoseBank:
 
     def _between(self, range_number: int, time_s: float) -> tuple[int, int, float]:
         """The two frames about a moment, and the share of the second."""
-        start, n_steps, is_looping = self._spans[range_number]
-        frame = time_s * self.rate
-        if is_looping and n_steps > 0 and not 0.0 <= frame <= n_steps:
-            frame %= n_steps
-        frame = min(max(frame, 0.0), float(n_steps))
-        low = min(int(frame), max(n_steps - 1, 0))
-        return start + low, start + min(low + 1, n_steps), frame - low
+        found: tuple[int, int, float] = loops().between(*self._spans[range_number], time_s * self.rate)
+        return found
 
     def _pose(self, low: int, high: int, share: float) -> tuple[Floats, Floats]:
         """Rotations [J, 4] and positions [M, 3] between two frames."""
@@ -316,11 +334,8 @@ class PoseBank:
         return rotations, positions
 
     def _root_velocity(self, low: int, high: int, share: float) -> Place3:
-        x, z, heading = self.root[low].tolist()
-        to_x, to_z, to_heading = self.root[high].tolist()
-        x, z, turn = (to_x - x) * self.rate, (to_z - z) * self.rate, to_heading - heading
-        sin, cos = math.sin(heading + share * turn), math.cos(heading + share * turn)
-        return cos * x - sin * z, sin * x + cos * z, turn * self.rate
+        found: Place3 = loops().root_velocity(self.root, low, high, share, self.rate)
+        return found
 
     def _unknown(self, asset: str) -> Fault:
         names = list(dict.fromkeys(self.assets))

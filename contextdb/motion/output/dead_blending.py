@@ -7,71 +7,61 @@ It never shows more than what was shown and what plays lie apart, which for pose
 
 Source: D. Holden, "Dead Blending", 2023, and the node of that name in Unreal.
 """
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return"
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output import kernels
-from contextdb.motion.output.bank import Place3, Sample
-from contextdb.motion.output.stages import Posture, Tick
+from contextdb.motion.output.kernels import compiled
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Fading:
-    """What was shown at the last seam, its velocities then, and the seconds since."""
+@compiled
+def _mixed(
+    left, spins, shifts, speeds, since, fade_s, y, playing, playing_spins, playing_positions, playing_speeds,
+    to_left, to_spins, to_shifts, to_speeds,
+):  # fmt: skip
+    """What is shown while one thing fades over another: rotations, positions, and how both change."""
+    u = since / fade_s
+    share, slope = u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) / fade_s
+    braking = math.exp(-y * since)
+    reach = (1.0 - braking) / y
+    kernels.fade_turns(left, spins, reach, share, slope, braking, playing, playing_spins, to_left, to_spins)
+    for k in range(shifts.shape[0]):
+        for i in range(3):
+            gone = shifts[k, i] + reach * speeds[k, i]
+            apart = playing_positions[k, i] - gone
+            to_speeds[k, i] = (1.0 - share) * braking * speeds[k, i] + share * playing_speeds[k, i] + slope * apart
+            to_shifts[k, i] = gone + share * apart
 
-    rotations: Floats
-    positions: Floats
-    spins: Floats
-    velocities: Floats
-    since_s: float
 
-
-@dataclass(frozen=True, slots=True)
-class DeadBlending:
-    """The stage: what was left at the last seam, until it has faded."""
-
-    fade_s: float
-    halflife_s: float
-
-    def begin(self, posture: Posture, body: Place3 | None) -> Fading | None:
-        """Nothing fades."""
-        return None
-
-    def apply(self, posture: Posture, tick: Tick, state: object) -> tuple[Posture, Fading | None]:
-        """What plays, and what was left over it as far as it has not faded."""
-        assert isinstance(state, Fading | None)
-        fading = None if state is None or state.since_s + tick.dt_s >= self.fade_s else state
-        if fading is not None:
-            fading = replace(fading, since_s=fading.since_s + tick.dt_s)
-        if tick.left is not None:
-            fading = self._mixed(fading, tick.left)
-        if fading is None:
-            return posture, None
-        zeros = np.zeros((len(posture.rotations), 3))
-        plays = Sample(posture.rotations, posture.positions, zeros, np.zeros_like(posture.positions), (0.0, 0.0, 0.0))
-        shown = self._mixed(fading, plays)
-        return replace(posture, rotations=shown.rotations, positions=shown.positions), fading
-
-    def _mixed(self, fading: Fading | None, plays: Sample) -> Fading:
-        """What is shown while one thing fades over another, as what fades from now on."""
-        if fading is None:
-            return Fading(plays.rotations, plays.positions, plays.spins, plays.velocities, 0.0)
-        u = fading.since_s / self.fade_s
-        share, slope = u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) / self.fade_s
-        y = math.log(2.0) / self.halflife_s
-        braking = math.exp(-y * fading.since_s)
-        reach = (1.0 - braking) / y
-        rotations, spins = np.empty_like(plays.rotations), np.empty_like(fading.spins)
-        kernels.fade_turns(
-            fading.rotations, fading.spins, reach, share, slope, braking, plays.rotations, plays.spins, rotations, spins
-        )
-        gone = fading.positions + reach * fading.velocities
-        positions = gone + share * (plays.positions - gone)
-        velocities = (1.0 - share) * braking * fading.velocities + share * plays.velocities + slope * (plays.positions - gone)
-        return Fading(rotations, positions, spins, velocities, 0.0)
+@compiled
+def dead_blend(
+    left, spins, shifts, speeds, since, fade_s, y, dt, is_seam, seam, seam_spins, seam_positions, seam_speeds,
+    clip, clip_positions, to_left, to_spins, to_shifts, to_speeds, rotations, positions,
+):  # fmt: skip
+    """What plays, and what was left over it as far as it has not faded; gives the seconds since the last seam, below 0 for none."""
+    since = -1.0 if since < 0.0 or since + dt >= fade_s else since + dt
+    if is_seam and since >= 0.0:
+        _mixed(
+            left, spins, shifts, speeds, since, fade_s, y, seam, seam_spins, seam_positions, seam_speeds,
+            to_left, to_spins, to_shifts, to_speeds,
+        )  # fmt: skip
+        since = 0.0
+    elif is_seam:
+        to_left[:], to_spins[:], to_shifts[:], to_speeds[:] = seam, seam_spins, seam_positions, seam_speeds
+        since = 0.0
+    else:
+        to_left[:], to_spins[:], to_shifts[:], to_speeds[:] = left, spins, shifts, speeds
+    if since < 0.0:
+        rotations[:], positions[:] = clip, clip_positions
+        return since
+    still, pace, slide = np.zeros(spins.shape), np.empty(spins.shape), np.empty(shifts.shape)
+    _mixed(
+        to_left, to_spins, to_shifts, to_speeds, since, fade_s, y, clip, still, clip_positions, np.zeros(shifts.shape),
+        rotations, pace, positions, slide,
+    )  # fmt: skip
+    return since

@@ -24,18 +24,18 @@ the knee's damping from Forsyth, "How a Character Should Walk".
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.output.bank import Place3, PoseBank, tops_of
-from contextdb.motion.output.feet_loops import FAR_M, FREE, HIPS_DAMPING, LOCKED, POINT, SEEN, WIDTH, free_places, stand_all
-from contextdb.motion.output.ground import FLAT, Footing, below, standing, swinging
-from contextdb.motion.output.legs import Leg, eased, leg_of
-from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import Posture, Tick, damping, decayed
+from contextdb.motion.output.bank import Flags, Place3, PoseBank
+from contextdb.motion.output.feet_loops import FAR_M, FREE, HIPS_DAMPING, LOCKED, POINT, SEEN
+from contextdb.motion.output.ground import Footing, Triple, standing, swinging
+from contextdb.motion.output.legs import eased, leg_of
+from contextdb.motion.output.stages import FEET, FOOT, FOOTING, FOOTINGS, HIPS, STRIDE, TURN, Columns, decayed
 
 GONE = (1.0, 0.0, 0.0)
 """The step of a foot where there is no ground any more: it is there already."""
@@ -64,98 +64,80 @@ class Height:
 LEVEL_HIPS = Height()
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class LegsState:
-    """The feet and what is below them, the height of the hips over their clip's, and how much lower than that legs need them."""
-
-    feet: Floats
-    footings: tuple[Footing, ...]
-    hips: Height = LEVEL_HIPS
-    lower: Height = LEVEL_HIPS
-
-    @property
-    def is_flat(self) -> bool:
-        """Whether no ground is felt any more."""
-        return (self.hips is LEVEL_HIPS or self.hips == LEVEL_HIPS) and self.footings == (FLAT,) * len(self.footings)
+def legs_of(bank: PoseBank) -> Ints:
+    """The hip, knee, ankle and what stands of each foot that a bank has contacts of, all `NO_LEG` for one without a leg: [F, 4]."""
+    legs = [leg_of(bank.skeleton, foot) for foot in bank.feet]
+    joints = [[NO_LEG] * 4 if leg is None else [*leg.joints.tolist(), leg.toe] for leg in legs]
+    return np.array(joints, np.int64).reshape(-1, 4)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Feet:
-    """The stage: all legs of a rig."""
+class OnGround:
+    """The feet of one character that feels a ground, in one update: asked first where, and then told what is below.
 
-    settings: PoseSettings
-    bank: PoseBank
-    legs: tuple[Leg | None, ...]
-    joints: Ints
-    tops: Ints
+    `steps` says how far each foot is through its swing in the clip, and where it comes down; empty without a ground. `root` is
+    where the body is, `free` [F, 3] where the feet are without a lock; `row` is written, and has footings and hips as they were.
+    """
 
-    @classmethod
-    def of(cls, settings: PoseSettings, bank: PoseBank) -> Feet:
-        """For the feet that a bank has contacts of."""
-        legs = tuple(leg_of(bank.skeleton, foot) for foot in bank.feet)
-        joints = [[NO_LEG] * 4 if leg is None else [*leg.joints.tolist(), leg.toe] for leg in legs]
-        tops = np.searchsorted(bank.moving, tops_of(bank.skeleton))
-        return cls(settings, bank, legs, np.array(joints, np.int64).reshape(-1, 4), tops)
+    legs: Ints
+    columns: Columns
+    contacts: Flags
+    steps: Sequence[Sequence[float]]
+    root: Place3
+    free: Floats
+    row: Floats
 
-    def begin(self, posture: Posture, body: Place3 | None) -> LegsState:
-        """No foot has been seen."""
-        return LegsState(np.zeros((len(self.legs), WIDTH)), (FLAT,) * len(self.legs))
+    def points(self) -> list[tuple[float, float]]:
+        """Where the ground is asked, x and z: for each foot that has a leg where it is, or where it will come down; without any
+        where the body is."""
+        found = []
+        for i, toe, foot in self._feet():
+            if self.contacts[i] or _is_far(toe, foot):
+                is_held = foot[LOCKED] and not _is_far(toe, foot)
+                found.append((foot[POINT], foot[POINT + 1]) if is_held else (toe[0], toe[2]))
+            else:
+                found.append(self._landing(*self._step(i)[1:]))
+        return found or [self.root[:2]]
 
-    def apply(self, posture: Posture, tick: Tick, state: object) -> tuple[Posture, LegsState]:
-        """The posture with its legs bent to where the feet are to be."""
-        assert isinstance(state, LegsState)
-        is_flat = tick.ground is None and state.is_flat
-        is_level = is_flat and posture.warp.stride == 1.0 and state.lower == LEVEL_HIPS
-        if is_level and not self.settings.foot_lock:
-            return posture, state
-        rig, places, (vx, vz) = self.bank.skeleton, self.bank.places, tick.velocity or (0.0, 0.0)
-        n_joints, n_feet, root = len(rig.parents), len(self.legs), posture.root
-        positions, world, free = np.empty((n_joints, 3)), np.empty((n_joints, 4)), np.empty((n_feet, 3))
-        more = posture.warp.stride - 1.0
-        free_places(
-            rig.parents, rig.offsets, places, posture.rotations, posture.positions, *root, self.joints, more, vx, vz,
-            positions, world, free,
-        )  # fmt: skip
-        if not is_flat:
-            state = self._on_ground(posture, tick, state, free.tolist())
-        footings = np.array([footing.now for footing in state.footings]).reshape(-1, 3)
-        feet, lower = np.empty((n_feet, WIDTH)), np.array((state.lower.now, state.lower.speed))
-        rotations, moved = posture.rotations.copy(), posture.positions.copy()
-        lock = self.settings.foot_lock, damping(self.settings.foot_halflife_s), self.settings.foot_radius_m
-        stand_all(
-            rig.parents, rig.offsets, places, tick.clip.rotations, tick.clip.positions, self.joints, self.tops, *lock, tick.dt_s,
-            np.array(tick.contacts), free, footings, state.hips.now, state.feet, positions, world, feet, lower, rotations, moved,
-        )  # fmt: skip
-        now, speed = lower.tolist()
-        state = LegsState(feet, state.footings, state.hips, Height(now, speed))
-        return Posture(rotations, moved, root, posture.warp), state
-
-    def _on_ground(self, posture: Posture, tick: Tick, state: LegsState, free: list[list[float]]) -> LegsState:
-        """The state with feet and hips where the ground has them."""
-        footings, heights = list(state.footings), []
-        is_new = True
-        for i, (leg, toe, own, foot) in enumerate(zip(self.legs, free, state.footings, state.feet.tolist(), strict=True)):
-            if leg is None:
-                continue
-            is_far = not foot[SEEN] or math.hypot(toe[0] - foot[FREE], toe[2] - foot[FREE + 2]) > FAR_M
+    def stand(self, below: Sequence[Triple], dt_s: float) -> None:
+        """Write footings and hips as they are some time later, with this ground at the points."""
+        part = self.row[self.columns.at[FOOTINGS] : self.columns.at[FOOTINGS + 1]].reshape(-1, FOOTING)
+        heights, is_new, feet = [], True, list(self._feet())
+        for (i, toe, foot), here in zip(feet, below, strict=False):
+            numbers = part[i].tolist()
+            own = Footing((*numbers[0:3],), (*numbers[3:6],), (*numbers[6:9],))
+            is_far = _is_far(toe, foot)
             is_new = is_new and is_far
-            point = (foot[POINT], foot[POINT + 1]) if foot[LOCKED] and not is_far else (toe[0], toe[2])
-            share, left, ahead = tick.steps[i] if tick.steps else GONE
-            if tick.contacts[i] or is_far:
-                here = below(tick.ground, *point)
-                footings[i] = Footing(here, last=here) if is_far else standing(own, here, HIPS_DAMPING, tick.dt_s)
+            if self.contacts[i] or is_far:
+                now = Footing(here, last=here) if is_far else standing(own, here, HIPS_DAMPING, dt_s)
                 heights.append(here[0])
-                continue
-            there = below(tick.ground, *_landing(posture, left, ahead))
-            footings[i] = swinging(own, there, share, HIPS_DAMPING, tick.dt_s)
-            heights.append(own.last[0] + eased(share) * (there[0] - own.last[0]))
-        goal = min(heights) if heights else below(tick.ground, *posture.root[:2])[0]
-        hips = Height(goal) if is_new and heights else state.hips.come(goal, tick.dt_s)
-        return replace(state, footings=tuple(footings), hips=hips)
+            else:
+                share = self._step(i)[0]
+                now = swinging(own, here, share, HIPS_DAMPING, dt_s)
+                heights.append(own.last[0] + eased(share) * (here[0] - own.last[0]))
+            part[i] = (*now.now, *now.speed, *now.last)
+        goal = min(heights) if heights else below[0][0]
+        hips = Height(*self.row[HIPS : HIPS + 2].tolist())
+        hips = Height(goal) if is_new and heights else hips.come(goal, dt_s)
+        self.row[HIPS : HIPS + 2] = hips.now, hips.speed
+
+    def _feet(self) -> list[tuple[int, list[float], list[float]]]:
+        """The number, the toe and the state of each foot that has a leg."""
+        part = self.row[self.columns.at[FEET] : self.columns.at[FEET + 1]].reshape(-1, FOOT).tolist()
+        each = zip(self.legs[:, 0].tolist(), self.free.tolist(), part, strict=True)
+        return [(i, toe, foot) for i, (hip, toe, foot) in enumerate(each) if hip != NO_LEG]
+
+    def _step(self, foot: int) -> Sequence[float]:
+        return self.steps[foot] if self.steps else GONE
+
+    def _landing(self, left: float, ahead: float) -> tuple[float, float]:
+        """A place that a clip has to the left and ahead of the body, where the warped body comes to it."""
+        x, z, heading = self.root
+        turn, stride = float(self.row[TURN]), float(self.row[STRIDE])
+        sin, cos = math.sin(heading + turn), math.cos(heading + turn)
+        return x + stride * (cos * left + sin * ahead), z + stride * (cos * ahead - sin * left)
 
 
-def _landing(posture: Posture, left: float, ahead: float) -> tuple[float, float]:
-    """A place that a clip has to the left and ahead of the body, where the warped body comes to it."""
-    x, z, heading = posture.root
-    sin, cos, stride = math.sin(heading + posture.warp.turn), math.cos(heading + posture.warp.turn), posture.warp.stride
-    return x + stride * (cos * left + sin * ahead), z + stride * (cos * ahead - sin * left)
+def _is_far(toe: Sequence[float], foot: Sequence[float]) -> bool:
+    """Whether a foot belongs to a character that was put elsewhere."""
+    return not foot[SEEN] or math.hypot(toe[0] - foot[FREE], toe[2] - foot[FREE + 2]) > FAR_M

@@ -7,20 +7,29 @@ The ground of a pose is three numbers: the height, and by how much it rises alon
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from contextdb.cells.arguments import require_real
 from contextdb.errors import ContextError, Fault
+from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.bank import Place3
 from contextdb.motion.output.legs import eased
 from contextdb.motion.output.stages import Ground, decayed
 
 Triple = tuple[float, float, float]
+ManyGround = Callable[[Floats, Floats], tuple[Any, Any] | None]
+"""Of places x [n] and z [n]: heights [n] and normals [n, 3], or None where all is flat."""
 
 LEVEL: Triple = (0.0, 0.0, 0.0)
 STEEPEST = math.tan(math.radians(35.0))
 """A foot stands no steeper than this."""
 A_GROUND = "a function of x and z that gives a height in metres and a normal upwards, or None where it is flat"
+
+MANY_GROUND = "a function of x [n] and z [n] that gives heights [n] and normals upwards [n, 3], or None where all is flat"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +59,27 @@ def below(ground: Ground | None, x: float, z: float) -> Triple:
     along_x, along_z = -nx / ny, -nz / ny
     share = min(1.0, STEEPEST / max(math.hypot(along_x, along_z), 1e-9))
     return height, share * along_x, share * along_z
+
+
+def below_many(ground: ManyGround, points: Sequence[tuple[float, float]]) -> list[Triple]:
+    """Height and rise of the ground at many places, asked at once. Raises ContextError for a ground that is none."""
+    at = np.array(points, np.float64).reshape(-1, 2)
+    found = ground(at[:, 0], at[:, 1])
+    if found is None:
+        return [LEVEL] * len(points)
+    try:
+        heights, normals = (np.asarray(each, np.float64) for each in found)
+        is_whole = heights.shape == (len(at),) and normals.shape == (len(at), 3)
+    except (TypeError, ValueError):
+        is_whole = False
+    if not is_whole:
+        raise ContextError(Fault(f"the ground at {len(at)} places is {found!r}.", MANY_GROUND))
+    if not (np.isfinite(heights).all() and np.isfinite(normals).all() and (normals[:, 1] > 0.0).all()):
+        accepted = "finite heights, and normals upwards: y above 0"
+        raise ContextError(Fault("some heights or normals of the ground are none.", accepted))
+    rise = -normals[:, [0, 2]] / normals[:, 1:2]
+    share = np.minimum(1.0, STEEPEST / np.maximum(np.hypot(rise[:, 0], rise[:, 1]), 1e-9))
+    return [(height, x, z) for height, (x, z) in zip(heights.tolist(), (share[:, None] * rise).tolist(), strict=True)]
 
 
 def standing(footing: Footing, here: Triple, y: float, dt_s: float) -> Footing:

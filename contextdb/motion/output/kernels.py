@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 try:
     import numba
 except ImportError:  # pragma: no cover - the same loops, slower
@@ -28,6 +30,38 @@ def compiled(loop: Any) -> Any:
         return numba.njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")(loop)
     except RuntimeError:  # pragma: no cover - a folder that nobody may write to
         return loop
+
+
+# ---- angles and moments
+
+
+@compiled
+def remainder(angle):
+    """The angle that is the same and at most half a turn, as `math.remainder` has it."""
+    rest = abs(angle) % math.tau
+    rest = rest - math.tau if rest > math.pi else rest
+    return -rest if angle < 0.0 else rest
+
+
+@compiled
+def between(start, n_steps, is_looping, frame):
+    """The two frames about a moment of a range, counted over all, and the share of the second; a loop goes on."""
+    if is_looping and n_steps > 0 and not 0.0 <= frame <= n_steps:
+        frame %= n_steps
+    frame = min(max(frame, 0.0), float(n_steps))
+    low = min(int(frame), max(n_steps - 1, 0))
+    return start + low, start + min(low + 1, n_steps), frame - low
+
+
+@compiled
+def root_velocity(root, low, high, share, rate):
+    """How fast the body moves between two frames: to its left and ahead, and its turning."""
+    heading, to_heading = np.float64(root[low, 2]), np.float64(root[high, 2])
+    x = (np.float64(root[high, 0]) - np.float64(root[low, 0])) * rate
+    z = (np.float64(root[high, 1]) - np.float64(root[low, 1])) * rate
+    turn = to_heading - heading
+    sin, cos = math.sin(heading + share * turn), math.cos(heading + share * turn)
+    return (cos * x - sin * z, sin * x + cos * z, turn * rate)
 
 
 # ---- one rotation

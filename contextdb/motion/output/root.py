@@ -13,175 +13,213 @@ for, what lies along it is not. The game then goes on from the pose's root.
 A jump moves nobody, but it changes the velocity of what plays. The difference decays as the offsets of joints do: the body runs on
 or falls back a little, and comes to the path of what plays.
 
+Places are (x, z, heading). Rows are those of `contextdb.motion.output.stages`.
+
 Source: Root Motion Weight in EA's talk; speed from the animation along a path from code in Remedy's; the
 adjustment and the clamp of orangeduck/Motion-Matching, `controller.cpp`.
 """
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return"
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from contextdb.motion.clips.steering import STANDING_MPS
-from contextdb.motion.output.bank import Place3
-from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import Posture, Tick, Warp, damping, decayed
-from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.output.kernels import compiled, remainder
+from contextdb.motion.output.stages import (
+    ANIMATION,
+    BASE,
+    BEGUN,
+    BODY,
+    CLIP_ROOT,
+    CODE,
+    GIVEN_BODY,
+    GIVES_BODY,
+    HAS_BODY,
+    HAS_VELOCITY,
+    IS_AHEAD,
+    MIXED,
+    OFFSET,
+    OFFSET_SPEED,
+    PATH,
+    PLAIN,
+    STRIDE,
+    TURN,
+    VELOCITY,
+    WEIGHT,
+)
 
 MOST_PULL = 0.5
 """The pull is at most this share of the character's own movement."""
 TURN_PER_M = 6.0
 """So many radians of turning a metre of way allows the pull as well: who walks may be steered, and who stands is not turned."""
-NOTHING: Place3 = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class RootState:
-    """Where the root is without its offset, the offset and its change a second, and where the game's body was."""
-
-    base: Place3
-    offset: Place3
-    offset_speed: Place3
-    body: Place3 | None
-
-
-@dataclass(frozen=True, slots=True)
-class Root:
-    """The stage: the root's place and heading."""
-
-    settings: PoseSettings
-
-    def begin(self, posture: Posture, body: Place3 | None) -> RootState:
-        """At the game's body; without one where the posture has the root."""
-        return RootState(posture.root if body is None else body, NOTHING, NOTHING, body)
-
-    def apply(self, posture: Posture, tick: Tick, state: object) -> tuple[Posture, RootState]:
-        """The posture at its place."""
-        assert isinstance(state, RootState)
-        position_share = _position_share(self.settings, tick.root_weight)
-        rotations = rotation_share(self.settings, tick.root_weight)
-        base = self._moved(state, tick, position_share, rotations)
-        offset, speed = state.offset, state.offset_speed
-        if self.settings.blend != "none":
-            offset, speed = decayed(offset, speed, damping(self.settings.halflife_s), tick.dt_s)
-            step = _step(tick, base[2], position_share, rotations)
-            speed = _sum(speed, step)
-            if tick.is_ahead:
-                offset = _sum(offset, (step[0] * tick.dt_s, step[1] * tick.dt_s, step[2] * tick.dt_s))
-        if self.settings.root in ("mixed", "path") and tick.body is not None:
-            base = self._clamped(base, offset, tick.body, _way(tick) if self.settings.root == "path" else None)
-        return Posture(posture.rotations, posture.positions, _sum(base, offset)), RootState(
-            base, offset, speed, tick.body or state.body
-        )
-
-    def _moved(self, state: RootState, tick: Tick, position_share: float, rotation_share: float) -> Place3:
-        """The base after this tick's movement and the pull to the game's body."""
-        body = tick.body
-        if body is None or self.settings.root == "animation":
-            return _after(state.base, _warped(tick), position_share, rotation_share)
-        if self.settings.root == "code":
-            return body
-        way = _way(tick) if self.settings.root == "path" else None
-        x, z, heading = _after(state.base, _warped(tick), position_share, rotation_share)
-        before = body if state.body is None else state.body
-        if way is not None:
-            far = math.hypot(x - state.base[0], z - state.base[1])
-            x, z = state.base[0] + far * way[0], state.base[1] + far * way[1]
-        x += (1.0 - position_share) * (body[0] - before[0])
-        z += (1.0 - position_share) * (body[1] - before[1])
-        heading += (1.0 - rotation_share) * math.remainder(body[2] - before[2], math.tau)
-        moved = math.hypot(x - state.base[0], z - state.base[1])
-        turned = abs(heading - state.base[2]) + TURN_PER_M * moved
-        return self._pulled((x, z, heading), _beside((x, z), body, way), moved, turned, tick.dt_s)
-
-    def _pulled(self, base: Place3, body: Place3, way: float, turned: float, dt_s: float) -> Place3:
-        """The base nearer to the game's body, by what it moved and turned itself at most."""
-        x, z, heading = body[0] - base[0], body[1] - base[1], math.remainder(body[2] - base[2], math.tau)
-        apart = math.hypot(x, z)
-        share = _made_up(self.settings.position_pull_s, dt_s)
-        share = min(share, MOST_PULL * way / apart) if apart > 0.0 else 0.0
-        turn_share = _made_up(self.settings.rotation_pull_s, dt_s)
-        turn = math.copysign(min(turn_share * abs(heading), MOST_PULL * turned), heading)
-        return base[0] + share * x, base[1] + share * z, base[2] + turn
-
-    def _clamped(self, base: Place3, offset: Place3, body: Place3, along: tuple[float, float] | None) -> Place3:
-        """The base from which the shown root is within the clamp: of the body, or of its way where that is given."""
-        x, z, heading = _sum(base, offset)
-        body = _beside((x, z), body, along)
-        left, ahead, turn = x - body[0], z - body[1], math.remainder(heading - body[2], math.tau)
-        apart, most = math.hypot(left, ahead), self.settings.position_clamp_m
-        share = most / apart - 1.0 if apart > most else 0.0
-        most_turn = math.radians(self.settings.rotation_clamp_deg)
-        over = turn - min(max(turn, -most_turn), most_turn)
-        return base[0] + share * left, base[1] + share * ahead, base[2] - over
-
-
-def rotation_share(settings: PoseSettings, root_weight: float) -> float:
+@compiled
+def rotation_share(to, root_weight):
     """How much of the turning is the animation's."""
-    if settings.root == "mixed":
-        return root_weight * settings.rotation_weight
-    return 1.0 if settings.root == "animation" else 0.0
+    if to.root == MIXED:
+        return root_weight * to.rotation_weight
+    return 1.0 if to.root == ANIMATION else 0.0
 
 
-def _position_share(settings: PoseSettings, root_weight: float) -> float:
+@compiled
+def _position_share(to, root_weight):
     """How much of the movement is the animation's."""
-    if settings.root == "mixed":
-        return root_weight * settings.position_weight
-    return 0.0 if settings.root == "code" else 1.0
+    if to.root == MIXED:
+        return root_weight * to.position_weight
+    return 0.0 if to.root == CODE else 1.0
 
 
-def _sum(first: Place3, second: Place3) -> Place3:
-    return first[0] + second[0], first[1] + second[1], first[2] + second[2]
+@compiled
+def move_body(given, dt, before, row):
+    """Write where the game has the body, and how fast it moves it: by how far it came since the last update, as a session knows no
+    more."""
+    has_place, had_body = given[GIVES_BODY] != 0.0, before[HAS_BODY] != 0.0
+    row[HAS_BODY] = 1.0 if has_place or had_body else 0.0
+    for i in range(3):
+        row[BODY + i] = given[GIVEN_BODY + i] if has_place else before[BODY + i]
+    is_moved = has_place and had_body and dt > 0.0
+    row[HAS_VELOCITY] = 1.0 if is_moved else before[HAS_VELOCITY]
+    for i in range(2):
+        row[VELOCITY + i] = (given[GIVEN_BODY + i] - before[BODY + i]) / dt if is_moved else before[VELOCITY + i]
 
 
-def _after(base: Place3, motion: RootMotion, position_share: float, rotation_share: float) -> Place3:
+@compiled
+def place_root(to, given, motion, dt, is_seam, left, entered, before, row):
+    """Write the root after some time, in which the clip moved it by `motion`; gives where it is shown.
+
+    At a seam, `left` and `entered` are the velocities of what was left and what is entered, in the body's own frame.
+    """
+    moved, turned = _position_share(to, given[WEIGHT]), rotation_share(to, given[WEIGHT])
+    base = _moved(to, given, motion, dt, moved, turned, before, row)
+    offset = (before[OFFSET], before[OFFSET + 1], before[OFFSET + 2])
+    speed = (before[OFFSET_SPEED], before[OFFSET_SPEED + 1], before[OFFSET_SPEED + 2])
+    if to.blend != PLAIN:
+        offset, speed = _decayed(offset, speed, to.damping, dt)
+        if is_seam:
+            if given[IS_AHEAD] != 0.0 and dt > 0.0:
+                entered = (motion[0] / dt, motion[1] / dt, motion[2] / dt)
+            apart = (left[0] - entered[0], left[1] - entered[1], 0.0)
+            step = _after((0.0, 0.0, base[2]), _bent(apart, before), moved, 0.0)
+            change = (step[0], step[1], turned * (left[2] - entered[2]))
+            speed = _sum(speed, change)
+            if given[IS_AHEAD] != 0.0:
+                offset = _sum(offset, (change[0] * dt, change[1] * dt, change[2] * dt))
+    if (to.root == MIXED or to.root == PATH) and given[GIVES_BODY] != 0.0:
+        base = _clamped(to, base, offset, row)
+    for i in range(3):
+        row[BASE + i], row[OFFSET + i], row[OFFSET_SPEED + i] = base[i], offset[i], speed[i]
+    return _sum(base, offset)
+
+
+@compiled
+def _moved(to, given, motion, dt, moved, turned, before, row):
+    """The base after this update's movement and the pull to the game's body."""
+    body = (row[BODY], row[BODY + 1], row[BODY + 2])
+    has_body = given[GIVES_BODY] != 0.0
+    if before[BEGUN] != 0.0:
+        base = (before[BASE], before[BASE + 1], before[BASE + 2])
+    elif has_body:
+        base = body
+    else:
+        base = (row[CLIP_ROOT], row[CLIP_ROOT + 1], row[CLIP_ROOT + 2])
+    after = _after(base, _bent(motion, before), moved, turned)
+    if not has_body or to.root == ANIMATION:
+        return after
+    if to.root == CODE:
+        return body
+    is_on, way = _way(to, row)
+    last = (before[BODY], before[BODY + 1], before[BODY + 2]) if before[HAS_BODY] != 0.0 else body
+    x, z, heading = after
+    if is_on:
+        far = math.hypot(x - base[0], z - base[1])
+        x, z = base[0] + far * way[0], base[1] + far * way[1]
+    x += (1.0 - moved) * (body[0] - last[0])
+    z += (1.0 - moved) * (body[1] - last[1])
+    heading += (1.0 - turned) * remainder(body[2] - last[2])
+    own_m = math.hypot(x - base[0], z - base[1])
+    own_turn = abs(heading - base[2]) + TURN_PER_M * own_m
+    return _pulled(to, (x, z, heading), _beside(x, z, body, is_on, way), own_m, own_turn, dt)
+
+
+@compiled
+def _pulled(to, base, body, way, turned, dt):
+    """The base nearer to the game's body, by what it moved and turned itself at most."""
+    x, z, heading = body[0] - base[0], body[1] - base[1], remainder(body[2] - base[2])
+    apart = math.hypot(x, z)
+    share = min(_made_up(to.position_pull_s, dt), MOST_PULL * way / apart) if apart > 0.0 else 0.0
+    turn = math.copysign(min(_made_up(to.rotation_pull_s, dt) * abs(heading), MOST_PULL * turned), heading)
+    return (base[0] + share * x, base[1] + share * z, base[2] + turn)
+
+
+@compiled
+def _clamped(to, base, offset, row):
+    """The base from which the shown root is within the clamp: of the body, or of its way in the mode "path"."""
+    x, z, heading = _sum(base, offset)
+    is_on, way = _way(to, row)
+    body = _beside(x, z, (row[BODY], row[BODY + 1], row[BODY + 2]), is_on, way)
+    left, ahead, turn = x - body[0], z - body[1], remainder(heading - body[2])
+    apart, most = math.hypot(left, ahead), to.position_clamp_m
+    share = most / apart - 1.0 if apart > most else 0.0
+    over = turn - min(max(turn, -to.rotation_clamp), to.rotation_clamp)
+    return (base[0] + share * left, base[1] + share * ahead, base[2] - over)
+
+
+@compiled
+def _sum(first, second):
+    return (first[0] + second[0], first[1] + second[1], first[2] + second[2])
+
+
+@compiled
+def _decayed(offset, speed, y, dt):
+    """An offset and its change a second some time later: `stages.decayed`."""
+    fade = math.exp(-y * dt)
+    p, q, r = speed[0] + offset[0] * y, speed[1] + offset[1] * y, speed[2] + offset[2] * y
+    rest = (fade * (offset[0] + p * dt), fade * (offset[1] + q * dt), fade * (offset[2] + r * dt))
+    return rest, (fade * (speed[0] - p * y * dt), fade * (speed[1] - q * y * dt), fade * (speed[2] - r * y * dt))
+
+
+@compiled
+def _after(base, motion, moved, turned):
     """A place after a share of a movement in its own frame."""
     sin, cos = math.sin(base[2]), math.cos(base[2])
-    left, ahead = position_share * motion.left_m, position_share * motion.ahead_m
-    return base[0] + cos * left + sin * ahead, base[1] - sin * left + cos * ahead, base[2] + rotation_share * motion.turn_rad
+    left, ahead = moved * motion[0], moved * motion[1]
+    return (base[0] + cos * left + sin * ahead, base[1] - sin * left + cos * ahead, base[2] + turned * motion[2])
 
 
-def _warped(tick: Tick) -> RootMotion:
-    """The movement of what plays, turned and stretched as the legs were."""
-    return _bent(tick.root_motion, tick.warp)
-
-
-def _bent(motion: RootMotion, warp: Warp) -> RootMotion:
-    if warp.turn == 0.0 and warp.stride == 1.0:
+@compiled
+def _bent(motion, before):
+    """A movement of what plays, turned and stretched as the legs were."""
+    turn, stride = before[TURN], before[STRIDE]
+    if turn == 0.0 and stride == 1.0:
         return motion
-    sin, cos = warp.stride * math.sin(warp.turn), warp.stride * math.cos(warp.turn)
-    left, ahead = motion.left_m, motion.ahead_m
-    return RootMotion(cos * left + sin * ahead, cos * ahead - sin * left, motion.turn_rad)
+    sin, cos = stride * math.sin(turn), stride * math.cos(turn)
+    return (cos * motion[0] + sin * motion[1], cos * motion[1] - sin * motion[0], motion[2])
 
 
-def _way(tick: Tick) -> tuple[float, float] | None:
-    """Which way the game goes; none where it stands."""
-    x, z = tick.velocity or (0.0, 0.0)
+@compiled
+def _way(to, row):
+    """Whether the game goes a way that the root keeps to, and which; none where it stands."""
+    if to.root != PATH or row[HAS_VELOCITY] == 0.0:
+        return False, (0.0, 0.0)
+    x, z = row[VELOCITY], row[VELOCITY + 1]
     size = math.hypot(x, z)
-    return (x / size, z / size) if size > STANDING_MPS else None
+    if size > STANDING_MPS:
+        return True, (x / size, z / size)
+    return False, (0.0, 0.0)
 
 
-def _beside(place: tuple[float, float], body: Place3, way: tuple[float, float] | None) -> Place3:
+@compiled
+def _beside(x, z, body, is_on, way):
     """The body, moved along its way to beside a place."""
-    if way is None:
+    if not is_on:
         return body
-    along = (place[0] - body[0]) * way[0] + (place[1] - body[1]) * way[1]
-    return body[0] + along * way[0], body[1] + along * way[1], body[2]
+    along = (x - body[0]) * way[0] + (z - body[1]) * way[1]
+    return (body[0] + along * way[0], body[1] + along * way[1], body[2])
 
 
-def _step(tick: Tick, heading: float, position_share: float, rotation_share: float) -> Place3:
-    """By how much the velocity of what plays drops at a seam, over the ground of the world."""
-    if tick.left is None or tick.entered is None:
-        return NOTHING
-    entered = tick.entered.root_velocity
-    if tick.is_ahead and tick.dt_s > 0.0:
-        own = tick.root_motion
-        entered = own.left_m / tick.dt_s, own.ahead_m / tick.dt_s, own.turn_rad / tick.dt_s
-    left, ahead, turn = (a - b for a, b in zip(tick.left.root_velocity, entered, strict=True))
-    x, z, _ = _after((0.0, 0.0, heading), _bent(RootMotion(left, ahead), tick.warp), position_share, 0.0)
-    return x, z, rotation_share * turn
-
-
-def _made_up(halflife_s: float, dt_s: float) -> float:
+@compiled
+def _made_up(halflife_s, dt):
     """The share of a difference that is gone after some time; none where no half-life is set."""
-    return 1.0 - math.exp(-math.log(2.0) * dt_s / halflife_s) if halflife_s > 0.0 else 0.0
+    return 1.0 - math.exp(-math.log(2.0) * dt / halflife_s) if halflife_s > 0.0 else 0.0

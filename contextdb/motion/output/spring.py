@@ -7,63 +7,31 @@ time they are what they are after one.
 
 Source: D. Bollo, "Inertialization", GDC 2018; D. Holden, "Spring-It-On", 2021; orangeduck/Motion-Matching, `controller.cpp`.
 """
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return"
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
-
-from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output import kernels
-from contextdb.motion.output.bank import Place3, Sample
-from contextdb.motion.output.stages import Posture, Tick, damping
+from contextdb.motion.output.kernels import compiled
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Offsets:
-    """What is added to what plays: turns [J, 3] and shifts [M, 3], and their changes a second."""
-
-    turns: Floats
-    turn_speeds: Floats
-    shifts: Floats
-    shift_speeds: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class Spring:
-    """The stage: offsets of all joints that decay by a half-life."""
-
-    halflife_s: float
-
-    def begin(self, posture: Posture, body: Place3 | None) -> Offsets:
-        """No offset."""
-        n_joints, n_moving = len(posture.rotations), len(posture.positions)
-        return Offsets(np.zeros((n_joints, 3)), np.zeros((n_joints, 3)), np.zeros((n_moving, 3)), np.zeros((n_moving, 3)))
-
-    def apply(self, posture: Posture, tick: Tick, state: object) -> tuple[Posture, Offsets]:
-        """The posture with the offsets as they are now."""
-        assert isinstance(state, Offsets)
-        offsets = decayed(state, self.halflife_s, tick.dt_s)
-        if tick.left is not None and tick.entered is not None:
-            offsets = kept(offsets, tick.left, tick.entered)
-        rotations = np.empty_like(posture.rotations)
-        kernels.turn_by(offsets.turns, posture.rotations, rotations)
-        return Posture(rotations, posture.positions + offsets.shifts, posture.root), offsets
-
-
-def decayed(offsets: Offsets, halflife_s: float, dt_s: float) -> Offsets:
-    """The offsets some time later."""
-    now = Offsets(*(np.empty_like(each) for each in (offsets.turns, offsets.turns, offsets.shifts, offsets.shifts)))
-    y = damping(halflife_s)
-    kernels.decay(offsets.turns, offsets.turn_speeds, y, dt_s, now.turns, now.turn_speeds)
-    kernels.decay(offsets.shifts, offsets.shift_speeds, y, dt_s, now.shifts, now.shift_speeds)
-    return now
-
-
-def kept(offsets: Offsets, left: Sample, entered: Sample) -> Offsets:
-    """The offsets to one moment of a clip that show the same as some offsets to another one, in pose and velocity."""
-    turns, speeds = np.empty_like(offsets.turns), np.empty_like(offsets.turns)
-    kernels.leave(offsets.turns, offsets.turn_speeds, left.rotations, left.spins, entered.rotations, entered.spins, turns, speeds)
-    shifts = offsets.shifts + left.positions - entered.positions
-    return Offsets(turns, speeds, shifts, offsets.shift_speeds + left.velocities - entered.velocities)
+@compiled
+def spring(
+    turns, spins, shifts, speeds, y, dt, is_seam, left, left_spins, left_positions, left_speeds,
+    entered, entered_spins, entered_positions, entered_speeds, clip, clip_positions,
+    to_turns, to_spins, to_shifts, to_speeds, rotations, positions,
+):  # fmt: skip
+    """The clip's pose with the offsets as they are after some time, and after a seam where there is one."""
+    kernels.decay(turns, spins, y, dt, to_turns, to_spins)
+    kernels.decay(shifts, speeds, y, dt, to_shifts, to_speeds)
+    if is_seam:
+        old, pace = to_turns.copy(), to_spins.copy()
+        kernels.leave(old, pace, left, left_spins, entered, entered_spins, to_turns, to_spins)
+        for k in range(shifts.shape[0]):
+            for i in range(3):
+                to_shifts[k, i] = to_shifts[k, i] + left_positions[k, i] - entered_positions[k, i]
+                to_speeds[k, i] = to_speeds[k, i] + left_speeds[k, i] - entered_speeds[k, i]
+    kernels.turn_by(to_turns, clip, rotations)
+    for k in range(shifts.shape[0]):
+        for i in range(3):
+            positions[k, i] = clip_positions[k, i] + to_shifts[k, i]

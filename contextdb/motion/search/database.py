@@ -478,6 +478,10 @@ class MotionDatabase(Searched):
         """What a search with these arguments may choose from, and what it adds to each frame's cost; see `search`."""
         return self._filters.make(valid, **options)
 
+    def ranges_of(self, valid: Valid | None) -> Flags:
+        """Which ranges a search may choose from that is given nothing else: bool [R]."""
+        return self._filters.ranges_of(valid)
+
     def valid_of_each(self, valid: ValidForMany | None, n: int) -> list[ValidRanges]:
         """What the masks of n characters mean to this database, see `search_many`: each serves as `valid` of `search`."""
         return self._filters.valid_of_each(valid, n)

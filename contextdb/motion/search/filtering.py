@@ -83,6 +83,10 @@ class FilterMaker:
             self.biases.continuing,
         )
 
+    def ranges_of(self, valid: Valid | None) -> Flags:
+        """Which ranges may play, where nothing else is given: bool [R]."""
+        return self._ranges(valid)[0]
+
     def make_many(self, n: int, valid: ValidForMany | None, current: Currents | None, tags: Tags | None) -> ManyFilters:
         """The filters of n searches; see `MotionDatabase.search_many` for what is given."""
         ranges, biases = self._ranges_of_many(valid, n)

@@ -50,24 +50,33 @@ class Asked:
 
     def __post_init__(self) -> None:
         for what in ("bias", "skip", "penalties"):
-            if not isinstance(given := getattr(self, what), (NoneType, dict, Mapping)):
+            if (given := getattr(self, what)) is not None and not isinstance(given, (dict, Mapping)):
                 accepted = f"{'a mapping of assets to costs, or ' if what == 'penalties' else ''}a mapping of databases"
                 raise QueryError(Fault(f"{what} is a {type(given).__name__}.", accepted))
-        if not isinstance(self.tags, (NoneType, TagFilter, Mapping)):
+        if self.tags is not None and not isinstance(self.tags, (TagFilter, Mapping)):
             raise QueryError(Fault(f"tags is a {type(self.tags).__name__}.", "a TagFilter, or a mapping of databases"))
-        if not isinstance(self.current, (Choice, NoneType)) and not _is_pair(self.current):
+        if self.current is not None and not isinstance(self.current, Choice) and not _is_pair(self.current):
             raise QueryError(Fault(f"what plays now is {self.current!r}.", 'a Choice, or such as ("jog", 120)'))
 
     def of(self, name: str) -> dict[str, Any]:
         """What one database is given, by the names of the parameters of `MotionDatabase.search`."""
         return {
-            "valid": self.valid.get(name) if isinstance(self.valid, (dict, Mapping)) else self.valid,
+            "valid": self.valid_of(name),
             "tags": self.tags if isinstance(self.tags, (NoneType, TagFilter)) else self.tags.get(name),
             "current": self._current_in(name),
             "bias": self.bias.get(name) if self.bias else None,
             "skip": self.skip.get(name, ()) if self.skip else (),
             "penalties": self._penalties_of(name),
         }
+
+    def valid_of(self, name: str) -> Valid | None:
+        """What may play of one database."""
+        return self.valid.get(name) if isinstance(self.valid, (dict, Mapping)) else self.valid
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing but what may play is given to a database."""
+        return self.tags is None and self.current is None and self.bias is None and self.skip is None and self.penalties is None
 
     def options(self) -> Options:
         """The same as keyword arguments."""

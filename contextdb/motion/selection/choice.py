@@ -27,7 +27,7 @@ class Reason(StrEnum):
     NOTHING_VALID = "nothing valid"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Search:
     """One database in a choice: its best frame, its threshold, and what became of it. `hit` is None when it was not searched."""
 
@@ -50,7 +50,7 @@ class Search:
         return f"{told}, {'under' if self.is_under_threshold else 'not under'} its threshold {self.threshold:g}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Choice:
     """What a selector chose, and how. False when nothing may play.
 

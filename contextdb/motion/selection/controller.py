@@ -131,7 +131,8 @@ class Controller:
         """What plays, moved on; the last is kept, for an update mostly follows what was asked of `upcoming`."""
         playing, selector, of_time = self._state.playing, self.selector, (self.settings.rate, dt_s * self._state.play_rate)
         if self._moved is None or self._moved[0] is not playing or self._moved[1] is not selector or self._moved[2] != of_time:
-            self._moved = playing, selector, of_time, Ongoing.of(playing, selector, *of_time)
+            last = None if self._moved is None or self._moved[3] is None else self._moved[3].head
+            self._moved = playing, selector, of_time, Ongoing.of(playing, selector, *of_time, last)
         return self._moved[3]
 
     def copy(self) -> Controller:

@@ -113,7 +113,8 @@ class ControllerGroup(Sequence[Controller]):
                 found = frames.setdefault(id(database), (controller.selector, playing.database, [], []))
                 found[2].append(i)
                 found[3].append(playing.frame)
-        widths = {database.n_features for controller in self for database in controller.selector.databases.values()}
+        selectors = {controller.selector for controller in self}
+        widths = {database.n_features for selector in selectors for database in selector.databases.values()}
         if len(widths) > 1:
             raise MotionError(Fault(f"the databases have {sorted(widths)} features.", "databases of one schema"))
         poses = np.zeros((len(self), max(widths, default=0)))
@@ -228,7 +229,8 @@ def _each_among(among: object, n: int) -> Sequence[object]:
 def _each_place(body: OfBodies | None, n: int) -> Sequence[GroundPlace | None]:
     """Where each body is; None for all, or for one of a list, where none is given."""
     if isinstance(body, ManySteered):
-        body = np.column_stack((body.positions, body.headings))
+        together = zip(body.positions.tolist(), body.headings.tolist(), strict=True)
+        return each_of([(x, z, heading) for (x, z), heading in together], n, "body", is_one=False)
     places = []
     for i, each in enumerate(each_of(body, n, "body", is_one=body is None)):
         try:

@@ -56,7 +56,7 @@ class Action(StrEnum):
     NOTHING = "plays nothing"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Decision:
     """One update of a controller.
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.layout import Features
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion, motion_between
 
 TOLERANCE_S = 1e-6
@@ -46,7 +48,7 @@ class Move:
     motion: RootMotion = NO_MOTION
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Playhead:
     """A range of a database, and how its frames follow each other.
 
@@ -67,22 +69,27 @@ class Playhead:
         """A range's; `rate` is that of a database that does not know its own."""
         return cls(database, range_number, rate if database.schema is None else database.schema.rate)
 
-    @property
+    @cached_property
     def start(self) -> int:
         """The first frame."""
         return int(self.database.starts[self.range])
 
-    @property
+    @cached_property
     def stop(self) -> int:
         """The frame behind the last."""
         return int(self.database.stops[self.range])
 
-    @property
+    @cached_property
     def last_s(self) -> float:
         """Seconds from the first frame to the last."""
         return (self.stop - self.start - 1) / self.rate
 
-    @property
+    @cached_property
+    def path(self) -> Features | None:
+        """Where the body is in each frame [n, 3]; None where the database does not know."""
+        return None if self.database.root is None else self.database.root[self.start : self.stop]
+
+    @cached_property
     def is_looping(self) -> bool:
         """Whether the range continues at its start when it ends."""
         return bool(self.database.marks.looping[self.range]) and self.stop - self.start > 1
@@ -131,8 +138,7 @@ class Playhead:
         return first + int(np.argmin(np.append(playable[self.database.marks.kinds[first:stop]], False)))
 
     def _motion(self, from_s: float, to_s: float) -> RootMotion:
-        root = self.database.root
-        return NO_MOTION if root is None else motion_between(root[self.start : self.stop], from_s * self.rate, to_s * self.rate)
+        return NO_MOTION if self.path is None else motion_between(self.path, from_s * self.rate, to_s * self.rate)
 
 
 def _joined(move: Move, then: Move) -> Move:

@@ -65,7 +65,7 @@ def motion_between(path: Features, from_frame: float, to_frame: float) -> RootMo
 def _at(path: Features, frame: float) -> tuple[float, float, float]:
     """The path at a frame; between two frames on the straight line."""
     low = min(max(int(frame), 0), len(path) - 1)
-    high = min(low + 1, len(path) - 1)
     share = min(max(frame - low, 0.0), 1.0)
-    (x, z, heading), (to_x, to_z, to_heading) = path[low].tolist(), path[high].tolist()
+    about = path[low : low + 2].tolist()
+    (x, z, heading), (to_x, to_z, to_heading) = about[0], about[-1]
     return x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)

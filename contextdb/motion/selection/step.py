@@ -230,11 +230,11 @@ class Step:
 
 def _standing(ongoing: Ongoing, asked: Asked) -> Standing:
     """Whether the playing asset is still valid. A mask that does not fit is refused here, also where nothing hangs on it."""
-    database, at, given = ongoing.head.database, ongoing.head.range, asked.of(ongoing.database)
-    if database.filter(**given).ranges[at]:
+    database, at, valid = ongoing.head.database, ongoing.head.range, asked.valid_of(ongoing.database)
+    if (database.ranges_of(valid) if asked.is_plain else database.filter(**asked.of(ongoing.database)).ranges)[at]:
         return Standing.VALID
-    wide = widened_of(given["valid"])
-    is_widened = wide is not None and database.filter(wide).ranges[at]
+    wide = widened_of(valid)
+    is_widened = wide is not None and database.ranges_of(wide)[at]
     return Standing.WIDENED if is_widened else Standing.NOT_VALID
 
 

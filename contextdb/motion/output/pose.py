@@ -1,0 +1,89 @@
+"""CrowdPoses to show: one, and those of many characters at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import overload
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.output.bank import Flags, Place3
+from contextdb.motion.selection.decision import Playing
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pose:
+    """A pose to show.
+
+    Attributes
+    ----------
+    playing : Playing or None
+        What it is a pose of.
+    is_jump, is_forced : bool
+        Whether something else began to play, and whether it had to: because what played could not play on.
+    root : (x, z, heading)
+        Where the body is: metres and radians.
+    rotations : float64 array, shape (J, 4)
+        Each joint against its parent, the first against the root.
+    translations : float64 array, shape (J, 3)
+        Likewise, in metres; the rig's offset for a joint without a position of its own.
+    positions : float64 array, shape (J, 3)
+        Each joint in the world.
+    contacts : bool array, shape (n feet,)
+        Which of `PoseBank.feet` are down in the clip.
+    play_rate : float
+        Seconds of the clip that pass in a second of play.
+    """
+
+    playing: Playing | None
+    is_jump: bool
+    is_forced: bool
+    root: Place3
+    rotations: Floats
+    translations: Floats
+    positions: Floats
+    contacts: Flags
+    play_rate: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CrowdPoses(Sequence[Pose]):
+    """The poses of N characters: a sequence, whose poses are made when they are asked for, with their arrays as views.
+
+    Attributes
+    ----------
+    playing : list of N Playing or None
+    is_jump, is_forced : list of N bool
+    roots : float64 array, shape (N, 3)
+        x, z and heading of each.
+    rotations : float64 array, shape (N, J, 4)
+    translations, positions : float64 array, shape (N, J, 3)
+    contacts : bool array, shape (N, n feet)
+    play_rates : float64 array, shape (N,)
+    """
+
+    playing: list[Playing | None]
+    is_jump: list[bool]
+    is_forced: list[bool]
+    roots: Floats
+    rotations: Floats
+    translations: Floats
+    positions: Floats
+    contacts: Flags
+    play_rates: Floats
+
+    def __len__(self) -> int:
+        return len(self.playing)
+
+    @overload
+    def __getitem__(self, i: int) -> Pose: ...
+
+    @overload
+    def __getitem__(self, i: slice) -> list[Pose]: ...
+
+    def __getitem__(self, i: int | slice) -> Pose | list[Pose]:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        x, z, heading = self.roots[i].tolist()
+        arrays = self.rotations[i], self.translations[i], self.positions[i], self.contacts[i]
+        return Pose(self.playing[i], self.is_jump[i], self.is_forced[i], (x, z, heading), *arrays, float(self.play_rates[i]))

@@ -1,0 +1,177 @@
+"""The pose streams of a crowd: each gives what it gives alone, and all are worked out together, in arrays with a row a character.
+
+What a character costs is then a little of Python for its decision and loops over numbers: no object is made for a pose until it is
+asked for. The streams go on from where the crowd left them, and the crowd from where they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import overload
+
+import numpy as np
+
+from contextdb.cells.arguments import require_many_of, require_real
+from contextdb.errors import ContextError, Fault, MotionError, Place, plural
+from contextdb.motion.clips.ground_place import OfBody
+from contextdb.motion.clips.many_steered import ManySteered
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.output.ground import MANY_GROUND, ManyGround
+from contextdb.motion.output.pipeline import Grounds, Rows
+from contextdb.motion.output.pose import CrowdPoses
+from contextdb.motion.output.stages import Ground
+from contextdb.motion.output.stream import PoseState, PoseStream, checked_place
+from contextdb.motion.selection.decision import Decision
+
+UNKNOWN = (math.nan, math.nan, math.nan)
+"""The place of a body that is not given."""
+OfBodies = ManySteered | Sequence[OfBody | None] | Floats
+
+
+class PoseStreams(Sequence[PoseStream]):
+    """The streams of a crowd, in order: a sequence, with whose numbers decisions, bodies and poses go.
+
+    Parameters
+    ----------
+    streams : iterable of PoseStream
+        Each once, at least one, all with the same banks and settings; `copy.copy` makes more of one.
+
+    Raises
+    ------
+    MotionError
+        No stream, the same one twice, or streams of different banks or settings.
+    """
+
+    def __init__(self, streams: Iterable[PoseStream]) -> None:
+        self._streams: list[PoseStream] = require_many_of(streams, PoseStream, "streams", "a list of PoseStream")
+        if not self._streams:
+            raise MotionError(Fault("there is no stream.", "at least one"))
+        if len(set(map(id, self._streams))) < len(self._streams):
+            raise MotionError(Fault("the same stream is there twice.", "one of its own for each, such as copy.copy(stream)"))
+        self._pipeline = self._streams[0].pipeline
+        if not all(stream.pipeline.is_like(self._pipeline) for stream in self._streams):
+            raise MotionError(Fault("the streams have different banks or settings.", "streams of the same banks and settings"))
+
+    @overload
+    def __getitem__(self, i: int) -> PoseStream: ...
+
+    @overload
+    def __getitem__(self, i: slice) -> list[PoseStream]: ...
+
+    def __getitem__(self, i: int | slice) -> PoseStream | list[PoseStream]:
+        return self._streams[i]
+
+    def __len__(self) -> int:
+        return len(self._streams)
+
+    def __iter__(self) -> Iterator[PoseStream]:
+        return iter(self._streams)
+
+    def __repr__(self) -> str:
+        return f"<PoseStreams: {plural(len(self), 'character')}>"
+
+    @property
+    def states(self) -> list[PoseState]:
+        """Where each is, to come back to with `restore`."""
+        return [stream.state for stream in self]
+
+    def restore(self, states: Sequence[PoseState]) -> None:
+        """Go on from the states of as many streams; raises ContextError for anything else."""
+        states = require_many_of(states, PoseState, "states", "a list of PoseState, what `states` gives")
+        if len(states) != len(self):
+            raise ContextError(Fault(f"{plural(len(states), 'state')} for {plural(len(self), 'character')}.", "one for each"))
+        for stream, state in zip(self, states, strict=True):
+            stream.restore(state)
+
+    def update(
+        self,
+        decisions: Sequence[Decision],
+        dt: float,
+        bodies: OfBodies | None = None,
+        ground: Sequence[Ground | None] | ManyGround | None = None,
+    ) -> CrowdPoses:
+        """The poses of all after a decision for each, as `PoseStream.update` gives them.
+
+        Parameters
+        ----------
+        decisions : sequence of N Decision
+            Such as `ControllerGroup.update` gives them.
+        dt : float
+            Seconds since the last update, for all.
+        bodies : ManySteered, sequence of N bodies, or float array of shape (N, 3), optional
+            Where the game has each body.
+        ground : function, or sequence of N functions or None, optional
+            A function is asked once for all feet: of arrays x [n] and z [n], the heights [n] and normals [n, 3], or None where all
+            is flat. Of a sequence each is asked as by `PoseStream.update`, foot by foot, which is slower.
+
+        Raises
+        ------
+        MotionError
+            As `PoseStream.update`. All streams then stand where they stood.
+        ContextError
+            An argument of another type, or not one for each.
+        """
+        decided = require_many_of(decisions, Decision, "decisions", "a list of Decision")
+        dt = require_real(dt, "dt", 0.0)
+        if len(decided) != len(self):
+            found = f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}."
+            raise ContextError(Fault(found, "one for each"))
+        poses, rows = self.updated(decided, dt, self._places(bodies), self._grounds(ground))
+        self.go_on(rows)
+        return poses
+
+    def updated(
+        self, decisions: Sequence[Decision], dt: float, places: Floats | None, grounds: Grounds = None
+    ) -> tuple[CrowdPoses, Rows]:
+        """The same unchecked, with the places [N, 3] of bodies, NaN for none; the streams stand where they stood until `go_on`."""
+        rows, poses = self._pipeline.update(self._rows(), decisions, dt, places, grounds)
+        return poses, rows
+
+    def go_on(self, rows: Rows) -> None:
+        """Go on from some rows, one for each."""
+        for i, stream in enumerate(self._streams):
+            stream.go_on(rows, i)
+
+    def _rows(self) -> Rows:
+        """The rows of all: as the last update left them, unless a stream was elsewhere meanwhile."""
+        each = [stream.place for stream in self._streams]
+        first = each[0][0]
+        if len(first) == len(each) and all(rows is first and at == i for i, (rows, at) in enumerate(each)):
+            return first
+        return Rows(np.array([rows.numbers[at] for rows, at in each]), [rows.playing[at] for rows, at in each])
+
+    def _places(self, bodies: OfBodies | None) -> Floats | None:
+        """Where all bodies are, [N, 3]; None where none is given."""
+        settings = self._pipeline.settings
+        if isinstance(bodies, ManySteered):
+            bodies = np.column_stack((bodies.positions, bodies.headings))
+        if bodies is None:
+            checked_place(None, settings)
+            return None
+        if not isinstance(bodies, (list, tuple, np.ndarray)) or len(bodies) != len(self):
+            raise ContextError(Fault(f"the bodies are {bodies!r}.", f"one for each of {plural(len(self), 'character')}"))
+        if (
+            isinstance(bodies, np.ndarray)
+            and bodies.shape == (len(self), 3)
+            and bodies.dtype == np.float64
+            and np.isfinite(bodies).all()
+        ):
+            return bodies
+        places = []
+        for i, body in enumerate(bodies):
+            try:
+                places.append(checked_place(body, settings))
+            except (ContextError, MotionError) as error:
+                raise type(error)(*(fault.at(Place(f"character {i}")) for fault in error.faults)) from None
+        return np.array([UNKNOWN if place is None else place for place in places], np.float64)
+
+    def _grounds(self, ground: object) -> Grounds:
+        if ground is None or callable(ground):
+            return ground
+        if not isinstance(ground, (list, tuple)) or len(ground) != len(self):
+            raise ContextError(Fault(f"ground is {ground!r}.", f"{MANY_GROUND}; or a function or None for each character"))
+        for i, each in enumerate(ground):
+            if each is not None and not callable(each):
+                raise ContextError(Fault(f"the ground is {each!r}.", "a function, or None", place=Place(f"character {i}")))
+        return ground if any(each is not None for each in ground) else None

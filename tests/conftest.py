@@ -7,6 +7,7 @@ it first; write it over the test as `@example(...)`, and every run tries it. EXA
 
 from __future__ import annotations
 
+import gc
 import os
 import random
 import sys
@@ -70,3 +71,9 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     test = getattr(item, "function", None)
     if hypothesis.is_hypothesis_test(test) and not settings.default.derandomize:
         seed_test(test, f"{_seed(item.config)} {item.nodeid}")
+
+
+def pytest_collection_finish() -> None:
+    """What is loaded and collected by now stays: the search for what can be thrown away need not go through it again and again."""
+    gc.collect()
+    gc.freeze()

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
@@ -156,20 +157,20 @@ def test_a_misspelt_argument_is_named_with_the_nearest_and_the_help(arguments: l
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code"),
+    ("arguments", "code", "how"),
     [
-        (["query", "t.csv", "ok=True"], 0),
-        (["query", "t.csv", "ok=False"], 1),
-        (["query", "t.csv", "ok=x"], 2),
-        (["query", "none.csv"], 2),
-        (["check", "t.csv"], 0),
-        (["check", "none"], 2),
-        (["compile", "t.csv"], 0),
-        (["demo", "--tables", "none"], 2),
+        (["query", "t.csv", "ok=True"], 0, run),
+        (["query", "t.csv", "ok=False"], 1, run_process),
+        (["query", "t.csv", "ok=x"], 2, run),
+        (["query", "none.csv"], 2, run_process),
+        (["check", "t.csv"], 0, run_process),
+        (["check", "none"], 2, run),
+        (["compile", "t.csv"], 0, run),
+        (["demo", "--tables", "none"], 2, run),
     ],
 )
-def test_data_goes_to_standard_output_and_messages_to_standard_error(arguments: list[str], code: int):
-    result = run_process(*arguments)
+def test_data_goes_to_standard_output_and_messages_to_standard_error(arguments: list[str], code: int, how: Callable[..., Result]):
+    result = how(*arguments)
     assert result.code == code
     if code == 2:
         assert result.out == ""
@@ -185,18 +186,24 @@ def test_the_installed_command_and_the_module_are_the_same_function():
     assert run_process("--version").out == run("--version").out
 
 
-def test_no_colour_where_no_terminal_is():
-    for arguments in (["query", "t.csv", "ok=True"], ["query", "t.csv", "ok=False"], ["check", "t.csv"], ["demo"]):
-        result = run_process(*arguments, env={"TERM": "xterm-256color"})
+def test_no_colour_where_no_terminal_is(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("TERM", "xterm-256color")
+    result = run_process("check", "t.csv", env={"TERM": "xterm-256color"})
+    assert ESCAPE not in result.out + result.err
+    for arguments in (["query", "t.csv", "ok=True"], ["query", "t.csv", "ok=False"], ["demo"]):
+        result = run(*arguments)
         assert ESCAPE not in result.out + result.err
 
 
 @pytest.mark.parametrize(
     ("environment", "is_coloured"), [({"FORCE_COLOR": "1"}, True), ({"FORCE_COLOR": "1", "NO_COLOR": "1"}, False)]
 )
-def test_colour_can_be_forced_and_forbidden(environment: dict[str, str], is_coloured: bool):
+def test_colour_can_be_forced_and_forbidden(environment: dict[str, str], is_coloured: bool, monkeypatch: pytest.MonkeyPatch):
     assert (ESCAPE in run_process("query", "t.csv", "ok=True", env=environment).out) is is_coloured
-    assert (ESCAPE in run_process("query", "t.csv", "ok=True", "--json", env=environment).out) is False
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert (ESCAPE in run("query", "t.csv", "ok=True").out) is is_coloured
+    assert (ESCAPE in run("query", "t.csv", "ok=True", "--json").out) is False
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])

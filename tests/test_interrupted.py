@@ -28,7 +28,7 @@ def large_table(path: Path) -> None:
 
 def write_rows(path: Path, n_rows: int, cells: tuple[str, ...], separator: str = ",") -> None:
     rng = random.Random(1)
-    rows = [[f"a{r}", *(rng.choice(cells) for _ in range(N_CONDITIONS))] for r in range(n_rows)]
+    rows = [[f"a{r}", *rng.choices(cells, k=N_CONDITIONS)] for r in range(n_rows)]
     head = ["Asset", *(f"c{i}" for i in range(N_CONDITIONS))]
     path.write_text("".join(separator.join(row) + "\n" for row in [head, *rows]), encoding="utf-8")
 

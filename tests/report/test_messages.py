@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -26,6 +27,8 @@ COMPANIONS = {"identical-rows": {"never-chosen"}, "equal-row": {"never-chosen"}}
 """Rules that an example of another cannot but break too: under the policy "first" the later of two equal rows never plays."""
 METHODS = ("_at", "_whole")
 """Methods that make a finding, and take the rule before its level."""
+SAID_BY = re.compile(rf"\b(rule|{'|'.join(RULE_ARGUMENT)})\b|[\"']({'|'.join(LEVELS)})[\"']")
+"""A module without one of these words names no rule in any of the ways that `rules_in` looks for."""
 
 
 def rules_in(tree: ast.AST, in_tuples: bool) -> Iterator[str]:
@@ -48,10 +51,18 @@ def rules_in(tree: ast.AST, in_tuples: bool) -> Iterator[str]:
         yield from (f.value for f in found if isinstance(f, ast.Constant) and isinstance(f.value, str) and f.value not in LEVELS)
 
 
+@cache
+def rules_by_module(package: str) -> dict[Path, set[str]]:
+    """The rules that each module of a package names."""
+    texts = {path: path.read_text(encoding="utf-8") for path in sorted((ROOT / package).rglob("*.py"))}
+    in_tuples = package == "contextdb"
+    return {path: set(rules_in(ast.parse(text), in_tuples)) if SAID_BY.search(text) else set() for path, text in texts.items()}
+
+
 def rules_of(*patterns: str, package: str = "contextdb") -> set[str]:
     """Every rule that the modules of a package name."""
-    paths = [path for pattern in patterns for path in (ROOT / package).glob(pattern)]
-    return {rule for path in paths for rule in rules_in(ast.parse(path.read_text(encoding="utf-8")), package == "contextdb")}
+    named = rules_by_module(package)
+    return {rule for pattern in patterns for path in (ROOT / package).glob(pattern) for rule in named[path]}
 
 
 def module_of(path: Path) -> str:
@@ -59,11 +70,10 @@ def module_of(path: Path) -> str:
     return ".".join(path.relative_to(ROOT / "contextdb").with_suffix("").parts).removesuffix(".__init__")
 
 
-MODULES = {
-    module_of(path): set(rules_in(ast.parse(path.read_text(encoding="utf-8")), in_tuples=True))
-    for path in sorted((ROOT / "contextdb").rglob("*.py"))
-}
-"""The rules that each module reports."""
+@cache
+def modules() -> dict[str, set[str]]:
+    """The rules that each module reports."""
+    return {module_of(path): rules for path, rules in rules_by_module("contextdb").items()}
 
 
 def fenced(section: str, language: str) -> str | None:
@@ -93,7 +103,7 @@ def test_every_rule_of_a_check_carries_its_own_help():
 
 @pytest.mark.parametrize("rule", RULES)
 def test_a_rule_is_reported_by_the_modules_that_the_catalogue_names_and_by_no_other(rule: str):
-    assert RULES[rule].modules == tuple(module for module, rules in MODULES.items() if rule in rules)
+    assert RULES[rule].modules == tuple(module for module, rules in modules().items() if rule in rules)
 
 
 def test_no_rule_has_two_sections():

@@ -29,12 +29,20 @@ def recorded(tmp_path):
     return tmp_path
 
 
-@pytest.fixture
-def cluster():
+@pytest.fixture(scope="module")
+def workers():
     """Two workers, each a process."""
     distributed = pytest.importorskip("distributed", reason='dask is not installed: pip install "contextdb[dask]"')
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as made:
         yield made
+
+
+@pytest.fixture
+def cluster(workers):
+    """Both workers are there: one that a test before killed has been started again."""
+    with workers.get_client() as client:
+        client.wait_for_workers(2)
+        yield workers
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")

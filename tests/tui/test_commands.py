@@ -153,9 +153,9 @@ def test_every_command_runs_wherever_one_is(tmp_path, name, state):
     file = tmp_path / f"{name}.csv"
     file.write_text(TABLES[name])
     commands = [command for command in COMMANDS if command.id != "quit"]
-    if not IS_FULL:  # each command in two of the states
+    if not IS_FULL:  # each command in one of the states
         place = STATES.index((name, state))
-        commands = [command for i, command in enumerate(commands) if (i - place) % len(STATES) < 2]
+        commands = [command for i, command in enumerate(commands) if i % len(STATES) == place]
 
     async def script(app: EditorApp, pilot) -> list[str]:
         ran = []
@@ -178,8 +178,11 @@ def test_every_key_of_a_command_does_something_without_a_fault(tmp_path, name):
     file = tmp_path / f"{name}.csv"
     file.write_text(TABLES[name])
 
+    # every day the keys of each second command on each of the tables
+    commands = COMMANDS if IS_FULL else COMMANDS[name == "no_rows" :: 2]
+
     async def script(app: EditorApp, pilot) -> None:
-        for command in COMMANDS:
+        for command in commands:
             for key in keys_of(command):
                 if command.id not in ("quit", "palette"):
                     await press(pilot, key)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.style import Style
-from strategies import examples
+from strategies import examples, some
 from terminal import press, said, screen_text, with_editor
 from textual.strip import Strip
 
@@ -246,13 +246,6 @@ def test_a_line_costs_the_same_however_long_the_table_is():
 # ---- in the editor
 
 
-@pytest.fixture(params=TABLES)
-def path(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    file = tmp_path / f"{request.param}.csv"
-    file.write_text(TABLES[request.param], "utf-8")
-    return file
-
-
 @pytest.fixture
 def ordinary(tmp_path: Path) -> Path:
     file = tmp_path / "ordinary.csv"
@@ -260,8 +253,11 @@ def ordinary(tmp_path: Path) -> Path:
     return file
 
 
-@pytest.mark.parametrize("size", [(20, 8), (40, 12), (160, 48)])
-def test_every_table_opens_moves_and_edits_in_every_window(path, size):
+@pytest.mark.parametrize(("name", "size"), some(product(TABLES, [(20, 8), (40, 12), (160, 48)])))
+def test_every_table_opens_moves_and_edits_in_every_window(tmp_path, name, size):
+    path = tmp_path / f"{name}.csv"
+    path.write_text(TABLES[name], "utf-8")
+
     async def script(app, pilot):
         await press(pilot, "ctrl+end", "ctrl+home", "down", "right", "pagedown", "pageup", "end", "f6", "f6")
         await press(pilot, "f2", "escape", "shift+down", "shift+right", "ctrl+a", "escape", "alt+w")

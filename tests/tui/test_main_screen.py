@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from strategies import some
 from terminal import press, said, screen_text, with_editor
 
 from contextdb.errors import FileError
@@ -198,7 +199,7 @@ def test_why_needs_a_test_row_that_asks(path):
     assert with_editor(path, script).startswith("The test row is empty")
 
 
-@pytest.mark.parametrize("size", [(20, 8), (40, 12), (80, 24), (160, 48)])
+@pytest.mark.parametrize("size", some([(20, 8), (40, 12), (80, 24), (160, 48)], 3))
 def test_every_tab_is_shown_in_every_window(path, size):
     async def script(app, pilot):
         shown = []

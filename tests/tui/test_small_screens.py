@@ -11,7 +11,7 @@ from terminal import press, screen_text, settled, with_editor
 
 TABLES = Path(__file__).parent.parent.parent / "tables"
 SIZES = ((20, 8), (200, 60), (33, 11), (80, 24), (3, 2), (1, 1), (60, 14), (80, 24))
-FEW_SIZES = ((200, 60), (33, 11), (1, 1), (80, 24))
+FEW_SIZES = ((33, 11), (1, 1), (100, 30), (80, 24))
 SCENES = {
     "grid": (),
     "cell editor": ("right", "right", "right", "f2"),

@@ -46,6 +46,10 @@ def playing_at(database: str, head: Playhead, frame: int, time_s: float) -> Play
 
 def _range_of(playing: Playing, database: MotionDatabase) -> int | None:
     """The range that plays, also in a database that was built again."""
-    near = range(playing.range, min(playing.range + 1, len(database.assets)))
+    at = playing.range
+    is_there = 0 <= at < len(database.assets) and database.assets[at] == playing.asset
+    if is_there and database.mirrored[at] == playing.mirrored and database.stops[at] > database.starts[at]:
+        return at
+    near = range(at, min(at + 1, len(database.assets)))
     same = (i for i in (*near, *range(len(database.assets))) if database.assets[i] == playing.asset)
     return next((i for i in same if database.mirrored[i] == playing.mirrored and database.stops[i] > database.starts[i]), None)

@@ -67,5 +67,5 @@ def _at(path: Features, frame: float) -> tuple[float, float, float]:
     low = min(max(int(frame), 0), len(path) - 1)
     high = min(low + 1, len(path) - 1)
     share = min(max(frame - low, 0.0), 1.0)
-    (x, z, heading), (to_x, to_z, to_heading) = path[low].tolist(), path[high].tolist()
+    (x, z, heading), (to_x, to_z, to_heading) = path[low : low + 2].tolist() if high > low else 2 * [path[low].tolist()]
     return x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)

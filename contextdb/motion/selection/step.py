@@ -10,6 +10,7 @@ from enum import Enum, auto
 from contextdb.motion.arguments import ValidRanges, widened_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut, Skip
+from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.database import Hit
 from contextdb.motion.selection import guards, trigger
 from contextdb.motion.selection.asked import Asked, OfValid
@@ -231,6 +232,10 @@ class Step:
 def _standing(ongoing: Ongoing, asked: Asked) -> Standing:
     """Whether the playing asset is still valid. A mask that does not fit is refused here, also where nothing hangs on it."""
     database, at, given = ongoing.head.database, ongoing.head.range, asked.of(ongoing.database)
+    known, tags = given["valid"], given["tags"]
+    is_plain = given["bias"] is None and given["penalties"] is None and (tags is None or isinstance(tags, TagFilter))
+    if is_plain and isinstance(known, ValidRanges) and known.flags[at]:  # read before: nothing is left to refuse
+        return Standing.VALID
     if database.filter(**given).ranges[at]:
         return Standing.VALID
     wide = widened_of(given["valid"])

@@ -35,7 +35,7 @@ from contextdb.motion.trace.cost_views import cost_text
 from tui.debug import ladder, reasons
 from tui.debug.bars import Bars
 from tui.debug.channels import Channels, Dial
-from tui.debug.figures import figure_of, wanted_speed
+from tui.debug.figures import figure_of
 from tui.debug.help import DebugHelp
 from tui.debug.key_line import DebugKeyLine
 from tui.debug.keys import KEYS
@@ -67,6 +67,7 @@ class DebugScreen(Screen[None]):
         #head, #told, #figures, #said, #detail { text-wrap: nowrap; text-overflow: ellipsis; }
         #head { height: 1; background: $panel; text-style: bold; padding: 0 1; }
         #told { height: 2; padding: 0 1; background: $surface; }
+        #status { height: 2; padding: 0 1; background: $surface; color: $text-muted; }
         #figures { height: 1; padding: 0 1; color: $text-muted; background: $surface; }
         #said { height: 1; padding: 0 1; }
         #detail { height: 2; padding: 0 1; color: $text-muted; }
@@ -83,6 +84,7 @@ class DebugScreen(Screen[None]):
         #find { height: 1; border: none; padding: 0 1; background: $boost; display: none; }
         #find.-shown { display: block; }
         #tiny { display: none; }
+        &.-small #status { display: none; }
         &.-small #left, &.-small #right { width: 1fr; }
         &.-small #channels { height: 1fr; max-height: 100%; }
         &.-tiny { #tiny { display: block; } #body { display: none; } }
@@ -107,6 +109,7 @@ class DebugScreen(Screen[None]):
         self._written: list[SchemaChange] = []
         self._playing: tuple[Timer, float, float] | None = None
         """The timer, when it began, and at which second of the session."""
+        self._status: list[tuple[str, str]] = []
         self._recorded = recording.weights()
         self._thresholds = recording.thresholds()
 
@@ -117,6 +120,7 @@ class DebugScreen(Screen[None]):
         with Vertical(id="body"):
             yield Static(id="head")
             yield Static(id="told")
+            yield Static(id="status")
             yield Timeline(self.recording)
             yield Static(id="figures")
             with Horizontal(id="panes"):
@@ -281,6 +285,7 @@ class DebugScreen(Screen[None]):
         moment = self.moment
         if moment is None:
             return
+        self._show_status()
         self._show_head(moment)
         self._show_bars()
         self._show_rest()
@@ -314,7 +319,7 @@ class DebugScreen(Screen[None]):
         if self.turned and moment.turned is not None and moment.asked is not None:
             yield self._instead(moment)
         else:
-            yield self._speeds(moment)
+            yield self._facts(moment)
 
     def _instead(self, moment: Moment) -> str:
         assert moment.turned is not None, "was looked at before"
@@ -326,25 +331,17 @@ class DebugScreen(Screen[None]):
             return f"With these weights the same is chosen: {what}."
         return f"With these weights {'another asset' if moment.turned.is_other_asset else 'another frame'} is chosen: {what}."
 
-    def _speeds(self, moment: Moment) -> str:
-        """How fast the path was wanted, how fast the clip goes and how fast the body went."""
-        line, at = self.recording.line, self.index
-        got = ""
-        if 0 < at < len(line):
-            step = float(line.times_s[at] - line.times_s[at - 1])
-            if step > 0.0:
-                got = f"{float(np.hypot(*(line.roots[at, :2] - line.roots[at - 1, :2]))) / step:.2f}"
-        speed = wanted_speed(moment)
-        wanted = "" if speed is None else f"{speed:.2f}"
-        clip = ""
-        playing = moment.decision.playing
-        bank = None if playing is None else self.banks.get(playing.database)
-        if playing is not None and bank is not None:
-            left, ahead, _ = bank.sample_of(bank.range_of(playing.asset, playing.mirrored), playing.time_s).root_velocity
-            clip = f"{float(np.hypot(left, ahead)):.2f}"
-        known = [f"{name} {value}" for name, value in (("wanted", wanted), ("clip", clip), ("got", got)) if value]
+    def _facts(self, moment: Moment) -> str:
+        """What the game said of the moment, behind the speeds where these have no line of their own."""
         facts = ", ".join(f"{name} {reasons.fact_text(value)}" for name, value in sorted((moment.decision.context or {}).items()))
-        return printable(f"m/s {', '.join(known)}" * bool(known) + (f" · {facts}" if facts else ""))
+        speed = self._status[0][1] if self._is_small and self._status and self._status[0][0] == "m/s" else ""
+        return printable(" · ".join(filter(None, (f"m/s {speed}" if speed else "", facts))))
+
+    def _show_status(self) -> None:
+        """Speeds and angles, on a line of their own where there is room."""
+        self._status = list(self.recording.status_at(self.index).lines())
+        text = Text(" · ".join(f"{name} {told}" for name, told in self._status))
+        self.query_one("#status", Static).update(text)
 
     def _show_bars(self) -> None:
         moment, bars = self.moment, self.bars
@@ -413,6 +410,14 @@ class DebugScreen(Screen[None]):
             rate = 30.0 if database.schema is None else database.schema.rate
             asset = (row.database, row.asset, row.mirrored, (row.frame - int(database.starts[row.range])) / rate)
         note = "" if self.banks else "no poses: " + (self.recording.missing or "they are being made of the clips")
+        how = (
+            ""
+            if not self.banks
+            else " · as shown, blended"
+            if self.recording.displayed is not None
+            else " · of the clips, not blended"
+        )
+        self.stage.border_title = f"{TITLES['stage']}{how}"
         self.stage.show(figure_of(self.recording, self.banks, moment, asset), note)
 
     def _show_reasons(self) -> None:
@@ -423,6 +428,8 @@ class DebugScreen(Screen[None]):
             lines = [reasons.Line(moment.not_asked or "no asset is under the cursor")]
         else:
             lines = reasons.reason_lines(self.recording, moment, row)
+        if self._is_small:
+            lines += [reasons.Line("how it stands", "head"), *(reasons.Line(f"    {name}  {told}") for name, told in self._status)]
         text = Content.assemble(*((f"{printable(line.text)}\n", STYLES[line.kind]) for line in lines))
         self.query_one("#reasons", Static).update(text)
 
@@ -613,6 +620,7 @@ class DebugScreen(Screen[None]):
 
     def _take_strips(self, strips: dict[str, Floats]) -> None:
         self.timeline.add_strips(strips)
+        self._show()
         self.say("")
 
     def _progress(self, what: str) -> Callable[[float], None]:

@@ -110,6 +110,11 @@ class Trace(Sequence[Decision]):
         self.n_forgotten += len(self._rows) == self.most
         self._rows.append(packed)
 
+    @property
+    def controller(self) -> str:
+        """The controller that recorded it; "" where the session does not say."""
+        return next((str(about["controller"]) for about in self.about.values() if "controller" in about), "")
+
     def __len__(self) -> int:
         return self._n_loaded + len(self._rows)
 

@@ -133,16 +133,24 @@ class Recording:
         self.file, self.trace, self.folder = file, trace, folder
         self.databases: dict[str, MotionDatabase] = dict(databases)
         self.missing = missing
-        self.line: Timeline = timeline_of(trace)
+        self._decisions: list[Decision] | None = None
+        self.displayed: Displayed | None = None
+        """Its poses, once they are made."""
+        self.measured: Mapping[str, Floats] = {}
+        """And what is measured of them."""
+        self.run_again: Mapping[str, float | None] | None = None
+        """Its measures run again with nothing turned, once they are known."""
+        self.refresh(missing)
+
+    def refresh(self, missing: str) -> None:
+        """Read the session again, which grew at its end, and may be forgotten at its start."""
+        self.missing = missing
+        self.line: Timeline = timeline_of(self.trace)
         self.figures = Figures.of(self.line)
         self.uses = self.line.uses()
         self.searches = np.flatnonzero(self.line.searched)
         self.jumps = np.flatnonzero(self.line.jumped)
-        self._decisions: list[Decision] | None = None
-        self.displayed: Displayed | None = None
-        """Its poses, once they are made."""
-        self.run_again: Mapping[str, float | None] | None = None
-        """Its measures run again with nothing turned, once they are known."""
+        self.__dict__.pop("reasked", None)
 
     @property
     def name(self) -> str:
@@ -151,6 +159,11 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.line)
+
+    def edited(self) -> None:
+        """Read the project again, whose tables may have been edited."""
+        for name in ("project", "config", "stock", "reasked"):
+            self.__dict__.pop(name, None)
 
     # ---- moments
 
@@ -252,7 +265,7 @@ class Recording:
         """The poses that are saved beside the databases and go with them."""
         return saved_poses(self.folder, self.databases) if self.folder else {}
 
-    def strips(self, banks: Mapping[str, PoseBank], on_step: Callable[[], None]) -> dict[str, Floats]:
+    def strips(self, banks: Mapping[str, PoseBank], on_step: Callable[[], None]) -> Mapping[str, Floats]:
         """What is measured of the session's poses at each update, by the names of `MEASURES`; the poses themselves are kept."""
         decisions = self.decisions(on_step)
         settings = PoseSettings() if self.config is None else self.config.output_of(self.controller)
@@ -262,7 +275,8 @@ class Recording:
         assert poses.roots is not None, "was just made"
         parents = next(iter(banks.values())).skeleton.parents
         self.displayed = Displayed(poses.positions.astype(np.float32), poses.roots, parents, [warp for _, warp in warped])
-        return strips_of(shown.with_poses(shown.of_decisions(decisions), poses).with_contacts(Clips.of(banks)))
+        self.measured = strips_of(shown.with_poses(shown.of_decisions(decisions), poses).with_contacts(Clips.of(banks)))
+        return self.measured
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,8 @@ A small screen shows one of the four panes below the timeline, a large one all o
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,6 +19,7 @@ from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.events import Resize
+from textual.message import Message
 from textual.screen import Screen
 from textual.timer import Timer
 from textual.widget import Widget
@@ -36,6 +38,7 @@ from tui.debug import ladder, reasons
 from tui.debug.bars import Bars
 from tui.debug.channels import Channels, Dial
 from tui.debug.figures import figure_of
+from tui.debug.game import Live
 from tui.debug.help import DebugHelp
 from tui.debug.key_line import DebugKeyLine
 from tui.debug.keys import KEYS
@@ -52,8 +55,32 @@ HIGH = 44
 PANES = ("bars", "why", "stage", "channels")
 TITLES = {"bars": "Bars", "why": "Why", "stage": "Poses", "channels": "Weights"}
 FRAME_S = 1.0 / 30.0
+LIVE_S = 0.2
+"""So often a running game is looked at."""
 SAME_S = 1e-6
 STYLES = {"head": "bold", "plain": "", "bad": "$error", "good": "$success", "dim": "$foreground 55%"}
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the screen begins: an update, and what is turned."""
+
+    tick: int
+    turned: Turned
+
+
+@dataclass
+class RowWanted(Message):
+    """Show a row of a table in the sheet."""
+
+    table: str
+    """Its file."""
+    row: int
+    """From 0."""
+    column: str | None
+    """The first whose cell does not accept its fact."""
+    start: Start
+    """Where to come back to."""
 
 
 class DebugScreen(Screen[None]):
@@ -91,9 +118,24 @@ class DebugScreen(Screen[None]):
     }
     """
 
-    def __init__(self, recording: Recording, *, measures: bool = True) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        measures: bool = True,
+        live: Live | None = None,
+        start: Start | None = None,
+        is_inside: bool = False,
+    ) -> None:
         super().__init__()
+        self._start = start
+        self._is_inside = is_inside
+        """Whether the screen is one of the editor's: Esc goes back there."""
         self.recording = recording
+        self.live = live
+        """The game that is followed; None for a recorded session."""
+        self.is_now = live is not None
+        """Whether the newest moment of the game is shown, and goes on."""
         self.index = 0
         self.turned = Turned()
         self.order = ORDERS[0]
@@ -141,8 +183,18 @@ class DebugScreen(Screen[None]):
             self.query_one(f"#{name}").border_title = title
         self.query_one("#figures", Static).update(Text(self.recording.figures.text))
         first = self.recording.jumps[self.recording.jumps > 0]
-        self.go(int(first[0]) if len(first) else 0)
-        if self._measures and self.recording.folder:
+        if self.live is not None:
+            self.timeline.window_s = None
+            self._show_at(len(self.recording) - 1)
+            self.set_interval(LIVE_S, self.follow)
+        else:
+            self.go(int(first[0]) if len(first) else 0)
+        if self._start is not None:
+            self._turn(self._start.turned)
+            self.go(int(np.searchsorted(self.recording.line.ticks, self._start.tick)))
+        if self.recording.displayed is not None:
+            self.timeline.add_strips(self.recording.measured)
+        elif self._measures and self.recording.folder:
             self.measure()
 
     @property
@@ -200,7 +252,32 @@ class DebugScreen(Screen[None]):
     # ---- time
 
     def go(self, index: int) -> None:
-        """Show another moment."""
+        """Show another moment, and stay there."""
+        self.is_now = False
+        self._show_at(index)
+
+    def follow(self) -> None:
+        """Take what the game decided, and show its newest moment, unless another is held."""
+        live, line = self.live, self.recording.line
+        if live is None:
+            return
+        tick = int(line.ticks[self.index])
+        if live.take():
+            self.timeline.grow()
+            self.query_one("#figures", Static).update(Text(self.recording.figures.text))
+            at = int(np.searchsorted(self.recording.line.ticks, tick))
+            if self.is_now:
+                self._show_at(len(self.recording) - 1)
+            elif at < len(self.recording) and int(self.recording.line.ticks[at]) == tick and self.moment is not None:
+                self.index = at
+                self.moment = replace(self.moment, index=at, search_index=self.recording.search_at(at))
+                self.timeline.go(at)
+            else:
+                self._show_at(0)
+        if self.moment is not None:
+            self._show_head(self.moment)
+
+    def _show_at(self, index: int) -> None:
         self.index = min(max(0, index), len(self.recording) - 1)
         self.moment = Moment.of(self.recording, self.index, self.turned)
         self.timeline.go(self.index)
@@ -243,14 +320,24 @@ class DebugScreen(Screen[None]):
 
     def action_end(self, by: int) -> None:
         """To the start, or the end."""
-        self.go(len(self.recording) - 1 if by > 0 else 0)
+        if by > 0 and self.live is not None:
+            self.is_now = True
+            self._show_at(len(self.recording) - 1)
+        else:
+            self.go(len(self.recording) - 1 if by > 0 else 0)
 
     def action_zoom(self, by: int) -> None:
         """A shorter stretch of time, or a longer one."""
         self.timeline.zoom(by > 0)
 
     def action_play(self) -> None:
-        """Play from here, or stop."""
+        """Play from here, or stop; of a running game hold this moment, or go back to now."""
+        if self.live is not None:
+            if self.is_now:
+                self.go(self.index)
+            else:
+                self.action_end(1)
+            return
         if self._playing is not None:
             self._stop_playing()
             return
@@ -303,6 +390,13 @@ class DebugScreen(Screen[None]):
         plays = "" if decision.playing is None else f" {_named(decision.playing)} at {decision.playing.time_s:.2f} s"
         head = f"{decision.time_s:.2f} s of {line.times_s[-1]:.2f} · tick {decision.tick:,} · {action}{plays}"
         text = Text(printable(f"{self.recording.name}  {head}"))
+        if self.live is not None:
+            back_s = float(line.times_s[-1]) - decision.time_s
+            when = "● now" if self.is_now else f"❚❚ {back_s:.1f} s ago, End: now"
+            notes = self.live.notes
+            text = Text(f"{when}  ", style="bold") + Text(printable(f"{self.live.name} · tick {decision.tick:,} · {action}{plays}"))
+            if notes:
+                text = Text(f"! {printable(notes)}  ", style="bold") + text
         self.query_one("#head", Static).update(text)
         told = Text("\n".join(self._told(moment)))
         self.query_one("#told", Static).update(told)
@@ -482,8 +576,13 @@ class DebugScreen(Screen[None]):
         if row is None or found is None:
             self.say("No table has a row of this asset.")
             return
-        path, at = found
-        self.say(f"{row.asset} is in row {at + 1}: contextdb edit {path}")
+        where = Start(int(self.recording.line.ticks[self.index]), self.turned)
+        self.post_message(RowWanted(*found, self._failing(row), where))
+
+    def _failing(self, row: Row) -> str | None:
+        """The first column whose cell does not accept its fact."""
+        moment = self.moment
+        return None if moment is None else reasons.failing_column(self.recording, moment, row)
 
     # ---- weights
 
@@ -577,6 +676,8 @@ class DebugScreen(Screen[None]):
         """Run the whole session again with what is turned."""
         if not self.turned:
             self.say("Nothing is turned: + and - turn the weight under the cursor of the weights.")
+        elif self.live is not None:
+            self.say("A running game cannot be run again: record a session of it with motion.Trace.")
         elif self.recording.missing or not self.recording.databases:
             self.say(f"The session cannot be run again: {self.recording.missing}")
         else:
@@ -606,7 +707,7 @@ class DebugScreen(Screen[None]):
         try:
             banks = self.recording.open_banks()
             self.app.call_from_thread(self._take_banks, banks)
-            strips = self.recording.strips(banks, steps) if banks else {}
+            strips = self.recording.strips(banks, steps) if banks and self.live is None else {}
         except Cancelled:
             return
         except ContextDBError as error:
@@ -618,7 +719,7 @@ class DebugScreen(Screen[None]):
         self.banks = banks
         self._show_stage()
 
-    def _take_strips(self, strips: dict[str, Floats]) -> None:
+    def _take_strips(self, strips: Mapping[str, Floats]) -> None:
         self.timeline.add_strips(strips)
         self._show()
         self.say("")
@@ -654,6 +755,8 @@ class DebugScreen(Screen[None]):
         elif is_at_work:
             self.workers.cancel_node(self)
             self.say("Ended.")
+        elif self._is_inside:
+            self.action_quit()
 
     # ---- the rest
 
@@ -677,7 +780,10 @@ class DebugScreen(Screen[None]):
     def action_quit(self) -> None:
         """Leave."""
         self.workers.cancel_node(self)
-        self.app.exit()
+        if self._is_inside:
+            self.dismiss()
+        else:
+            self.app.exit()
 
     def on_descendant_focus(self) -> None:
         """A click gives a pane the focus too."""

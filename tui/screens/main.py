@@ -57,6 +57,8 @@ class Answer(Protocol):
 
 
 TABS = ("assets", "options", "priorities", "coverage", "problems")
+MOTION = "motion"
+"""The tab that there is where the project declares motion databases, and once it was gone to."""
 CELL_MENU = (
     "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "insert-row", "insert-below", "duplicate", "delete-rows",
     "enable", "filter-same", "values", "nearest",
@@ -108,6 +110,12 @@ class MainScreen(Screen[None]):
         return self.query_one("#panes", ContentSwitcher).current or "assets"
 
     @property
+    def tabs(self) -> Sequence[str]:
+        """The tabs that there are."""
+        has_motion = bool(self.session.sheet.table.schema.motion) or self.tab == MOTION
+        return (*TABS, MOTION) if has_motion else TABS
+
+    @property
     def assets(self) -> AssetsPane:
         """The tab of the grid."""
         return self.query_one(AssetsPane)
@@ -145,7 +153,7 @@ class MainScreen(Screen[None]):
     def _show_bars(self) -> None:
         mark = " *" if self.session.sheet.is_modified else ""
         items = [Item("open", f"{self.table_name}{mark}", is_strong=True)]
-        items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in TABS]
+        items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in self.tabs]
         table = self.session.sheet.table
         about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
         self.query_one("#tabs", Bar).show(items, about)
@@ -215,6 +223,10 @@ class MainScreen(Screen[None]):
             return OptionsPane(sheet, id=name)
         if name == "priorities":
             return PrioritiesPane(sheet, id=name)
+        if name == MOTION:
+            from tui.panes.motion import MotionPane  # loads the motion search
+
+            return MotionPane(self.workspace.folder, id=name)
         return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
 
     def _coverage_pane(self, name: str) -> CoveragePane:
@@ -222,7 +234,8 @@ class MainScreen(Screen[None]):
 
     async def action_next_tab(self, by: int) -> None:
         """Go to the tab beside."""
-        await self.action_tab(TABS[(TABS.index(self.tab) + by) % len(TABS)])
+        tabs = self.tabs
+        await self.action_tab(tabs[(tabs.index(self.tab) + by) % len(tabs)])
 
     def action_help(self) -> None:
         from tui.screens.help import HelpDialog

@@ -112,7 +112,7 @@ class MainScreen(Screen[None]):
     @property
     def tabs(self) -> Sequence[str]:
         """The tabs that there are."""
-        has_motion = bool(self.session.sheet.table.schema.motion) or self.tab == MOTION
+        has_motion = bool(self.session.sheet.table.schema.motion.get("databases")) or self.tab == MOTION
         return (*TABS, MOTION) if has_motion else TABS
 
     @property

@@ -17,6 +17,7 @@ COMPUTED = {
     "detected from its cells", "OURS", "next to contextdb.toml", "the rate of the features", "the clip's own path",
     "contextdb, or the Python that runs now", "as recorded", "whole, except in our own workbooks", "from the settings",
     "200,000, fewer above 500 conditions", "as the project says, else by size", "as the project says, else y",
+    "the first that decides",
 }  # fmt: skip
 """What is worked out by the command: the parsed value is then None."""
 

@@ -349,12 +349,6 @@ def test_the_cursor_goes_with_what_is_chosen_until_it_is_moved(recording: Record
     assert last == "walk"
 
 
-def test_o_says_where_the_row_is(recording: Recording):
-    text = after(recording, "o")
-    assert "walk is in row 2: contextdb edit " in text
-    assert "moves.csv" in text
-
-
 def test_the_help_has_the_questions_and_every_key(recording: Recording):
     text = after(recording, "f1", size=(160, 100))
     for question in ("Why this clip?", "Why not mine?", "Why does it jump so much?", "What if this weight were different?"):

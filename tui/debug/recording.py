@@ -25,7 +25,7 @@ from contextdb.motion.storage.pose_files import open_or_build_poses, saved_poses
 from contextdb.motion.trace.reasked import Reasked, why_not_asked
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.session import Trace
-from contextdb.motion.trace.stats import SMALL_GAIN
+from contextdb.motion.trace.stats import SMALL_GAIN, gains_of
 from contextdb.motion.trace.status import Status, status_of
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.timeline import Timeline, timeline_of
@@ -72,8 +72,8 @@ class Figures:
         """Those of a timeline."""
         is_jump = line.jumped & (np.arange(len(line)) > 0) & (np.roll(line.playing, 1) >= 0)
         n, n_forced = int(is_jump.sum()), int(line.forced.sum())
-        known = is_jump & ~line.forced & np.isfinite(line.continuing) & (line.continuing != 0.0)
-        gains = (line.continuing[known] - line.costs[known]) / np.abs(line.continuing[known])
+        known = is_jump & ~line.forced & np.isfinite(line.continuing)
+        gains = gains_of(line.continuing[known], line.costs[known])
         begins = np.flatnonzero((line.playing >= 0) & (np.diff(line.playing, prepend=-1) != 0))
         stays = np.diff(np.append(line.times_s[begins], line.times_s[-1])) if len(begins) else np.empty(0)
         return cls(

@@ -75,8 +75,8 @@ class MotionPane(Pane):
     def compose(self) -> ComposeResult:
         """The parts."""
         yield Static(id="motion-summary", markup=False)
-        columns = [ListColumn("Session", 16, 3), ListColumn("When", 17), ListColumn("Lasts", 9, 0, True)]
-        columns += [ListColumn("Jumps/s", 8, 0, True), ListColumn("Forced", 7, 0, True), ListColumn("Gain", 6, 0, True)]
+        columns = [ListColumn("Session", 18, 3), ListColumn("When", 12), ListColumn("Lasts", 9, 0, True)]
+        columns += [ListColumn("Jumps/s", 8, 0, True), ListColumn("Forced", 7, 0, True)]
         yield SessionList([*columns, ListColumn("In a clip", 10, 0, True)], empty=NONE, id="sessions")
 
     def show(self) -> None:
@@ -135,15 +135,14 @@ class MotionPane(Pane):
     def _cells(self, at: int) -> Sequence[ListCell]:
         entry = self.entries[at]
         if entry.is_game:
-            return [(f"● {printable(entry.path.stem)}", "strong"), "now", "", "", "", "", ""]
+            return [(f"● {printable(entry.path.stem)}", "strong"), "now", "", "", "", ""]
         name = printable(entry.path.name)
-        when = f"{datetime.fromtimestamp(_mtime(entry.path)):%Y-%m-%d %H:%M}"
+        when = f"{datetime.fromtimestamp(_mtime(entry.path)):%d %b %H:%M}"
         if entry.measures is None or isinstance(entry.measures, str):
-            return [name, when, "…" if entry.measures is None else ("damaged", "error"), "", "", "", ""]
+            return [name, when, "…" if entry.measures is None else ("damaged", "error"), "", "", ""]
         seconds, figures = entry.measures
-        gain = "" if figures.gain_median is None else f"{figures.gain_median:.0%}"
         stay = "" if figures.stay_s is None else f"{figures.stay_s:.2f} s"
-        return [name, when, f"{seconds:,.1f} s", f"{figures.jumps_per_s:.2f}", f"{figures.forced:,}", gain, stay]
+        return [name, when, f"{seconds:,.1f} s", f"{figures.jumps_per_s:.2f}", f"{figures.forced:,}", stay]
 
     # ---- what is done
 

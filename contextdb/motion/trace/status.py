@@ -53,7 +53,7 @@ class Compared:
     @property
     def text(self) -> str:
         """In a line; "" where nothing is known."""
-        form, sign = ("{:.0f}°", "{:+.0f}") if self.is_angle else ("{:.2f}", "{:+.2f}")
+        form, sign, digits = ("{:.0f}°", "{:+.0f}", 0) if self.is_angle else ("{:.2f}", "{:+.2f}", 2)
         parts = []
         for name, value, off in (
             ("wanted", self.wanted, None),
@@ -61,7 +61,10 @@ class Compared:
             ("got", self.got, self.got_off),
         ):
             if value is not None:
-                parts.append(f"{name} {form.format(value + 0.0)}" + ("" if off is None else f" ({sign.format(off)})"))
+                parts.append(
+                    f"{name} {form.format(_shown(value, digits))}"
+                    + ("" if off is None else f" ({sign.format(_shown(off, digits))})")
+                )
         return ", ".join(parts)
 
     def _off(self, value: float | None) -> float | None:
@@ -118,7 +121,7 @@ class Status:
         yield "time scale", f"{self.time_scale:.2f}"
         if self.stride is not None and self.warp_deg is not None:
             yield "stride", f"{self.stride:.2f}"
-            yield "warp", f"{self.warp_deg + 0.0:.0f}°"
+            yield "warp", f"{_shown(self.warp_deg):.0f}°"
 
 
 def status_of(
@@ -151,6 +154,11 @@ def status_of(
     stride, turn = (None, None) if warp is None else warp
     turned = None if turn is None else math.degrees(turn)
     return Status(speed, move, facing, _n_evaluated(decision, databases), decision.play_rate, stride, turned)
+
+
+def _shown(value: float, digits: int = 0) -> float:
+    """A number rounded, without the sign of a zero."""
+    return round(value, digits) + 0.0
 
 
 Path = tuple[float | None, float | None, float | None]

@@ -136,10 +136,14 @@ def test_the_screen_follows_is_held_and_goes_back_to_now(game: Game, live: Live)
         while live.recording is None:
             await pilot.pause(0.01)
             app.screen.look() if isinstance(app.screen, WaitingScreen) else None
+        waiting = app.screen
+        game.play(2)
+        if isinstance(waiting, WaitingScreen):
+            waiting.look()  # which takes no more
         await pilot.pause()
         screen = app.screen
         assert isinstance(screen, DebugScreen)
-        game.play(20)
+        game.play(18)
         while len(screen.recording) < 40:
             screen.follow()
         assert screen.index == 39

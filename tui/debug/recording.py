@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contextdb.errors import ContextDBError
+from contextdb.errors import ContextDBError, plural
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.measuring import measure, shown
@@ -88,7 +88,7 @@ class Figures:
     @property
     def text(self) -> str:
         """In a line."""
-        told = f"{self.jumps:,} jumps, {self.jumps_per_s:.2f} a second, {self.forced:,} forced"
+        told = f"{plural(self.jumps, 'jump')}, {self.jumps_per_s:.2f} a second, {self.forced:,} forced"
         if self.gain_median is not None and self.gain_small_share is not None:
             told += f" · gain median {self.gain_median:.0%}, {self.gain_small_share:.0%} under {SMALL_GAIN:.0%}"
         return told if self.stay_s is None else f"{told} · {self.stay_s:.2f} s in a clip"

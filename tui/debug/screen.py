@@ -185,6 +185,7 @@ class DebugScreen(Screen[None]):
         first = self.recording.jumps[self.recording.jumps > 0]
         if self.live is not None:
             self.timeline.window_s = None
+            self.timeline.grow()
             self._show_at(len(self.recording) - 1)
             self.set_interval(LIVE_S, self.follow)
         else:

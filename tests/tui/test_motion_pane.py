@@ -14,8 +14,9 @@ from textual.pilot import Pilot
 
 from tui.app import EditorApp
 from tui.debug.app import DebugApp
-from tui.debug.opening import opened, sessions_of
+from tui.debug.opening import opened
 from tui.debug.screen import DebugScreen
+from tui.model.sessions import sessions_of
 from tui.model.workspace import Workspace
 from tui.panes.motion import MotionPane
 from tui.screens.main import MainScreen
@@ -126,13 +127,17 @@ def test_the_editor_begins_at_the_cell_that_is_asked_for(here: Path):
         assert drive(app, script, (120, 40)) == (1, "speed")
 
 
-def test_a_project_without_databases_has_no_tab(here: Path):
-    (here / "alone").mkdir()
-    shutil.copy("game/moves.csv", "alone/moves.csv")
-    (here / "alone" / "contextdb.toml").write_text("", encoding="utf-8")
+def test_a_project_without_a_session_has_no_tab_until_it_is_gone_to(here: Path):
+    shutil.copytree("game", "alone")
 
     async def script(pilot: Pilot[Any]) -> str:
-        return screen_text(pilot.app)
+        before = screen_text(pilot.app).splitlines()[0]
+        assert isinstance(pilot.app.screen, MainScreen)
+        await pilot.app.screen.action_tab("motion")
+        await settled(pilot)
+        assert "No session is recorded here" in screen_text(pilot.app)
+        assert "Motion" in screen_text(pilot.app).splitlines()[0]
+        return before
 
     with alone(Path.cwd()):
-        assert "Motion" not in drive(EditorApp(Workspace("alone")), script, (120, 40)).splitlines()[0]
+        assert "Motion" not in drive(EditorApp(Workspace("alone")), script, (120, 40))

@@ -1,11 +1,8 @@
-"""The sessions of a project, and one of them opened with its databases, which may have to be built in memory first."""
+"""A session opened with the databases of its project, which may have to be built in memory first."""
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import islice
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,51 +12,10 @@ from contextdb.motion.storage.building import open_or_build, saved_path
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.storage.stored import open_database
 from contextdb.motion.trace.filter_rows import is_recorded
-from contextdb.motion.trace.session import ABOUT_KEY, FORMAT_KEY, Trace
+from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.timeline import timeline_of
 from contextdb.tables.project import Project
 from tui.debug.recording import Figures, Recording
-
-MOST_FILES = 1000
-"""So many files are looked at."""
-
-
-def sessions_of(folder: Path) -> list[Path]:
-    """The recorded sessions of a project, the newest first: those in its folder, two folders deep, and beside it."""
-    found = []
-    for path in islice(_near(folder), MOST_FILES):
-        try:
-            if _is_of(path, folder):
-                found.append((path.stat().st_mtime, path))
-        except OSError:  # gone since
-            continue
-    return [path for _, path in sorted(found, key=lambda each: (-each[0], each[1].name))]
-
-
-def _near(folder: Path) -> Iterator[Path]:
-    own = [(folder, pattern) for pattern in ("*.parquet", "*/*.parquet", "*/*/*.parquet")]
-    for base, pattern in (*own, (folder.resolve().parent, "*.parquet")):
-        try:
-            yield from base.glob(pattern)
-        except OSError:
-            continue
-
-
-def _is_of(path: Path, folder: Path) -> bool:
-    """Whether a Parquet file is a session of the project, or says of none and lies in its folder."""
-    import polars as pl
-
-    try:
-        told = pl.read_parquet_metadata(path)
-        about = json.loads(told[ABOUT_KEY]) if FORMAT_KEY in told else None
-    except (KeyError, ValueError, pl.exceptions.PolarsError):
-        return False
-    if not isinstance(about, dict):
-        return False
-    projects = {str(each["project"]) for each in about.values() if isinstance(each, dict) and "project" in each}
-    if not projects:
-        return folder.resolve() in path.resolve().parents
-    return any(os.path.realpath(path.parent / project) == os.path.realpath(folder) for project in projects)
 
 
 def measures_of(path: Path) -> tuple[float, Figures]:

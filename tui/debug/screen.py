@@ -241,6 +241,8 @@ class DebugScreen(Screen[None]):
         self.query_one("#left").display = bool(seen & {"stage", "channels"})
         self.query_one("#right").display = bool(seen & {"bars", "why"})
         self.query_one("#detail").display = "bars" in seen
+        if self.moment is not None:
+            self._show_head(self.moment)
         self._show_stage()
         self._show_reasons()
 

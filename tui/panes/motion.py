@@ -22,9 +22,10 @@ from contextdb.console import printable
 from contextdb.errors import ContextDBError, plural
 from contextdb.telemetry.link.doors import doors
 from tui.debug.game import Live
-from tui.debug.opening import databases_of, measures_of, opened, sessions_of
+from tui.debug.opening import databases_of, measures_of, opened
 from tui.debug.recording import Figures, Recording
 from tui.messages import Told
+from tui.model.sessions import sessions_of
 from tui.panes.pane import Pane
 from tui.widgets.line_list import LineList, ListCell, ListColumn
 

@@ -28,6 +28,7 @@ from tui.model.coverage_run import CoverageRun
 from tui.model.importing import Import
 from tui.model.new_table import make_table, name_fault
 from tui.model.session import Session
+from tui.model.sessions import sessions_of
 from tui.model.workspace import Workspace
 from tui.panes.assets import AssetsPane
 from tui.panes.coverage import CoveragePane
@@ -58,7 +59,7 @@ class Answer(Protocol):
 
 TABS = ("assets", "options", "priorities", "coverage", "problems")
 MOTION = "motion"
-"""The tab that there is where the project declares motion databases, and once it was gone to."""
+"""The tab that there is where the project declares motion databases and has a recorded session, and where it was gone to."""
 CELL_MENU = (
     "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "insert-row", "insert-below", "duplicate", "delete-rows",
     "enable", "filter-same", "values", "nearest",
@@ -101,6 +102,8 @@ class MainScreen(Screen[None]):
         self.renamed = ""
         """What is said of a rename, after which the table was opened again."""
         self._said = ("", "information")
+        has_databases = bool(self.session.sheet.table.schema.motion.get("databases"))
+        self._has_sessions = has_databases and bool(sessions_of(workspace.folder))
         self.care = DiskCare(self, self.session, self.say, self.show)
         self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
 
@@ -112,8 +115,7 @@ class MainScreen(Screen[None]):
     @property
     def tabs(self) -> Sequence[str]:
         """The tabs that there are."""
-        has_motion = bool(self.session.sheet.table.schema.motion.get("databases")) or self.tab == MOTION
-        return (*TABS, MOTION) if has_motion else TABS
+        return (*TABS, MOTION) if self._has_sessions or self.tab == MOTION else TABS
 
     @property
     def assets(self) -> AssetsPane:

@@ -89,3 +89,23 @@ def test_what_is_no_session_is_refused(here: Path, file: str, said: str):
 def test_an_empty_session_is_refused(here: Path):
     Trace().save("empty.parquet")
     assert "the session has no decision." in refused("empty.parquet")
+
+
+# ---- a running game
+
+
+@pytest.fixture
+def no_games(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+
+@pytest.mark.usefixtures("no_games")
+def test_a_game_that_does_not_run_is_said():
+    assert "no game is running" in refused("--live")
+    assert "no game is running" in refused("--live", "game")  # a folder
+    assert 'no game "other" is running' in refused("other", "game", "--live")
+
+
+def test_a_session_or_live_is_asked_for_and_who_is_of_a_game():
+    assert "no session is named" in refused()
+    assert "--live" in refused("session.parquet", "--who", "player")

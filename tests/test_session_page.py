@@ -156,7 +156,7 @@ def view(n: int = 60, joints: int = 22, rate: float = 30.0, n_moments: int = 3) 
         playing=[(HOSTILE, i / rate) for i in range(n)],
         flags=np.zeros(n, np.uint8),
         strips={"cost": rng.random(n)},
-        moments=[Moment(i, HOSTILE, True, False, ((HOSTILE, HOSTILE),), (), ()) for i in range(n_moments)],
+        moments=[Moment(i, HOSTILE, True, False, ((HOSTILE, HOSTILE),), ((HOSTILE, HOSTILE),), (), ()) for i in range(n_moments)],
         changes=[ChangeLine(i / rate, (HOSTILE, HOSTILE, "1", HOSTILE)) for i in range(n_moments)],
         measures={HOSTILE: (HOSTILE, "")},
     )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import partial
-from typing import ClassVar
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.app import SystemCommand
 from textual.binding import BindingType
@@ -28,6 +29,11 @@ from tui.screens.conflicts import ConflictsDialog
 from tui.screens.leaving import HeldDialog, LeavingDialog
 from tui.screens.main import MainScreen
 from tui.themes import DARK, THEMES
+
+if TYPE_CHECKING:
+    from tui.debug.game import Live
+    from tui.debug.screen import RowWanted, Start
+    from tui.panes.motion import DebugWanted
 
 LOW = 14
 """On a screen of fewer lines the tools and the details give way to the rows."""
@@ -69,8 +75,14 @@ class EditorApp(Editor):
     """
     VERTICAL_BREAKPOINTS = [(0, "-low"), (LOW, "-high")]  # noqa: RUF012 - Textual declares it so
 
-    def __init__(self, workspace: Workspace, settings: EditorSettings | None = None, theme: str = "") -> None:
+    def __init__(
+        self, workspace: Workspace, settings: EditorSettings | None = None, theme: str = "", at: GoToCell | None = None
+    ) -> None:
         super().__init__()
+        self._at = at
+        """The cell that is gone to first."""
+        self._debugged: dict[str, Start] = {}
+        """Where sessions were left for a row of a table."""
         self.workspace = workspace
         self.settings = settings or EditorSettings()
         for one in THEMES:
@@ -90,6 +102,55 @@ class EditorApp(Editor):
             Begin(self, self.workspace, self.workspace.beginning).ask()
         else:
             self.open_table(self.workspace.first)
+            if self._at is not None:
+                self.main.call_after_refresh(self.main.go_to_cell, self._at)
+
+    # ---- the debugger
+
+    def on_debug_wanted(self, message: DebugWanted) -> None:
+        """Show the debugger of a session, or of a running game once it has decided something."""
+        from tui.debug.recording import Recording  # loads the motion search
+        from tui.debug.screen import DebugScreen
+        from tui.debug.waiting import WaitingScreen
+
+        shown = message.shown
+        if isinstance(shown, Recording):
+            self.push_screen(DebugScreen(shown, start=self._debugged.get(shown.file), is_inside=True))
+        elif shown.recording is None:
+            self.push_screen(WaitingScreen(shown, lambda: self._begun(shown), self._left_waiting))
+        else:
+            self._show_live(shown)
+
+    def _left_waiting(self) -> None:
+        self.pop_screen()
+
+    def _begun(self, live: Live) -> None:
+        self.pop_screen()
+        self._show_live(live)
+
+    def _show_live(self, live: Live) -> None:
+        from tui.debug.screen import DebugScreen
+
+        assert live.recording is not None, "was waited for"
+        self.push_screen(DebugScreen(live.recording, live=live, is_inside=True), lambda _: live.close())
+
+    def on_row_wanted(self, message: RowWanted) -> None:
+        """Leave the debugger for a row of a table."""
+        from tui.debug.screen import DebugScreen
+
+        screen = self.screen
+        path = Path(message.table).resolve()
+        name = next((name for name, file in self.workspace.files.items() if file.resolve() == path), None)
+        if not isinstance(screen, DebugScreen):
+            return
+        if name is None:
+            screen.say(f"{message.table} is no table of the editor.", is_error=True)
+            return
+        self._debugged[screen.recording.file] = message.start
+        screen.action_quit()
+        if name != self.main.table_name:
+            self.open_table(name)
+        self.call_later(lambda: self.main.call_after_refresh(self.main.go_to_cell, GoToCell(message.row, message.column)))
 
     # ---- tables
 

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
 from contextdb.motion import MotionDatabase, Trace
 from tui.app import EditorApp
 from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
 from tui.keyboard import read_whole_keys
+from tui.messages import GoToCell
 from tui.model.conflicted import conflicts_in
 from tui.model.workspace import Workspace
+
+if TYPE_CHECKING:
+    from tui.debug.game import Live
+    from tui.debug.recording import Recording
 
 FEW_COLOURS = ("ansi", "linux", "vt100", "vt220", "xterm", "xterm-color", "screen", "tmux", "rxvt", "cygwin")
 """Terminals of 16 colours or fewer, by TERM, unless COLORTERM says that they can do more."""
@@ -58,14 +65,61 @@ def debug(file: str, trace: Trace, folder: str, databases: Mapping[str, MotionDa
     ContextDBError
         The settings cannot be taken.
     """
-    from tui.debug.app import DebugApp
     from tui.debug.recording import Recording
 
     settings = read_settings(settings_path(), EditorApp.theme_names())
     recording = Recording(file, trace, folder, databases, missing)
     _forget_exported_size()
     read_whole_keys()
-    DebugApp(recording, _theme_for(settings)).run()
+    _debugged(recording, settings)
+
+
+def debug_live(game: str, path: Path, who: str | None, folder: str, databases: Mapping[str, MotionDatabase]) -> None:
+    """Follow a running game, and stay until it is left.
+
+    Parameters
+    ----------
+    game, path
+        Its name and its door.
+    who : str or None
+        The character; None for the first that decides.
+    folder, databases
+        As for `debug`.
+
+    Raises
+    ------
+    ContextDBError
+        The settings cannot be taken.
+    """
+    from tui.debug.game import Live
+
+    settings = read_settings(settings_path(), EditorApp.theme_names())
+    _forget_exported_size()
+    read_whole_keys()
+    live = Live(game, path, who, folder, databases)
+    try:
+        _debugged(live, settings)
+    finally:
+        live.close()
+
+
+def _debugged(shown: Recording | Live, settings: EditorSettings) -> None:
+    """Show the debugger; where a row is wanted the editor with it, and then the debugger again."""
+    from tui.debug.app import DebugApp
+    from tui.debug.recording import Recording
+
+    theme, start = _theme_for(settings), None
+    while True:
+        app = DebugApp(shown, theme, start=start)
+        app.run()
+        wanted = app.wanted
+        if wanted is None:
+            return
+        start = wanted.start
+        EditorApp(Workspace(wanted.table), settings, theme, at=GoToCell(wanted.row, wanted.column)).run()
+        recording = shown if isinstance(shown, Recording) else shown.recording
+        if recording is not None:
+            recording.edited()
 
 
 def _forget_exported_size() -> None:

@@ -6,31 +6,49 @@ turned: everything is searched again at once. F1 says what the screen shows and 
 The databases are those of the project that the session was recorded with, or of FOLDER. Exits with 2 without a terminal; "contextdb
 motion replay" answers the same questions in scripts.
 
+With --live the screen follows a running game whose link watches its controllers: what plays now, and the last minute. SESSION is
+then the name of the game, which may be left out where one game runs; FOLDER is its project, by default the current folder.
+
   contextdb motion debug session.parquet
   contextdb motion debug session.parquet game/
+  contextdb motion debug --live game/
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 
 from contextdb.commands.edit_command import require_terminal
+from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_replay_command import databases_of, project_of
+from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode
 from contextdb.errors import ContextDBError, Fault, MotionError, Place
+from contextdb.motion import open_or_build
 from contextdb.motion.trace.session import Trace
+from contextdb.tables.project import SCHEMA_FILE
+from contextdb.telemetry.link.hearing import the_game
 
 INSTEAD = 'to use "contextdb motion replay" in scripts'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the command."""
-    parser.add_argument("file", metavar="SESSION", help="a recorded session, a .parquet file")
+    parser.add_argument("file", metavar="SESSION", nargs="?", help="a recorded session, a .parquet file; with --live a game")
     parser.add_argument("folder", metavar="FOLDER", nargs="?", help="the project with the databases (default: as recorded)")
+    parser.add_argument("--live", action="store_true", help="follow a running game")
+    parser.add_argument("--who", metavar="NAME", help="with --live: this character (default: the first that decides)")
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
-    """Show the session, and stay until it is left."""
+    """Show the session, or the game, and stay until it is left."""
+    if arguments.live:
+        return _live(arguments.file, arguments.folder, arguments.who)
+    if arguments.file is None:
+        raise MotionError(Fault("no session is named.", "SESSION, a .parquet file; or --live for a running game"))
+    if arguments.who is not None:
+        raise MotionError(Fault("--who is of a running game.", "--live with it"))
     trace = Trace.load(arguments.file)
     if not len(trace):
         raise MotionError(Fault("the session has no decision.", "one with at least an update", place=Place(arguments.file)))
@@ -46,4 +64,23 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     from tui.run import debug
 
     debug(arguments.file, trace, folder, databases, why)
+    return ExitCode.OK
+
+
+def _live(name: str | None, folder: str | None, who: str | None) -> ExitCode:
+    """Follow a running game; a folder alone is that of the project."""
+    if folder is None and name is not None and os.path.isdir(name):
+        name, folder = None, name
+    game, path = the_game(name)
+    if folder is None and os.path.isfile(SCHEMA_FILE):
+        folder = os.curdir
+    databases = {}
+    if folder is not None:
+        motion = MotionProject.load(folder)
+        with building_bar() as progress:
+            databases = open_or_build(motion.config, motion.folder, motion.assets, progress)
+    require_terminal('to use "contextdb live" in scripts')
+    from tui.run import debug_live
+
+    debug_live(game, path, who, folder or "", databases)
     return ExitCode.OK

@@ -57,8 +57,7 @@ class Played:
     @property
     def settings(self) -> PoseSettings:
         """How its poses are made."""
-        said = [str(about["controller"]) for about in self.trace.about.values() if "controller" in about]
-        return self.project.config.output_of(said[0] if said else "")
+        return self.project.config.output_of(self.trace.controller)
 
     @cached_property
     def measured(self) -> SessionMeasures:

@@ -25,10 +25,13 @@ import argparse
 import json
 import os
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+
+import numpy as np
 
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_page import Played, comment_of, page_file, write_page
@@ -39,8 +42,10 @@ from contextdb.console import ExitCode, output, terminal_width
 from contextdb.disk import path_in_quotes, write_atomic
 from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, QueryError, in_quotes
 from contextdb.motion import MotionDatabase, open_database, open_or_build, saved_path
+from contextdb.motion.measuring.measure import warped_poses
 from contextdb.motion.reading import as_number
 from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.storage.pose_files import saved_poses
 from contextdb.motion.trace.asked_views import diff_lines, stats_lines, what_if_lines, why_lines
 from contextdb.motion.trace.chrome_trace import chrome_trace
 from contextdb.motion.trace.cost_views import Ranked, View
@@ -48,6 +53,7 @@ from contextdb.motion.trace.filter_rows import is_recorded
 from contextdb.motion.trace.json_form import decision_json, ranked_json
 from contextdb.motion.trace.reasked import Changes, Reasked, require_known, why_not_asked
 from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.status import Status, status_of
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.views import decision_lines, session_lines, summary_line
 from contextdb.motion.trace.what_if import what_if
@@ -56,6 +62,7 @@ from contextdb.report.render_json import as_json
 from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
 
 Json = dict[str, object]
+WARP_S = 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -297,7 +304,26 @@ class _Shown:
             again["not_asked"] = self.not_asked or None
         if self.why_not is not None:
             again["why_not"] = self.why_not.to_json()
-        return {**decision_json(self.decision, events), **again}
+        return {**decision_json(self.decision, events), "status": self._status().to_json(), **again}
+
+    def _status(self) -> Status:
+        """Speeds and angles; with stride and warp where the poses are saved."""
+        trace, place, databases = self.replay.trace, self.place, self.replay.databases
+        known = {} if self.replay.missing else databases
+        last = trace[place - 1] if place else None
+        return status_of(self.decision, last, known, self._warp(known) if known else None)
+
+    def _warp(self, databases: Mapping[str, MotionDatabase]) -> tuple[float, float] | None:
+        """Those of the pose that was shown; what was longer ago than `WARP_S` has faded out of it."""
+        trace = self.replay.trace
+        folder, _ = project_of(trace, self.replay.asked.project, self.replay.file)
+        banks = saved_poses(folder, databases)
+        if len(banks) < len(databases):
+            return None
+        times_s = trace.columns(["time_s"])["time_s"].to_numpy()
+        first = int(np.searchsorted(times_s, times_s[self.place] - WARP_S))
+        settings = MotionProject.load(folder).config.output_of(trace.controller)
+        return deque((warp for _, warp in warped_poses(trace[first : self.place + 1], banks, settings)), 1)[0]
 
     def _lines(self) -> Iterator[str]:
         asked, width = self.replay.asked, terminal_width()

@@ -285,6 +285,7 @@ function drawMoment(lane) {
   const title = element("p", undefined, moment.forced ? "why forced" : "why");
   title.append(at, element("span", ` ${moment.why}`));
   box.append(title);
+  if (moment.status.length) box.append(element("p", moment.status.map(([name, value]) => `${name} ${value}`).join(" · "), "muted"));
   if (moment.context.length) box.append(element("p", moment.context.map(([name, value]) => `${name} = ${value}`).join(", "), "muted"));
   if (moment.candidates.length) box.append(candidates(lane.session, moment));
   if (moment.bars) box.append(...landscape(lane, moment));

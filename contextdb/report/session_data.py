@@ -109,6 +109,8 @@ class Moment:
     is_change: bool
     forced: bool
     context: tuple[tuple[str, str], ...]
+    status: tuple[tuple[str, str], ...]
+    """Speeds and angles, each with its name; empty where nothing changed."""
     channels: tuple[str, ...]
     candidates: Sequence[Candidate]
     ghosts: Sequence[Ghost] = ()
@@ -238,6 +240,7 @@ def _moment(moment: Moment, names: _Names, step: int, rate: float, detail: Detai
         "why": moment.why,
         "forced": moment.forced,
         "context": [list(pair) for pair in moment.context],
+        "status": [list(pair) for pair in moment.status],
         "channels": list(moment.channels),
         "candidates": [_candidate(each, names) for each in moment.candidates[: detail.candidates]],
         "ghosts": [_ghost(each, rate / step, detail) for each in moment.ghosts[: detail.ghosts]],

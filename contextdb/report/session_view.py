@@ -22,6 +22,7 @@ from contextdb.motion.trace.cost_views import Ranked, cost_text
 from contextdb.motion.trace.reasked import Reasked, why_not_asked
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.session import Trace
+from contextdb.motion.trace.status import status_of
 from contextdb.motion.trace.views import fact_text
 from contextdb.report.session_data import (
     FORCED,
@@ -78,7 +79,8 @@ def view_of(
     decisions = list(trace.brief())
     if not decisions:
         raise MotionError(Fault("the session has no decision.", "one with at least an update"))
-    poses = measure.poses_of(decisions, banks, settings) if poses is None else poses
+    warped = list(measure.warped_poses(decisions, banks, settings))
+    poses = [pose for pose, _ in warped] if poses is None else poses
     played = shown.with_poses(shown.of_decisions(decisions), shown.of_poses(poses, 1.0)).with_contacts(Clips.of(banks))
     assert played.positions is not None, "was just made"
     assert played.roots is not None, "was just made"
@@ -99,7 +101,7 @@ def view_of(
         playing=[(None, 0.0) if d.playing is None else (d.playing.asset, d.playing.time_s) for d in decisions],
         flags=np.array([_flags(decision) for decision in decisions], np.uint8),
         strips={"cost": _costs(decisions), **strips_of(played)},
-        moments=list(_moments(decisions, poses, banks, trace, reasked)),
+        moments=list(_moments(decisions, warped, banks, trace, reasked)),
         changes=[_change(decision) for decision in decisions if decision.action in CHANGES],
         measures=dict(measured or {}),
     )
@@ -132,15 +134,25 @@ def _named(asset: str, mirrored: bool) -> str:
 
 
 def _moments(
-    decisions: Sequence[Decision], poses: Sequence[Pose], banks: Mapping[str, PoseBank], trace: Trace, reasked: Reasked | None
+    decisions: Sequence[Decision],
+    warped: Sequence[tuple[Pose, tuple[float, float]]],
+    banks: Mapping[str, PoseBank],
+    trace: Trace,
+    reasked: Reasked | None,
 ) -> Iterator[Moment]:
     for i, decision in enumerate(decisions):
         if not decision.searched:
             continue
         is_change = decision.action in CHANGES
-        told = Moment(i, decision.why, is_change, shown.is_forced(decision), _facts(decision), (), ())
+        told = Moment(i, decision.why, is_change, shown.is_forced(decision), _facts(decision), (), (), ())
         asked = _asked(trace, reasked, i) if is_change else None
-        yield told if asked is None else _in_full(told, asked, decision, _Ghosts(banks, poses[i].root[2]))
+        if asked is not None and reasked is not None:
+            pose, warp = warped[i]
+            status = status_of(asked.decision, decisions[i - 1] if i else None, reasked.databases, warp)
+            told = replace(told, status=tuple(status.lines()))
+            yield _in_full(told, asked, decision, _Ghosts(banks, pose.root[2]))
+        else:
+            yield told
 
 
 def _facts(decision: Decision) -> tuple[tuple[str, str], ...]:

@@ -10,6 +10,7 @@ from test_motion_measure_command import here, made
 
 from contextdb.motion import LeftOut, Trace, open_or_build
 from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.trace.stats import gains_of
 from contextdb.tables.project import Project
 from tui.debug import ladder
 from tui.debug.camera import MOST_ZOOM, Camera
@@ -183,3 +184,22 @@ def test_the_order_is_by_best_by_name_or_by_use(here: Path):
     assert used == sorted(used, reverse=True)
     assert {row.asset for row in scene.ordered("best", "TIRED")} == {"walk_tired"}
     assert Landscape({}).ordered("best") == []
+
+
+# ---- what jumps spare
+
+
+@pytest.mark.parametrize(
+    ("continuing", "cost", "gain"),
+    [
+        (1.0, 0.25, 0.75),
+        (1.0, 0.0, 1.0),
+        (0.001, 0.5, -0.998),
+        (0.0, 0.5, -1.0),
+        (0.0, 0.0, 0.0),
+        (-0.1, 0.1, -1.0),
+        (0.1, -0.1, 1.0),
+    ],
+)
+def test_a_gain_is_a_share_also_where_playing_on_costs_about_nothing(continuing: float, cost: float, gain: float):
+    assert gains_of(np.array([continuing]), np.array([cost])).tolist() == pytest.approx([gain])

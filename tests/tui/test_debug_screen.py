@@ -349,12 +349,6 @@ def test_the_cursor_goes_with_what_is_chosen_until_it_is_moved(recording: Record
     assert last == "walk"
 
 
-def test_o_says_where_the_row_is(recording: Recording):
-    text = after(recording, "o")
-    assert "walk is in row 2: contextdb edit " in text
-    assert "moves.csv" in text
-
-
 def test_the_help_has_the_questions_and_every_key(recording: Recording):
     text = after(recording, "f1", size=(160, 100))
     for question in ("Why this clip?", "Why not mine?", "Why does it jump so much?", "What if this weight were different?"):
@@ -381,3 +375,40 @@ def test_hostile_names_are_text(here: Path):
     text = after(lone)
     assert "\x1b" not in text
     assert "[b]" in text
+
+
+# ---- how it stands
+
+
+def test_the_status_is_that_of_replay_once_the_poses_are_made(recording: Recording):
+    recording.strips(recording.open_banks(), lambda: None)
+    status, expected = recording.status_at(FIRST), told(FIRST)["status"]
+    assert status.to_json() == {**expected, "stride": status.to_json()["stride"], "warp_deg": status.to_json()["warp_deg"]}
+    assert status.stride is not None
+    assert expected["speed_mps"]["clip_off"] == pytest.approx(
+        expected["speed_mps"]["clip"] - expected["speed_mps"]["wanted"], abs=1e-3
+    )
+
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> str:
+        screen.go(FIRST)
+        await pilot.pause()
+        return " ".join(screen_text(screen.app).split())
+
+    found = shown(recording, script)
+    for name, text in status.lines():
+        assert f"{name} {text}" in found
+
+
+def test_the_pose_is_the_one_that_was_shown_and_the_pane_says_so(recording: Recording):
+    async def script(screen: DebugScreen, pilot: Pilot[Any]) -> tuple[str, str, bool]:
+        screen.banks = recording.open_banks()
+        screen.go(FIRST + 2)
+        assert screen.stage.figure is not None
+        before, bones = str(screen.stage.border_title), screen.stage.figure.chosen
+        screen._take_strips(recording.strips(screen.banks, lambda: None))
+        return before, str(screen.stage.border_title), bool(abs(screen.stage.figure.chosen - bones).max() > 1e-3)
+
+    of_clips, blended, is_other = shown(recording, script)
+    assert "not blended" in of_clips
+    assert "as shown, blended" in blended
+    assert is_other

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.features.channels import Channel
 from contextdb.motion.output.bank import PoseBank, loops
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.trace.cost_views import PATH
-from tui.debug.recording import Moment, Recording
+from tui.debug.recording import Displayed, Moment, Recording
 
 AHEAD_S = 1.0
 """So long paths are."""
@@ -59,7 +60,7 @@ def figure_of(
     """
     decision, line = moment.decision, recording.line
     return Figure(
-        chosen=_bones_of(banks, decision.playing),
+        chosen=_bones_of(banks, decision.playing) if recording.displayed is None else _shown(recording.displayed, moment.index),
         plays_on=_bones_of(banks, decision.before) if line.jumped[moment.index] else NO_BONES,
         asset=NO_BONES if asset is None else _bones(banks, *asset),
         wanted=wanted_path(moment),
@@ -73,6 +74,23 @@ def _bones_of(banks: Mapping[str, PoseBank], playing: Playing | None) -> Floats:
     return NO_BONES if playing is None else _bones(banks, playing.database, playing.asset, playing.mirrored, playing.time_s)
 
 
+def _shown(displayed: Displayed, index: int) -> Floats:
+    """The bones of the pose that was shown at an update."""
+    x, z, heading = displayed.roots[index].tolist()
+    at = displayed.positions[index].astype(np.float64)
+    across, along = at[:, 0] - x, at[:, 2] - z
+    sin, cos = np.sin(heading), np.cos(heading)
+    return _pairs(np.stack((cos * across - sin * along, at[:, 1], sin * across + cos * along), axis=1), displayed.parents)
+
+
+def _pairs(positions: Floats, parents: Ints) -> Floats:
+    """Joints [J, 3] as bones; a joint that stays on the ground is none."""
+    children = np.flatnonzero(parents >= 0)
+    starts = positions[parents[children]]
+    is_root = np.linalg.norm(starts, axis=1) < 1e-6
+    return np.asarray(np.stack((starts, positions[children]), axis=1)[~is_root])
+
+
 def _bones(banks: Mapping[str, PoseBank], database: str, asset: str, mirrored: bool, time_s: float) -> Floats:
     """The bones of a pose of a clip [J - 1, 2, 3]."""
     bank = banks.get(database)
@@ -81,10 +99,7 @@ def _bones(banks: Mapping[str, PoseBank], database: str, asset: str, mirrored: b
     sample = bank.sample_of(bank.range_of(asset, mirrored), time_s)
     positions, world = np.empty((bank.n_joints, 3)), np.empty((bank.n_joints, 4))
     loops().place(bank.skeleton.parents, bank.translations(sample.positions), sample.rotations, 0.0, 0.0, 0.0, positions, world)
-    children = np.flatnonzero(bank.skeleton.parents >= 0)
-    parents = bank.skeleton.parents[children]
-    is_root = np.linalg.norm(positions[parents], axis=1) < 1e-9  # a joint that stays on the ground is no bone
-    return np.asarray(np.stack((positions[parents], positions[children]), axis=1)[~is_root])
+    return _pairs(positions, bank.skeleton.parents)
 
 
 def wanted_path(moment: Moment) -> Floats:
@@ -110,19 +125,6 @@ def _path_points(database: MotionDatabase, query: Floats) -> Floats:
             values = query[schema.slices[channel.name]].reshape(-1, 2)
             found += [(at, left, 0.0, ahead) for at, (left, ahead) in zip(channel.at, values.tolist(), strict=True)]
     return np.array(sorted(found))[:, 1:] if len(found) > 1 else NO_PATH
-
-
-def wanted_speed(moment: Moment) -> float | None:
-    """How fast the path that the query asks for begins, m/s."""
-    path = wanted_path(moment)
-    if moment.asked is None or len(path) < 2:
-        return None
-    schemas = [search.database.schema for search in moment.asked.searches.values()]
-    ats = [at for schema in schemas if schema is not None for channel in schema.channels if _is_place(channel) for at in channel.at]
-    first = min((at for at in ats if at > 0.0), default=None)
-    if first is None or min(ats) < 0.0:
-        return None
-    return float(np.hypot(path[1, 0], path[1, 2])) / first
 
 
 def _is_place(channel: Channel) -> bool:

@@ -35,8 +35,8 @@ KEYS = (
     Key("N", "peak(-1)", "Peak before", "To the peak before.", TIME),
     Key("m", "measure", "Measure", "Choose the next measure: its strip is marked with ▸.", TIME),
     Key("home", "end(-1)", "Start", "To the start of the session.", TIME),
-    Key("end", "end(1)", "End", "To its end.", TIME),
-    Key("space", "play", "Play", "Play from here, or stop.", TIME, True),
+    Key("end", "end(1)", "End", "To its end; of a running game back to now.", TIME),
+    Key("space", "play", "Play", "Play from here, or stop; of a running game hold the moment, or go on.", TIME, True),
     Key("comma", "zoom(1)", "Shorter", "Show a shorter stretch of time; also the wheel of the mouse.", TIME),
     Key("full_stop", "zoom(-1)", "Longer", "Show a longer one.", TIME),
     Key(
@@ -51,7 +51,13 @@ KEYS = (
     Key("slash", "filter", "Find", "Only assets whose name holds a text; Esc shows all.", CHOOSE, True),
     Key("s", "order", "Order", "Order assets by best cost, by name, or by how long they play in the session.", CHOOSE),
     Key("c", "chosen", "Chosen", "Move the cursor to the asset that is chosen.", CHOOSE),
-    Key("o", "sheet", "Row", "Open the asset's row in the sheet, or say with which command.", CHOOSE),
+    Key(
+        "o",
+        "sheet",
+        "Row",
+        "Open the asset's row in the sheet, at the first cell that fails; quit the editor to come back.",
+        CHOOSE,
+    ),
     Key(
         "plus,equals_sign",
         "turn(1)",
@@ -71,7 +77,7 @@ KEYS = (
     Key("j", "orbit(0, -1)", "From below", "From lower down.", LOOK),
     Key("z", "near(1)", "Nearer", "From nearer; also the wheel of the mouse.", LOOK),
     Key("x", "near(-1)", "Farther", "From farther away.", LOOK),
-    Key("escape", "stop", "Stop", "End what is at work, or show all assets again.", MORE),
+    Key("escape", "stop", "Stop", "End what is at work, or show all assets again; in the editor, go back to it.", MORE),
     Key("f1,question_mark", "help", "Help", "What the screen shows, and these keys.", MORE, True),
     Key("q,ctrl+q", "quit", "Quit", "Leave.", MORE, True),
 )

@@ -93,3 +93,16 @@ def table_row(recording: Recording, row: Row) -> tuple[str, int] | None:
         if table.text(i, table.asset_column) == row.asset:
             return str(table.path), i
     return None
+
+
+def failing_column(recording: Recording, moment: Moment, row: Row) -> str | None:
+    """The first condition of the asset's row whose cell does not accept its fact; None where all do, or none is known."""
+    table: Any = recording.stock.table(row.database)
+    context = None if moment.searched is None else moment.searched.context
+    if table is None or context is None:
+        return None
+    try:
+        explained = table.compile().explain(dict(context), unknown=UNKNOWN).asset(row.asset)
+    except ContextDBError:
+        return None
+    return next((failing.condition for each in explained for failing in each.failures), None)

@@ -6,12 +6,13 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from contextdb.errors import ContextDBError
+from contextdb.errors import ContextDBError, plural
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.measuring import measure, shown
 from contextdb.motion.measuring.raw_clips import Clips
 from contextdb.motion.measuring.strips import strips_of
@@ -20,11 +21,12 @@ from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.storage.config import MotionConfig
-from contextdb.motion.storage.pose_files import open_or_build_poses, open_poses, poses_path
+from contextdb.motion.storage.pose_files import open_or_build_poses, saved_poses
 from contextdb.motion.trace.reasked import Reasked, why_not_asked
 from contextdb.motion.trace.reasked_decision import ReaskedDecision
 from contextdb.motion.trace.session import Trace
-from contextdb.motion.trace.stats import SMALL_GAIN
+from contextdb.motion.trace.stats import SMALL_GAIN, gains_of
+from contextdb.motion.trace.status import Status, status_of
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.timeline import Timeline, timeline_of
 from contextdb.tables.project import SCHEMA_FILE, Project
@@ -70,8 +72,8 @@ class Figures:
         """Those of a timeline."""
         is_jump = line.jumped & (np.arange(len(line)) > 0) & (np.roll(line.playing, 1) >= 0)
         n, n_forced = int(is_jump.sum()), int(line.forced.sum())
-        known = is_jump & ~line.forced & np.isfinite(line.continuing) & (line.continuing != 0.0)
-        gains = (line.continuing[known] - line.costs[known]) / np.abs(line.continuing[known])
+        known = is_jump & ~line.forced & np.isfinite(line.continuing)
+        gains = gains_of(line.continuing[known], line.costs[known])
         begins = np.flatnonzero((line.playing >= 0) & (np.diff(line.playing, prepend=-1) != 0))
         stays = np.diff(np.append(line.times_s[begins], line.times_s[-1])) if len(begins) else np.empty(0)
         return cls(
@@ -86,7 +88,7 @@ class Figures:
     @property
     def text(self) -> str:
         """In a line."""
-        told = f"{self.jumps:,} jumps, {self.jumps_per_s:.2f} a second, {self.forced:,} forced"
+        told = f"{plural(self.jumps, 'jump')}, {self.jumps_per_s:.2f} a second, {self.forced:,} forced"
         if self.gain_median is not None and self.gain_small_share is not None:
             told += f" · gain median {self.gain_median:.0%}, {self.gain_small_share:.0%} under {SMALL_GAIN:.0%}"
         return told if self.stay_s is None else f"{told} · {self.stay_s:.2f} s in a clip"
@@ -131,14 +133,24 @@ class Recording:
         self.file, self.trace, self.folder = file, trace, folder
         self.databases: dict[str, MotionDatabase] = dict(databases)
         self.missing = missing
-        self.line: Timeline = timeline_of(trace)
+        self._decisions: list[Decision] | None = None
+        self.displayed: Displayed | None = None
+        """Its poses, once they are made."""
+        self.measured: Mapping[str, Floats] = {}
+        """And what is measured of them."""
+        self.run_again: Mapping[str, float | None] | None = None
+        """Its measures run again with nothing turned, once they are known."""
+        self.refresh(missing)
+
+    def refresh(self, missing: str) -> None:
+        """Read the session again, which grew at its end, and may be forgotten at its start."""
+        self.missing = missing
+        self.line: Timeline = timeline_of(self.trace)
         self.figures = Figures.of(self.line)
         self.uses = self.line.uses()
         self.searches = np.flatnonzero(self.line.searched)
         self.jumps = np.flatnonzero(self.line.jumped)
-        self._decisions: list[Decision] | None = None
-        self.run_again: Mapping[str, float | None] | None = None
-        """Its measures run again with nothing turned, once they are known."""
+        self.__dict__.pop("reasked", None)
 
     @property
     def name(self) -> str:
@@ -148,12 +160,22 @@ class Recording:
     def __len__(self) -> int:
         return len(self.line)
 
+    def edited(self) -> None:
+        """Read the project again, whose tables may have been edited."""
+        for name in ("project", "config", "stock", "reasked"):
+            self.__dict__.pop(name, None)
+
     # ---- moments
 
     def search_at(self, index: int) -> int | None:
         """Which update searched last, at a moment; None where none did yet."""
         at = int(np.searchsorted(self.searches, index, side="right")) - 1
         return None if at < 0 else int(self.searches[at])
+
+    def status_at(self, index: int) -> Status:
+        """Speeds and angles of an update."""
+        last, known = self.trace[index - 1] if index else None, {} if self.missing else self.databases
+        return status_of(self.trace[index], last, known, None if self.displayed is None else self.displayed.warps[index])
 
     def asked(self, index: int) -> tuple[ReaskedDecision | None, str]:
         """The search of an update asked again, or why it cannot be."""
@@ -206,7 +228,7 @@ class Recording:
     @property
     def controller(self) -> str:
         """The controller that recorded it; "" where the session does not say."""
-        return next((str(about["controller"]) for about in self.trace.about.values() if "controller" in about), "")
+        return self.trace.controller
 
     def weights(self) -> dict[str, float]:
         """The weights of all channels, as they were recorded."""
@@ -241,23 +263,39 @@ class Recording:
 
     def saved_banks(self) -> dict[str, PoseBank]:
         """The poses that are saved beside the databases and go with them."""
-        found = {}
-        for name, database in self.databases.items():
-            try:
-                bank = open_poses(poses_path(Path(self.folder), name))
-            except ContextDBError:
-                continue
-            if bank.assets == database.assets and bank.n_frames == int((database.stops - database.starts).sum()):
-                found[name] = bank
-        return found
+        return saved_poses(self.folder, self.databases) if self.folder else {}
 
-    def strips(self, banks: Mapping[str, PoseBank], on_step: Callable[[], None]) -> dict[str, Floats]:
-        """What is measured of the session's poses at each update, by the names of `MEASURES`."""
+    def strips(self, banks: Mapping[str, PoseBank], on_step: Callable[[], None]) -> Mapping[str, Floats]:
+        """What is measured of the session's poses at each update, by the names of `MEASURES`; the poses themselves are kept."""
         decisions = self.decisions(on_step)
         settings = PoseSettings() if self.config is None else self.config.output_of(self.controller)
-        poses = measure.poses_of(Watched(decisions, on_step), banks, settings)
-        it = shown.with_poses(shown.of_decisions(decisions), shown.of_poses(poses, 1.0)).with_contacts(Clips.of(banks))
-        return strips_of(it)
+        warped = list(measure.warped_poses(Watched(decisions, on_step), banks, settings))
+        poses = shown.of_poses([pose for pose, _ in warped], 1.0)
+        assert poses.positions is not None, "was just made"
+        assert poses.roots is not None, "was just made"
+        parents = next(iter(banks.values())).skeleton.parents
+        self.displayed = Displayed(poses.positions.astype(np.float32), poses.roots, parents, [warp for _, warp in warped])
+        self.measured = strips_of(shown.with_poses(shown.of_decisions(decisions), poses).with_contacts(Clips.of(banks)))
+        return self.measured
+
+
+@dataclass(frozen=True, eq=False)
+class Displayed:
+    """The poses of a session as they are shown: blended, with feet locked and all else that its settings ask for.
+
+    Attributes
+    ----------
+    positions : float32 array, shape (T, J, 3)
+        Each joint in the world.
+    roots : float64 array, shape (T, 3)
+    parents : int64 array, shape (J,)
+    warps : list of (stride, radians), length T
+    """
+
+    positions: NDArray[np.float32]
+    roots: Floats
+    parents: Ints
+    warps: Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,8 @@ A small screen shows one of the four panes below the timeline, a large one all o
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,6 +19,7 @@ from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.events import Resize
+from textual.message import Message
 from textual.screen import Screen
 from textual.timer import Timer
 from textual.widget import Widget
@@ -35,7 +37,8 @@ from contextdb.motion.trace.cost_views import cost_text
 from tui.debug import ladder, reasons
 from tui.debug.bars import Bars
 from tui.debug.channels import Channels, Dial
-from tui.debug.figures import figure_of, wanted_speed
+from tui.debug.figures import figure_of
+from tui.debug.game import Live
 from tui.debug.help import DebugHelp
 from tui.debug.key_line import DebugKeyLine
 from tui.debug.keys import KEYS
@@ -52,8 +55,32 @@ HIGH = 44
 PANES = ("bars", "why", "stage", "channels")
 TITLES = {"bars": "Bars", "why": "Why", "stage": "Poses", "channels": "Weights"}
 FRAME_S = 1.0 / 30.0
+LIVE_S = 0.2
+"""So often a running game is looked at."""
 SAME_S = 1e-6
 STYLES = {"head": "bold", "plain": "", "bad": "$error", "good": "$success", "dim": "$foreground 55%"}
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the screen begins: an update, and what is turned."""
+
+    tick: int
+    turned: Turned
+
+
+@dataclass
+class RowWanted(Message):
+    """Show a row of a table in the sheet."""
+
+    table: str
+    """Its file."""
+    row: int
+    """From 0."""
+    column: str | None
+    """The first whose cell does not accept its fact."""
+    start: Start
+    """Where to come back to."""
 
 
 class DebugScreen(Screen[None]):
@@ -67,6 +94,7 @@ class DebugScreen(Screen[None]):
         #head, #told, #figures, #said, #detail { text-wrap: nowrap; text-overflow: ellipsis; }
         #head { height: 1; background: $panel; text-style: bold; padding: 0 1; }
         #told { height: 2; padding: 0 1; background: $surface; }
+        #status { height: 2; padding: 0 1; background: $surface; color: $text-muted; }
         #figures { height: 1; padding: 0 1; color: $text-muted; background: $surface; }
         #said { height: 1; padding: 0 1; }
         #detail { height: 2; padding: 0 1; color: $text-muted; }
@@ -83,15 +111,31 @@ class DebugScreen(Screen[None]):
         #find { height: 1; border: none; padding: 0 1; background: $boost; display: none; }
         #find.-shown { display: block; }
         #tiny { display: none; }
+        &.-small #status { display: none; }
         &.-small #left, &.-small #right { width: 1fr; }
         &.-small #channels { height: 1fr; max-height: 100%; }
         &.-tiny { #tiny { display: block; } #body { display: none; } }
     }
     """
 
-    def __init__(self, recording: Recording, *, measures: bool = True) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        measures: bool = True,
+        live: Live | None = None,
+        start: Start | None = None,
+        is_inside: bool = False,
+    ) -> None:
         super().__init__()
+        self._start = start
+        self._is_inside = is_inside
+        """Whether the screen is one of the editor's: Esc goes back there."""
         self.recording = recording
+        self.live = live
+        """The game that is followed; None for a recorded session."""
+        self.is_now = live is not None
+        """Whether the newest moment of the game is shown, and goes on."""
         self.index = 0
         self.turned = Turned()
         self.order = ORDERS[0]
@@ -107,6 +151,7 @@ class DebugScreen(Screen[None]):
         self._written: list[SchemaChange] = []
         self._playing: tuple[Timer, float, float] | None = None
         """The timer, when it began, and at which second of the session."""
+        self._status: list[tuple[str, str]] = []
         self._recorded = recording.weights()
         self._thresholds = recording.thresholds()
 
@@ -117,6 +162,7 @@ class DebugScreen(Screen[None]):
         with Vertical(id="body"):
             yield Static(id="head")
             yield Static(id="told")
+            yield Static(id="status")
             yield Timeline(self.recording)
             yield Static(id="figures")
             with Horizontal(id="panes"):
@@ -137,8 +183,19 @@ class DebugScreen(Screen[None]):
             self.query_one(f"#{name}").border_title = title
         self.query_one("#figures", Static).update(Text(self.recording.figures.text))
         first = self.recording.jumps[self.recording.jumps > 0]
-        self.go(int(first[0]) if len(first) else 0)
-        if self._measures and self.recording.folder:
+        if self.live is not None:
+            self.timeline.window_s = None
+            self.timeline.grow()
+            self._show_at(len(self.recording) - 1)
+            self.set_interval(LIVE_S, self.follow)
+        else:
+            self.go(int(first[0]) if len(first) else 0)
+        if self._start is not None:
+            self._turn(self._start.turned)
+            self.go(int(np.searchsorted(self.recording.line.ticks, self._start.tick)))
+        if self.recording.displayed is not None:
+            self.timeline.add_strips(self.recording.measured)
+        elif self._measures and self.recording.folder:
             self.measure()
 
     @property
@@ -184,6 +241,8 @@ class DebugScreen(Screen[None]):
         self.query_one("#left").display = bool(seen & {"stage", "channels"})
         self.query_one("#right").display = bool(seen & {"bars", "why"})
         self.query_one("#detail").display = "bars" in seen
+        if self.moment is not None:
+            self._show_head(self.moment)
         self._show_stage()
         self._show_reasons()
 
@@ -196,7 +255,32 @@ class DebugScreen(Screen[None]):
     # ---- time
 
     def go(self, index: int) -> None:
-        """Show another moment."""
+        """Show another moment, and stay there."""
+        self.is_now = False
+        self._show_at(index)
+
+    def follow(self) -> None:
+        """Take what the game decided, and show its newest moment, unless another is held."""
+        live, line = self.live, self.recording.line
+        if live is None:
+            return
+        tick = int(line.ticks[self.index])
+        if live.take():
+            self.timeline.grow()
+            self.query_one("#figures", Static).update(Text(self.recording.figures.text))
+            at = int(np.searchsorted(self.recording.line.ticks, tick))
+            if self.is_now:
+                self._show_at(len(self.recording) - 1)
+            elif at < len(self.recording) and int(self.recording.line.ticks[at]) == tick and self.moment is not None:
+                self.index = at
+                self.moment = replace(self.moment, index=at, search_index=self.recording.search_at(at))
+                self.timeline.go(at)
+            else:
+                self._show_at(0)
+        if self.moment is not None:
+            self._show_head(self.moment)
+
+    def _show_at(self, index: int) -> None:
         self.index = min(max(0, index), len(self.recording) - 1)
         self.moment = Moment.of(self.recording, self.index, self.turned)
         self.timeline.go(self.index)
@@ -239,14 +323,24 @@ class DebugScreen(Screen[None]):
 
     def action_end(self, by: int) -> None:
         """To the start, or the end."""
-        self.go(len(self.recording) - 1 if by > 0 else 0)
+        if by > 0 and self.live is not None:
+            self.is_now = True
+            self._show_at(len(self.recording) - 1)
+        else:
+            self.go(len(self.recording) - 1 if by > 0 else 0)
 
     def action_zoom(self, by: int) -> None:
         """A shorter stretch of time, or a longer one."""
         self.timeline.zoom(by > 0)
 
     def action_play(self) -> None:
-        """Play from here, or stop."""
+        """Play from here, or stop; of a running game hold this moment, or go back to now."""
+        if self.live is not None:
+            if self.is_now:
+                self.go(self.index)
+            else:
+                self.action_end(1)
+            return
         if self._playing is not None:
             self._stop_playing()
             return
@@ -281,6 +375,7 @@ class DebugScreen(Screen[None]):
         moment = self.moment
         if moment is None:
             return
+        self._show_status()
         self._show_head(moment)
         self._show_bars()
         self._show_rest()
@@ -298,6 +393,13 @@ class DebugScreen(Screen[None]):
         plays = "" if decision.playing is None else f" {_named(decision.playing)} at {decision.playing.time_s:.2f} s"
         head = f"{decision.time_s:.2f} s of {line.times_s[-1]:.2f} · tick {decision.tick:,} · {action}{plays}"
         text = Text(printable(f"{self.recording.name}  {head}"))
+        if self.live is not None:
+            back_s = float(line.times_s[-1]) - decision.time_s
+            when = "● now" if self.is_now else f"❚❚ {back_s:.1f} s ago, End: now"
+            notes = self.live.notes
+            text = Text(f"{when}  ", style="bold") + Text(printable(f"{self.live.name} · tick {decision.tick:,} · {action}{plays}"))
+            if notes:
+                text = Text(f"! {printable(notes)}  ", style="bold") + text
         self.query_one("#head", Static).update(text)
         told = Text("\n".join(self._told(moment)))
         self.query_one("#told", Static).update(told)
@@ -314,7 +416,7 @@ class DebugScreen(Screen[None]):
         if self.turned and moment.turned is not None and moment.asked is not None:
             yield self._instead(moment)
         else:
-            yield self._speeds(moment)
+            yield self._facts(moment)
 
     def _instead(self, moment: Moment) -> str:
         assert moment.turned is not None, "was looked at before"
@@ -326,25 +428,17 @@ class DebugScreen(Screen[None]):
             return f"With these weights the same is chosen: {what}."
         return f"With these weights {'another asset' if moment.turned.is_other_asset else 'another frame'} is chosen: {what}."
 
-    def _speeds(self, moment: Moment) -> str:
-        """How fast the path was wanted, how fast the clip goes and how fast the body went."""
-        line, at = self.recording.line, self.index
-        got = ""
-        if 0 < at < len(line):
-            step = float(line.times_s[at] - line.times_s[at - 1])
-            if step > 0.0:
-                got = f"{float(np.hypot(*(line.roots[at, :2] - line.roots[at - 1, :2]))) / step:.2f}"
-        speed = wanted_speed(moment)
-        wanted = "" if speed is None else f"{speed:.2f}"
-        clip = ""
-        playing = moment.decision.playing
-        bank = None if playing is None else self.banks.get(playing.database)
-        if playing is not None and bank is not None:
-            left, ahead, _ = bank.sample_of(bank.range_of(playing.asset, playing.mirrored), playing.time_s).root_velocity
-            clip = f"{float(np.hypot(left, ahead)):.2f}"
-        known = [f"{name} {value}" for name, value in (("wanted", wanted), ("clip", clip), ("got", got)) if value]
+    def _facts(self, moment: Moment) -> str:
+        """What the game said of the moment, behind the speeds where these have no line of their own."""
         facts = ", ".join(f"{name} {reasons.fact_text(value)}" for name, value in sorted((moment.decision.context or {}).items()))
-        return printable(f"m/s {', '.join(known)}" * bool(known) + (f" · {facts}" if facts else ""))
+        speed = self._status[0][1] if self._is_small and self._status and self._status[0][0] == "m/s" else ""
+        return printable(" · ".join(filter(None, (f"m/s {speed}" if speed else "", facts))))
+
+    def _show_status(self) -> None:
+        """Speeds and angles, on a line of their own where there is room."""
+        self._status = list(self.recording.status_at(self.index).lines())
+        text = Text(" · ".join(f"{name} {told}" for name, told in self._status))
+        self.query_one("#status", Static).update(text)
 
     def _show_bars(self) -> None:
         moment, bars = self.moment, self.bars
@@ -413,6 +507,14 @@ class DebugScreen(Screen[None]):
             rate = 30.0 if database.schema is None else database.schema.rate
             asset = (row.database, row.asset, row.mirrored, (row.frame - int(database.starts[row.range])) / rate)
         note = "" if self.banks else "no poses: " + (self.recording.missing or "they are being made of the clips")
+        how = (
+            ""
+            if not self.banks
+            else " · as shown, blended"
+            if self.recording.displayed is not None
+            else " · of the clips, not blended"
+        )
+        self.stage.border_title = f"{TITLES['stage']}{how}"
         self.stage.show(figure_of(self.recording, self.banks, moment, asset), note)
 
     def _show_reasons(self) -> None:
@@ -423,6 +525,8 @@ class DebugScreen(Screen[None]):
             lines = [reasons.Line(moment.not_asked or "no asset is under the cursor")]
         else:
             lines = reasons.reason_lines(self.recording, moment, row)
+        if self._is_small:
+            lines += [reasons.Line("how it stands", "head"), *(reasons.Line(f"    {name}  {told}") for name, told in self._status)]
         text = Content.assemble(*((f"{printable(line.text)}\n", STYLES[line.kind]) for line in lines))
         self.query_one("#reasons", Static).update(text)
 
@@ -475,8 +579,13 @@ class DebugScreen(Screen[None]):
         if row is None or found is None:
             self.say("No table has a row of this asset.")
             return
-        path, at = found
-        self.say(f"{row.asset} is in row {at + 1}: contextdb edit {path}")
+        where = Start(int(self.recording.line.ticks[self.index]), self.turned)
+        self.post_message(RowWanted(*found, self._failing(row), where))
+
+    def _failing(self, row: Row) -> str | None:
+        """The first column whose cell does not accept its fact."""
+        moment = self.moment
+        return None if moment is None else reasons.failing_column(self.recording, moment, row)
 
     # ---- weights
 
@@ -570,6 +679,8 @@ class DebugScreen(Screen[None]):
         """Run the whole session again with what is turned."""
         if not self.turned:
             self.say("Nothing is turned: + and - turn the weight under the cursor of the weights.")
+        elif self.live is not None:
+            self.say("A running game cannot be run again: record a session of it with motion.Trace.")
         elif self.recording.missing or not self.recording.databases:
             self.say(f"The session cannot be run again: {self.recording.missing}")
         else:
@@ -599,7 +710,7 @@ class DebugScreen(Screen[None]):
         try:
             banks = self.recording.open_banks()
             self.app.call_from_thread(self._take_banks, banks)
-            strips = self.recording.strips(banks, steps) if banks else {}
+            strips = self.recording.strips(banks, steps) if banks and self.live is None else {}
         except Cancelled:
             return
         except ContextDBError as error:
@@ -611,8 +722,9 @@ class DebugScreen(Screen[None]):
         self.banks = banks
         self._show_stage()
 
-    def _take_strips(self, strips: dict[str, Floats]) -> None:
+    def _take_strips(self, strips: Mapping[str, Floats]) -> None:
         self.timeline.add_strips(strips)
+        self._show()
         self.say("")
 
     def _progress(self, what: str) -> Callable[[float], None]:
@@ -646,6 +758,8 @@ class DebugScreen(Screen[None]):
         elif is_at_work:
             self.workers.cancel_node(self)
             self.say("Ended.")
+        elif self._is_inside:
+            self.action_quit()
 
     # ---- the rest
 
@@ -669,7 +783,10 @@ class DebugScreen(Screen[None]):
     def action_quit(self) -> None:
         """Leave."""
         self.workers.cancel_node(self)
-        self.app.exit()
+        if self._is_inside:
+            self.dismiss()
+        else:
+            self.app.exit()
 
     def on_descendant_focus(self) -> None:
         """A click gives a pane the focus too."""

@@ -100,6 +100,11 @@ class Timeline(Widget):
         self.index = index
         self.refresh()
 
+    def grow(self) -> None:
+        """The session is another than it was."""
+        self.strips = {"cost": self.recording.line.costs, "valid": self.recording.line.n_valid}
+        self.refresh()
+
     def add_strips(self, strips: Mapping[str, Floats]) -> None:
         """More measures."""
         self.strips.update({name: strips[name] for name in TITLES if name in strips})

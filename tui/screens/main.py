@@ -26,6 +26,7 @@ from tui.model.coverage_run import CoverageRun
 from tui.model.importing import Import
 from tui.model.new_table import make_table, name_fault
 from tui.model.session import Session
+from tui.model.sessions import sessions_of
 from tui.model.workspace import Workspace
 from tui.panes.assets import AssetsPane
 from tui.panes.options import OptionsPane
@@ -54,6 +55,8 @@ class Answer(Protocol):
 
 
 TABS = ("assets", "options", "priorities", "coverage", "problems")
+MOTION = "motion"
+"""The tab that there is where the project declares motion databases and has a recorded session, and where it was gone to."""
 CELL_MENU = (
     "edit", "copy", "cut", "paste", "fill-down", "fill-series", "clear", "note", "insert-row", "insert-below",
     "insert-copied", "duplicate", "delete-rows", "enable", "colour-rows", "filter-same", "values", "rename-asset", "nearest",
@@ -101,6 +104,8 @@ class MainScreen(Screen[None]):
         """Where the cursor was when a warning of a verb was first seen: the next cell takes it away."""
         self._is_of_verb = False
         """What is said, not quietly, is of something that was done."""
+        has_databases = bool(self.session.sheet.table.schema.motion.get("databases"))
+        self._has_sessions = has_databases and bool(sessions_of(workspace.folder))
         self.care = DiskCare(self, self.session, self.say, self.show)
         self.clipboard = Clipboard(lambda text: self.app.copy_to_clipboard(text))
 
@@ -108,6 +113,11 @@ class MainScreen(Screen[None]):
     def tab(self) -> str:
         """The tab that is seen."""
         return self.query_one("#panes", ContentSwitcher).current or "assets"
+
+    @property
+    def tabs(self) -> Sequence[str]:
+        """The tabs that there are."""
+        return (*TABS, MOTION) if self._has_sessions or self.tab == MOTION else TABS
 
     @property
     def assets(self) -> AssetsPane:
@@ -147,7 +157,7 @@ class MainScreen(Screen[None]):
     def _show_bars(self) -> None:
         mark = " *" if self.session.sheet.is_modified else ""
         items = [Item("open", f"{self.table_name}{mark}", is_strong=True)]
-        items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in TABS]
+        items += [Item(tab, BY_ID[tab].label, is_on=tab == self.tab) for tab in self.tabs]
         table = self.session.sheet.table
         about = f"{plural(table.n_rows, 'row')} · {plural(len(table.columns), 'column')}"
         self.query_one("#tabs", Bar).show(items, about)
@@ -227,6 +237,10 @@ class MainScreen(Screen[None]):
             from tui.panes.priorities import PrioritiesPane  # with all of motion
 
             return PrioritiesPane(sheet, id=name)
+        if name == MOTION:
+            from tui.panes.motion import MotionPane  # loads the motion search
+
+            return MotionPane(self.workspace.folder, id=name)
         return self._coverage_pane(name) if name == "coverage" else ProblemsPane(sheet, id=name)
 
     def _coverage_pane(self, name: str) -> Pane:
@@ -236,7 +250,8 @@ class MainScreen(Screen[None]):
 
     async def action_next_tab(self, by: int) -> None:
         """Go to the tab beside."""
-        await self.action_tab(TABS[(TABS.index(self.tab) + by) % len(TABS)])
+        tabs = self.tabs
+        await self.action_tab(tabs[(tabs.index(self.tab) + by) % len(tabs)])
 
     def action_help(self) -> None:
         from tui.screens.help import HelpDialog

@@ -10,7 +10,7 @@ a path.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -161,15 +161,19 @@ def poses_of(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings
 
     Raises MotionError where the banks have no poses of what plays.
     """
+    return [pose for pose, _ in warped_poses(decisions, banks, settings)]
+
+
+def warped_poses(decisions: Sequence[Decision], banks: Banks, settings: PoseSettings) -> Iterator[tuple[Pose, tuple[float, float]]]:
+    """The same, each with its warp: how many times as long the steps became, and by how many radians hips and legs were turned."""
     if settings.root != "animation" and any(decision.body is None for decision in decisions):
         settings = replace(settings, root="animation")
     stream = PoseStream(banks, settings)
     last_s = decisions[0].time_s
-    poses = []
     for decision in decisions:
-        poses.append(stream.update(decision, max(decision.time_s - last_s, 0.0), decision.body))
+        pose = stream.update(decision, max(decision.time_s - last_s, 0.0), decision.body)
+        yield pose, stream.state.warp
         last_s = decision.time_s
-    return poses
 
 
 def _rows(given: ArrayLike, n: int, width: int, what: str) -> Floats:

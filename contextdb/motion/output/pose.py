@@ -1,4 +1,4 @@
-"""CrowdPoses to show: one, and those of many characters at once."""
+"""Poses to show: one, and those of many characters at once."""
 
 from __future__ import annotations
 

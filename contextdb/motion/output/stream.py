@@ -22,7 +22,7 @@ from contextdb.motion.output.ground import A_GROUND
 from contextdb.motion.output.pipeline import Pipeline, Rows
 from contextdb.motion.output.pose import Pose
 from contextdb.motion.output.settings import PoseSettings
-from contextdb.motion.output.stages import Ground
+from contextdb.motion.output.stages import STRIDE, TURN, Ground
 from contextdb.motion.selection.decision import Decision, Playing
 
 __all__ = ["Pose", "PoseState", "PoseStream"]
@@ -49,6 +49,11 @@ class PoseState:
     n_joints: int
     playing: Playing | None
     row: Floats
+
+    @property
+    def warp(self) -> tuple[float, float]:
+        """How many times as long steps are as the clip's, and by how many radians hips and legs are turned against the root."""
+        return float(self.row[STRIDE]), float(self.row[TURN])
 
 
 class PoseStream:

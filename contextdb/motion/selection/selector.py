@@ -75,13 +75,13 @@ class Selector:
     def __init__(self, entries: Sequence[Entry], tags: Sequence[str] = ()) -> None:
         self.entries: tuple[Entry, ...] = tuple(require_many_of(entries, Entry, "entries", "a list of Entry"))
         _check_entries(self.entries)
+        self.names: tuple[str, ...] = tuple(entry.name for entry in self.entries)
+        """The names of all databases in order, those not loaded too."""
+        self._all = frozenset(self.names)
         loaded = {entry.name: entry.database for entry in self.entries if entry.database is not None}
         known = (tag for database in loaded.values() for tag in database.marks.tags)
         self.tags: tuple[str, ...] = tuple(dict.fromkeys((*known, *tags)))
         self._databases = {name: with_tags(database, self.tags) for name, database in loaded.items()}
-        self.names: tuple[str, ...] = tuple(entry.name for entry in self.entries)
-        """The names of all databases in order, those not loaded too."""
-        self._all = frozenset(self.names)
 
     @property
     def databases(self) -> Mapping[str, MotionDatabase]:

@@ -20,16 +20,17 @@ The metadata hold `contextdb.poses` (the version of this layout), `about` (JSON:
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from contextdb.cells.arguments import require_kind, require_path, require_text
-from contextdb.errors import ArtefactError, FileError
+from contextdb.errors import ArtefactError, ContextDBError, FileError
 from contextdb.files.tensors import FileKind, Tensors, digest_of, read_tensors, texts_from_array, texts_to_array, write_tensors
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.output.bank import PoseBank
+from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage.build_inputs import Assets, Inputs
 from contextdb.motion.storage.building import checked
 from contextdb.motion.storage.clip_files import read_clip
@@ -109,6 +110,19 @@ def open_poses(path: str | PathLike[str], *, verify: bool = False) -> PoseBank:
 def poses_path(folder: str | PathLike[str], name: str) -> Path:
     """Where the bank of the database of a name is saved. Raises ContextError for what is no path and no name."""
     return require_path(folder, "folder") / file_name(require_text(name, "name"), SAVED_SUFFIX)
+
+
+def saved_poses(folder: str | PathLike[str], databases: Mapping[str, MotionDatabase]) -> dict[str, PoseBank]:
+    """The banks that are saved in a folder and hold the frames of these databases; the others are left out."""
+    found = {}
+    for name, database in databases.items():
+        try:
+            bank = open_poses(poses_path(folder, name))
+        except ContextDBError:
+            continue
+        if bank.assets == database.assets and bank.n_frames == int((database.stops - database.starts).sum()):
+            found[name] = bank
+    return found
 
 
 def open_or_build_poses(

@@ -36,8 +36,9 @@ def inputs_json(inputs: Inputs) -> str:
     return f'{json.dumps(told)[:-1]}, "settings": {_settings_json(inputs.settings)}}}'
 
 
+@lru_cache(64)
 def inputs_of(text: str) -> Inputs:
-    """The inputs that a text was made of.
+    """The inputs that a text was made of; those of one text are one.
 
     Raises
     ------

@@ -11,6 +11,7 @@ is exact because the search is.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, TypedDict, overload
@@ -74,6 +75,12 @@ class Reasked(Sequence[ReaskedDecision]):
             require_kind(each, Biases, "one of biases", "Biases")
             self._of_biases[name] = each
         self.databases = {name: _changed(each, weights, self._of_biases.get(name)) for name, each in stock.databases.items()}
+
+    def over(self, decisions: Sequence[Decision]) -> Reasked:
+        """The same of other decisions, such as those of the session read once."""
+        found = copy(self)
+        found.decisions = decisions
+        return found
 
     @overload
     def __getitem__(self, index: int) -> ReaskedDecision: ...

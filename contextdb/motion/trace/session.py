@@ -110,6 +110,11 @@ class Trace(Sequence[Decision]):
         self.n_forgotten += len(self._rows) == self.most
         self._rows.append(packed)
 
+    @property
+    def controller(self) -> str:
+        """The controller that recorded it; "" where the session does not say."""
+        return next((str(about["controller"]) for about in self.about.values() if "controller" in about), "")
+
     def __len__(self) -> int:
         return self._n_loaded + len(self._rows)
 
@@ -134,7 +139,7 @@ class Trace(Sequence[Decision]):
         """Some columns of all rows, as the file has them."""
         import polars as pl
 
-        own = _frame([{**dict.fromkeys(columns()), **row} for row in map(_unpacked, self._rows)])
+        own = frame_of_rows([{**dict.fromkeys(columns()), **row} for row in map(_unpacked, self._rows)])
         frames = [own] if self._loaded is None else [self._loaded, own]
         return pl.concat([frame.select(names) for frame in frames])
 
@@ -225,7 +230,7 @@ class Trace(Sequence[Decision]):
 
         frames = [] if self._loaded is None else [self._loaded]
         rows = map(_unpacked, self._rows)
-        while len(part := _frame(list(islice(rows, CHUNK)))) or not frames:
+        while len(part := frame_of_rows(list(islice(rows, CHUNK)))) or not frames:
             frames.append(part)
         whole = pl.concat(frames)
         frame, about = whole if timings else whole.drop(TIMINGS), json.dumps(self.about)
@@ -349,7 +354,8 @@ def _unpacked(packed: bytes) -> Row:
 # ---- rows as Parquet
 
 
-def _frame(rows: list[Row]) -> pl.DataFrame:
+def frame_of_rows(rows: list[Row]) -> pl.DataFrame:
+    """Rows as a table of `columns`."""
     import polars as pl
 
     return pl.DataFrame(rows, schema=columns())

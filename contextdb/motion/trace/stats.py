@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.selection.decision import Action, Decision
 from contextdb.motion.trace.views import cause_of
 
@@ -33,7 +34,8 @@ class SessionStats:
     causes : dict of str to int
         How many searches there were for each cause.
     gain_median : float or None
-        What a jump spares of the cost of playing on, as a share; None without a jump from what could play on.
+        What a jump spares of the cost of playing on, as a share; None without a jump from what could play on. Negative for a jump
+        that costs more: one that variation drew, or to a database that wins outright under its threshold. See `gains_of`.
     gain_small_share : float or None
         The share of such jumps that spare less than a fifth.
     gains : tuple of int
@@ -75,7 +77,8 @@ def stats_of(decisions: Iterable[Decision], about: About) -> SessionStats:
     found = list(decisions)
     jumps = [each for each in found if each.action is Action.JUMP]
     seconds = found[-1].time_s - found[0].time_s if found else 0.0
-    gains = [_gain(each) for each in jumps if each.cost is not None and each.continuing_cost]
+    pairs = [(each.continuing_cost, each.cost) for each in jumps if each.cost is not None and each.continuing_cost is not None]
+    gains: list[float] = gains_of(*np.array(pairs).reshape(-1, 2).T).tolist()
     causes: dict[str, int] = {}
     for each in found:
         if each.searched:
@@ -116,10 +119,14 @@ def measures_of(decisions: Sequence[Decision], about: About) -> dict[str, float 
     }
 
 
-def _gain(jump: Decision) -> float:
-    assert jump.cost is not None, "a jump has a cost"
-    assert jump.continuing_cost, "playing on has a cost"
-    return (jump.continuing_cost - jump.cost) / abs(jump.continuing_cost)
+def gains_of(continuing: Floats, costs: Floats) -> Floats:
+    """What jumps of some costs spare of what playing on would have cost, as a share from -1 to 1.
+
+    It is a share of the larger of both costs. For a jump that costs less than playing on that is the cost of playing on; where
+    playing on costs about nothing, and a jump is made all the same, the share stays readable.
+    """
+    larger = np.maximum(np.abs(continuing), np.abs(costs))
+    return np.clip((continuing - costs) / np.where(larger > 0.0, larger, 1.0), -1.0, 1.0)
 
 
 def _stays(decisions: Sequence[Decision]) -> list[float]:

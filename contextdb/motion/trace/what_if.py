@@ -12,18 +12,20 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from contextdb.console import progress
 from contextdb.errors import Fault, MotionError
-from contextdb.motion.arguments import ValidRanges
+from contextdb.motion.arguments import Flags, ValidRanges
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Filter
+from contextdb.motion.selection.asked import Asked
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.decision import Decision, Playing
+from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.selector import Entry, Selector
 from contextdb.motion.trace.cost_views import PATH
 from contextdb.motion.trace.other_filters import asked_of_table
@@ -86,6 +88,8 @@ def what_if(recorded: Reasked, changed: Reasked) -> WhatIf:
 
     Raises MotionError where the session does not say how its updates were made.
     """
+    is_of_one, kept = changed.decisions is recorded.decisions, list(recorded.decisions)
+    recorded, changed = recorded.over(kept), changed.over(kept if is_of_one else list(changed.decisions))
     asked = [each for each in progress(changed, "asking again") if each.choice is not None]
     others = tuple(
         ChangedChoice(each.decision.tick, each.decision.time_s, _asset(each.decision.choice), _asset(each.choice))
@@ -122,8 +126,8 @@ def run_again(asked: Reasked, on_step: Callable[[], None] | None = None) -> list
     runner = _Runner.of(asked, decisions)
     steps = progress(decisions, "running the session again") if on_step is None else decisions
     found = []
-    for each in steps:
-        found.append(runner.update(each))
+    for at, each in enumerate(steps):
+        found.append(runner.update(each, at))
         if on_step is not None:
             on_step()
     return found
@@ -135,8 +139,12 @@ class _Runner:
 
     asked: Reasked
     controller: Controller
+    is_of_frame: Flags
+    """Whether the pose of each recorded query was that of the frame that would have played on."""
     chosen: dict[str, Filter] = field(default_factory=dict)
-    databases: dict[str, MotionDatabase] = field(default_factory=dict)
+    given: tuple[Inputs, Asked] | None = None
+    """What the last update was given; it is so again until something is searched, or the inputs change."""
+    raws: dict[tuple[str, int], Floats] = field(default_factory=dict)
 
     @classmethod
     def of(cls, asked: Reasked, decisions: Sequence[Decision]) -> _Runner:
@@ -144,76 +152,96 @@ class _Runner:
         first = next((each for each in decisions if each.choice is not None), None)
         if first is None or first.choice is None or first.inputs is None:
             raise MotionError(Fault("the session has no search.", "one with at least a search"))
-        tags = sorted({tag for each in decisions for tag in _tags_of(each)})
+        each_inputs = {id(each.inputs): each.inputs for each in decisions if each.inputs is not None}
+        tags = sorted({tag for each in each_inputs.values() for tag in _tags_of(each)})
         entries = [
             Entry(each.database, asked.databases.get(each.database), asked.thresholds.get(each.database, each.threshold))
             for each in first.choice.searches
         ]
-        return cls(asked, Controller(Selector(entries, tags), first.inputs.settings, rng=random.Random(0)))
+        controller = Controller(Selector(entries, tags), first.inputs.settings, rng=random.Random(0))
+        return cls(asked, controller, _are_of_frames(asked, decisions))
 
-    def update(self, recorded: Decision) -> Decision:
-        """The update of a recorded decision, made again."""
-        inputs = recorded.inputs
+    @cached_property
+    def poses(self) -> Flags:
+        """Which features are of the pose: bool [F]."""
+        database = next(iter(self.controller.selector.databases.values()))
+        found = np.zeros(database.n_features, np.bool_)
+        for name, part in zip(database.channel_names, database.slices, strict=True):
+            found[part] = not name.startswith(PATH)
+        return found
+
+    def update(self, recorded: Decision, at: int) -> Decision:
+        """The update of a recorded decision, the one at a place, made again."""
+        inputs, controller = recorded.inputs, self.controller
         assert inputs is not None, "was looked at before"
         if recorded.choice is not None:
-            searches = self.asked.of(recorded).searches
-            self.chosen = {name: each.chosen for name, each in searches.items()}
-        self.controller.settings = inputs.settings
+            self.chosen = {name: each.chosen for name, each in self.asked.of(recorded).searches.items()}
+            self.given = None
+        controller.settings = inputs.settings
+        if self.given is None or self.given[0] is not inputs or self.asked.tables:
+            self.given = inputs, self._asked(recorded, inputs)
+        query = self._query(recorded, inputs.dt_s, at)
+        asking = controller.ask(inputs.dt_s, query, self.given[1], recorded.context, inputs.force, inputs.interrupt)
+        choice = None if asking.wanted is None else controller.selector.search(asking.query, **asking.wanted.options())
+        return controller.answer(asking, choice)
+
+    def _asked(self, recorded: Decision, inputs: Inputs) -> Asked:
+        """What an update is given but its query."""
         databases = self.controller.selector.databases
-        chosen = {name: self._asked(name, each, recorded) for name, each in self.chosen.items() if name in databases}
+        chosen = {name: self._filter(name, each, recorded) for name, each in self.chosen.items() if name in databases}
         tags: dict[str, Any] = {name: each.frames if len(each.frames) else inputs.tags_of(name) for name, each in chosen.items()}
-        return self.controller.update(
-            inputs.dt_s,
-            self._query(recorded, inputs.dt_s),
-            {name: ValidRanges(each.ranges, each.range_biases) for name, each in chosen.items()},
-            {name: each for name, each in tags.items() if each is not None},
-            recorded.context,
+        return Asked(
+            valid={name: ValidRanges(each.ranges, each.range_biases) for name, each in chosen.items()},
+            tags={name: each for name, each in tags.items() if each is not None},
             bias={name: each.frame_biases for name, each in chosen.items() if len(each.frame_biases)},
             among=inputs.among,
-            force=inputs.force,
-            interrupt=inputs.interrupt,
         )
 
-    def _asked(self, name: str, chosen: Filter, recorded: Decision) -> Filter:
+    def _filter(self, name: str, chosen: Filter, recorded: Decision) -> Filter:
         """A filter with what its table says at this update, where it is asked again."""
         table = self.asked.tables.get(self.asked.stock.table_of.get(name, ""))
         if table is None or recorded.context is None:
             return chosen
         return asked_of_table(self.asked.databases[name], chosen, table, recorded.context)
 
-    def _query(self, recorded: Decision, dt_s: float) -> Floats:
+    def _query(self, recorded: Decision, dt_s: float, at: int) -> Floats:
         """The recorded wish with the pose that would play on now."""
         query, upcoming = recorded.query, self.controller.upcoming(dt_s)
         assert query is not None, "was looked at before"
-        if upcoming is None or recorded.before is None or _same(upcoming, recorded.before):
+        if upcoming is None or recorded.before is None or _same(upcoming, recorded.before) or not self.is_of_frame[at]:
             return query
-        database = self.controller.selector.databases[upcoming.database]
-        pose = [part for name, part in zip(database.channel_names, database.slices, strict=True) if not name.startswith(PATH)]
-        if database.schema is None or not self._is_of_frame(recorded, pose):
-            return query
-        found, raw = query.copy(), database.raw(upcoming.frame).astype(np.float32)
-        for part in pose:
-            found[part] = raw[part]
-        return found
+        key = upcoming.database, upcoming.frame
+        raw = self.raws.get(key)
+        if raw is None:
+            database = self.controller.selector.databases[upcoming.database]
+            if database.schema is None:
+                return query
+            raw = self.raws[key] = database.raw(upcoming.frame).astype(np.float32).astype(np.float64)
+        return np.where(self.poses, raw, query)
 
-    def _is_of_frame(self, recorded: Decision, pose: Sequence[slice]) -> bool:
-        """Whether the pose of a recorded query was that of the frame that would have played on."""
-        before, query = recorded.before, recorded.query
-        assert before is not None, "was looked at before"
-        assert query is not None, "was looked at before"
-        if before.database not in self.asked.databases or before.database in self.asked.changed:
-            return True
-        raw = self.asked.databases[before.database].raw(before.frame)
-        return all(np.allclose(query[part], raw[part], rtol=ALIKE, atol=ALIKE) for part in pose)
+
+def _are_of_frames(asked: Reasked, decisions: Sequence[Decision]) -> Flags:
+    """Whether the pose of each recorded query was that of the frame that would have played on: bool [T]."""
+    found = np.ones(len(decisions), np.bool_)
+    for name, database in asked.databases.items():
+        places = [i for i, each in enumerate(decisions) if each.before is not None and each.before.database == name]
+        frames = np.array([each.before.frame for i in places if (each := decisions[i]).before is not None], np.int64)
+        if name in asked.changed or not places or not database.layout.are_in_ranges(frames).all():
+            continue
+        pose = [part for channel, part in zip(database.channel_names, database.slices, strict=True) if not channel.startswith(PATH)]
+        queries, raws = np.array([decisions[i].query for i in places]), database.raw_many(frames)
+        are_near = [np.isclose(queries[:, part], raws[:, part], rtol=ALIKE, atol=ALIKE).all(axis=1) for part in pose]
+        found[places] = np.logical_and.reduce(are_near) if are_near else True
+    return found
 
 
 def _same(one: Playing, other: Playing) -> bool:
     return (one.database, one.asset, one.frame) == (other.database, other.asset, other.frame)
 
 
-def _tags_of(decision: Decision) -> set[str]:
-    """Every tag that a decision's filters name."""
-    tags = None if decision.inputs is None else decision.inputs.tags
+def _tags_of(inputs: Inputs) -> set[str]:
+    """Every tag that the filters of inputs name."""
+    tags = inputs.tags
     each = list(tags.values()) if isinstance(tags, Mapping) else [] if tags is None else [tags]
     hard = {tag for one in each for tag in (*one.include, *one.every, *one.exclude)}
     return hard | {tag for one in each for tag, _ in (*one.prefer, *one.avoid)}

@@ -102,7 +102,7 @@ class Link:
 
         Parameters
         ----------
-        what : CompiledTable, LiveContext, Controller, Watch or mapping of CompiledTable
+        what : CompiledTable, LiveContext, Controller, Character, Watch or mapping of CompiledTable
             A folder that is watched for changes, `cdb.watch(folder)`, stays watched when its tables are exchanged. Tables, live
             contexts and controllers that the game lets go are watched no more.
         who : str or function, optional
@@ -116,7 +116,7 @@ class Link:
         if self._is_closed:
             raise ContextError(Fault("the link is closed.", "an open link"))
         with self._publisher.lock:
-            if hasattr(what, "recorder"):
+            if hasattr(getattr(what, "controller", what), "recorder"):
                 self._load_decisions()
             self._taps.watch(what, who)
 

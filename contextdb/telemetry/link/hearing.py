@@ -26,6 +26,8 @@ class Wanted:
     tables: Sequence[str] = ()
     every: bool = False
     """Every question, not only the newest of each character and table."""
+    trace: bool = False
+    """Every decision in full, as a row of a recorded session, and nothing else."""
 
     def takes(self, line: Line) -> bool:
         """Whether a line is asked for: a game written in C sends all of them."""
@@ -126,6 +128,7 @@ def _request(wanted: Wanted, token: str) -> bytes:
     asked |= {"token": token} if token else {}
     asked |= {"who": list(wanted.who)} if wanted.who else {}
     asked |= {"tables": list(wanted.tables)} if wanted.tables else {}
+    asked |= {"trace": True} if wanted.trace else {}
     return dumped(asked)
 
 
@@ -148,6 +151,24 @@ def games() -> list[Game]:
         except (OSError, ContextDBError):
             continue
     return found
+
+
+def the_game(name: str | None) -> tuple[str, Path]:
+    """The game that is meant, with its door: the one of a name, or the only one that runs.
+
+    Raises ContextDBError for none, or several.
+    """
+    if name is not None:
+        path = dict(doors()).get(name)
+        if path is None:
+            raise no_game(name, games())
+        return name, path
+    running = games()
+    if not running:
+        raise no_game(None, running)
+    if len(running) > 1:
+        raise ContextDBError(Fault("several games are running.", some([game.name for game in running]), "to name one"))
+    return running[0].name, running[0].path
 
 
 def no_game(name: str | None, running: Sequence[Game]) -> ContextDBError:

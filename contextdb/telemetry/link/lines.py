@@ -25,6 +25,7 @@ FORMAT = 1
 """Raised when a reader of the old format would read the new one wrongly. More keys, and more kinds of lines, are no new format."""
 
 HEADER, TABLES, ASK, PICK, DECISION, LOST, END = "header", "tables", "ask", "pick", "decision", "lost", "end"
+DATABASES = "databases"
 """What a line is: the value of its key "line"."""
 
 MOST_BYTES = 1 << 20
@@ -65,6 +66,7 @@ _KEYS: Mapping[str, Mapping[str, tuple[type, ...]]] = {
     ASK: {"t": (int, float), "who": (str, type(None)), "table": (str,), "facts": (dict,), "rows": (str,), "valid": (int,)},
     PICK: {"t": (int, float), "who": (str, type(None)), "table": (str,), "pick": (dict,)},
     DECISION: {"t": (int, float), "who": (str, type(None)), "decision": (dict,)},
+    DATABASES: {"who": (str, type(None)), "databases": (dict,)},
     LOST: {"count": (int,)},
 }
 

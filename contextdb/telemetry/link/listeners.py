@@ -2,10 +2,10 @@
 
 A listener may send one line of JSON, and again whenever it wants other lines:
 
-    {"format": 1, "token": "…", "every": true, "who": ["player"], "tables": ["locomotion"]}
+    {"format": 1, "token": "…", "every": true, "who": ["player"], "tables": ["locomotion"], "trace": true}
 
-`every`: every question, not only the newest of each character and table. What a listener does not read in time is lost, and it is
-told how many lines; nothing here ever waits for it.
+`every`: every question, not only the newest of each character and table. `trace`: every decision in full, and nothing else. What a
+listener does not read in time is lost, and it is told how many lines; nothing here ever waits for it.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ class Listener(Protocol):
     """Takes lines."""
 
     wants_every: bool
+    wants_trace: bool
 
     @property
     def has_room(self) -> bool:
@@ -48,6 +49,10 @@ class Listener(Protocol):
         """Take a line, or lose it."""
         ...
 
+    def offer_in_full(self, moment: Moment) -> None:
+        """Take a decision in full; only for who wants that."""
+        ...
+
     def lose(self, n_lines: int) -> None:
         """Learn that lines are lost."""
         ...
@@ -59,7 +64,9 @@ class SocketListener:
     def __init__(self, connection: socket.socket, token: str, header: Callable[[], bytes]) -> None:
         connection.setblocking(False)
         self.connection = connection
-        self.wants_every = False
+        self.wants_every = self.wants_trace = False
+        self._knows: set[object] = set()
+        """What it was sent already, and need not be sent again."""
         self.is_gone = False
         self._header = header
         self._token = token
@@ -86,6 +93,8 @@ class SocketListener:
         """Whether a moment is among those asked for."""
         if self._who is not None and moment.who not in self._who:
             return False
+        if self.wants_trace:
+            return moment.decision is not None
         return self._tables is None or moment.table is None or moment.table in self._tables
 
     def offer(self, line: bytes) -> None:
@@ -100,9 +109,17 @@ class SocketListener:
             self._n_lost = 0
         self._pending += line
 
+    def offer_in_full(self, moment: Moment) -> None:
+        """Take the lines of a decision for who debugs it."""
+        for mark, line in moment.in_full():
+            if mark is None or mark not in self._knows:
+                self._knows |= set() if mark is None else {mark}
+                self.offer(line)
+
     def lose(self, n_lines: int) -> None:
         """Learn that lines are lost."""
         self._n_lost += n_lines
+        self._knows.clear()
 
     def read(self) -> None:
         """Read what it asks for."""
@@ -130,7 +147,8 @@ class SocketListener:
         if not isinstance(asked, dict) or not self._knows_token(asked):
             self.is_gone = True
             return
-        self.wants_every = asked.get("every") is True
+        self.wants_trace = asked.get("trace") is True
+        self.wants_every = asked.get("every") is True or self.wants_trace
         self._who, self._tables = _names(asked.get("who")), _names(asked.get("tables"))
         if not self.is_let_in:
             self.is_let_in = True
@@ -168,6 +186,7 @@ class FileListener:
     """A file that takes every line, until the disk refuses one: that is logged, and the game goes on without the file."""
 
     wants_every = True
+    wants_trace = False
     has_room = True
 
     def __init__(self, path: Path, file: IO[bytes]) -> None:
@@ -185,6 +204,9 @@ class FileListener:
             line = dumped({"line": LOST, "count": self._n_lost}) + line
             self._n_lost = 0
         self._try(partial(self._file.write, line))
+
+    def offer_in_full(self, moment: Moment) -> None:
+        """A recording has the lines that everybody gets."""
 
     def lose(self, n_lines: int) -> None:
         """Learn that lines are lost."""

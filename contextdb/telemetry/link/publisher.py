@@ -188,6 +188,7 @@ class Publisher:
             self.ring.forget(self._pace)
             return
         self.ring.keeps_all = any(one.wants_every for one in listeners)
+        self.ring.keeps_filters = any(one.wants_trace for one in listeners)
         with self.lock:
             self.taps.follow()
         self._open_taps()
@@ -232,13 +233,14 @@ class Publisher:
     def _offer(self, moment: Moment, takers: list[Listener]) -> None:
         try:
             moment.time_s -= self.began_s
-            line = moment.line()
+            for one in takers:
+                if one.wants_trace:
+                    one.offer_in_full(moment)
+                else:
+                    one.offer(moment.line())
         except Exception:  # facts that changed while they were read, or that no JSON can be made of
             for listener in takers:
                 listener.lose(1)
-            return
-        for listener in takers:
-            listener.offer(line)
 
     def _tell_tables(self, listeners: list[Listener]) -> None:
         """Tell of tables that are new, or of a new version."""

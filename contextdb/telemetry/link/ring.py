@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from contextdb.cells.conditions import Condition
 from contextdb.compiled.casting.facts import Actors
 from contextdb.compiled.matches import Matches
-from contextdb.telemetry.link.lines import ASK, DECISION, PICK, Line, dumped, sent_facts
+from contextdb.telemetry.link.lines import ASK, DATABASES, DECISION, PICK, Line, dumped, sent_facts
 
 MOST_ENTRIES = 1 << 13
 AT_ONCE = 128
@@ -69,6 +69,8 @@ class Ring:
 
     def __init__(self, most: int = MOST_ENTRIES) -> None:
         self.keeps_all = False
+        self.keeps_filters = False
+        """Whether somebody debugs: decisions then say what could be chosen."""
         self.slots: dict[object, Entry] = {}
         self.picks: dict[object, tuple[Entry, Entry]] = {}
         self.entries: deque[Entry] = deque(maxlen=most)
@@ -154,6 +156,20 @@ class Moment:
         if self._line is None:
             self._line = dumped(self._said())
         return self._line
+
+    def in_full(self) -> Iterator[tuple[object, bytes]]:
+        """The lines of a decision for who debugs it: its databases, which need be sent only once, and its row; each with a mark of
+        what it says, None for what is always sent."""
+        from contextdb.telemetry.link import decisions
+
+        databases = decisions.databases_of(self.decision)
+        if databases is not None:
+            told = decisions.sent_databases(databases)
+            mark = self.who, tuple((name, *each.values()) for name, each in told.items())
+            yield mark, dumped({"line": DATABASES, "who": self.who, "databases": told})
+        row = decisions.sent_row(self.decision)
+        if row is not None:
+            yield None, dumped({"line": DECISION, "t": round(self.time_s, 6), "who": self.who, "decision": {}, "row": row})
 
     def _said(self) -> Line:
         head: Line = {"t": round(self.time_s, 6), "who": self.who}

@@ -205,8 +205,9 @@ class ControllerTap:
 
     @property
     def n_candidates(self) -> int:
-        """As many as the other recorder wants."""
-        return 0 if self._other is None else int(self._other.n_candidates)
+        """As many as the other recorder wants; some where somebody debugs, so that a decision says what could be chosen."""
+        wanted = 0 if self._other is None else int(self._other.n_candidates)
+        return max(wanted, 1) if self._ring.keeps_filters else wanted
 
     def record(self, decision: object) -> None:
         """Take one decision."""
@@ -270,11 +271,13 @@ class Taps:
         elif isinstance(what, Mapping) and all(isinstance(table, CompiledTable) for table in what.values()):
             self._folders.append(_Folder(what, who))
             self.follow()
+        elif hasattr(getattr(what, "controller", None), "recorder"):  # a character
+            self.watch(what.controller, who)  # type: ignore[attr-defined]
         elif hasattr(what, "recorder") and callable(getattr(what, "update", None)):
             self._put(what, who, lambda: ControllerTap(what, self.ring, who))
         else:
             found = f"a link cannot watch what is of type {type(what).__name__}."
-            accepted = "a compiled table, a live context, a controller, or cdb.watch(folder)"
+            accepted = "a compiled table, a live context, a controller, a character, or cdb.watch(folder)"
             mend = "to compile it first" if hasattr(what, "compile") else ""
             raise ContextError(Fault(found, accepted, mend))
 

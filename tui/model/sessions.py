@@ -1,0 +1,52 @@
+"""The recorded sessions of a project, by their files. Reads of each what it says of itself, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+MOST_FILES = 1000
+"""So many files are looked at."""
+
+
+def sessions_of(folder: Path) -> list[Path]:
+    """The recorded sessions of a project, the newest first: those in its folder, two folders deep, and beside it."""
+    found = []
+    for path in islice(_near(folder), MOST_FILES):
+        try:
+            if _is_of(path, folder):
+                found.append((path.stat().st_mtime, path))
+        except OSError:  # gone since
+            continue
+    return [path for _, path in sorted(found, key=lambda each: (-each[0], each[1].name))]
+
+
+def _near(folder: Path) -> Iterator[Path]:
+    own = [(folder, pattern) for pattern in ("*.parquet", "*/*.parquet", "*/*/*.parquet")]
+    for base, pattern in (*own, (folder.resolve().parent, "*.parquet")):
+        try:
+            yield from base.glob(pattern)
+        except OSError:
+            continue
+
+
+def _is_of(path: Path, folder: Path) -> bool:
+    """Whether a Parquet file is a session of the project, or says of none and lies in its folder."""
+    import polars as pl
+
+    from contextdb.motion.trace.session import ABOUT_KEY, FORMAT_KEY  # loads the motion search, only where there is such a file
+
+    try:
+        told = pl.read_parquet_metadata(path)
+        about = json.loads(told[ABOUT_KEY]) if FORMAT_KEY in told else None
+    except (KeyError, ValueError, pl.exceptions.PolarsError):
+        return False
+    if not isinstance(about, dict):
+        return False
+    projects = {str(each["project"]) for each in about.values() if isinstance(each, dict) and "project" in each}
+    if not projects:
+        return folder.resolve() in path.resolve().parents
+    return any(os.path.realpath(path.parent / project) == os.path.realpath(folder) for project in projects)

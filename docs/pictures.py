@@ -118,7 +118,7 @@ def main(names: Sequence[str]) -> None:
     FOLDER.mkdir(exist_ok=True)
     for name in names or PICTURES:
         (FOLDER / name).write_bytes(draw(PICTURES[name]).encode())
-    for path in FOLDER.iterdir():
+    for path in FOLDER.glob("*.svg"):
         if path.name not in PICTURES:
             path.unlink()
 

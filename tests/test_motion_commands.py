@@ -7,6 +7,8 @@ import json
 import shutil
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -844,6 +846,57 @@ def test_a_chrome_trace_has_slices_counters_and_instants(here: Path):
     assert instants == [decision.tick for decision in decisions if decision.action in ("starts", "jumps")]
     counters = [event["args"]["cost"] for event in events if event["ph"] == "C"]
     assert counters == [decision.cost for decision in decisions if decision.cost is not None]
+
+
+class LoggedStream:
+    """Stands for a stream of rerun-sdk, and keeps what it is told."""
+
+    kept: ClassVar[list[tuple[float, str, object]]] = []
+
+    def __init__(self, *names: str, **options: str) -> None:
+        self.time_s = 0.0
+        self.kept.clear()
+
+    def binary_stream(self) -> SimpleNamespace:
+        return SimpleNamespace(read=lambda: b"RRF2")
+
+    def set_time(self, timeline: str, *, duration: float) -> None:
+        self.time_s = duration
+
+    def log(self, path: str, what: object, *, static: bool = False) -> None:
+        self.kept.append((self.time_s, path, what))
+
+    def flush(self) -> None:
+        pass
+
+
+def test_a_recording_for_rerun_has_a_skeleton_a_moment_and_a_line_a_change(here: Path, monkeypatch: pytest.MonkeyPatch):
+    levels = SimpleNamespace(WARN="WARN", INFO="INFO")
+    parts = {name: lambda what, **options: what for name in ("LineStrips3D", "Points3D", "Scalars", "TextLog")}
+    axes = SimpleNamespace(RIGHT_HAND_Y_UP="y up")
+    fake = SimpleNamespace(RecordingStream=LoggedStream, TextLogLevel=levels, ViewCoordinates=axes, **parts)
+    monkeypatch.setitem(sys.modules, "rerun", fake)
+    motion("replay", "session.parquet", "--rrd", "session.rrd")
+    assert (here / "session.rrd").read_bytes() == b"RRF2"
+    decisions, kept = list(Trace.load("session.parquet")), LoggedStream.kept
+    strips = [(time_s, what) for time_s, path, what in kept if path == "character/skeleton"]
+    assert [time_s for time_s, _ in strips] == [decision.time_s for decision in decisions]
+    assert all(np.shape(what) == (18, 2, 3) for _, what in strips)
+    told = [(time_s, what) for time_s, path, what in kept if path == "plays"]
+    changes = [each for each in decisions if each.action in ("starts", "jumps")]
+    assert [time_s for time_s, _ in told] == [each.time_s for each in changes]
+    assert all(each.playing is not None and each.playing.asset in str(what) for each, (_, what) in zip(changes, told, strict=True))
+
+
+def test_rerun_itself_writes_a_recording(here: Path):
+    pytest.importorskip("rerun", reason="needs the extra rerun")
+    motion("replay", "session.parquet", "--rrd", "session.rrd")
+    assert (here / "session.rrd").read_bytes()[:3] == b"RRF"
+
+
+def test_without_rerun_its_extra_is_named(here: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    assert 'pip install "contextdb[rerun]"' in refused("replay", "session.parquet", "--rrd", "session.rrd")
 
 
 def test_without_its_databases_a_session_says_what_is_missing(here: Path):

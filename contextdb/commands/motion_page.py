@@ -1,4 +1,4 @@
-"""Sessions as a page, or as the comment of a review: what `contextdb motion replay --html` and `--markdown` give."""
+"""Sessions as a page, for a viewer, or as a comment: what `contextdb motion replay --html`, `--rrd` and `--markdown` give."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contextdb.disk import path_in_quotes, write_atomic
 from contextdb.errors import Fault, FileError, MotionError, Place
 from contextdb.motion import MotionDatabase, PoseBank, PoseSettings, measure, open_or_build_poses
 from contextdb.motion.trace.session import Trace
-from contextdb.report import session_html, session_markdown
+from contextdb.report import session_html, session_markdown, session_rerun
 from contextdb.report.measure_results import SessionMeasures
 from contextdb.report.session_data import SessionView
 from contextdb.report.session_view import view_of
@@ -65,18 +65,18 @@ class Played:
         found = measure(self.trace, self.banks, databases=self.databases or None, settings=self.settings)
         return SessionMeasures(self.file, found, {}, ())
 
-    def view(self) -> SessionView:
-        """What the page shows."""
+    def view(self, *, is_asked: bool = True) -> SessionView:
+        """What the page shows; without what there was to choose from where that is not asked."""
         rows = {label: (value, raw) for label, value, raw, _ in self.measured.rows()}
-        reasked = self.trace.reasked(self.databases) if self.databases else None
+        reasked = self.trace.reasked(self.databases) if self.databases and is_asked else None
         return view_of(os.path.basename(self.file), self.trace, self.banks, self.settings, reasked, rows)
 
 
-def page_file(name: str) -> Path:
+def page_file(name: str, what: str = "a page", suffix: str = SUFFIX) -> Path:
     """Where a page is to be written, refused before the work where it could only be refused after."""
     path, place = Path(name), Place(name)
-    if path.suffix != SUFFIX:
-        raise FileError(Fault("a page cannot be written to such a file.", f"a name that ends in {SUFFIX}", place=place))
+    if path.suffix != suffix:
+        raise FileError(Fault(f"{what} cannot be written to such a file.", f"a name that ends in {suffix}", place=place))
     if not os.path.isdir(path.parent):
         found = f"there is no folder {path_in_quotes(path.parent)}."
         raise FileError(Fault(found, "an existing folder", place=place, rule="no-such-path"))
@@ -86,6 +86,18 @@ def page_file(name: str) -> Path:
 def write_page(out: Path, sessions: Sequence[Played]) -> None:
     """Write the page of a session, or of two side by side."""
     write_atomic(out, session_html.render([each.view() for each in sessions], parting=parting_of(sessions)).encode())
+
+
+def rerun_file(name: str) -> Path:
+    """Where a recording for Rerun is to be written; raises MotionError without rerun-sdk."""
+    session_rerun.require_rerun()
+    return page_file(name, "a recording for Rerun", ".rrd")
+
+
+def write_rerun(out: Path, session: Played) -> None:
+    """Write a session for the Rerun viewer."""
+    times_s = [decision.time_s for decision in session.trace.brief()]
+    write_atomic(out, session_rerun.render(session.view(is_asked=False), times_s))
 
 
 def comment_of(sessions: Sequence[Played], page: str | None) -> str:

@@ -34,7 +34,7 @@ from pathlib import Path
 import numpy as np
 
 from contextdb.commands.motion_build_command import MotionProject, warn
-from contextdb.commands.motion_page import Played, comment_of, page_file, write_page
+from contextdb.commands.motion_page import Played, comment_of, page_file, rerun_file, write_page, write_rerun
 from contextdb.commands.motion_stage import add_view
 from contextdb.commands.motion_what_if import changes_of
 from contextdb.commands.progress import building_bar
@@ -78,6 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--diff", metavar="OTHER", help="where this session and another one part")
     parser.add_argument("--trace", metavar="OUT", help="write a Chrome trace, a .json file that Perfetto opens")
+    parser.add_argument("--rrd", metavar="OUT", help="write a .rrd file for the Rerun viewer; needs the extra rerun")
     parser.add_argument("--html", metavar="OUT", help="write a page that plays the session, with --diff both side by side")
     parser.add_argument("--markdown", action="store_true", help="the comment of a review: measures, and what changed")
     parser.add_argument("--project", metavar="FOLDER", help="the project with the databases (default: as recorded)")
@@ -93,6 +94,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if arguments.markdown and (arguments.json or arguments.at is not None):
         raise QueryError(Fault("--markdown is of a whole session.", "--markdown without --json and --at"))
     page = None if arguments.html is None else page_file(arguments.html)
+    recording = None if arguments.rrd is None else rerun_file(arguments.rrd)
     replay = Replay(Trace.load(arguments.file), arguments)
     other = None if arguments.diff is None else Trace.load(arguments.diff)
     if page is not None or arguments.markdown:
@@ -103,6 +105,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             with output():
                 print(comment_of(sessions, arguments.html), end="")
             return ExitCode.OK
+    if recording is not None:
+        write_rerun(recording, _played(replay))
     place = None if arguments.at is None else place_of(arguments.at, replay.trace, arguments.file)
     parts = list(_parts(replay, other))
     if arguments.trace is not None:

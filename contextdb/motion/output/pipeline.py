@@ -14,13 +14,12 @@ from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.console import announce
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, some
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.output import kernels
-from contextdb.motion.output.alignment import spine_of
 from contextdb.motion.output.bank import Flags, PoseBank, tops_of
 from contextdb.motion.output.feet import OnGround, legs_of
 from contextdb.motion.output.ground import ManyGround, Triple, below, below_many
 from contextdb.motion.output.pose import CrowdPoses
 from contextdb.motion.output.settings import PoseSettings
+from contextdb.motion.output.spine import spine_of
 from contextdb.motion.output.stages import (
     ANIMATION,
     CLIP_RATE,
@@ -255,7 +254,7 @@ def _gives(grounds: Grounds, n: int) -> Sequence[bool]:
 @cache
 def _loops() -> ModuleType:
     """The loops over rows, with a word where they are compiled for the first time on this machine."""
-    from contextdb.motion.output import row_loops
+    from contextdb.motion.output import kernels, row_loops
 
     if kernels.IS_COMPILED:
         announce(row_loops.move_rows)

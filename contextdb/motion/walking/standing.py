@@ -14,10 +14,9 @@ import numpy as np
 from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
-from contextdb.motion.output import kernels
-from contextdb.motion.output.bank import Place3, tops_of
+from contextdb.motion.output.bank import Place3, loops, tops_of
 from contextdb.motion.output.feet import LEVEL_HIPS, Height
-from contextdb.motion.output.feet_loops import HIPS_DAMPING, MOST_LOWER, STRAIGHT
+from contextdb.motion.output.foot_state import HIPS_DAMPING, MOST_LOWER, STRAIGHT
 from contextdb.motion.output.ground import FLAT, Footing, below, standing, swinging
 from contextdb.motion.output.legs import Leg, eased, leg_of
 from contextdb.motion.output.stages import Ground
@@ -96,7 +95,7 @@ class Legs:
         for leg, toe, footing in zip(self.legs, toes, state.footings, strict=True):
             if leg is not None:
                 _, x, z = footing.now
-                down = kernels.too_high(positions, leg.joints, leg.toe, toe, x, z, STRAIGHT)
+                down = loops().too_high(positions, leg.joints, leg.toe, toe, x, z, STRAIGHT)
                 most = max(most, min(down + state.hips.now, MOST_LOWER))
         lower = state.lower.gone_down(max(most, 0.0), dt_s)
         height = state.hips.now - lower.now
@@ -106,7 +105,7 @@ class Legs:
         for leg, toe, footing in zip(self.legs, toes, state.footings, strict=True):
             if leg is not None:
                 _, x, z = footing.now
-                kernels.stand(self.rig.parents, positions, world, leg.joints, leg.toe, toe, x, z, STRAIGHT, rotations)
+                loops().stand(self.rig.parents, positions, world, leg.joints, leg.toe, toe, x, z, STRAIGHT, rotations)
         positions, _ = self._placed(rotations, translations, place)
         return Shown(rotations, translations, positions), GroundState(state.footings, state.hips, lower)
 
@@ -149,5 +148,5 @@ class Legs:
     def _placed(self, rotations: Floats, translations: Floats, place: Place3) -> tuple[Floats, Floats]:
         """Positions and rotations of all joints in the world."""
         positions, world = np.empty((len(rotations), 3)), np.empty((len(rotations), 4))
-        kernels.place(self.rig.parents, translations, rotations, *place, positions, world)
+        loops().place(self.rig.parents, translations, rotations, *place, positions, world)
         return positions, world

@@ -247,7 +247,8 @@ class Recording:
                 bank = open_poses(poses_path(Path(self.folder), name))
             except ContextDBError:
                 continue
-            if bank.assets == database.assets and bank.n_frames == int((database.stops - database.starts).sum()):
+            once = slice(None, None, database.n_permutations)
+            if bank.assets == database.assets[once] and bank.n_frames == int((database.stops - database.starts)[once].sum()):
                 found[name] = bank
         return found
 

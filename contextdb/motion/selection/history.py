@@ -6,6 +6,8 @@ Three rules, each a span of frames that a search leaves out. The frame that play
 - Jump threshold: frames of the playing range near to the playing one are left out; a jump there would be a hiccup.
 - History: frames played within the last so many seconds, in any database, are left out, so that no pose is entered over and over.
 
+All hold for a frame in every permutation of its clip alike, as each shows the same.
+
 Source: NextNaturalOnly of EA's talk; PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch.
 """
 
@@ -16,6 +18,7 @@ from dataclasses import dataclass
 
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Mark
+from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 
 
@@ -27,6 +30,11 @@ class Played:
     start: int
     stop: int
     time_s: float
+
+
+def played_spans(database: MotionDatabase, at: int, spans: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Spans of frames of a range in every permutation of its clip."""
+    return [each for start, stop in spans for each in database.in_permutations(at, start, stop)]
 
 
 def remembered(

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import Filter
+from contextdb.motion.selection.continuing import continuing_cost
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.playhead import Move, Playhead
 from contextdb.motion.selection.selector import Selector
@@ -37,11 +43,27 @@ class Ongoing:
         """The name of the database."""
         return self.playing.database
 
+    def cheapest(self, query: Floats, chosen: Filter) -> Ongoing:
+        """The same in the permutation of its clip that costs least to play on in; on a tie in that which plays.
+
+        `chosen` is a filter of its database; one that lets the asset not play is asked for its costs alone.
+        """
+        database, at = self.head.database, self.head.range
+        among = chosen if chosen.ranges[at] else chosen._replace(ranges=np.ones_like(chosen.ranges))
+        frames = [start for start, _ in database.in_permutations(at, self.move.frame, self.move.frame + 1)]
+        costs = [continuing_cost(database, query, among._replace(current=frame)) for frame in frames]
+        own = at % len(frames)
+        best = min(range(len(frames)), key=lambda i: (math.inf if costs[i] is None else costs[i], i != own))
+        head = replace(self.head, range=at - own + best)
+        playing = playing_at(self.database, head, frames[best], self.playing.time_s)
+        return replace(self, playing=playing, head=head, move=replace(self.move, frame=frames[best]))
+
 
 def playing_at(database: str, head: Playhead, frame: int, time_s: float) -> Playing:
     """What plays at a moment of a range."""
     at = head.range
-    return Playing(database, head.database.assets[at], at, frame, time_s, bool(head.database.mirrored[at]))
+    mirrored, permutation_s = bool(head.database.mirrored[at]), head.database.permutation_s(at)
+    return Playing(database, head.database.assets[at], at, frame, time_s, mirrored, permutation_s)
 
 
 def _range_of(playing: Playing, database: MotionDatabase) -> int | None:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from contextdb.cells.arguments import require_real, require_whole
 from contextdb.files.toml_text import what
 from contextdb.motion.features.channels import MOST_SECONDS
 from contextdb.motion.reading import Section, as_number
@@ -30,11 +31,21 @@ class Permutations:
         Seconds between one permutation and the next.
     from_s : float
         Seconds that the first looks ahead.
+
+    Raises
+    ------
+    ContextError
+        A number out of range: 1 to 100 permutations, seconds from 0 to 60.
     """
 
     count: int
     step_s: float = 0.0
     from_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_real(require_whole(self.count, "count"), "count", 1, MOST_PERMUTATIONS)
+        for name in ("step_s", "from_s"):
+            require_real(getattr(self, name), name, 0.0, MOST_SECONDS)
 
     @cached_property
     def seconds(self) -> tuple[float, ...]:
@@ -52,9 +63,8 @@ def read_permutations(parent: Section) -> Permutations | None:
     section = Section(f"{parent.where} permutations", value, ("count", "step_s", "from_s"), parent.faults, parent.file)
     count = _read_count(section)
     accepted = f"seconds, above 0 and at most {MOST_SECONDS:g}, such as 0.1"
-    needs_step = count is None or count > 1
     step_s = 0.0
-    if "step_s" in value or (needs_step and section.has("step_s", accepted)):
+    if "step_s" in value or (count is not None and count > 1 and section.has("step_s", accepted)):
         step_s = section.number("step_s", accepted, 1e-3, MOST_SECONDS) or 0.0
     from_s = 0.0
     if "from_s" in value:

@@ -300,8 +300,10 @@ class Trace(Sequence[Decision]):
             decision = decision_of(row)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError, ContextDBError) as error:
             raise _refused(f"row {place} holds no decision ({type(error).__name__}).", self._file) from error
-        now, before = self._permuted(decision.playing), self._permuted(decision.before)
-        return self._with_candidates(replace(decision, playing=now, before=before))
+        if any(PERMUTATION_S in about for about in self.about.values()):
+            now, before = self._permuted(decision.playing), self._permuted(decision.before)
+            decision = replace(decision, playing=now, before=before)
+        return self._with_candidates(decision)
 
     def _permuted(self, playing: Playing | None) -> Playing | None:
         """What plays, with how far ahead its permutation looks: not in its row, but known of its database."""

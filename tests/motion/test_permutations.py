@@ -20,19 +20,30 @@ from contextdb.motion import (
     ControllerSettings,
     Entry,
     FeatureSchema,
+    JointDatabase,
+    LivePose,
+    MotionConfig,
     MotionDatabase,
     Permutations,
     PoseBank,
+    PoseHistory,
     Selector,
     Trace,
+    build_all,
     clip_features,
     clip_permutations,
+    local_poses,
     make_clip,
+    make_joint_clip,
     measure,
     open_database,
     parse_bvh,
+    poses_of,
     query_from,
+    query_from_pose,
+    resampled,
     save_database,
+    write_bvh,
 )
 from contextdb.motion.features.schema_dict import schema_to_dict
 from contextdb.motion.measuring.coverage import coverage
@@ -163,6 +174,38 @@ def test_features_that_are_not_all_permutations_of_their_clips_are_refused():
         MotionDatabase.from_parts(clip_permutations(CLIP, SCHEMA)[:2], SCHEMA)
 
 
+def test_the_cache_keeps_every_permutation_of_a_clip(tmp_path):
+    write_bvh(CLIP, tmp_path / "catch.bvh")
+    config = MotionConfig.from_dict({"features": {"catch": KEYS}, "databases": {"db": {"clips": "*.bvh", "features": "catch"}}})
+    first, again = (build_all(config, tmp_path)["db"] for _ in range(2))
+    assert (first.computed, again.cached) == (("catch",), ("catch",))
+    assert np.array_equal(first.database.features, again.database.features)
+    assert first.digest == again.digest
+    fewer = KEYS | {"permutations": {"count": 2, "step_s": 0.2, "from_s": 0.2}}
+    other = MotionConfig.from_dict({"features": {"catch": fewer}, "databases": {"db": {"clips": "*.bvh", "features": "catch"}}})
+    assert build_all(other, tmp_path)["db"].computed == ("catch",)
+
+
+def test_a_joint_clip_has_a_joint_range_for_each_permutation():
+    channels = [{"type": "position", "bone": "RightHand", "permuted": True}]
+    schema = FeatureSchema.from_dict("two", {"rate": 30, "permutations": {"count": 2, "step_s": 0.1}, "channels": channels})
+    joint = JointDatabase.of(MotionDatabase.build(make_joint_clip("greet_walk").values(), schema), ("Host", "Guest"))
+    assert joint.assets == ("greet_walk", "greet_walk")
+    assert [[joint.database.permutation_s(i) for i in roles] for roles in joint.ranges.tolist()] == [[0.0, 0.0], [0.1, 0.1]]
+
+
+def test_a_query_from_the_pose_that_is_shown_takes_the_pose_for_what_comes():
+    clip = make_clip("walk").clip
+    bones = (("position", "RightHand", None), ("velocity", "Head", None), ("direction", "LeftFoot", "Hips"))
+    channels = [Channel(kind, bone=bone, relative_to=other, permuted=True) for kind, bone, other in bones]
+    schema = FeatureSchema("live", 30.0, (*channels, Channel("permutation_time")), permutations=Permutations(2, 0.3, 0.2))
+    poses, local, history = poses_of(clip, 30.0), local_poses(clip), PoseHistory(clip.skeleton, 30.0)
+    shown = [LivePose(poses.positions[f], resampled(local, 30.0).rotations[f]) for f in range(poses.n_frames)]
+    for pose in shown[:-1]:
+        history.add(pose)
+    assert query_from_pose(schema, shown[-1], history) == pytest.approx(query_from(schema, clip, len(shown) - 1), abs=1e-4)
+
+
 # ---- playing
 
 
@@ -179,6 +222,27 @@ def test_a_clip_plays_on_while_its_permutations_count_down():
         assert (found.action, found.playing.asset) == (Action.CONTINUE, "catch")
         assert (found.playing.time_s, found.playing.permutation_s) == pytest.approx((frame / 30.0, in_s))
         assert found.cost == pytest.approx(0.0, abs=1e-6)
+
+
+def test_playing_on_costs_what_the_cheapest_permutation_of_the_playing_frame_costs():
+    playing, rng = controller(jump_threshold_s=3.0), np.random.default_rng(1)
+    playing.update(0.0, ball_query(20, 40, 0.6))
+    for _ in range(8):
+        query = ball_query(30, int(rng.integers(10, 50)), float(rng.uniform(0.0, 0.8)))
+        found = playing.update(0.2, query)
+        same = [3 * (found.before.range // 3) * N_FRAMES + k * N_FRAMES + found.before.frame % N_FRAMES for k in range(3)]
+        costs = [sum(DATABASE.channel_costs(frame, query).values()) for frame in same]
+        assert found.continuing_cost == pytest.approx(min(costs))
+        assert found.before.frame == same[int(np.argmin(costs))]
+
+
+def test_what_plays_goes_on_in_a_database_that_was_built_with_other_permutations():
+    playing = controller()
+    playing.update(0.0, ball_query(22, 40, 0.6))
+    fewer = replace(SCHEMA, permutations=Permutations(1, 0.0, 0.4))
+    playing.selector = Selector([Entry("db", MotionDatabase.build([CLIP, OTHER], fewer))])
+    found = playing.update(0.2, ball_query(28, 40, 0.4))
+    assert (found.action, found.playing.asset, found.playing.permutation_s) == (Action.CONTINUE, "catch", 0.4)
 
 
 def test_frames_just_played_are_left_out_in_every_permutation():

@@ -50,7 +50,7 @@ class Permutations:
     @cached_property
     def seconds(self) -> tuple[float, ...]:
         """How far ahead each permutation looks."""
-        return tuple(self.from_s + i * self.step_s for i in range(self.count))
+        return tuple(round(self.from_s + i * self.step_s, 9) for i in range(self.count))
 
 
 def read_permutations(parent: Section) -> Permutations | None:

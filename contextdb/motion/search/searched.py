@@ -47,7 +47,10 @@ class Searched:
 
     def in_permutations(self, range_number: int, start: int, stop: int) -> list[tuple[int, int]]:
         """Frames [start, stop) of a range as each permutation of its clip has them."""
-        n, length = self.n_permutations, int(self.stops[range_number] - self.starts[range_number])
+        n = self.n_permutations
+        if n == 1:
+            return [(start, stop)]
+        length = int(self.stops[range_number] - self.starts[range_number])
         steps = [(i - range_number % n) * length for i in range(n)]
         return [(start + step, stop + step) for step in steps]
 

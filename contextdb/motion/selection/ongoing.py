@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.search import cost
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Filter
-from contextdb.motion.selection.continuing import continuing_cost
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.playhead import Move, Playhead
 from contextdb.motion.selection.selector import Selector
@@ -49,14 +48,20 @@ class Ongoing:
         `chosen` is a filter of its database; one that lets the asset not play is asked for its costs alone.
         """
         database, at = self.head.database, self.head.range
-        among = chosen if chosen.ranges[at] else chosen._replace(ranges=np.ones_like(chosen.ranges))
-        frames = [start for start, _ in database.in_permutations(at, self.move.frame, self.move.frame + 1)]
-        costs = [continuing_cost(database, query, among._replace(current=frame)) for frame in frames]
-        own = at % len(frames)
-        best = min(range(len(frames)), key=lambda i: (math.inf if costs[i] is None else costs[i], i != own))
-        head = replace(self.head, range=at - own + best)
-        playing = playing_at(self.database, head, frames[best], self.playing.time_s)
-        return replace(self, playing=playing, head=head, move=replace(self.move, frame=frames[best]))
+        frames = np.array([start for start, _ in database.in_permutations(at, self.move.frame, self.move.frame + 1)])
+        ranges = at - at % len(frames) + np.arange(len(frames))
+        costs = cost.costs(database.layout, frames, database.normalised(query), database.slices, database.cost_weights)
+        costs += chosen.range_biases[ranges]
+        if len(chosen.frame_biases):
+            costs += chosen.frame_biases[frames]
+        if len(chosen.frames):
+            costs[~chosen.frames[frames]] = np.inf
+        if chosen.ranges[at]:
+            costs[~chosen.ranges[ranges]] = np.inf
+        best = int(np.lexsort((ranges != at, costs))[0])
+        head = replace(self.head, range=int(ranges[best]))
+        playing = playing_at(self.database, head, int(frames[best]), self.playing.time_s)
+        return replace(self, playing=playing, head=head, move=replace(self.move, frame=int(frames[best])))
 
 
 def playing_at(database: str, head: Playhead, frame: int, time_s: float) -> Playing:

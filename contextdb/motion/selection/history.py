@@ -13,7 +13,7 @@ Source: NextNaturalOnly of EA's talk; PoseJumpThresholdTime and PoseReselectHist
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from contextdb.motion.markup.left_out import LeftOut, Skip
@@ -24,7 +24,7 @@ from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """Frames [start, stop) of a database, and the moment at which they were played."""
+    """Frames [start, stop) of a database, and the moment at which they were played; of permutations those of the first."""
 
     database: str
     start: int
@@ -33,8 +33,24 @@ class Played:
 
 
 def played_spans(database: MotionDatabase, at: int, spans: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Spans of frames of a range in every permutation of its clip."""
-    return [each for start, stop in spans for each in database.in_permutations(at, start, stop)]
+    """Spans of frames of a range, as the first permutation of its clip has them: so they are remembered once."""
+    return [database.in_permutations(at, start, stop)[0] for start, stop in spans]
+
+
+def in_every_permutation(database: MotionDatabase, skips: Sequence[Skip], at: int = -1) -> Sequence[Skip]:
+    """What is left out of a range, in every permutation of its clip; `at` is the range, -1 for that which holds each.
+
+    Frames that are in no range any more, as those played before the database was exchanged, are left away.
+    """
+    if database.n_permutations == 1:
+        return skips
+    ranges = [database.range_of(skip.start) if at < 0 else at for skip in skips]
+    return [
+        Skip(*span, skip.why)
+        for i, skip in zip(ranges, skips, strict=True)
+        if i >= 0
+        for span in database.in_permutations(i, skip.start, skip.stop)
+    ]
 
 
 def remembered(

@@ -19,7 +19,15 @@ from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Playing
 from contextdb.motion.selection.guards import Held
-from contextdb.motion.selection.history import Played, ended_skip, history_skips, played_spans, playing_skips, remembered
+from contextdb.motion.selection.history import (
+    Played,
+    ended_skip,
+    history_skips,
+    in_every_permutation,
+    played_spans,
+    playing_skips,
+    remembered,
+)
 from contextdb.motion.selection.ongoing import Ongoing, playing_at
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 from contextdb.motion.selection.selector import Selector
@@ -142,7 +150,8 @@ class Step:
 
     def wanted(self, cause: Trigger) -> Asked:
         """What the selector is asked: beside what the caller asks, what may play on, and what is left out."""
-        skip = {name: skips for name, skips in history_skips(self.history).items() if name in self.selector.databases}
+        known, played = self.selector.databases, history_skips(self.history)
+        skip = {name: in_every_permutation(known[name], skips) for name, skips in played.items() if name in known}
         if self.ongoing is None:
             return replace(self.asked, skip=skip)
         name, frame = self.ongoing.database, self.ongoing.move.frame
@@ -169,9 +178,7 @@ class Step:
             skips = [ended_skip(head, frame, max(self.settings.jump_threshold_s, self.settings.search_every_s))]
         else:
             skips = list(playing_skips(head, frame, self.settings.jump_threshold_s))
-        return [
-            Skip(*span, each.why) for each in skips for span in head.database.in_permutations(head.range, each.start, each.stop)
-        ]
+        return in_every_permutation(head.database, skips, head.range)
 
     # ---- what comes of it
 

@@ -29,10 +29,11 @@ from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.steering import Steered, steered_path
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, steady_path
 from contextdb.motion.features.channels import Channel
-from contextdb.motion.features.extraction import ClipFeatures, clip_features, features_of, query_from, with_path
+from contextdb.motion.features.extraction import ClipFeatures, clip_features, clip_permutations, features_of, query_from, with_path
 from contextdb.motion.features.live_query import LivePose, PoseHistory, query_from_pose
 from contextdb.motion.features.many_queries import with_paths
 from contextdb.motion.features.normalisation import Normalisation
+from contextdb.motion.features.permutations import Permutations
 from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.hit import JointHit
@@ -184,6 +185,7 @@ __all__ = [
     "Near",
     "Normalisation",
     "Parting",
+    "Permutations",
     "Playing",
     "Pose",
     "PoseBank",
@@ -237,6 +239,7 @@ __all__ = [
     "build_databases",
     "clip_features",
     "clip_of_poses",
+    "clip_permutations",
     "coverage",
     "describe",
     "descriptions",

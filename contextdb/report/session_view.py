@@ -194,7 +194,8 @@ def _assets(asked: ReaskedDecision, best: Sequence[Ranked]) -> Iterator[AssetCos
         own = slice(int(search.database.starts[each.row.range]), int(search.database.stops[each.row.range]))
         said = "" if each.row.left_out is LeftOut.NO else each.row.left_out.text
         may_play = search.left_out[own] == LeftOut.NO
-        yield AssetCosts(_named(each.row.asset, each.row.mirrored), search.costs[own], may_play, said)
+        permutation = "" if each.row.permutation_s is None else f" +{each.row.permutation_s:g} s"
+        yield AssetCosts(_named(each.row.asset, each.row.mirrored) + permutation, search.costs[own], may_play, said)
 
 
 @dataclass(frozen=True, eq=False)

@@ -141,8 +141,12 @@ def turn_between(first, second):
     return axis * (math.atan2(sine, (np.trace(turn) - 1.0) / 2.0) / sine) if sine > 1e-9 else axis
 
 
-def slow_channel(body, channel, frame):
-    """One channel's features in one frame."""
+def slow_channel(body, channel, frame, ahead_s=0.0):
+    """One channel's features in one frame; of a permuted channel in a permutation so many seconds ahead."""
+    if channel.type == "permutation_time":
+        return [ahead_s]
+    if channel.permuted:
+        return slow_bone(body, channel, frame, min(frame + round(ahead_s * body.rate), body.n_frames - 1))
     if channel.type == "trajectory":
         frames = [frame + seconds * body.rate for seconds in channel.at]
         frames += [body.frame_along(frame, metres) for metres in channel.along]
@@ -150,20 +154,21 @@ def slow_channel(body, channel, frame):
     found = []
     for seconds in channel.at or (0.0,):
         moment = min(max(frame + round(seconds * body.rate), 0), body.n_frames - 1)
-        found += slow_bone(body, channel, moment)
+        found += slow_bone(body, channel, moment, moment)
     return found
 
 
-def slow_bone(body, channel, frame):
+def slow_bone(body, channel, frame, then):
+    """What the bone does then, seen from the body or the other bone in the frame."""
     bone, other = channel.bone, channel.relative_to
     if channel.type == "position":
-        return list(body.own(frame, body.place(frame, bone) - (body.place(frame, other) if other else body.ground(frame))))
+        return list(body.own(frame, body.place(then, bone) - (body.place(frame, other) if other else body.ground(frame))))
     if channel.type == "velocity":
-        velocities = [body.velocity(frame, lambda f, b=b: body.place(f, b)) for b in (bone, other) if b]
+        velocities = [body.velocity(then, lambda f, b=b: body.place(f, b)) for b in (bone, other) if b]
         return list(body.own(frame, velocities[0] - sum(velocities[1:])))
     if channel.type == "angular_velocity":
-        return list(body.own(frame, body.spin(frame, bone) - (body.spin(frame, other) if other else 0.0)))
-    seen = body.turn(frame, other).T @ body.turn(frame, bone) if other else body.own(frame, body.turn(frame, bone))
+        return list(body.own(frame, body.spin(then, bone) - (body.spin(then, other) if other else 0.0)))
+    seen = body.turn(frame, other).T @ body.turn(then, bone) if other else body.own(frame, body.turn(then, bone))
     if channel.type == "orientation":
         return [*seen[:, 0], *seen[:, 1]]
     return list(seen[:, AXES[channel.axis[-1].upper()]] * (-1.0 if channel.axis.startswith("-") else 1.0))

@@ -84,7 +84,7 @@ REFUSED = {
         {**POINTS, "rat": 3},
         '[features.loco] has no key "rat". Accepted: "rate", "channels", "root", "facing", "facing_smooth_s", "root_smooth_s", '
         '"mirror", '
-        '"feet", "heels", "toes". '
+        '"feet", "heels", "toes", "permutations". '
         'Did you mean "rate"?',
     ),
     "no channels": ({"rate": 30.0}, '[features.loco] has no "channels".'),
@@ -102,7 +102,7 @@ REFUSED = {
         one_channel(type="positon", bone="Hips"),
         '[features.loco] channel 1 type = "positon": there is no such type. '
         'Accepted: "position", "velocity", "trajectory", "direction", '
-        '"orientation", "angular_velocity", "phase", "custom". '
+        '"orientation", "angular_velocity", "phase", "custom", "permutation_time". '
         'Did you mean type = "position"?',
     ),
     "a type under another name": (one_channel(type="path", what="speed", at=[1]), 'Did you mean type = "trajectory"?'),

@@ -8,7 +8,22 @@ import numpy as np
 import pytest
 from test_motion_measure_command import here, made
 
-from contextdb.motion import LeftOut, Trace, open_or_build
+from contextdb.motion import (
+    Channel,
+    Controller,
+    Entry,
+    FeatureSchema,
+    LeftOut,
+    MotionDatabase,
+    Permutations,
+    PoseBank,
+    Selector,
+    Trace,
+    make_clip,
+    open_or_build,
+    poses_path,
+    save_poses,
+)
 from contextdb.motion.storage.config import MotionConfig
 from contextdb.motion.trace.stats import gains_of
 from contextdb.tables.project import Project
@@ -203,3 +218,19 @@ def test_the_order_is_by_best_by_name_or_by_use(here: Path):
 )
 def test_a_gain_is_a_share_also_where_playing_on_costs_about_nothing(continuing: float, cost: float, gain: float):
     assert gains_of(np.array([continuing]), np.array([cost])).tolist() == pytest.approx([gain])
+
+
+# ---- permutations of clips
+
+
+def test_poses_are_those_of_a_database_with_permutations_and_each_has_a_bar(tmp_path: Path):
+    walk = make_clip("walk").clip
+    channels = (Channel("position", bone="LeftFoot", permuted=True),)
+    database = MotionDatabase.build([walk], FeatureSchema("steps", 30.0, channels, permutations=Permutations(2, 0.4, 0.2)))
+    save_poses(PoseBank.build([walk], database.schema), poses_path(tmp_path, "loco"))
+    trace = Trace()
+    Controller(Selector([Entry("loco", database)]), recorder=trace).update(0.0, database.raw(5))
+    recording = Recording("session.parquet", trace, str(tmp_path), {"loco": database}, "")
+    assert list(recording.saved_banks()) == ["loco"]
+    rows = Landscape(trace.reasked()[0].searches).rows
+    assert [row.name for row in rows] == ["walk +0.2 s", "walk +0.6 s"]

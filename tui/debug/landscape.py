@@ -36,11 +36,13 @@ class Row:
     """Why its best frame may not be chosen."""
     is_searched: bool
     """Whether its database was searched, and none before it won outright."""
+    permutation_s: float | None = None
+    """How many seconds ahead its permutation looks."""
 
     @property
     def name(self) -> str:
         """As it is shown."""
-        return f"{self.asset} ~" if self.mirrored else self.asset
+        return f"{self.asset}{' ~' if self.mirrored else ''}{'' if self.permutation_s is None else f' +{self.permutation_s:g} s'}"
 
     @property
     def may_play(self) -> bool:
@@ -114,6 +116,6 @@ def _rows(name: str, search: ReaskedSearch, is_searched: bool) -> Sequence[Row]:
         costs, why = search.costs[start:stop], search.left_out[start:stop]
         free = np.where(why == LeftOut.NO, costs, np.inf)
         at = int(free.argmin()) if np.isfinite(free).any() else int(costs.argmin())
-        mirrored = bool(database.mirrored[i])
-        found.append(Row(name, i, database.assets[i], mirrored, start + at, float(costs[at]), LeftOut(int(why[at])), is_searched))
+        mirrored, left_out, ahead_s = bool(database.mirrored[i]), LeftOut(int(why[at])), database.permutation_s(i)
+        found.append(Row(name, i, database.assets[i], mirrored, start + at, float(costs[at]), left_out, is_searched, ahead_s))
     return found

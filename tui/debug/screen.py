@@ -799,7 +799,8 @@ class DebugScreen(Screen[None]):
 
 
 def _named(playing: Playing) -> str:
-    return f"{playing.asset} ~" if playing.mirrored else playing.asset
+    permutation = "" if playing.permutation_s is None else f" +{playing.permutation_s:g} s"
+    return f"{playing.asset}{' ~' if playing.mirrored else ''}{permutation}"
 
 
 def _biases(bias: float) -> str:

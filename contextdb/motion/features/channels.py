@@ -10,6 +10,7 @@ The body's own frame has its origin at the body's place on the ground and looks 
     orientation       6           a bone's rotation: where its own x and y axes point
     phase             4           both feet: sine and cosine of how far each is through its step; 0, 0 for a foot without steps
     custom            `size`      what a function of yours makes of the poses and the path
+    permutation_time  1           how many seconds ahead the permuted channels look
     trajectory        2 a point   what = "position" (m: left, ahead), "velocity" (m/s),
                                   "direction" (of the facing, a unit vector),
                                   "direction_to_velocity" (of the facing against the way it moves, as if it moved ahead)
@@ -19,6 +20,10 @@ With `relative_to`, another bone takes the body's place: a position or a velocit
 body's axes; a direction or an orientation is seen from that bone, in its own axes. `at` gives seconds after the frame, `along`
 metres further on the path; negative ones before and behind. A pose channel `at` other moments is what it is at the nearest frame,
 in the body's frame of that moment, and stays what it was beyond the clip's ends.
+
+A bone's channel that is `permuted` looks ahead by the seconds of the permutation, see `contextdb.motion.features.permutations`: it
+holds the bone as it is then, seen from the body, or from the bone that it is relative to, as that is now. A velocity is the
+difference of both bones then. Beyond the clip's end it stays what it was, too.
 
 An orientation has six numbers because a rotation cannot be four or fewer without a jump: a quaternion and its negative are one
 rotation, and angles leap from 180 to -180. Two axes are continuous, so frames that look alike are near each other.
@@ -37,23 +42,26 @@ from contextdb.errors import in_quotes, shown
 from contextdb.files.toml_text import as_toml, what
 from contextdb.motion.reading import Section, as_number
 
-ChannelType = Literal["position", "velocity", "trajectory", "direction", "orientation", "angular_velocity", "phase", "custom"]
+ChannelType = Literal[
+    "position", "velocity", "trajectory", "direction", "orientation", "angular_velocity", "phase", "custom", "permutation_time"
+]
 What = Literal["position", "direction", "velocity", "speed", "direction_to_velocity"]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 TYPES: tuple[ChannelType, ...] = get_args(ChannelType)
 WHATS: tuple[What, ...] = get_args(What)
 AXES: tuple[Axis, ...] = get_args(Axis)
-BONE_KEYS = ("type", "bone", "relative_to", "at", "weight", "group")
+BONE_KEYS = ("type", "bone", "relative_to", "at", "permuted", "weight", "group")
 KEYS: dict[str, tuple[str, ...]] = {
     "position": BONE_KEYS,
     "velocity": BONE_KEYS,
     "angular_velocity": BONE_KEYS,
-    "direction": ("type", "bone", "axis", "relative_to", "at", "weight", "group"),
+    "direction": ("type", "bone", "axis", "relative_to", "at", "permuted", "weight", "group"),
     "orientation": BONE_KEYS,
     "phase": ("type", "feet", "at", "weight", "group"),
     "custom": ("type", "function", "size", "at", "weight", "group"),
     "trajectory": ("type", "what", "at", "along", "weight", "group"),
+    "permutation_time": ("type", "weight", "group"),
 }
 ANY_KEY = tuple(dict.fromkeys(key for keys in KEYS.values() for key in keys))
 TYPE_SYNONYMS = {
@@ -95,7 +103,8 @@ class Channel:
     Attributes
     ----------
     type : str
-        "position", "velocity", "angular_velocity", "direction", "orientation", "phase", "custom" or "trajectory".
+        "position", "velocity", "angular_velocity", "direction", "orientation", "phase", "custom", "trajectory" or
+        "permutation_time".
     weight : float
         Multiplies the squared differences of this channel's normalised features.
     bone : str, optional
@@ -118,6 +127,8 @@ class Channel:
         The name of a custom channel's function; see `FeatureSchema.with_functions`.
     size : int
         How many features a custom channel has.
+    permuted : bool
+        Whether it looks ahead by the seconds of each permutation of a clip.
     """
 
     type: ChannelType
@@ -132,6 +143,12 @@ class Channel:
     feet: tuple[str, str] | None = None
     function: str | None = None
     size: int = 1
+    permuted: bool = False
+
+    @property
+    def varies(self) -> bool:
+        """Whether it differs between the permutations of a clip."""
+        return self.permuted or self.type == "permutation_time"
 
     @property
     def name(self) -> str:
@@ -165,10 +182,12 @@ class Channel:
                 return f"custom {self.function}"
             case "phase":
                 return "phase" if self.feet is None else f"phase {' '.join(self.feet)}"
+            case "permutation_time":
+                return "permutation time"
             case _:
                 axis = f" {self.axis or DEFAULT_AXIS}" if self.type == "direction" else ""
                 seen_from = f" relative to {self.relative_to}" if self.relative_to else ""
-                return f"{self.bone} {self.type.replace('_', ' ')}{axis}{seen_from}"
+                return f"{self.bone} {self.type.replace('_', ' ')}{axis}{seen_from}{' permuted' if self.permuted else ''}"
 
     @property
     def _axes(self) -> tuple[str, ...]:
@@ -180,6 +199,8 @@ class Channel:
                 return ("",) if self.size == 1 else tuple(str(i + 1) for i in range(self.size))
             case "phase":
                 return PHASE_AXES
+            case "permutation_time":
+                return ("",)
         seen = ("x", "y", "z") if self.relative_to and self.type in ("direction", "orientation") else BODY_AXES
         return tuple(f"{own} axis {axis}" for own in "xy" for axis in seen) if self.type == "orientation" else seen
 
@@ -231,9 +252,26 @@ def _bone_channel(part: Section, kind: ChannelType, weight: float, group: str | 
         part.wrong("relative_to", "this is the bone itself", 'another bone, such as "Hips"')
     axis = part.one_of("axis", AXES, "axis") if "axis" in part.part else DEFAULT_AXIS
     at = _read_seconds(part)
+    permuted = _read_permuted(part)
     if bone is None or at is None:
         return None
-    return Channel(kind, weight, bone, None, at, (), group, cast(Axis, axis) if kind == "direction" else None, relative_to=other)
+    own = cast(Axis, axis) if kind == "direction" else None
+    return Channel(kind, weight, bone, None, at, (), group, own, relative_to=other, permuted=permuted)
+
+
+def _read_permuted(part: Section) -> bool:
+    value = part.part.get("permuted", False)
+    if not isinstance(value, bool):
+        part.wrong("permuted", f"this is {what(value)}, neither true nor false", "true or false")
+    elif value and "at" in part.part:
+        part.add(
+            f'{part.where} has both "at" and "permuted".', "one of them: a permuted channel looks ahead as its permutation does"
+        )
+    return value is True
+
+
+def _permutation_time(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
+    return Channel(kind, weight, group=group)
 
 
 def _phase_channel(part: Section, kind: ChannelType, weight: float, group: str | None) -> Channel | None:
@@ -288,6 +326,7 @@ READERS: dict[str | None, Reader] = {
     "phase": _phase_channel,
     "custom": _custom_channel,
     "trajectory": _trajectory_channel,
+    "permutation_time": _permutation_time,
 }
 
 

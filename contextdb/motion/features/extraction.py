@@ -59,6 +59,16 @@ def clip_features(
 ) -> ClipFeatures:
     """The features of every frame of a clip, resampled to the schema's rate, and the body's path.
 
+    Of a schema with permutations they are those of the first; the parameters and what it raises are those of `clip_permutations`.
+    """
+    return clip_permutations(clip, schema, mirrored=mirrored, looping=looping, contacts=contacts)[0]
+
+
+def clip_permutations(
+    clip: Clip, schema: FeatureSchema, *, mirrored: bool = False, looping: bool = False, contacts: ContactMarks = NO_MARKS
+) -> list[ClipFeatures]:
+    """The features of every frame of a clip in each permutation of the schema, one where it has none, in order.
+
     Parameters
     ----------
     clip : Clip
@@ -84,7 +94,8 @@ def clip_features(
     if faults:
         raise MotionError(*(fault.at(Place(clip.name)) for fault in faults))
     if clip.n_frames == 0:
-        return ClipFeatures(clip.name, mirrored, np.zeros((0, schema.n_features), np.float32), np.zeros((0, 3), np.float32))
+        none = ClipFeatures(clip.name, mirrored, np.zeros((0, schema.n_features), np.float32), np.zeros((0, 3), np.float32))
+        return [none] * len(schema.permutation_s)
     with np.errstate(all="ignore"):  # numbers too large become infinite or NaN, and are refused below
         poses = poses_of(clip, schema.rate)
     _check_size(poses, clip)
@@ -97,9 +108,19 @@ def clip_features(
         marks = rounds_of(marks, 3, (poses.n_frames - 1) / poses.rate)
         poses, own = three_rounds(poses, path)
         path = schema.path_of(poses)
-    blocks = [_channel_features(channel, poses, path, schema, clip.name, marks)[own] for channel in schema.channels]
-    features = np.concatenate(blocks, axis=1).astype(np.float32)
-    return ClipFeatures(clip.name, mirrored, features, root)
+    blocks = {
+        channel.name: _channel_features(channel, poses, path, schema, clip.name, marks)[own]
+        for channel in schema.channels
+        if not channel.varies
+    }
+    found = []
+    for ahead_s in schema.permutation_s:
+        for channel in schema.channels:
+            if channel.varies:
+                blocks[channel.name] = _channel_features(channel, poses, path, schema, clip.name, marks, ahead_s)[own]
+        features = np.concatenate([blocks[channel.name] for channel in schema.channels], axis=1).astype(np.float32)
+        found.append(ClipFeatures(clip.name, mirrored, features, root))
+    return found
 
 
 def features_of(clip: Clip, schema: FeatureSchema) -> Features:
@@ -108,7 +129,13 @@ def features_of(clip: Clip, schema: FeatureSchema) -> Features:
 
 
 def query_from(
-    schema: FeatureSchema, clip: Clip, frame: int = 0, wanted: Trajectory | None = None, *, mirrored: bool = False
+    schema: FeatureSchema,
+    clip: Clip,
+    frame: int = 0,
+    wanted: Trajectory | None = None,
+    *,
+    mirrored: bool = False,
+    permutation: int = 0,
 ) -> Features:
     """A query: the pose of a clip's frame, with the trajectory of the clip or a wished one.
 
@@ -123,6 +150,8 @@ def query_from(
         Where the body shall go, such as `steady_path(1.4)`; its frame `now` is this moment.
     mirrored : bool
         Take the clip in a mirror; a wished path stays as it is wished.
+    permutation : int
+        Which permutation of the clip: by how many seconds the permuted channels look ahead.
 
     Returns
     -------
@@ -132,13 +161,16 @@ def query_from(
     Raises
     ------
     QueryError
-        The clip has no such frame.
+        The clip has no such frame, or the schema no such permutation.
     MotionError
         As `clip_features`.
     ContextError
-        `frame` is no whole number, or `wanted` no path.
+        `frame` or `permutation` is no whole number, or `wanted` no path.
     """
-    features = clip_features(clip, schema, mirrored=mirrored).features
+    parts = clip_permutations(clip, schema, mirrored=mirrored)
+    if not 0 <= require_whole(permutation, "permutation") < len(parts):
+        raise QueryError(Fault(f"there is no permutation {permutation} in [features.{schema.name}].", f"0 to {len(parts) - 1}"))
+    features = parts[permutation].features
     if not 0 <= require_whole(frame, "frame") < len(features):
         found = f"there is no frame {frame} in {clip.name}."
         raise QueryError(
@@ -164,9 +196,12 @@ def with_path(schema: FeatureSchema, query: Features | Floats, wanted: Trajector
 
 
 def _channel_features(
-    channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: str, marks: ContactMarks
+    channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema, clip: str, marks: ContactMarks, ahead_s: float = 0.0
 ) -> Floats:
+    """A channel's features of every frame; what varies with permutations looks some seconds ahead."""
     match channel.type:
+        case "permutation_time":
+            return np.full((poses.n_frames, 1), ahead_s)
         case "trajectory":
             return trajectory_features(channel, path, np.arange(poses.n_frames))
         case "phase":
@@ -174,13 +209,13 @@ def _channel_features(
         case "custom":
             found = _custom_features(channel, poses, path, schema.functions, clip)
         case _:
-            found = _bone_features(channel, poses, path)
+            found = _bone_features(channel, poses, path, ahead_s * poses.rate)
     return found if not channel.at else np.concatenate([_moved(found, seconds * poses.rate) for seconds in channel.at], axis=1)
 
 
 def block_of(channel: Channel, poses: Poses, path: Trajectory, schema: FeatureSchema) -> Floats:
     """A channel's features of every frame of some poses and their path: [F, features of the channel]."""
-    return _channel_features(channel, poses, path, schema, schema.name, NO_MARKS)
+    return _channel_features(channel, poses, path, schema, schema.name, NO_MARKS, schema.permutation_s[0])
 
 
 def require_features(skeleton: Skeleton, schema: FeatureSchema) -> None:
@@ -199,24 +234,27 @@ def _moved(values: Floats, frames: float) -> Floats:
 # ---- a bone
 
 
-def _bone_features(channel: Channel, poses: Poses, path: Trajectory) -> Floats:
+def _bone_features(channel: Channel, poses: Poses, path: Trajectory, ahead: float) -> Floats:
+    """A bone's features; of a permuted channel as the bone is some frames ahead, seen from the body now."""
+    ahead = ahead if channel.permuted else 0.0
     assert channel.bone is not None, "a channel of a bone names it"
     bone = poses.skeleton.index(channel.bone)
     other = None if channel.relative_to is None else poses.skeleton.index(channel.relative_to)
     match channel.type:
         case "position":
-            vectors = poses.positions[:, bone] - (_origins(path) if other is None else poses.positions[:, other])
+            vectors = _moved(poses.positions[:, bone], ahead) - (_origins(path) if other is None else poses.positions[:, other])
         case "velocity":
             places = poses.positions[:, bone] - (0.0 if other is None else poses.positions[:, other])
-            vectors = rates_of_change(places, poses.rate)
+            vectors = _moved(rates_of_change(places, poses.rate), ahead)
         case "angular_velocity":
             vectors = angular_velocities(poses.rotations[:, bone], poses.rate)
             if other is not None:
                 vectors = vectors - angular_velocities(poses.rotations[:, other], poses.rate)
+            vectors = _moved(vectors, ahead)
         case "direction":
-            return quaternions.rotate(_seen_rotations(poses, path, bone, other), _axis(channel.axis or DEFAULT_AXIS))
+            return quaternions.rotate(_seen_rotations(poses, path, bone, other, ahead), _axis(channel.axis or DEFAULT_AXIS))
         case _:
-            turned = _seen_rotations(poses, path, bone, other)
+            turned = _seen_rotations(poses, path, bone, other, ahead)
             return np.concatenate([quaternions.rotate(turned, _axis(axis)) for axis in "xy"], axis=-1)
     return _in_body(vectors, path.headings)
 
@@ -231,10 +269,10 @@ def _axis(name: str) -> Floats:
     return np.asarray((-1.0 if name[0] == "-" else 1.0) * np.eye(3)[quaternions.AXES.index(name[-1])])
 
 
-def _seen_rotations(poses: Poses, path: Trajectory, bone: int, other: int | None) -> Floats:
-    """A bone's rotations as the body sees them, or another bone: [F, 4]."""
+def _seen_rotations(poses: Poses, path: Trajectory, bone: int, other: int | None, ahead: float) -> Floats:
+    """A bone's rotations some frames ahead as the body sees them now, or another bone: [F, 4]."""
     seen_from = quaternions.about_axis("y", path.headings) if other is None else poses.rotations[:, other]
-    return quaternions.multiply(quaternions.inverse(seen_from), poses.rotations[:, bone])
+    return quaternions.multiply(quaternions.inverse(seen_from), _moved(poses.rotations[:, bone], ahead))
 
 
 def angular_velocities(rotations: Floats, rate: float) -> Floats:

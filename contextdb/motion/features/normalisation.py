@@ -36,6 +36,7 @@ FLOORS: dict[str, tuple[float, str]] = {
     "direction": (0.02, "of a unit vector"),
     "orientation": (0.02, "of a unit vector"),
     "phase": (0.2, "of a sine"),
+    "permutation_time": (0.1, "s"),
     "trajectory position": (0.1, "m"),
     "trajectory velocity": (0.2, "m/s"),
     "trajectory speed": (0.2, "m/s"),

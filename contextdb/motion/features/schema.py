@@ -23,6 +23,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory
 from contextdb.motion.features.channels import Channel, What, check_together, is_pair, read_channel, read_pair
+from contextdb.motion.features.permutations import ACCEPTED, Permutations, read_permutations
 from contextdb.motion.reading import Mapped, Section
 
 __all__ = ["Channel", "CustomFunction", "FeatureSchema"]
@@ -32,7 +33,9 @@ CustomFunction = Callable[[Poses, Trajectory], Floats]
 
 PathChannels = tuple[tuple[float, ...], tuple[float, ...], tuple[tuple[What | None, slice], ...]]
 
-SCHEMA_KEYS = ("rate", "channels", "root", "facing", "facing_smooth_s", "root_smooth_s", "mirror", "feet", "heels", "toes")
+SCHEMA_KEYS = (
+    "rate", "channels", "root", "facing", "facing_smooth_s", "root_smooth_s", "mirror", "feet", "heels", "toes", "permutations",
+)  # fmt: skip
 MOST_RATE = 1000.0
 ABOUT_S = 0.5
 """How fast a path goes is the mean of about so many seconds."""
@@ -67,6 +70,8 @@ class FeatureSchema:
         Pairs of bones that change places when a clip is mirrored; a `*` on both sides matches the same rest of the name.
     feet, heels, toes : (left bone, right bone), optional
         What touches the ground. Default: feet by their names, the toes below them, and heels worked out from both.
+    permutations : Permutations, optional
+        How often each clip is searched, and how far ahead its permuted channels look each time. Default: once, and none does.
     functions : mapping of name to function
         What custom channels are computed by. Not compared, and not part of contextdb.toml: see `with_functions`.
     """
@@ -82,6 +87,7 @@ class FeatureSchema:
     feet: Pair | None = None
     heels: Pair | None = None
     toes: Pair | None = None
+    permutations: Permutations | None = None
     functions: Mapping[str, CustomFunction] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
@@ -134,6 +140,11 @@ class FeatureSchema:
             tuple(second for channel in channels for second in channel.at),
             tuple(metre for channel in channels for metre in channel.along),
         )
+
+    @property
+    def permutation_s(self) -> tuple[float, ...]:
+        """How many seconds ahead the permuted channels look in each permutation of a clip."""
+        return (0.0,) if self.permutations is None else self.permutations.seconds
 
     @property
     def weights(self) -> Floats:
@@ -217,9 +228,22 @@ def _read_schema(
     facing_s, root_s = (_read_smooth(section, key) if key in mapping else 0.0 for key in ("facing_smooth_s", "root_smooth_s"))
     mirror = _read_mirror(section) if "mirror" in mapping else ()
     feet, heels, toes = (read_pair(section, key, A_FOOT) if key in mapping else None for key in ("feet", "heels", "toes"))
+    permutations = read_permutations(section) if "permutations" in mapping else None
     if faults or rate is None or facing_s is None or root_s is None:
         return None
-    return cls(name, rate, tuple(channels), root, facing, facing_s, root_s, mirror, feet, heels, toes)
+    _check_permuted(section, channels, permutations)
+    return cls(name, rate, tuple(channels), root, facing, facing_s, root_s, mirror, feet, heels, toes, permutations)
+
+
+def _check_permuted(section: Section, channels: list[Channel], permutations: Permutations | None) -> None:
+    """Leave a fault where channels look ahead by permutations that there are not, or permutations are all alike."""
+    varying = [channel.name for channel in channels if channel.varies]
+    if varying and permutations is None:
+        section.add(f"{section.where} has the channel {in_quotes(varying[0])}, but no permutations.", f"permutations = {ACCEPTED}")
+    if permutations is not None and not varying:
+        section.add(
+            f"{section.where} has permutations, but no channel looks ahead by them.", "permuted = true in a channel of a bone"
+        )
 
 
 def _read_rate(section: Section) -> float | None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import asdict, fields
 
 from contextdb.motion.features.channels import KEYS, Channel
+from contextdb.motion.features.permutations import Permutations
 from contextdb.motion.features.schema import SCHEMA_KEYS, FeatureSchema
 
 WEIGHING = ("weight", "group")
@@ -38,4 +39,6 @@ def _given(part: FeatureSchema | Channel) -> Iterator[tuple[str, object]]:
 
 
 def _plain(value: object) -> object:
+    if isinstance(value, Permutations):
+        return asdict(value)
     return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value

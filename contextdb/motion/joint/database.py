@@ -99,19 +99,19 @@ class JointDatabase:
             faults.append(Fault("the root motion of a frame is not finite.", "finite numbers"))
         if faults:
             raise MotionError(*faults)
-        found: dict[tuple[str, bool], dict[str, int]] = {}
+        found: dict[tuple[str, bool, int], dict[str, int]] = {}
         for i, (name, mirrored) in enumerate(zip(database.assets, database.mirrored.tolist(), strict=True)):
             asset, role = divided(name, names)
-            found.setdefault((asset, mirrored), {})[role] = i
-        if one_sided := [asset for (asset, _), each in found.items() if len(each) < len(names)]:
+            found.setdefault((asset, mirrored, i % database.n_permutations), {})[role] = i
+        if one_sided := [asset for (asset, _, _), each in found.items() if len(each) < len(names)]:
             told = f"the joint asset {in_quotes(one_sided[0])} is mirrored for some of its roles alone."
             raise MotionError(Fault(told, "all clips of an asset mirrored, or none", rule="roles"))
         ranges = np.array([[each[role] for role in names] for each in found.values()], np.int64).reshape(-1, len(names))
         return cls(
             database,
             names,
-            tuple(asset for asset, _ in found),
-            np.array([mirrored for _, mirrored in found], np.bool_),
+            tuple(asset for asset, _, _ in found),
+            np.array([mirrored for _, mirrored, _ in found], np.bool_),
             ranges,
             _weight(place_weight, "place_weight"),
             _weight(facing_weight, "facing_weight"),

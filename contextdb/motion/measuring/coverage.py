@@ -356,7 +356,7 @@ def _clips(databases: Mapping[str, MotionDatabase]) -> Iterator[ClipFrames]:
         plays = usable(database)
         for number, asset in enumerate(database.assets):
             start, stop = int(database.starts[number]), int(database.stops[number])
-            if stop == start:
+            if stop == start or number % database.n_permutations:
                 continue
             counts = Moves.of(database.root[start:stop].astype(np.float64), database.schema.rate).counts(plays[start:stop])
             is_mirrored = bool(database.mirrored[number])

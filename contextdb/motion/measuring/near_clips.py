@@ -2,6 +2,7 @@
 
 Of a clip some frames a second are compared with every frame of every other clip, mirrored ones too, at the cost of a search without
 biases. What 95 % of them cost at most, each with the nearest frame of one other clip, says how far the clip lies from that clip.
+Of the permutations of a clip the first is compared.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ Tell = Callable[[int, int, str], None]
 
 def near_clips(database: MotionDatabase, most: float = NEAR_COST, progress: Tell | None = None) -> list[Near]:
     """The clips that lie within a cost of another, the nearest first; of two that lie within each other both are there."""
-    filled = np.flatnonzero(database.stops > database.starts)
+    firsts = np.arange(0, len(database.starts), database.n_permutations)
+    filled = firsts[database.stops[firsts] > database.starts[firsts]]
     if database.schema is None or not len(filled):
         return []
     starts, stops = database.starts[filled], database.stops[filled]

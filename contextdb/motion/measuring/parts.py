@@ -12,7 +12,7 @@ from contextdb.motion.clips.skeleton import Ints
 from contextdb.motion.measuring import formulas
 from contextdb.motion.measuring.raw_clips import Banks, Clips
 from contextdb.motion.measuring.shown import Shown
-from contextdb.motion.measuring.usage import HasRanges, frames_used, usable
+from contextdb.motion.measuring.usage import HasRanges, frames_used, permutations_in, usable
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.search.database import MotionDatabase
 
@@ -207,7 +207,7 @@ def usage(it: Shown, databases: Mapping[str, MotionDatabase] | None, banks: Bank
     known = list(dict.fromkeys(asset for each in of.values() for asset in each.assets))
     played = {at.asset for at in it.playing if at is not None}
     never = tuple(asset for asset in known if asset not in played)
-    n_frames = sum(each.n_frames for each in of.values())
+    n_frames = sum(each.n_frames // permutations_in(each) for each in of.values())
     found: dict[str, object] = {
         "frames_used_share": sum(int(flags.sum()) for flags in used.values()) / n_frames if n_frames else NO_DATABASES,
         "assets_used_share": (len(known) - len(never)) / len(known) if known else NO_DATABASES,
@@ -215,7 +215,8 @@ def usage(it: Shown, databases: Mapping[str, MotionDatabase] | None, banks: Bank
         "frames_unusable_share": NO_DATABASES,
     }
     if databases and n_frames:
-        found["frames_unusable_share"] = sum(int((~usable(each)).sum()) for each in databases.values()) / n_frames
+        unusable = sum(int((~usable(each)).sum()) // each.n_permutations for each in databases.values())
+        found["frames_unusable_share"] = unusable / n_frames
     return found
 
 

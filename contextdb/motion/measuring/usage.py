@@ -38,16 +38,23 @@ class HasRanges(Protocol):
         """How many frames there are."""
 
 
+def permutations_in(of: HasRanges) -> int:
+    """How many ranges each clip has that show the same, one after the other."""
+    return of.n_permutations if isinstance(of, MotionDatabase) else 1
+
+
 def frames_used(
     playing: Sequence[At | None], entered: Flags, of: Mapping[str, HasRanges], rates: Mapping[str, float]
 ) -> dict[str, Flags]:
-    """Which frames of each database are played: at each moment the nearest, and those passed since the moment before.
+    """Which frames of each database are played: at each moment the nearest, and those passed since the moment before; of
+    permutations, which show the same, those of the first.
 
     A database whose name is not known is the first that has the asset.
     """
     used = {name: np.zeros(each.n_frames, np.bool_) for name, each in of.items()}
     numbers = {
-        name: {pair: i for i, pair in enumerate(zip(each.assets, each.mirrored.tolist(), strict=True))} for name, each in of.items()
+        name: {(each.assets[i], bool(each.mirrored[i])): i for i in range(0, len(each.assets), permutations_in(each))}
+        for name, each in of.items()
     }
     last: tuple[str, int, int] | None = None
     for at, is_entered in zip(playing, entered.tolist(), strict=True):

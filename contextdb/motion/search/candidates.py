@@ -43,6 +43,8 @@ class Candidate:
         and "continuing".
     left_out : LeftOut
         Why it may not be chosen; LeftOut.NO if it may.
+    permutation_s : float or None
+        How many seconds ahead its permuted channels look; None for a database without permutations.
     """
 
     asset: str
@@ -54,6 +56,7 @@ class Candidate:
     channels: dict[str, float]
     biases: dict[str, float]
     left_out: LeftOut
+    permutation_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +145,7 @@ def _candidates(
             channels=dict(zip(database.channel_names, by_channel[:, i].tolist(), strict=True)),
             biases=_biases(database, chosen, frame, at),
             left_out=LeftOut(int(why[frame])),
+            permutation_s=database.permutation_s(at),
         )
 
 

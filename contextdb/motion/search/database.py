@@ -34,7 +34,7 @@ from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.feet import NO_MARKS
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.features.extraction import ClipFeatures, clip_features
+from contextdb.motion.features.extraction import ClipFeatures, clip_permutations
 from contextdb.motion.features.normalisation import Normalisation
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.left_out import Skip
@@ -122,7 +122,7 @@ class MotionDatabase(Searched):
         biases: Biases = NO_BIAS,
         end_s: float = 0.0,
     ) -> MotionDatabase:
-        """Compute the features of some clips; each clip is one range, named like it.
+        """Compute the features of some clips; each clip is one range, named like it, or one for each permutation of the schema.
 
         Parameters
         ----------
@@ -158,10 +158,11 @@ class MotionDatabase(Searched):
         biases: Biases = NO_BIAS,
         end_s: float = 0.0,
     ) -> MotionDatabase:
-        """The database of some clips whose features are known, one range each."""
+        """The database of some clips whose features are known, one range each; those of `clip_permutations` follow one another."""
         require_kind(biases, Biases, "biases", "Biases")
         require_kind(markup, (Markup, type(None)), "markup", "a Markup, or None")
         require_number(end_s, "end_s")
+        _check_permutations(parts, schema)
         shared = Normalisation.of([part.features for part in parts], schema) if normalisation is None else normalisation
         lengths = np.array([len(part.features) for part in parts], np.int64)
         stops = np.cumsum(lengths)
@@ -524,7 +525,7 @@ def build_databases(sets: Mapping[str, Iterable[Clip]], schema: FeatureSchema) -
 def parts_of(
     clips: Iterable[Clip], schema: FeatureSchema, mirror: bool | Collection[str] = False, markup: Markup | None = None
 ) -> list[ClipFeatures]:
-    """The features of each clip, and of those to be mirrored once more mirrored; the faults of all clips together.
+    """The features of each clip in all its permutations, and of those to be mirrored once more; the faults of all clips together.
 
     Clips that loop by the markup go on at their ends, and feet that it marks are down just then.
     """
@@ -545,7 +546,8 @@ def parts_of(
             looping = markup is not None and markup.is_looping(clip.name)
             ways = (False, True) if is_mirrored else (False,)
             marks = NO_MARKS if markup is None else markup.contacts_of(clip.name)
-            parts += [clip_features(clip, schema, mirrored=way, looping=looping, contacts=marks) for way in ways]
+            for way in ways:
+                parts += clip_permutations(clip, schema, mirrored=way, looping=looping, contacts=marks)
         except MotionError as error:
             faults.extend(error.faults)
     if faults:
@@ -562,6 +564,16 @@ def _as_features(features: ArrayLike) -> Features:
         raise MotionError(Fault(f"the features have shape {array.shape}.", "frames x features"))
     with np.errstate(over="ignore"):
         return np.ascontiguousarray(array, np.float32)
+
+
+def _check_permutations(parts: Sequence[ClipFeatures], schema: FeatureSchema) -> None:
+    """Refuse parts that are not all permutations of a clip, then all of the next."""
+    n = len(schema.permutation_s)
+    for first in range(0, len(parts), n):
+        same = {(part.asset, part.mirrored, len(part.features)) for part in parts[first : first + n]}
+        if len(same) > 1 or len(parts) - first < n:
+            found = f"the features of {in_quotes(parts[first].asset)} are not those of its {n} permutations."
+            raise MotionError(Fault(found, "all that `clip_permutations` gives of a clip, in order"))
 
 
 def _check_finite(features: Features, starts: Ints, stops: Ints, assets: Sequence[str]) -> None:

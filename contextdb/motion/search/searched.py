@@ -35,6 +35,26 @@ class Searched:
     schema: FeatureSchema | None = None
 
     @cached_property
+    def n_permutations(self) -> int:
+        """How many ranges each clip has, as it is and as many mirrored; they follow one another."""
+        return 1 if self.schema is None else len(self.schema.permutation_s)
+
+    def permutation_s(self, range_number: int) -> float | None:
+        """How many seconds ahead the permuted channels of a range look; None for a database without permutations."""
+        if self.schema is None or self.schema.permutations is None:
+            return None
+        return self.schema.permutation_s[range_number % self.n_permutations]
+
+    def in_permutations(self, range_number: int, start: int, stop: int) -> list[tuple[int, int]]:
+        """Frames [start, stop) of a range as each permutation of its clip has them."""
+        n = self.n_permutations
+        if n == 1:
+            return [(start, stop)]
+        length = int(self.stops[range_number] - self.starts[range_number])
+        steps = [(i - range_number % n) * length for i in range(n)]
+        return [(start + step, stop + step) for step in steps]
+
+    @cached_property
     def cost_weights(self) -> Floats:
         """What each channel's squared differences are multiplied by in a cost: float64 [C].
 

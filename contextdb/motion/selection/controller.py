@@ -37,7 +37,7 @@ from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder
 from contextdb.motion.selection.guards import Held
-from contextdb.motion.selection.history import remembered
+from contextdb.motion.selection.history import played_spans, remembered
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.ongoing import Ongoing
 from contextdb.motion.selection.play_rate import eased, play_rate
@@ -223,6 +223,7 @@ class Controller:
         held = step.held(cause)
         if held:
             cause = None
+        step = step if cause is None else step.permuted()
         wanted = None if cause is None else step.wanted(cause)
         return Asking(step, cause, wanted, context, force, interrupt, body, held)
 
@@ -278,7 +279,9 @@ class Controller:
         state, playing, for_s = self._state, decision.playing, self.settings.history_s
         history, recent = step.history, state.recent
         if playing is not None and decision.action in (Action.START, Action.JUMP):
-            history = remembered(history, playing.database, ((playing.frame, playing.frame + 1),), step.now_s, for_s)
+            database, frame = self.selector.databases[playing.database], playing.frame
+            spans = played_spans(database, playing.range, [(frame, frame + 1)])
+            history = remembered(history, playing.database, spans, step.now_s, for_s)
             if self.settings.variation is not None:
                 recent = self.settings.variation.remember(recent, playing.asset)
         since_s = 0.0 if decision.searched else state.since_search_s + step.dt_s

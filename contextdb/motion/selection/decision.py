@@ -31,6 +31,8 @@ class Playing:
     time_s : float
         Seconds since the start of the range.
     mirrored : bool
+    permutation_s : float or None
+        How many seconds ahead the permuted channels of the range look; None for a database without permutations.
     """
 
     database: str
@@ -39,6 +41,7 @@ class Playing:
     frame: int
     time_s: float
     mirrored: bool
+    permutation_s: float | None = None
 
 
 class Action(StrEnum):

@@ -6,27 +6,51 @@ Three rules, each a span of frames that a search leaves out. The frame that play
 - Jump threshold: frames of the playing range near to the playing one are left out; a jump there would be a hiccup.
 - History: frames played within the last so many seconds, in any database, are left out, so that no pose is entered over and over.
 
+All hold for a frame in every permutation of its clip alike, as each shows the same.
+
 Source: NextNaturalOnly of EA's talk; PoseJumpThresholdTime and PoseReselectHistory of Unreal's PoseSearch.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Mark
+from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """Frames [start, stop) of a database, and the moment at which they were played."""
+    """Frames [start, stop) of a database, and the moment at which they were played; of permutations those of the first."""
 
     database: str
     start: int
     stop: int
     time_s: float
+
+
+def played_spans(database: MotionDatabase, at: int, spans: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Spans of frames of a range, as the first permutation of its clip has them: so they are remembered once."""
+    return [database.in_permutations(at, start, stop)[0] for start, stop in spans]
+
+
+def in_every_permutation(database: MotionDatabase, skips: Sequence[Skip], at: int = -1) -> Sequence[Skip]:
+    """What is left out of a range, in every permutation of its clip; `at` is the range, -1 for that which holds each.
+
+    Frames that are in no range any more, as those played before the database was exchanged, are left away.
+    """
+    if database.n_permutations == 1:
+        return skips
+    ranges = [database.range_of(skip.start) if at < 0 else at for skip in skips]
+    return [
+        Skip(*span, skip.why)
+        for i, skip in zip(ranges, skips, strict=True)
+        if i >= 0
+        for span in database.in_permutations(i, skip.start, skip.stop)
+    ]
 
 
 def remembered(

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from contextdb.motion.clips.quaternions import Floats
+from contextdb.motion.search import cost
 from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.playhead import Move, Playhead
 from contextdb.motion.selection.selector import Selector
@@ -40,11 +45,33 @@ class Ongoing:
         """The name of the database."""
         return self.playing.database
 
+    def cheapest(self, query: Floats, chosen: Filter) -> Ongoing:
+        """The same in the permutation of its clip that costs least to play on in; on a tie in that which plays.
+
+        `chosen` is a filter of its database; one that lets the asset not play is asked for its costs alone.
+        """
+        database, at = self.head.database, self.head.range
+        frames = np.array([start for start, _ in database.in_permutations(at, self.move.frame, self.move.frame + 1)])
+        ranges = at - at % len(frames) + np.arange(len(frames))
+        costs = cost.costs(database.layout, frames, database.normalised(query), database.slices, database.cost_weights)
+        costs += chosen.range_biases[ranges]
+        if len(chosen.frame_biases):
+            costs += chosen.frame_biases[frames]
+        if len(chosen.frames):
+            costs[~chosen.frames[frames]] = np.inf
+        if chosen.ranges[at]:
+            costs[~chosen.ranges[ranges]] = np.inf
+        best = int(np.lexsort((ranges != at, costs))[0])
+        head = replace(self.head, range=int(ranges[best]))
+        playing = playing_at(self.database, head, int(frames[best]), self.playing.time_s)
+        return replace(self, playing=playing, head=head, move=replace(self.move, frame=int(frames[best])))
+
 
 def playing_at(database: str, head: Playhead, frame: int, time_s: float) -> Playing:
     """What plays at a moment of a range."""
     at = head.range
-    return Playing(database, head.database.assets[at], at, frame, time_s, bool(head.database.mirrored[at]))
+    mirrored, permutation_s = bool(head.database.mirrored[at]), head.database.permutation_s(at)
+    return Playing(database, head.database.assets[at], at, frame, time_s, mirrored, permutation_s)
 
 
 def _is_same(one: Playhead, other: Playhead) -> bool:

@@ -19,7 +19,15 @@ from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Action, Playing
 from contextdb.motion.selection.guards import Held
-from contextdb.motion.selection.history import Played, ended_skip, history_skips, playing_skips, remembered
+from contextdb.motion.selection.history import (
+    Played,
+    ended_skip,
+    history_skips,
+    in_every_permutation,
+    played_spans,
+    playing_skips,
+    remembered,
+)
 from contextdb.motion.selection.ongoing import Ongoing, playing_at
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 from contextdb.motion.selection.selector import Selector
@@ -75,7 +83,11 @@ class Step:
     ) -> Step:
         """An update that moved what plays on by some time, to `ongoing`."""
         now_s, for_s = state.time_s + dt_s, settings.history_s
-        name, spans = ("", ()) if ongoing is None else (ongoing.database, ongoing.move.spans)
+        name, spans = (
+            ("", ())
+            if ongoing is None
+            else (ongoing.database, played_spans(ongoing.head.database, ongoing.head.range, ongoing.move.spans))
+        )
         history = remembered(state.history, name, spans, now_s, for_s)
         standing = Standing.NOT_VALID if ongoing is None else _standing(ongoing, asked)
         return cls(selector, settings, state, dt_s, query, asked, ongoing, history, standing)
@@ -129,9 +141,17 @@ class Step:
 
     # ---- what to leave out
 
+    def permuted(self) -> Step:
+        """The same, with what plays in the permutation of its clip that costs least now: all of them show one and the same."""
+        if self.ongoing is None or self.ongoing.head.database.n_permutations == 1:
+            return self
+        chosen = self.ongoing.head.database.filter(**self.asked.of(self.ongoing.database))
+        return replace(self, ongoing=self.ongoing.cheapest(self.query, chosen))
+
     def wanted(self, cause: Trigger) -> Asked:
         """What the selector is asked: beside what the caller asks, what may play on, and what is left out."""
-        skip = {name: skips for name, skips in history_skips(self.history).items() if name in self.selector.databases}
+        known, played = self.selector.databases, history_skips(self.history)
+        skip = {name: in_every_permutation(known[name], skips) for name, skips in played.items() if name in known}
         if self.ongoing is None:
             return replace(self.asked, skip=skip)
         name, frame = self.ongoing.database, self.ongoing.move.frame
@@ -155,8 +175,10 @@ class Step:
     def _skips(self, ongoing: Ongoing) -> Sequence[Skip]:
         head, frame = ongoing.head, ongoing.move.frame
         if ongoing.move.is_ended:
-            return [ended_skip(head, frame, max(self.settings.jump_threshold_s, self.settings.search_every_s))]
-        return list(playing_skips(head, frame, self.settings.jump_threshold_s))
+            skips = [ended_skip(head, frame, max(self.settings.jump_threshold_s, self.settings.search_every_s))]
+        else:
+            skips = list(playing_skips(head, frame, self.settings.jump_threshold_s))
+        return in_every_permutation(head.database, skips, head.range)
 
     # ---- what comes of it
 

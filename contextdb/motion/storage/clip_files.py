@@ -18,7 +18,7 @@ from contextdb.motion.clips import clip as clips
 from contextdb.motion.clips.doubts import Measures, measure
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks
 from contextdb.motion.clips.skeleton import Skeleton
-from contextdb.motion.features.extraction import ClipFeatures, clip_features
+from contextdb.motion.features.extraction import ClipFeatures, clip_permutations
 from contextdb.motion.features.schema import FeatureSchema
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage.database_settings import DatabaseSettings
@@ -45,16 +45,21 @@ class ClipFile:
 
     @property
     def sides(self) -> tuple[bool, ...]:
-        """For each range of the clip whether it is mirrored."""
+        """As what the clip plays: whether it is mirrored. Each has a range for every permutation of the schema."""
         return (False, True) if self.settings.mirror else (False,)
+
+    @property
+    def ranges(self) -> list[tuple[bool, int]]:
+        """For each range of the clip whether it is mirrored, and which permutation it is."""
+        return [(side, i) for side in self.sides for i in range(len(self.schema.permutation_s))]
 
     def keys(self, content: bytes) -> list[str]:
         """For each range the key of its features."""
         unit, up = self.settings.metres_per_unit, self.settings.up
         loops, marks = self.is_looping, self.contacts
         return [
-            key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side, looping=loops, contacts=marks)
-            for side in self.sides
+            key_of(content, self.schema, metres_per_unit=unit, up=up, mirrored=side, looping=loops, contacts=marks, permutation=i)
+            for side, i in self.ranges
         ]
 
 
@@ -143,7 +148,7 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
     content = read_bytes(file.path)
     keys = file.keys(content)
     cache = None if file.schema.functions else cache
-    kept = [_kept(file, key, side, cache) for key, side in zip(keys, file.sides, strict=True)]
+    kept = [_kept(file, key, side, cache) for key, (side, _) in zip(keys, file.ranges, strict=True)]
     parts = [part for part in kept if part is not None]
     if len(parts) == len(kept):
         skeleton = _skeleton(file, content) if file.settings.mirror else None
@@ -156,7 +161,9 @@ def extract(file: ClipFile, cache: FeatureCache | None = None) -> Extracted:
         raise MotionError(Fault("the clip has no frame (Frames: 0).", accepted, mend, Place(str(file.path))))
     measures = measure(clip)
     computed = [
-        clip_features(clip, file.schema, mirrored=side, looping=file.is_looping, contacts=file.contacts) for side in file.sides
+        part
+        for side in file.sides
+        for part in clip_permutations(clip, file.schema, mirrored=side, looping=file.is_looping, contacts=file.contacts)
     ]
     if cache is not None:
         for key, part in zip(keys, computed, strict=True):

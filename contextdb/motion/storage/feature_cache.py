@@ -1,7 +1,7 @@
 """Features of clips kept on the disk, so that building again computes only the clips that changed.
 
-    FOLDER/DATABASE.features/KEY.safetensors      one clip, as recorded or mirrored: features and root, in raw
-                                                  units; its measures in the metadata
+    FOLDER/DATABASE.features/KEY.safetensors      one clip, as recorded or mirrored, in one permutation: features
+                                                  and root, in raw units; its measures in the metadata
 
 The key is a digest of all that the features depend on: the bytes of the BVH file, what the settings say of its unit and axis, the
 channels without their weights, and `EXTRACTION`. An entry is written in one step and checked when it is read; one that is missing,
@@ -52,6 +52,7 @@ def key_of(
     mirrored: bool,
     looping: bool,
     contacts: ContactMarks = NO_MARKS,
+    permutation: int = 0,
 ) -> str:
     """The key of a clip's features, from the bytes of its file and all else that they depend on."""
     about = {
@@ -63,6 +64,8 @@ def key_of(
         "looping": looping,
         "contacts": contacts if any(channel.type == "phase" for channel in schema.channels) else NO_MARKS,
     }
+    if permutation:
+        about["permutation"] = permutation
     digest = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
     digest.update(content)
     return digest.hexdigest()

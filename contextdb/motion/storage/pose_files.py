@@ -120,7 +120,8 @@ def saved_poses(folder: str | PathLike[str], databases: Mapping[str, MotionDatab
             bank = open_poses(poses_path(folder, name))
         except ContextDBError:
             continue
-        if bank.assets == database.assets and bank.n_frames == int((database.stops - database.starts).sum()):
+        once = slice(None, None, database.n_permutations)
+        if bank.assets == database.assets[once] and bank.n_frames == int((database.stops - database.starts)[once].sum()):
             found[name] = bank
     return found
 

@@ -75,6 +75,7 @@ def _base_columns(rows: Sequence[Ranked]) -> Iterator[Column]:
     yield Column("time s", [seconds(each.row.time_s) for each in rows], is_number=True)
     yield Column("frame", [f"{each.row.frame:,}" for each in rows], is_number=True)
     yield Column("mirrored", ["yes" if each.row.mirrored else "" for each in rows])
+    yield Column("permutation s", [seconds(each.row.permutation_s) for each in rows], is_number=True)
     yield Column("left out", [LeftOut(each.row.left_out).text for each in rows])
     yield Column("cost", [cost_text(each.row.cost) for each in rows], is_number=True)
 

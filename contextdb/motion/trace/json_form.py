@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search.candidates import Candidate, Candidates
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.trace.cost_views import Ranked
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 LEFT = ("candidates", "filters", "inputs")
 Json = dict[str, object]
@@ -42,8 +46,7 @@ def ranked_json(rows: Sequence[Ranked], events: Events | None = None) -> list[Js
 
 
 def _candidate_json(rank: int, row: Candidate, events: Sequence[str]) -> Json:
-    told = {field.name: as_plain(getattr(row, field.name)) for field in fields(row)}
-    return {"rank": rank, **told, "events": list(events)}
+    return {"rank": rank, **_by_field(row), "events": list(events)}
 
 
 def as_plain(value: object) -> object:
@@ -63,5 +66,11 @@ def as_plain(value: object) -> object:
     if isinstance(value, (set, frozenset)):
         return sorted(map(str, value))
     if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: as_plain(getattr(value, field.name)) for field in fields(value)}
+        return _by_field(value)
     return str(value)
+
+
+def _by_field(value: DataclassInstance) -> Json:
+    """The fields of a dataclass; `permutation_s` only where there are permutations."""
+    told = {field.name: as_plain(getattr(value, field.name)) for field in fields(value)}
+    return {name: plain for name, plain in told.items() if plain is not None or name != "permutation_s"}

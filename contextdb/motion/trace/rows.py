@@ -39,6 +39,9 @@ EventsOf = Callable[[str, int], tuple[str, ...]]
 Events = dict[tuple[str, int], tuple[str, ...]]
 
 TIMINGS, FILTERS, INPUTS, HELD, PLAY_RATE = "search_us", "filters", "inputs", "held", "play_rate"
+PERMUTATION_S = "permutation_s"
+"""Of a database with permutations: how far ahead each looks."""
+PLAYING = ("database", "asset", "range", "frame", "time_s", "mirrored")
 BODY = ("body_x", "body_z", "body_heading")
 OPTIONAL = (TIMINGS, FILTERS, INPUTS, *BODY, HELD, PLAY_RATE)
 """The columns that a file may lack: another recording has other timings, and older versions kept none of the others."""
@@ -286,7 +289,7 @@ def _known(value: Any) -> Any:
 
 
 def _playing(row: Row | None) -> Playing | None:
-    return None if row is None else Playing(*(_known(row[key]) for key in Playing.__slots__))
+    return None if row is None else Playing(**{key: _known(row[key]) for key in PLAYING})
 
 
 def _choice(row: Row) -> Choice:

@@ -33,11 +33,23 @@ from contextdb.disk import read_bytes, write_atomic
 from contextdb.errors import ArtefactError, ContextDBError, Fault, MotionError, Place, in_quotes, plural
 from contextdb.files.parquet_frame import MAGIC, UNSEALED, DamagedFrame, Frame, require_whole, sealed
 from contextdb.motion.search.database import MotionDatabase
-from contextdb.motion.selection.decision import Decision
+from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.worked_out import WorkedOut, of_searched
 from contextdb.motion.trace.filter_rows import RUNS, fingerprint, is_recorded, markup_digest
 from contextdb.motion.trace.reasked import Changes, Reasked
-from contextdb.motion.trace.rows import FILTERS, INPUTS, OPTIONAL, TIMINGS, Events, Row, columns, decision_of, events_in, row_of
+from contextdb.motion.trace.rows import (
+    FILTERS,
+    INPUTS,
+    OPTIONAL,
+    PERMUTATION_S,
+    TIMINGS,
+    Events,
+    Row,
+    columns,
+    decision_of,
+    events_in,
+    row_of,
+)
 from contextdb.motion.trace.session_diff import SessionDiff, diff_sessions
 from contextdb.motion.trace.stats import SessionStats, stats_of
 from contextdb.motion.trace.stock import Stock
@@ -77,8 +89,8 @@ class Trace(Sequence[Decision]):
     n_forgotten : int
         How many decisions came before the first that is kept.
     about : mapping
-        For the name of each database `rate`, `features`, `channels`, its ranges (`assets`, `starts`, `stops`, `mirrored`), and
-        the `digest` of what costs come from.
+        For the name of each database `rate`, `features`, `channels`, its ranges (`assets`, `starts`, `stops`, `mirrored`), the
+        `digest` of what costs come from, and `permutation_s` where it has permutations.
     """
 
     def __init__(
@@ -293,7 +305,15 @@ class Trace(Sequence[Decision]):
             decision = decision_of(row)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError, ContextDBError) as error:
             raise _refused(f"row {place} holds no decision ({type(error).__name__}).", self._file) from error
+        if any(PERMUTATION_S in about for about in self.about.values()):
+            now, before = self._permuted(decision.playing), self._permuted(decision.before)
+            decision = replace(decision, playing=now, before=before)
         return self._with_candidates(decision)
+
+    def _permuted(self, playing: Playing | None) -> Playing | None:
+        """What plays, with how far ahead its permutation looks: not in its row, but known of its database."""
+        looks = [] if playing is None else self.about.get(playing.database, {}).get(PERMUTATION_S, [])
+        return replace(playing, permutation_s=looks[playing.range % len(looks)]) if playing is not None and looks else playing
 
     def _with_candidates(self, decision: Decision) -> Decision:
         """A decision with candidates that are worked out when they are asked for, where all that they need is there."""
@@ -326,7 +346,10 @@ def _about(database: MotionDatabase) -> dict[str, Any]:
     ranges = {name: getattr(database, name).tolist() for name in ("starts", "stops", "mirrored")}
     biases = {"looping": database.marks.looping.tolist(), "biases": asdict(database.biases)}
     digests = {"digest": fingerprint(database), "markup": markup_digest(database)}
-    return {"rate": rate, **names, "assets": list(database.assets), **ranges, **biases, **digests}
+    about = {"rate": rate, **names, "assets": list(database.assets), **ranges, **biases, **digests}
+    if database.schema is not None and database.schema.permutations is not None:
+        about[PERMUTATION_S] = list(database.schema.permutation_s)
+    return about
 
 
 def missing(

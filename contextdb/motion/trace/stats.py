@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.selection.decision import Action, Decision
+from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.trace.rows import PERMUTATION_S
 from contextdb.motion.trace.views import cause_of
 
 SMALL_GAIN = 0.2
@@ -140,9 +141,16 @@ def _stays(decisions: Sequence[Decision]) -> list[float]:
     return [end - start for start, end in zip(changes, ends, strict=True)]
 
 
+def _frame(playing: Playing, about: About) -> int:
+    """What plays, in the first permutation of its clip: all show the same."""
+    each = about.get(playing.database, {})
+    at = playing.range % len(each.get(PERMUTATION_S, [0]))
+    return playing.frame - at * (each["stops"][playing.range] - each["starts"][playing.range]) if at else playing.frame
+
+
 def _frames_used(decisions: Sequence[Decision], about: About) -> float | None:
     if not about or not all("stops" in each for each in about.values()):
         return None
-    every = sum(stop - start for each in about.values() for start, stop in zip(each["starts"], each["stops"], strict=True))
-    used = {(each.playing.database, each.playing.frame) for each in decisions if each.playing is not None}
+    every = sum((sum(each["stops"]) - sum(each["starts"])) // len(each.get(PERMUTATION_S, [0])) for each in about.values())
+    used = {(each.playing.database, _frame(each.playing, about)) for each in decisions if each.playing is not None}
     return len(used) / every if every else None

@@ -202,7 +202,8 @@ def _status(decision: Decision, events: EventTexts) -> Iterator[tuple[str, str]]
 def _playing_text(playing: Playing | None) -> str:
     if playing is None:
         return "nothing"
-    return f"{_asset(playing)} at {playing.time_s:.2f} s, frame {playing.frame:,} of {playing.database}"
+    permutation = "" if playing.permutation_s is None else f", permutation {playing.permutation_s:g} s"
+    return f"{_asset(playing)} at {playing.time_s:.2f} s, frame {playing.frame:,} of {playing.database}{permutation}"
 
 
 def _parts_text(decision: Decision, playing: Playing | None) -> str:

@@ -24,6 +24,7 @@ from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import MOST_REACH_S, Trajectory
 from contextdb.motion.reading import as_number
+from contextdb.records import quickly_made
 
 STANDING_MPS = 0.1
 """Asked to go slower than this, a body keeps its facing."""
@@ -35,6 +36,7 @@ At = Any
 """What is the same at all moments: a number, or an array that goes with the moments."""
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Steered:
     """A body that follows a stick. `moved` gives the body some time later.

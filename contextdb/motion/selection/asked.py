@@ -16,6 +16,7 @@ from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.filtering import Penalties, Tags
 from contextdb.motion.selection.choice import Choice
+from contextdb.records import quickly_made
 
 Among: TypeAlias = Collection[str] | HasAssets
 OfValid: TypeAlias = Valid | Mapping[str, Valid]
@@ -36,6 +37,7 @@ class Options(TypedDict, total=False):
     penalties: OfPenalties | None
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Asked:
     """The same as one thing; see `Selector.search`."""

@@ -47,10 +47,12 @@ from contextdb.motion.selection.step import Outcome, Step
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.selection.worked_out import WorkedOut
+from contextdb.records import quickly_made
 
 Clock = Callable[[], float]
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Asking:
     """Half an update: what is to be searched, and why; `wanted` is None where nothing is. `held` is the guard that saw to that."""

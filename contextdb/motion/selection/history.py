@@ -17,8 +17,10 @@ from dataclasses import dataclass
 from contextdb.motion.markup.left_out import LeftOut, Skip
 from contextdb.motion.markup.marks import Mark
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Played:
     """Frames [start, stop) of a database, and the moment at which they were played."""

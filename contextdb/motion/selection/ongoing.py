@@ -8,8 +8,10 @@ from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.playhead import Move, Playhead
 from contextdb.motion.selection.selector import Selector
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Ongoing:
     """What plays, where it has moved on to, and how."""

@@ -15,11 +15,13 @@ import numpy as np
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.layout import Features
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion, motion_between
+from contextdb.records import quickly_made
 
 TOLERANCE_S = 1e-6
 """Times that are nearer than this are the same: sums of time steps are rounded."""
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Move:
     """A playhead moved on.

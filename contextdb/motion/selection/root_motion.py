@@ -12,8 +12,10 @@ import math
 from dataclasses import dataclass
 
 from contextdb.motion.search.layout import Features
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class RootMotion:
     """A movement over the ground in the body's own frame at its beginning: metres and radians, positive to the left."""

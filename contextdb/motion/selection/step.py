@@ -25,6 +25,7 @@ from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 from contextdb.motion.selection.selector import Selector
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
+from contextdb.records import quickly_made
 
 
 class Standing(Enum):
@@ -35,6 +36,7 @@ class Standing(Enum):
     NOT_VALID = auto()
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What an update comes to; the attributes are those of `Decision`."""
@@ -48,6 +50,7 @@ class Outcome:
     held: Held = Held.NOTHING
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Step:
     """An update under way: where the controller is, what it is asked, and what plays and was played, moved on."""

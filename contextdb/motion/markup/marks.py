@@ -126,6 +126,11 @@ class Marks:
         """Whether a frame of each kind may play on: bool [K], read-only."""
         return self._playable
 
+    @cached_property
+    def are_all_playable(self) -> bool:
+        """Whether a frame of any kind may play on."""
+        return bool(self._playable.all())
+
     def tag_biases(self, tags: TagFilter | Sequence[str] = ANY_TAGS) -> Floats:
         """What the soft categories of a filter add to the cost of frames of each kind: float64 [K], read-only."""
         return self._tag_biases(tags_of(tags))
@@ -139,6 +144,10 @@ class Marks:
     def _tag_biases(self) -> Callable[[TagFilter], Floats]:
         known = _Tags(self.tags, self.kind_tags)
         return lru_cache(KEPT_FILTERS)(lambda tags: _read_only(_tag_biases(known, tags)))
+
+    @cached_property
+    def _moves_all(self) -> bool:
+        return bool((self.kind_root_weights == 1.0).all())
 
     @cached_property
     def _playable(self) -> Flags:
@@ -163,7 +172,7 @@ class Marks:
 
     def root_weight(self, frame: int) -> float:
         """How much of the movement comes from the animation in a frame, from 0 to 1."""
-        return float(self.kind_root_weights[self._kind_of(frame)])
+        return 1.0 if self._moves_all else float(self.kind_root_weights[self._kind_of(frame)])
 
     def events(self, frame: int) -> tuple[str, ...]:
         """All that is said of a frame, in the words of a markup file: plain tags, then reserved ones, as "CostModifier 0.5".

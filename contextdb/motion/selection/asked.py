@@ -60,6 +60,10 @@ class Asked:
         if self.current is not None and not isinstance(self.current, Choice) and not _is_pair(self.current):
             raise QueryError(Fault(f"what plays now is {self.current!r}.", 'a Choice, or such as ("jog", 120)'))
 
+    def searched(self, valid: OfValid | None, current: Current | None, skip: Mapping[str, Sequence[Skip]]) -> Asked:
+        """The same of a search by what plays: with what may play, what would play on, and what is left out."""
+        return Asked(valid, self.tags, current, self.bias, self.among, skip, self.penalties)
+
     def of(self, name: str) -> dict[str, Any]:
         """What one database is given, by the names of the parameters of `MotionDatabase.search`."""
         return {

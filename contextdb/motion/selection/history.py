@@ -41,7 +41,7 @@ def remembered(
     n_forgotten = 0  # of those in front: what is remembered is in the order of its moments
     while n_forgotten < len(history) and history[n_forgotten].time_s <= oldest_s:
         n_forgotten += 1
-    return (*history[n_forgotten:], *(Played(database, start, stop, now_s) for start, stop in spans))
+    return (*history[n_forgotten:], *[Played(database, start, stop, now_s) for start, stop in spans])
 
 
 def history_skips(history: Iterable[Played]) -> dict[str, list[Skip]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, auto
 
 from contextdb.motion.arguments import ValidRanges, widened_of
@@ -136,15 +136,15 @@ class Step:
         """What the selector is asked: beside what the caller asks, what may play on, and what is left out."""
         skip = {name: skips for name, skips in history_skips(self.history).items() if name in self.selector.databases}
         if self.ongoing is None:
-            return replace(self.asked, skip=skip)
+            return self.asked.searched(self.asked.valid, None, skip)
         name, frame = self.ongoing.database, self.ongoing.move.frame
         current = (name, frame) if cause.may_continue else None
         skips = [*self._skips(self.ongoing), *skip.get(name, ())]
         if current is None or self.standing is not Standing.WIDENED:
-            return replace(self.asked, current=current, skip={**skip, name: skips})
+            return self.asked.searched(self.asked.valid, current, {**skip, name: skips})
         head = self.ongoing.head
         alone = Skip(head.start, head.stop, LeftOut.NOT_VALID)
-        return replace(self.asked, current=current, skip={**skip, name: [alone, *skips]}, valid=self._widened_for(self.ongoing))
+        return self.asked.searched(self._widened_for(self.ongoing), current, {**skip, name: [alone, *skips]})
 
     def _widened_for(self, ongoing: Ongoing) -> OfValid:
         """What may play, and with it the range that plays, with what its widened row costs."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
+import gc
 import inspect
 import pickle
 from dataclasses import FrozenInstanceError, dataclass, replace
 
 import pytest
 
-from contextdb.records import quickly_made
+from contextdb.records import collector_at_rest, quickly_made
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +73,18 @@ def test_it_can_be_replaced_copied_pickled_and_asked_for_its_signature():
 def test_a_subclass_with_more_fields_is_made_too():
     assert Wider("a", 1, more=4).more == 4
     assert type(Wider("a", 1)) is Wider
+
+
+@pytest.mark.parametrize("is_on", [True, False])
+def test_the_collector_is_left_as_it_was_also_after_an_error(is_on):
+    was_on = gc.isenabled()
+    try:
+        (gc.enable if is_on else gc.disable)()
+        with collector_at_rest():
+            assert not gc.isenabled()
+        assert gc.isenabled() is is_on
+        with pytest.raises(ValueError, match="inside"), collector_at_rest():
+            raise ValueError("inside")
+        assert gc.isenabled() is is_on
+    finally:
+        (gc.enable if was_on else gc.disable)()

@@ -433,9 +433,9 @@ class Character:
 
     def _trail_after(self, dt_s: float, place: Place3) -> tuple[tuple[float, Place3], ...]:
         """Where the animation was, and how many seconds ago, from the oldest that a search must know to now."""
-        back = back_s(self.schema)
-        if not back:
+        if not self.schema.looks_back:
             return ()
+        back = back_s(self.schema)
         older = [(ago + dt_s, each) for ago, each in self._trail]
         needed = sum(ago > back for ago, _ in older)  # one behind the farthest
         return (*older[max(0, needed - 1) :], (0.0, place))

@@ -60,6 +60,9 @@ class Steered:
     heading_halflife_s: float = 0.27
 
     def __post_init__(self) -> None:
+        one, other = self.velocity_halflife_s, self.heading_halflife_s
+        if type(one) is type(other) is float and 0.0 < one < math.inf and 0.0 < other < math.inf:  # as mostly
+            return
         for name in ("velocity_halflife_s", "heading_halflife_s"):
             number = as_number(getattr(self, name))
             if number is None or number <= 0.0:

@@ -25,6 +25,7 @@ from contextdb.motion.selection.controller import Asking, Controller
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.selector import Selector
+from contextdb.records import collector_at_rest
 
 HAS_IT = Fault("the group has this controller already.", "a controller of its own for each character")
 
@@ -122,6 +123,7 @@ class ControllerGroup(Sequence[Controller]):
             poses[numbers] = selector.databases[name].raw_many(at)
         return poses
 
+    @collector_at_rest()
     def update(
         self,
         dt_s: float,

@@ -48,7 +48,11 @@ def history_skips(history: Iterable[Played]) -> dict[str, list[Skip]]:
     """What was played, by database; spans that touch are one."""
     spans: dict[str, list[tuple[int, int]]] = {}
     for played in history:
-        spans.setdefault(played.database, []).append((played.start, played.stop))
+        own = spans.setdefault(played.database, [])
+        if own and own[-1][0] <= played.start <= own[-1][1]:  # it played on, as mostly
+            own[-1] = own[-1][0], max(own[-1][1], played.stop)
+        else:
+            own.append((played.start, played.stop))
     return {name: [Skip(start, stop, LeftOut.HISTORY) for start, stop in _joined(found)] for name, found in spans.items()}
 
 

@@ -146,6 +146,10 @@ class Marks:
         return lru_cache(KEPT_FILTERS)(lambda tags: _read_only(_tag_biases(known, tags)))
 
     @cached_property
+    def _has_next_natural(self) -> bool:
+        return bool((self.kind_marks & Mark.NEXT_NATURAL.value).any())
+
+    @cached_property
     def _moves_all(self) -> bool:
         return bool((self.kind_root_weights == 1.0).all())
 
@@ -161,6 +165,10 @@ class Marks:
     def mark_of(self, frame: int) -> Mark:
         """The flags of a frame."""
         return Mark(int(self.kind_marks[self._kind_of(frame)]))
+
+    def is_next_natural(self, frame: int) -> bool:
+        """Whether nothing but playing on comes next in a frame, for its own range."""
+        return self._has_next_natural and bool(self.kind_marks[self._kind_of(frame)] & Mark.NEXT_NATURAL.value)
 
     def tags_of(self, frame: int) -> tuple[str, ...]:
         """The plain tags of a frame, sorted."""

@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from contextdb.motion.markup.left_out import LeftOut, Skip
-from contextdb.motion.markup.marks import Mark
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 from contextdb.records import quickly_made
 
@@ -47,18 +46,23 @@ def remembered(
 def history_skips(history: Iterable[Played]) -> dict[str, list[Skip]]:
     """What was played, by database; spans that touch are one."""
     spans: dict[str, list[tuple[int, int]]] = {}
+    name, start, stop = "", 0, -1
     for played in history:
-        own = spans.setdefault(played.database, [])
-        if own and own[-1][0] <= played.start <= own[-1][1]:  # it played on, as mostly
-            own[-1] = own[-1][0], max(own[-1][1], played.stop)
-        else:
-            own.append((played.start, played.stop))
+        if start <= played.start <= stop and played.database == name:  # it played on, as mostly
+            if played.stop > stop:
+                stop = played.stop
+            continue
+        if stop >= start:
+            spans.setdefault(name, []).append((start, stop))
+        name, start, stop = played.database, played.start, played.stop
+    if stop >= start:
+        spans.setdefault(name, []).append((start, stop))
     return {name: [Skip(start, stop, LeftOut.HISTORY) for start, stop in _joined(found)] for name, found in spans.items()}
 
 
 def playing_skips(head: Playhead, frame: int, threshold_s: float) -> Iterator[Skip]:
     """What is left out because of a frame that may play on."""
-    if head.database.marks.mark_of(frame) & Mark.NEXT_NATURAL:
+    if head.database.marks.is_next_natural(frame):
         yield Skip(head.start, head.stop, LeftOut.NEXT_NATURAL)
     near = _n_frames(threshold_s, head.rate)
     first, stop = frame - near, frame + near + 1

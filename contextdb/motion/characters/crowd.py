@@ -104,7 +104,7 @@ class Crowd(Sequence[Character]):
     def update(
         self, dt: float, sticks: ArrayLike, facts: FactsOfMany | None = None, facing: ArrayLike | None = None
     ) -> list[Updated]:
-        """Update every character as `Character.update` does; what each gave, in order.
+        """Update every character as `Character.update` does; what each gave, in order. Python's garbage collector rests meanwhile.
 
         Parameters
         ----------

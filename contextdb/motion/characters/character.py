@@ -48,6 +48,7 @@ from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.trace.session import Trace
+from contextdb.records import quickly_made
 
 AT_REST = Steered()
 UNKNOWN = ("error", "any", "never")
@@ -79,6 +80,7 @@ class CharacterState:
     stream: PoseState | None
 
 
+@quickly_made
 @dataclass(frozen=True, eq=False, slots=True)
 class Updated:
     """What one update of a character gave.
@@ -114,6 +116,7 @@ class Updated:
         return self.poses[self.at] if self.poses else None
 
 
+@quickly_made
 @dataclass(frozen=True, eq=False, slots=True)
 class Step:
     """Half an update: what a character is about to ask."""
@@ -430,9 +433,9 @@ class Character:
 
     def _trail_after(self, dt_s: float, place: Place3) -> tuple[tuple[float, Place3], ...]:
         """Where the animation was, and how many seconds ago, from the oldest that a search must know to now."""
-        back = back_s(self.schema)
-        if not back:
+        if not self.schema.looks_back:
             return ()
+        back = back_s(self.schema)
         older = [(ago + dt_s, each) for ago, each in self._trail]
         needed = sum(ago > back for ago, _ in older)  # one behind the farthest
         return (*older[max(0, needed - 1) :], (0.0, place))

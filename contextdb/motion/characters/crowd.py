@@ -31,6 +31,7 @@ from contextdb.motion.output.streams import PoseStreams
 from contextdb.motion.selection.asked import OfValid
 from contextdb.motion.selection.controller_group import ControllerGroup
 from contextdb.motion.selection.decision import Decision
+from contextdb.records import collector_at_rest
 
 FactsOfMany = Mapping[str, Any] | Sequence[Facts]
 
@@ -99,10 +100,11 @@ class Crowd(Sequence[Character]):
         for character, state in zip(self, states, strict=True):
             character.restore(state)
 
+    @collector_at_rest()
     def update(
         self, dt: float, sticks: ArrayLike, facts: FactsOfMany | None = None, facing: ArrayLike | None = None
     ) -> list[Updated]:
-        """Update every character as `Character.update` does; what each gave, in order.
+        """Update every character as `Character.update` does; what each gave, in order. Python's garbage collector rests meanwhile.
 
         Parameters
         ----------
@@ -207,6 +209,8 @@ class Crowd(Sequence[Character]):
             for table in asking.each_of(character.tables):
                 table_of[id(table)] = table
                 users.setdefault((id(table), character.unknown), []).append(i)
+        if not users:
+            return None
         answers: list[dict[int, HasAssets]] = [{} for _ in self]
         for (key, unknown), numbers in users.items():
             for i, found in zip(numbers, _answers(table_of[key], [steps[i].facts for i in numbers], unknown), strict=True):

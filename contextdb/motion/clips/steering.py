@@ -24,6 +24,7 @@ from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import MOST_REACH_S, Trajectory
 from contextdb.motion.reading import as_number
+from contextdb.records import quickly_made
 
 STANDING_MPS = 0.1
 """Asked to go slower than this, a body keeps its facing."""
@@ -35,6 +36,7 @@ At = Any
 """What is the same at all moments: a number, or an array that goes with the moments."""
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Steered:
     """A body that follows a stick. `moved` gives the body some time later.
@@ -58,6 +60,9 @@ class Steered:
     heading_halflife_s: float = 0.27
 
     def __post_init__(self) -> None:
+        one, other = self.velocity_halflife_s, self.heading_halflife_s
+        if type(one) is type(other) is float and 0.0 < one < math.inf and 0.0 < other < math.inf:  # as mostly
+            return
         for name in ("velocity_halflife_s", "heading_halflife_s"):
             number = as_number(getattr(self, name))
             if number is None or number <= 0.0:

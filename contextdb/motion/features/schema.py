@@ -133,6 +133,11 @@ class FeatureSchema:
         return None
 
     @cached_property
+    def looks_back(self) -> bool:
+        """Whether a trajectory channel looks at where the path was."""
+        return any(reach < 0.0 for reaches in self.path_reaches for reach in reaches)
+
+    @cached_property
     def path_reaches(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """The seconds and the metres at which the trajectory channels look at the path."""
         channels = [channel for channel in self.channels if channel.type == "trajectory"]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+from contextdb.records import quickly_made
+
 
 class LeftOut(IntEnum):
     """Why a frame is left out of a search; 0 for one that is not. Where several reasons hold, the lowest number is reported."""
@@ -44,6 +46,7 @@ _TEXTS = {
 }
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Skip:
     """Frames [start, stop) of a database that one search leaves out, and why."""

@@ -126,6 +126,11 @@ class Marks:
         """Whether a frame of each kind may play on: bool [K], read-only."""
         return self._playable
 
+    @cached_property
+    def are_all_playable(self) -> bool:
+        """Whether a frame of any kind may play on."""
+        return bool(self._playable.all())
+
     def tag_biases(self, tags: TagFilter | Sequence[str] = ANY_TAGS) -> Floats:
         """What the soft categories of a filter add to the cost of frames of each kind: float64 [K], read-only."""
         return self._tag_biases(tags_of(tags))
@@ -141,6 +146,14 @@ class Marks:
         return lru_cache(KEPT_FILTERS)(lambda tags: _read_only(_tag_biases(known, tags)))
 
     @cached_property
+    def _has_next_natural(self) -> bool:
+        return bool((self.kind_marks & Mark.NEXT_NATURAL.value).any())
+
+    @cached_property
+    def _moves_all(self) -> bool:
+        return bool((self.kind_root_weights == 1.0).all())
+
+    @cached_property
     def _playable(self) -> Flags:
         return _read_only(np.asarray((self.kind_marks & Mark.EXCLUDED) == 0))
 
@@ -153,6 +166,10 @@ class Marks:
         """The flags of a frame."""
         return Mark(int(self.kind_marks[self._kind_of(frame)]))
 
+    def is_next_natural(self, frame: int) -> bool:
+        """Whether nothing but playing on comes next in a frame, for its own range."""
+        return self._has_next_natural and bool(self.kind_marks[self._kind_of(frame)] & Mark.NEXT_NATURAL.value)
+
     def tags_of(self, frame: int) -> tuple[str, ...]:
         """The plain tags of a frame, sorted."""
         return tuple(self.tags[i] for i in np.flatnonzero(self.kind_tags[self._kind_of(frame)]).tolist())
@@ -163,7 +180,7 @@ class Marks:
 
     def root_weight(self, frame: int) -> float:
         """How much of the movement comes from the animation in a frame, from 0 to 1."""
-        return float(self.kind_root_weights[self._kind_of(frame)])
+        return 1.0 if self._moves_all else float(self.kind_root_weights[self._kind_of(frame)])
 
     def events(self, frame: int) -> tuple[str, ...]:
         """All that is said of a frame, in the words of a markup file: plain tags, then reserved ones, as "CostModifier 0.5".

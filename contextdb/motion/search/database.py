@@ -51,8 +51,10 @@ from contextdb.motion.search.layout import Features, Layout
 from contextdb.motion.search.many_filters import ManyFilters, together
 from contextdb.motion.search.searched import Searched
 from contextdb.motion.search.searcher import Searcher
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Hit:
     """The frame that a search chose. False when nothing may play; its cost is then infinite, its asset None, range and frame -1.

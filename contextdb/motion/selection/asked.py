@@ -16,6 +16,7 @@ from contextdb.motion.markup.left_out import Skip
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.filtering import Penalties, Tags
 from contextdb.motion.selection.choice import Choice
+from contextdb.records import quickly_made
 
 Among: TypeAlias = Collection[str] | HasAssets
 OfValid: TypeAlias = Valid | Mapping[str, Valid]
@@ -36,6 +37,7 @@ class Options(TypedDict, total=False):
     penalties: OfPenalties | None
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Asked:
     """The same as one thing; see `Selector.search`."""
@@ -57,6 +59,10 @@ class Asked:
             raise QueryError(Fault(f"tags is a {type(self.tags).__name__}.", "a TagFilter, or a mapping of databases"))
         if self.current is not None and not isinstance(self.current, Choice) and not _is_pair(self.current):
             raise QueryError(Fault(f"what plays now is {self.current!r}.", 'a Choice, or such as ("jog", 120)'))
+
+    def searched(self, valid: OfValid | None, current: Current | None, skip: Mapping[str, Sequence[Skip]]) -> Asked:
+        """The same of a search by what plays: with what may play, what would play on, and what is left out."""
+        return Asked(valid, self.tags, current, self.bias, self.among, skip, self.penalties)
 
     def of(self, name: str) -> dict[str, Any]:
         """What one database is given, by the names of the parameters of `MotionDatabase.search`."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from contextdb.motion.search.database import Hit
+from contextdb.records import quickly_made
 
 
 class Status(StrEnum):
@@ -27,6 +28,7 @@ class Reason(StrEnum):
     NOTHING_VALID = "nothing valid"
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Search:
     """One database in a choice: its best frame, its threshold, and what became of it. `hit` is None when it was not searched."""
@@ -50,6 +52,7 @@ class Search:
         return f"{told}, {'under' if self.is_under_threshold else 'not under'} its threshold {self.threshold:g}"
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Choice:
     """What a selector chose, and how. False when nothing may play.

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from contextdb.motion import arguments
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Filter
@@ -19,7 +18,7 @@ def continuing_cost(database: MotionDatabase, query: Floats, chosen: Filter) -> 
     Parameters
     ----------
     query : float64 array, shape (F,)
-        In the schema's units.
+        In the schema's units, checked.
     chosen : Filter
         Made by `database.filter` with the current frame.
     """
@@ -33,7 +32,7 @@ def continuing_cost(database: MotionDatabase, query: Floats, chosen: Filter) -> 
     bias = float(chosen.range_biases[at] + chosen.kinds.biases[kind])
     if len(chosen.frame_biases):
         bias += float(chosen.frame_biases[frame])
-    wanted = database.normalisation.apply(arguments.query_of(query, database.feature_names))
+    wanted = database.normalisation.apply(query)
     total = _cost(database, frame, wanted) + (bias + chosen.continuing)
     return total if total < math.inf else None
 

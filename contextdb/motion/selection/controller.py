@@ -41,16 +41,19 @@ from contextdb.motion.selection.history import played_spans, remembered
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.ongoing import Ongoing
 from contextdb.motion.selection.play_rate import eased, play_rate
+from contextdb.motion.selection.playhead import Playhead
 from contextdb.motion.selection.root_motion import NO_MOTION
 from contextdb.motion.selection.selector import Selector
 from contextdb.motion.selection.step import Outcome, Step
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
 from contextdb.motion.selection.worked_out import WorkedOut
+from contextdb.records import quickly_made
 
 Clock = Callable[[], float]
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Asking:
     """Half an update: what is to be searched, and why; `wanted` is None where nothing is. `held` is the guard that saw to that."""
@@ -112,7 +115,8 @@ class Controller:
         self.selector, self.settings, self.recorder = selector, settings, recorder
         self._rng, self._clock = rng, clock
         self._state = ControllerState()
-        self._moved: tuple[object, object, object, Ongoing | None] | None = None
+        self._moved: tuple[object, object, float, float, Ongoing | None] | None = None
+        self._head: Playhead | None = None
 
     @property
     def playing(self) -> Playing | None:
@@ -128,12 +132,14 @@ class Controller:
         return None if ongoing is None else ongoing.playing
 
     def _ongoing(self, dt_s: float) -> Ongoing | None:
-        """What plays, moved on; the last is kept, for an update mostly follows what was asked of `upcoming`."""
-        playing, selector, of_time = self._state.playing, self.selector, (self.settings.rate, dt_s * self._state.play_rate)
-        if self._moved is None or self._moved[0] is not playing or self._moved[1] is not selector or self._moved[2] != of_time:
-            last = None if self._moved is None or self._moved[3] is None else self._moved[3].head
-            self._moved = playing, selector, of_time, Ongoing.of(playing, selector, *of_time, last)
-        return self._moved[3]
+        """What plays, moved on; kept until `answer`, for an update mostly follows what was asked of `upcoming`."""
+        playing, selector, rate, passed_s = self._state.playing, self.selector, self.settings.rate, dt_s * self._state.play_rate
+        kept = self._moved
+        if kept is not None and kept[0] is playing and kept[1] is selector and kept[2] == rate and kept[3] == passed_s:
+            return kept[4]
+        ongoing = Ongoing.of(playing, selector, rate, passed_s, self._head)
+        self._moved = playing, selector, rate, passed_s, ongoing
+        return ongoing
 
     def copy(self) -> Controller:
         """Another controller that stands where this one does, with the same selector and settings, and no recorder."""
@@ -233,6 +239,7 @@ class Controller:
         if self.recorder is not None:
             self.recorder.record(decision)
         self._state = self._state_after(asking.step, decision)
+        self._moved, self._head = None, None if asking.step.ongoing is None else asking.step.ongoing.head
         return decision
 
     def now_s(self) -> float:

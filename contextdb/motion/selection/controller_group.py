@@ -25,6 +25,7 @@ from contextdb.motion.selection.controller import Asking, Controller
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.selector import Selector
+from contextdb.records import collector_at_rest
 
 HAS_IT = Fault("the group has this controller already.", "a controller of its own for each character")
 
@@ -122,6 +123,7 @@ class ControllerGroup(Sequence[Controller]):
             poses[numbers] = selector.databases[name].raw_many(at)
         return poses
 
+    @collector_at_rest()
     def update(
         self,
         dt_s: float,
@@ -137,7 +139,8 @@ class ControllerGroup(Sequence[Controller]):
         interrupt: Flag = False,
         body: OfBodies | None = None,
     ) -> list[Decision]:
-        """Update every character as `Controller.update` does; the decision of each, in order.
+        """Update every character as `Controller.update` does; the decision of each, in order. Python's garbage collector rests
+        meanwhile.
 
         Parameters
         ----------
@@ -178,10 +181,11 @@ class ControllerGroup(Sequence[Controller]):
             strict=True,
         )
         asking = []
+        nothing = Asked() if all(given is None for given in (valid, tags, bias, among, penalties)) else None
         are_checked = self._have_width(wanted.shape[1]) and arguments.are_finite(wanted)
         for i, (controller, query, own_tags, own_bias, own_among, own_penalties, *others) in enumerate(each):
             try:
-                asked = Asked(masks[controller.selector][i], own_tags, None, own_bias, own_among, None, own_penalties)
+                asked = nothing or Asked(masks[controller.selector][i], own_tags, None, own_bias, own_among, None, own_penalties)
                 own_query = query if are_checked else controller.checked(query)
                 asking.append(controller.ask(dt_s, own_query, asked, *others))
             except QueryError as error:

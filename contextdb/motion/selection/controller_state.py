@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.history import Played
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class ControllerState:
     """A controller's state. The one that nothing is given to is that of a new controller.

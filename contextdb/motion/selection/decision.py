@@ -17,8 +17,10 @@ from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.choice import Choice
 from contextdb.motion.selection.inputs import Inputs
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Playing:
     """What a character plays.
@@ -59,6 +61,7 @@ class Action(StrEnum):
     NOTHING = "plays nothing"
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Decision:
     """One update of a controller.

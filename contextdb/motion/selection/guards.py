@@ -18,8 +18,6 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from contextdb.motion.markup.marks import Mark
-
 if TYPE_CHECKING:
     from contextdb.motion.selection.controller_settings import ControllerSettings
     from contextdb.motion.selection.ongoing import Ongoing
@@ -43,6 +41,6 @@ class Held(StrEnum):
 def held_without_search(ongoing: Ongoing, settings: ControllerSettings) -> Held:
     """Which guard lets an asset that is not valid play on, whatever else there is."""
     head, move = ongoing.head, ongoing.move
-    if head.database.marks.mark_of(move.frame) & Mark.NEXT_NATURAL and not move.n_loops:
+    if head.database.marks.is_next_natural(move.frame) and not move.n_loops:
         return Held.NEXT_NATURAL
     return Held.UNTIL_NATURAL if settings.until_natural and not head.is_looping else Held.NOTHING

@@ -17,11 +17,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from contextdb.motion.markup.left_out import LeftOut, Skip
-from contextdb.motion.markup.marks import Mark
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Played:
     """Frames [start, stop) of a database, and the moment at which they were played; of permutations those of the first."""
@@ -63,20 +64,29 @@ def remembered(
     n_forgotten = 0  # of those in front: what is remembered is in the order of its moments
     while n_forgotten < len(history) and history[n_forgotten].time_s <= oldest_s:
         n_forgotten += 1
-    return (*history[n_forgotten:], *(Played(database, start, stop, now_s) for start, stop in spans))
+    return (*history[n_forgotten:], *[Played(database, start, stop, now_s) for start, stop in spans])
 
 
 def history_skips(history: Iterable[Played]) -> dict[str, list[Skip]]:
     """What was played, by database; spans that touch are one."""
     spans: dict[str, list[tuple[int, int]]] = {}
+    name, start, stop = "", 0, -1
     for played in history:
-        spans.setdefault(played.database, []).append((played.start, played.stop))
+        if start <= played.start <= stop and played.database == name:  # it played on, as mostly
+            if played.stop > stop:
+                stop = played.stop
+            continue
+        if stop >= start:
+            spans.setdefault(name, []).append((start, stop))
+        name, start, stop = played.database, played.start, played.stop
+    if stop >= start:
+        spans.setdefault(name, []).append((start, stop))
     return {name: [Skip(start, stop, LeftOut.HISTORY) for start, stop in _joined(found)] for name, found in spans.items()}
 
 
 def playing_skips(head: Playhead, frame: int, threshold_s: float) -> Iterator[Skip]:
     """What is left out because of a frame that may play on."""
-    if head.database.marks.mark_of(frame) & Mark.NEXT_NATURAL:
+    if head.database.marks.is_next_natural(frame):
         yield Skip(head.start, head.stop, LeftOut.NEXT_NATURAL)
     near = _n_frames(threshold_s, head.rate)
     first, stop = frame - near, frame + near + 1

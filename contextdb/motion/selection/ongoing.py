@@ -11,10 +11,12 @@ from contextdb.motion.search import cost
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filters import Filter
 from contextdb.motion.selection.decision import Playing
-from contextdb.motion.selection.playhead import Move, Playhead
+from contextdb.motion.selection.playhead import Move, Playhead, rate_of
 from contextdb.motion.selection.selector import Selector
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Ongoing:
     """What plays, where it has moved on to, and how."""
@@ -32,11 +34,15 @@ class Ongoing:
         `rate` is that of databases that do not know theirs; `last` is the playhead of the update before, which is mostly this one.
         """
         database = None if playing is None else selector.databases.get(playing.database)
-        at = None if playing is None or database is None else _range_of(playing, database)
-        if playing is None or database is None or at is None:
+        if playing is None or database is None:
             return None
-        head = Playhead.of(database, at, rate)
-        head = last if last is not None and _is_same(last, head) else head
+        if last is not None and _still_plays(last, playing, database, rate):
+            head = last
+        else:
+            at = _range_of(playing, database)
+            if at is None:
+                return None
+            head = Playhead.of(database, at, rate)
         move = head.moved(playing.time_s, dt_s)
         return cls(playing_at(playing.database, head, move.frame, move.time_s), head, move)
 
@@ -69,13 +75,13 @@ class Ongoing:
 
 def playing_at(database: str, head: Playhead, frame: int, time_s: float) -> Playing:
     """What plays at a moment of a range."""
-    at = head.range
-    mirrored, permutation_s = bool(head.database.mirrored[at]), head.database.permutation_s(at)
-    return Playing(database, head.database.assets[at], at, frame, time_s, mirrored, permutation_s)
+    return Playing(database, head.asset, head.range, frame, time_s, head.mirrored, head.permutation_s)
 
 
-def _is_same(one: Playhead, other: Playhead) -> bool:
-    return one.database is other.database and one.range == other.range and one.rate == other.rate
+def _still_plays(last: Playhead, playing: Playing, database: MotionDatabase, rate: float) -> bool:
+    """Whether a playhead is one of what plays."""
+    is_range = last.database is database and last.range == playing.range and last.rate == rate_of(database, rate)
+    return is_range and last.asset == playing.asset and last.mirrored == playing.mirrored and last.stop > last.start
 
 
 def _range_of(playing: Playing, database: MotionDatabase) -> int | None:

@@ -15,11 +15,13 @@ import numpy as np
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.layout import Features
 from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion, motion_between
+from contextdb.records import quickly_made
 
 TOLERANCE_S = 1e-6
 """Times that are nearer than this are the same: sums of time steps are rounded."""
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Move:
     """A playhead moved on.
@@ -67,7 +69,7 @@ class Playhead:
     @classmethod
     def of(cls, database: MotionDatabase, range_number: int, rate: float) -> Playhead:
         """A range's; `rate` is that of a database that does not know its own."""
-        return cls(database, range_number, rate if database.schema is None else database.schema.rate)
+        return cls(database, range_number, rate_of(database, rate))
 
     @cached_property
     def start(self) -> int:
@@ -90,6 +92,21 @@ class Playhead:
         return None if self.database.root is None else self.database.root[self.start : self.stop]
 
     @cached_property
+    def asset(self) -> str:
+        """What plays."""
+        return self.database.assets[self.range]
+
+    @cached_property
+    def mirrored(self) -> bool:
+        """Whether it plays mirrored."""
+        return bool(self.database.mirrored[self.range])
+
+    @cached_property
+    def permutation_s(self) -> float | None:
+        """How many seconds ahead its permuted channels look; None without permutations."""
+        return self.database.permutation_s(self.range)
+
+    @cached_property
     def is_looping(self) -> bool:
         """Whether the range continues at its start when it ends."""
         return bool(self.database.marks.looping[self.range]) and self.stop - self.start > 1
@@ -97,7 +114,8 @@ class Playhead:
     def frame_at(self, time_s: float) -> int:
         """The frame nearest to a moment, the later of two that are equally near."""
         nearest = math.floor((time_s + TOLERANCE_S) * self.rate + 0.5)
-        return min(self.start + max(0, nearest), self.stop - 1)
+        frame, last = self.start + nearest, self.stop - 1
+        return self.start if nearest < 0 else frame if frame < last else last
 
     def moved(self, time_s: float, dt_s: float) -> Move:
         """Where playing on from a moment for some time leads."""
@@ -132,13 +150,18 @@ class Playhead:
 
     def _free_until(self, first: int, stop: int) -> int:
         """The first of some frames that may not be played on to; `stop` if all may."""
-        playable = self.database.marks.playable()
-        if playable.all():
+        marks = self.database.marks
+        if marks.are_all_playable:
             return max(first, stop)
-        return first + int(np.argmin(np.append(playable[self.database.marks.kinds[first:stop]], False)))
+        return first + int(np.argmin(np.append(marks.playable()[marks.kinds[first:stop]], False)))
 
     def _motion(self, from_s: float, to_s: float) -> RootMotion:
         return NO_MOTION if self.path is None else motion_between(self.path, from_s * self.rate, to_s * self.rate)
+
+
+def rate_of(database: MotionDatabase, rate: float) -> float:
+    """Frames a second of a database; `rate` where it does not know its own."""
+    return rate if database.schema is None else database.schema.rate
 
 
 def _joined(move: Move, then: Move) -> Move:

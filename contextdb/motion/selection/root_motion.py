@@ -12,8 +12,10 @@ import math
 from dataclasses import dataclass
 
 from contextdb.motion.search.layout import Features
+from contextdb.records import quickly_made
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class RootMotion:
     """A movement over the ground in the body's own frame at its beginning: metres and radians, positive to the left."""
@@ -56,16 +58,26 @@ def between(body: RootMotion, later: RootMotion) -> RootMotion:
 
 def motion_between(path: Features, from_frame: float, to_frame: float) -> RootMotion:
     """The movement of a path [n, 3], x and z in metres and heading in radians, from one frame to another; both may be fractions."""
-    x, z, heading = _at(path, from_frame)
-    to_x, to_z, to_heading = _at(path, to_frame)
+    low, to_low = _low(path, from_frame), _low(path, to_frame)
+    if low <= to_low <= low + 2:  # one look at the path is enough
+        about = path[low : to_low + 2].tolist()
+        x, z, heading = _between(about[:2], from_frame - low)
+        to_x, to_z, to_heading = _between(about[to_low - low :], to_frame - to_low)
+    else:
+        x, z, heading = _between(path[low : low + 2].tolist(), from_frame - low)
+        to_x, to_z, to_heading = _between(path[to_low : to_low + 2].tolist(), to_frame - to_low)
     sin, cos = math.sin(heading), math.cos(heading)
     return RootMotion(cos * (to_x - x) - sin * (to_z - z), sin * (to_x - x) + cos * (to_z - z), to_heading - heading)
 
 
-def _at(path: Features, frame: float) -> tuple[float, float, float]:
-    """The path at a frame; between two frames on the straight line."""
-    low = min(max(int(frame), 0), len(path) - 1)
-    share = min(max(frame - low, 0.0), 1.0)
-    about = path[low : low + 2].tolist()
+def _low(path: Features, frame: float) -> int:
+    """The last frame of a path that is not behind a frame."""
+    low, last = int(frame), len(path) - 1
+    return 0 if low < 0 else low if low < last else last
+
+
+def _between(about: list[list[float]], share: float) -> tuple[float, float, float]:
+    """A share of the straight line from the first of some places to the last."""
+    share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
     (x, z, heading), (to_x, to_z, to_heading) = about[0], about[-1]
     return x + share * (to_x - x), z + share * (to_z - z), heading + share * (to_heading - heading)

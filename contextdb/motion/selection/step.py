@@ -33,6 +33,7 @@ from contextdb.motion.selection.playhead import TOLERANCE_S, Playhead
 from contextdb.motion.selection.selector import Selector
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.selection.variation import Rng
+from contextdb.records import quickly_made
 
 
 class Standing(Enum):
@@ -43,6 +44,7 @@ class Standing(Enum):
     NOT_VALID = auto()
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What an update comes to; the attributes are those of `Decision`."""
@@ -56,6 +58,7 @@ class Outcome:
     held: Held = Held.NOTHING
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Step:
     """An update under way: where the controller is, what it is asked, and what plays and was played, moved on."""
@@ -153,15 +156,15 @@ class Step:
         known, played = self.selector.databases, history_skips(self.history)
         skip = {name: in_every_permutation(known[name], skips) for name, skips in played.items() if name in known}
         if self.ongoing is None:
-            return replace(self.asked, skip=skip)
+            return self.asked.searched(self.asked.valid, None, skip)
         name, frame = self.ongoing.database, self.ongoing.move.frame
         current = (name, frame) if cause.may_continue else None
         skips = [*self._skips(self.ongoing), *skip.get(name, ())]
         if current is None or self.standing is not Standing.WIDENED:
-            return replace(self.asked, current=current, skip={**skip, name: skips})
+            return self.asked.searched(self.asked.valid, current, {**skip, name: skips})
         head = self.ongoing.head
         alone = Skip(head.start, head.stop, LeftOut.NOT_VALID)
-        return replace(self.asked, current=current, skip={**skip, name: [alone, *skips]}, valid=self._widened_for(self.ongoing))
+        return self.asked.searched(self._widened_for(self.ongoing), current, {**skip, name: [alone, *skips]})
 
     def _widened_for(self, ongoing: Ongoing) -> OfValid:
         """What may play, and with it the range that plays, with what its widened row costs."""

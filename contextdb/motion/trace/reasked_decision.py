@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from contextdb.cells.arguments import require_text
+from contextdb.motion.arguments import query_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.search import candidates
@@ -78,7 +79,7 @@ class ReaskedDecision:
         if before is None or before.database not in self.searches:
             return None
         search = self.searches[before.database]
-        return continuing_cost(search.database, search.query, search.chosen)
+        return continuing_cost(search.database, query_of(search.query, search.database.feature_names), search.chosen)
 
     @property
     def is_changed(self) -> bool:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from running import ROOT, run
 from strategies import some
+from warm_commands import warm_program
 
 from contextdb import cli
 
@@ -18,7 +20,7 @@ TOML = '[conditions.speed]\ntype = "number"\nmin = 0.0\nmax = 10.0\n'
 PROGRAM = """import sys
 sys.path.insert(0, {root!r})
 from contextdb import cli
-cli.COMMANDS.update(dict.fromkeys(("merge", "git"), ""))
+{change}
 sys.exit(cli.main(sys.argv[1:]))
 """
 
@@ -52,8 +54,14 @@ def branched(name: str, ours: str, theirs: str) -> None:
     commit("ours")
 
 
+@pytest.fixture(scope="module")
+def warm() -> Iterator[str]:
+    with warm_program() as program:
+        yield program
+
+
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, warm: str) -> Path:
     """A repository with one table, in a folder with a blank in its name; nobody's own git configuration holds."""
     if shutil.which("git") is None:
         pytest.skip("git is not installed")
@@ -62,7 +70,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("GIT_CONFIG_NOSYSTEM", "1")
     folder = tmp_path / "my game"
     folder.mkdir()
-    (tmp_path / "a driver.py").write_text(PROGRAM.format(root=str(ROOT)), encoding="utf-8")
+    (tmp_path / "a driver.py").write_text(warm, encoding="utf-8")
     monkeypatch.chdir(folder)
     git("init", "-q", "-b", "main")
     for key, value in {"user.name": "t", "user.email": "t@example.org", "core.autocrlf": "false"}.items():
@@ -80,9 +88,21 @@ def installed(here: Path) -> Path:
     return here
 
 
+@pytest.fixture
+def installed_alone(installed: Path) -> Path:
+    """Here git starts the whole of contextdb for each file, as it does for everybody."""
+    in_a_process_of_its_own()
+    return installed
+
+
 def install(*arguments: str):
     program = Path("..", "a driver.py").resolve()
     return run("git", "install", *arguments, "--command", f"'{Path(sys.executable).as_posix()}' '{program.as_posix()}'")
+
+
+def in_a_process_of_its_own(change: str = "") -> None:
+    """Let the driver load contextdb, change something in it, and run there."""
+    Path("..", "a driver.py").write_text(PROGRAM.format(root=str(ROOT), change=change), encoding="utf-8")
 
 
 # ---- install, status, uninstall
@@ -181,7 +201,7 @@ def test_this_clone_is_meant_unless_told_otherwise(here, command):
 # ---- what git then does
 
 
-def test_two_branches_merge_and_rebase_cell_by_cell(installed):
+def test_two_branches_merge_and_rebase_cell_by_cell(installed_alone):
     ours, theirs = BASE.replace("walk,0..5", "walk,1..5"), BASE.replace("0..5,True", "0..5,False")
     branched("my tables/t.csv", ours, theirs)
     git("merge", "-q", "other", "-m", "both")
@@ -219,7 +239,7 @@ def test_columns_added_on_both_sides_are_both_declared(installed):
     assert "[conditions.stunned]" in merged
 
 
-def test_git_diff_and_git_log_show_the_asset_and_the_cell(installed):
+def test_git_diff_and_git_log_show_the_asset_and_the_cell(installed_alone):
     put("my tables/t.csv", BASE.replace("5..9", "5..8"))
     told = git("diff")
     assert "\n run\n-  speed: 5..9\n+  speed: 5..8\n   hit: Any\n" in told
@@ -270,13 +290,9 @@ def driven(driver: str) -> None:
     if driver == "without contextdb":
         assert run("git", "install", "--command", "no-such-contextdb").code == 0
     if driver == "without git merge-file":
-        program = Path("..", "a driver.py")
-        broken = (
-            "import contextdb.edits.diffing.lines as lines\n"
-            "lines.subprocess.run = lambda *a, **b: (_ for _ in ()).throw(OSError())\n"
+        in_a_process_of_its_own(
+            "import contextdb.edits.diffing.lines as lines\nlines.subprocess.run = lambda *a, **b: (_ for _ in ()).throw(OSError())"
         )
-        text = program.read_text(encoding="utf-8").replace("sys.exit(", broken + "sys.exit(")
-        program.write_text(text, encoding="utf-8")
 
 
 @pytest.mark.parametrize(("driver", "way", "is_ours"), some(CASES))

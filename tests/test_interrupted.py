@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from running import ROOT
+from strategies import some
 
 from contextdb.commands.demo_command import make_sample, sample_folder
 
@@ -65,7 +66,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(("make", "command"), CASES.values(), ids=CASES)
+@pytest.mark.parametrize(("make", "command"), some(CASES.values()), ids=some(CASES))
 def test_an_interrupt_after_the_first_line_of_progress_ends_the_command(
     make: Callable[[Path], None], command: tuple[str, ...], tmp_path: Path
 ):

@@ -5,13 +5,15 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from running import ROOT, run
+from running import run
+from warm_commands import warm_program
 
 from contextdb import cli
 from contextdb.columns import TextColumn
@@ -264,12 +266,17 @@ def test_files_that_are_missing_exit_with_2_and_change_nothing(here):
 # ---- git
 
 
+@pytest.fixture(scope="module")
+def driver() -> Iterator[str]:
+    with warm_program() as program:
+        yield program
+
+
 @pytest.fixture
-def repository(here: Path) -> Path:
+def repository(here: Path, driver: str) -> Path:
     if shutil.which("git") is None:
         pytest.skip("git is not installed")
-    code = "import sys; from contextdb import cli; cli.COMMANDS['merge'] = ''; sys.exit(cli.main(sys.argv[1:]))"
-    (here / "driver.py").write_text(f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{code}\n", encoding="utf-8")
+    (here / "driver.py").write_text(driver, encoding="utf-8")
     git("init", "-q", "-b", "main")
     git("config", "user.name", "t")
     git("config", "user.email", "t@example.org")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections import Counter
 from pathlib import Path
-
-import pytest
 
 import contextdb
 
@@ -61,11 +60,14 @@ def test_make_help_lists_every_target_that_a_person_calls():
     assert sorted(listed) == sorted(set(phony[1].split()) - {"help"})
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=named)
-def test_every_module_says_what_it_is_for(path: Path):
-    assert re.match(r'(#!.*\n)?(r?"""|\Z)', path.read_text(encoding="utf-8"))
+def test_every_module_says_what_it_is_for():
+    assert [named(path) for path in SOURCES if not re.match(r'(#!.*\n)?(r?"""|\Z)', path.read_text(encoding="utf-8"))] == []
 
 
-@pytest.mark.parametrize("path", TEXTS, ids=named)
-def test_no_file_names_a_folder_of_one_machine(path: Path):
-    assert not SOMEBODYS_FOLDER.search(path.read_text(encoding="utf-8"))
+def test_no_file_names_a_folder_of_one_machine():
+    assert [named(path) for path in TEXTS if SOMEBODYS_FOLDER.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_no_two_modules_of_tests_have_one_name():
+    names = Counter(path.name for path in SOURCES if path.is_relative_to(ROOT / "tests"))
+    assert [name for name, count in names.items() if count > 1] == []

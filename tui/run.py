@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contextdb.errors import ContextDBError, Fault, in_quotes, nearest
-from contextdb.motion import MotionDatabase, Trace
 from tui.app import EditorApp
 from tui.editor_settings import EditorSettings, SettingsError, read_settings, settings_path
 from tui.keyboard import read_whole_keys
@@ -17,6 +16,7 @@ from tui.model.conflicted import conflicts_in
 from tui.model.workspace import Workspace
 
 if TYPE_CHECKING:
+    from contextdb.motion import MotionDatabase, Trace
     from tui.debug.game import Live
     from tui.debug.recording import Recording
 

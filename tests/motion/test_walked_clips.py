@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ GAITS = [
     motion.Gait("walk", [CYCLES["walk"], CYCLES["walk_fast"]]),
     motion.Gait("run", [CYCLES["jog"], CYCLES["run"]]),
 ]
-CLIPS = {clip.name: clip for clip in motion.walked_clips(GAITS, [1.3, 1.6, 3.0], [0.0, 60.0])}
+NAMES = ["walk_1.30", "walk_1.30_left_60", "walk_1.60", "walk_1.60_left_60", "run_3.00", "run_3.00_left_60"]
 SCHEMA = motion.FeatureSchema.from_dict(
     "loco",
     {
@@ -27,13 +29,19 @@ SCHEMA = motion.FeatureSchema.from_dict(
 )
 
 
+@functools.cache
+def clips() -> dict[str, motion.Clip]:
+    """Clips of a walker at three speeds, straight on and to the left."""
+    return {clip.name: clip for clip in motion.walked_clips(GAITS, [1.3, 1.6, 3.0], [0.0, 60.0])}
+
+
 def test_names_say_gait_speed_and_turn():
-    assert list(CLIPS) == ["walk_1.30", "walk_1.30_left_60", "walk_1.60", "walk_1.60_left_60", "run_3.00", "run_3.00_left_60"]
+    assert list(clips()) == NAMES
 
 
-@pytest.mark.parametrize("name", CLIPS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_clip_ends_in_the_pose_that_it_began_with_at_its_speed_and_turn(name: str):
-    clip = CLIPS[name]
+    clip = clips()[name]
     values = clip.values[:, 6:]  # all joints but the first, whose turn is that of the body too
     apart = (values[-1] - values[0] + 180.0) % 360.0 - 180.0
     assert np.abs(apart).max() < 0.5  # degrees
@@ -44,9 +52,9 @@ def test_a_clip_ends_in_the_pose_that_it_began_with_at_its_speed_and_turn(name: 
     assert turned == pytest.approx(60.0 if "left" in name else 0.0, abs=0.5)
 
 
-@pytest.mark.parametrize("name", CLIPS)
+@pytest.mark.parametrize("name", NAMES)
 def test_feet_that_are_down_stand(name: str):
-    poses = motion.poses_of(CLIPS[name])
+    poses = motion.poses_of(clips()[name])
     for bone in ("LeftToe", "RightToe"):
         toe = poses.positions[:, poses.skeleton.index(bone)]
         speeds = np.linalg.norm(np.diff(toe, axis=0), axis=-1) * poses.rate
@@ -57,8 +65,8 @@ def test_feet_that_are_down_stand(name: str):
 def test_a_walker_is_a_database_of_a_selector_beside_others_and_its_poses_come_from_the_same_stream():
     loops = motion.Markup.parse("asset,tag,from,to,value\n*,Looping,,,\n")
     made = [motion.make_clip(name).clip for name in ("run", "sprint")]
-    parts = {"captured": made, "walked": list(CLIPS.values())}
-    built = motion.MotionDatabase.build([*made, *CLIPS.values()], SCHEMA, markup=loops).normalisation
+    parts = {"captured": made, "walked": list(clips().values())}
+    built = motion.MotionDatabase.build([*made, *clips().values()], SCHEMA, markup=loops).normalisation
     databases = {
         name: motion.MotionDatabase.build(clips, SCHEMA, markup=loops, normalisation=built) for name, clips in parts.items()
     }

@@ -18,14 +18,12 @@ from png_files import Picture, halved, write_png
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from examples.playground.__main__ import TABLES
+from contextdb.motion import write_game_clips
+from examples.playground.__main__ import RATE, TABLES
 from examples.playground.actor import Actor
-from examples.playground.clips import write_clips
 from examples.playground.game import Game
-from examples.playground.headless import RATE
-from examples.playground.screen import SIZE
 from examples.playground.stick import REST, Stick
-from examples.playground.window import Window
+from examples.playground.window import SIZE, Window
 
 FOLDER = Path(__file__).parent / "pictures"
 PER_SECOND = 12
@@ -122,7 +120,7 @@ def drawn(game: Game, words: float = SIZE) -> Iterator[Window]:
 
 def main(folder: Path = FOLDER) -> None:
     """Draw all of them."""
-    write_clips(TABLES / "clips")
+    write_game_clips(TABLES / "clips")
     for name in MOMENTS:
         write_png(folder / f"{name}.png", moment(name))
     write_png(folder / "playground.png", *film(), per_second=PER_SECOND)

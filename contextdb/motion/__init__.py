@@ -37,6 +37,7 @@ from contextdb.motion.features.schema import CustomFunction, FeatureSchema
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.hit import JointHit
 from contextdb.motion.joint.searcher import JointSearcher
+from contextdb.motion.made.game import write_game_clips
 from contextdb.motion.made.joint import JOINT_RECIPES, make_joint_clip, write_joint_clips
 from contextdb.motion.made.recipes import (
     ABOUT_TURNS,
@@ -282,6 +283,7 @@ __all__ = [
     "with_paths",
     "write_arrays",
     "write_bvh",
+    "write_game_clips",
     "write_joint_clips",
     "write_made_clips",
     "write_poses",

@@ -267,6 +267,7 @@ CALLS: dict[str, Call] = {
     "JointPlay.decision(role)": lambda x: MET.decision(x),
     "JointPlay.decision(database)": lambda x: isinstance(x, str) or MET.decision("Host", x),
     "make_joint_clip(name)": lambda x: motion.make_joint_clip(x),
+    "write_game_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_game_clips(x),
     "write_joint_clips(folder)": lambda x: isinstance(x, (str, Path)) or motion.write_joint_clips(x),
     "MatchGate(over)": lambda x: motion.MatchGate(x, 1.0),
     "MatchGate(threshold)": lambda x: motion.MatchGate(DATABASE, x),

@@ -12,7 +12,7 @@ import pytest
 from terminal import press, said, screen_text, with_editor
 from test_following import until
 
-from examples.playground.headless import RATE
+from examples.playground.__main__ import RATE
 from examples.playground.stick import Stick
 
 sys.path.insert(0, str(Path(__file__).parent.parent))

@@ -28,7 +28,7 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
 png_files = importlib.import_module("png_files")
 SECONDS = 60.0 if IS_FULL else 10.0
-BARS = {"jumps_per_s": 2.0, "skate_cm_s": 20.0, "path_rms_m": 0.1, "heading_rms_deg": 20.0, "accel_p99": 80.0}
+BARS = {"jumps_per_s": 2.0, "skate_cm_s": 12.0, "path_rms_m": 0.1, "heading_rms_deg": 20.0, "accel_p99": 80.0}
 """What `motion measure` may say of walking, turning, running and strafing."""
 
 
@@ -56,7 +56,7 @@ def push(game: Game, seconds: float, stick: Stick) -> None:
 def turned(stick: StickFile, seconds: float) -> StickFile:
     """The same again and again, there and back."""
     length_s = 9.0
-    back = [replace(each, x=-each.x, z=-each.z) for each in stick.sticks]
+    back = [replace(each, x=-each.x, z=-each.z, camera=each.camera + math.pi) for each in stick.sticks]
     times = math.ceil(seconds / length_s)
     sticks = [each for i in range(times) for each in (back if i % 2 else stick.sticks)]
     return StickFile([i * length_s + t for i in range(times) for t in stick.times_s], sticks)

@@ -226,7 +226,7 @@ def mesh(triangles: Floats, normals: Floats | None = None) -> NodePath:
 def capsule(length: float, radius: float) -> NodePath:
     """A capsule along y, from 0 to its length; a ball where that is 0."""
     angles = 0.5 * math.pi * np.maximum(np.arange(N_CAP + 1) / N_CAP, 1e-3)
-    wide, along = np.sin([*angles[::-1], *angles])[:, None], np.cos([*(math.pi - angles[::-1]), *angles])[:, None]
+    wide, along = np.cos([*angles[::-1], *angles])[:, None], np.sin([*-angles[::-1], *angles])[:, None]
     turns = np.linspace(0.0, math.tau, N_ROUND + 1)
     normals = np.stack(np.broadcast_arrays(wide * np.cos(turns), along, wide * np.sin(turns)), axis=-1)
     return mesh(quads(radius * normals + (normals[..., 1:2] > 0.0) * np.array((0.0, length, 0.0))), quads(normals))

@@ -38,6 +38,9 @@ class Words:
         player, held = self.game.player, self.game.player.moved.decision.held
         if player.once is not None:
             costs = player.once.costs
+            if player.once_of == "contest":
+                role = player.playing.split(".")[-1]
+                return f"Clip, frame and cast were found together; its own part, {role}, costs {costs.total:.2f}."
             return f"It fits best: its pose and the way to its target cost {costs.total:.2f}, {costs.distance:.2f} of it the way."
         return f"No longer valid, but held by {held}." if held else player.why
 

@@ -49,14 +49,13 @@ def main(words: list[str] | None = None) -> int:
                 return 0
             from examples.playground.window import Window
 
-            Window(game).play()
-    except ModuleNotFoundError as error:
-        if error.name not in ("panda3d", "direct"):
+            window = Window(game)
+            window.begin()
+            window.base.run()
+    except (ModuleNotFoundError, ContextDBError) as error:
+        if isinstance(error, ModuleNotFoundError) and error.name not in ("panda3d", "direct"):
             raise
-        print(NO_PANDA, file=sys.stderr)
-        return 2
-    except ContextDBError as error:
-        print(error, file=sys.stderr)
+        print(NO_PANDA if isinstance(error, ModuleNotFoundError) else error, file=sys.stderr)
         return 2
     return 0
 

@@ -53,7 +53,9 @@ class Actor:
         """One frame of the game."""
         self._tire(dt, stick)
         self.stick = stick
-        facts = {"gait": stick.gait, "style": self.style, "strafe": stick.strafe}
+        facts = {"gait": stick.gait, "strafe": stick.strafe, "style": "tired" if self.is_tired else "normal"}
+        if "style" in self.moves.asked and facts["style"] not in self.moves.asked["style"].domain.values:
+            del facts["style"]  # a folder of other clips may have none that is tired
         wanted, facing = stick.velocity(self.is_tired), stick.camera if stick.strafe else None
         before = self.character.body
         if self.once is None:
@@ -109,13 +111,6 @@ class Actor:
         playing = self.moved.decision.playing
         assert playing is not None
         return self.stock.databases[playing.database].raw(playing.frame)
-
-    @property
-    def style(self) -> str:
-        """The fact of this name: one that the table knows."""
-        known = self.moves.asked["style"].domain.values if "style" in self.moves.asked else None
-        wanted = "tired" if self.is_tired else "normal"
-        return wanted if not known or wanted in known else str(next(iter(known)))
 
     def sees(self, x: float, z: float) -> tuple[float, float]:
         """How far away a place is, and in which direction: metres, and degrees to the left."""

@@ -31,7 +31,17 @@ N_ROUND, N_CAP = 14, 5
 HEAD = 0.6
 """By so much of the neck the head is beyond its joint."""
 FLAT = world.Box((-20.0, 20.0), (-20.0, 20.0), 0.0, 0.0)
-THICK = {("hip", "spine", "chest"): 0.12, ("head",): 0.1, ("upleg", "thigh"): 0.085, ("leg",): 0.062, ("arm",): 0.055, ("",): 0.045}
+THICK = {
+    "hip": 0.12,
+    "spine": 0.12,
+    "chest": 0.12,
+    "head": 0.1,
+    "upleg": 0.085,
+    "thigh": 0.085,
+    "leg": 0.062,
+    "arm": 0.055,
+    "": 0.045,
+}
 """Words in the names of joints, and the radius of a bone, in metres."""
 
 
@@ -60,8 +70,8 @@ class Body:
         """The pose as it is now."""
         pose, positions, path = self.actor.pose, self.actor.pose.positions, self.actor.moved.path
         for (parent, joint, length, _), node in zip(self.bones, self.capsules, strict=True):
-            node.setPos(*here(positions[parent]))
             if length:
+                node.setPos(*here(positions[parent]))
                 node.lookAt(self.node, *here(positions[joint]))
             else:
                 node.setPos(*here(positions[joint] + HEAD * (joint == self.head) * (positions[joint] - positions[parent])))
@@ -142,13 +152,9 @@ def _bones(skeleton: motion.Skeleton) -> Iterator[tuple[int, int, float, float]]
         name = skeleton.names[joint].lower()
         if parent > 0 or (parent == 0 and "spine" in name) or "upleg" in name:
             own = name if not parent or "arm" in name else skeleton.names[parent].lower()
-            yield parent, joint, float(np.linalg.norm(skeleton.offsets[joint])), _thick(own)
+            yield parent, joint, float(np.linalg.norm(skeleton.offsets[joint])), next(r for word, r in THICK.items() if word in own)
         if joint not in skeleton.parents:
-            yield parent, joint, 0.0, _thick(name)
-
-
-def _thick(name: str) -> float:
-    return next(radius for words, radius in THICK.items() if any(word in name for word in words))
+            yield parent, joint, 0.0, next(r for word, r in THICK.items() if word in name)
 
 
 def solid(root: NodePath, node: NodePath, own: LColor) -> NodePath:

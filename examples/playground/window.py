@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 import subprocess
 import sys
 import tempfile
 import threading
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +36,8 @@ from examples.playground.words import Words
 
 LONGEST_FRAME_S, SLOW = 0.05, 0.2
 TURN_PER_PIXEL, TURN_DPS = 0.2, 140.0
-KEYS = {
-    "ahead": ("w", "arrow_up"),
-    "back": ("s", "arrow_down"),
-    "left": ("a", "arrow_left"),
-    "right": ("d", "arrow_right"),
-    "run": ("shift", "lshift"),
-    "strafe": ("mouse3", "q"),
-}
+KEYS = {"w": "ahead", "s": "back", "a": "left", "d": "right", "q": "strafe", "mouse3": "strafe", "shift": "run", "lshift": "run"}
+KEYS |= {"arrow_up": "ahead", "arrow_down": "back", "arrow_left": "left", "arrow_right": "right"}
 SIZE = 0.048
 SHADES = {"big": CLIP, "plays": CLIP, "dim": LColor(0.68, 0.72, 0.8, 1.0), "alarm": LColor(1.0, 0.5, 0.45, 1.0)}
 HELP = """\
@@ -82,6 +78,7 @@ class Window:
         self.game, self.base, self.is_offscreen = game, opened(is_offscreen, size), is_offscreen
         self.scene, self.words = Scene(self.base, game), Words(game)
         self.notice, self.is_slow, self.shows_help, self.held = "", False, False, set[str]()
+        self.gamepads = partial(self.base.devices.getDevices, InputDevice.DeviceClass.gamepad)
         self.paging: threading.Thread | None = None
         for name, shade in SHADES.items():
             properties = TextProperties()
@@ -92,23 +89,19 @@ class Window:
         left, top = 0.09 - self.base.getAspectRatio(), 0.92 - words
         self.top, self.state, self.middle = (self._text(x, y, words) for x, y in ((left, top), (left, -0.68), (-0.1, top)))
 
-    def play(self) -> None:
-        """Until the window is closed."""
-        self.begin()
-        self.base.run()
-
     def begin(self) -> None:
         """Listen to the keys, and update the game in each frame."""
         base = self.base
         base.disableMouse()
-        for name, key in ((name, key) for name, keys in KEYS.items() for key in keys):
+        for key, name in KEYS.items():
             base.accept(key, self.held.add, [name])
             base.accept(f"shift-{key}", self.held.add, [name])
             base.accept(f"{key}-up", self.held.discard, [name])
-        for key, does in (("f1", self._help), ("f2", self._slow), ("f3", self._page), ("f4", self._record), ("escape", sys.exit)):
-            base.accept(key, does)
-        for device in self._gamepads():
-            base.attachInputDevice(device)
+        does = {"f1": self._help, "f2": self._slow, "f3": self._page, "f4": self._record, "escape": sys.exit}
+        for key, act in does.items():
+            base.accept(key, act)
+        for pad in self.gamepads():
+            base.attachInputDevice(pad)
         base.taskMgr.add(self._frame, "game")
 
     def _frame(self, task: Any) -> Any:
@@ -117,11 +110,6 @@ class Window:
         self.game.update(dt * (SLOW if self.is_slow else 1.0), self._stick())
         self.show()
         return task.cont
-
-    def _gamepads(self) -> list[Any]:
-        return list(self.base.devices.getDevices(InputDevice.DeviceClass.gamepad))
-
-    # ---- what is seen
 
     def show(self) -> None:
         """Bring what is drawn and written up to date."""
@@ -160,22 +148,19 @@ class Window:
         path.setPos(x, 0.0, y)
         return node
 
-    # ---- the stick
-
     def _stick(self) -> Stick:
         """Keys and gamepad, turned to where the camera looks."""
         held, axis = self.held, InputDevice.Axis
         ahead = ("ahead" in held) - ("back" in held) + 0.0
         left = ("left" in held) - ("right" in held) + 0.0
         run, strafe = "run" in held, "strafe" in held
-        for pad in self._gamepads():
+        for pad in self.gamepads():
             ahead += pad.findAxis(axis.left_y).value
             left -= pad.findAxis(axis.left_x).value
             run |= pad.findAxis(axis.right_trigger).value > 0.5
             strafe |= pad.findButton("lshoulder").pressed
-        camera = math.radians(self.scene.turn)
-        sin, cos = math.sin(camera), math.cos(camera)
-        return Stick(left * cos + ahead * sin, ahead * cos - left * sin, run, strafe, camera)
+        way = complex(ahead, left) * cmath.rect(1.0, camera := math.radians(self.scene.turn))
+        return Stick(way.imag, way.real, run, strafe, camera)
 
     def _look(self, dt: float) -> None:
         """Turn the camera with the mouse, which stays in the middle of a window that is in front, or with the right stick."""
@@ -185,17 +170,14 @@ class Window:
             if window.movePointer(0, x, y):
                 scene.turn -= TURN_PER_PIXEL * (pointer.getX() - x)
                 scene.tilt = min(60.0, max(4.0, scene.tilt + TURN_PER_PIXEL * (pointer.getY() - y)))
-        for pad in self._gamepads():
+        for pad in self.gamepads():
             scene.turn -= dt * TURN_DPS * pad.findAxis(InputDevice.Axis.right_x).value
-
-    # ---- the F keys
 
     def _help(self) -> None:
         self.shows_help = not self.shows_help
 
     def _slow(self) -> None:
-        self.is_slow = not self.is_slow
-        self.notice = "slow motion" if self.is_slow else ""
+        self.is_slow, self.notice = not self.is_slow, "" if self.is_slow else "slow motion"
 
     def _page(self) -> None:
         """Have the debugger's page of the last minute written by another process, and show it."""

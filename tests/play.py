@@ -79,7 +79,7 @@ def checked(game: Game, seconds: float, stick: StickFile) -> Iterator[Game]:
             decision, facts = actor.moved.decision, actor.moved.facts
             assert decision.playing is not None
             if frame % ORACLE_EVERY == 0:
-                assert list(actor.valid) == oracles.rows(table, facts)
-            is_right = decision.playing.asset in actor.valid.assets
-            assert is_right or decision.held or not actor.valid, (actor.name, decision.playing.asset, facts)
+                assert list(actor.readout.valid) == oracles.rows(table, facts)
+            is_right = decision.playing.asset in actor.readout.valid.assets
+            assert is_right or decision.held or not actor.readout.valid, (actor.name, decision.playing.asset, facts)
         yield each

@@ -22,7 +22,6 @@ from examples.playground import world
 from examples.playground.__main__ import RATE, main, played, project_of_clips, run
 from examples.playground.game import Game
 from examples.playground.stick import REST, Stick, StickFile
-from examples.playground.words import Words
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
@@ -100,7 +99,7 @@ def test_what_cannot_be_read_is_said_and_the_game_plays_on(tmp_path: Path):
         moves.write_text(moves.read_text().replace("idle,Idle", "idle,Idel"))
         push(game, 0.5, REST)
         assert game.player.playing == "idle"
-        assert any(line.startswith("not loaded") and "Idel" in line for line in Words(game).state)
+        assert any(line.startswith("not loaded") and "Idel" in line for line in game.state)
 
 
 @pytest.mark.parametrize(
@@ -183,20 +182,20 @@ def test_feet_stand_on_the_ramp_and_on_the_steps(game: Game):
 
 def test_where_no_row_is_valid_the_screen_says_so_and_what_is_missing(game: Game):
     push(game, 0.2, Stick(0.0, -1.0, strafe=True))
-    words = Words(game)
+    words = game.player.readout
     assert words.rows == []
     assert words.gap.startswith("walk_strafe: direction is 180")
 
 
 def test_the_screen_says_what_plays_why_and_which_rows_are_valid(game: Game):
     push(game, 1.5, Stick(0.0, 1.0))
-    words = Words(game)
+    words = game.player.readout
     assert words.title.startswith("walk")
-    assert "walk at" in words.why
+    assert "walk at" in game.player.why
     assert ("  5  walk", True) in words.rows
     assert words.gap == ""
     assert "gait Walk" in words.facts
-    assert words.state[0].startswith("stamina")
+    assert game.state[0].startswith("stamina")
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from contextdb.motion.characters.character import Character, CharacterState, Upd
 from contextdb.motion.characters.crowd import Crowd
 from contextdb.motion.characters.facts import FACTS, Moment
 from contextdb.motion.characters.paths import path_from
+from contextdb.motion.characters.readout import Readout
 from contextdb.motion.clips.clip import Clip, load_bvh, load_clips, parse_bvh, write_bvh
 from contextdb.motion.clips.doubts import ClipFinding, doubts_of
 from contextdb.motion.clips.feet import Footfalls, footfalls
@@ -196,6 +197,7 @@ __all__ = [
     "Poses",
     "Proposal",
     "QueryError",
+    "Readout",
     "Reasked",
     "ReaskedDecision",
     "ReaskedSearch",

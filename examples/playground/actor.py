@@ -46,15 +46,15 @@ class Actor:
         self.keep(LAST_MINUTE)
         self.stamina, self.is_tired = 1.0, False
         self.once: motion.MatchPlay | None = None
+        self.readout = motion.Readout()
         self.update(0.0, REST)
-        self.why = self.moved.decision.why
 
     def update(self, dt: float, stick: Stick) -> None:
         """One frame of the game."""
         self._tire(dt, stick)
         self.stick = stick
         facts = {"gait": stick.gait, "strafe": stick.strafe, "style": "tired" if self.is_tired else "normal"}
-        if "style" in self.moves.asked and facts["style"] not in self.moves.asked["style"].domain.values:
+        if "style" in self.moves.asked and facts["style"] not in (self.moves.asked["style"].domain.values or ()):
             del facts["style"]  # a folder of other clips may have none that is tired
         wanted, facing = stick.velocity(self.is_tired), stick.camera if stick.strafe else None
         before = self.character.body
@@ -65,9 +65,7 @@ class Actor:
             self.pose = self.moved.pose
         else:
             self._play_once(self.once, dt, wanted, facts)
-        if self.moved.decision.action in (motion.Action.START, motion.Action.JUMP):
-            self.why = self.moved.decision.why
-        self.valid = self.moves.query(self.moved.facts, unknown="any")
+        self.readout.update(self.moved, self.moves, self.pose.playing)
 
     def begin(self, play: motion.MatchPlay, database: str) -> None:
         """Play a one-off from where the body is."""
@@ -104,6 +102,16 @@ class Actor:
         """The asset that is shown."""
         shown = self.pose.playing
         return "" if shown is None else shown.asset
+
+    @property
+    def why(self) -> str:
+        """Why that plays, in one sentence."""
+        if self.once is None:
+            return self.readout.why
+        cost, role = self.once.costs, self.playing.split(".")[-1]
+        if self.once_of == "contest":
+            return f"Clip, frame and cast were found together; its own part, {role}, costs {cost.total:.2f}."
+        return f"It fits best: its pose and the way to its target cost {cost.total:.2f}, {cost.distance:.2f} of it the way."
 
     @property
     def features(self) -> Any:

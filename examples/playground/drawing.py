@@ -31,17 +31,7 @@ N_ROUND, N_CAP = 14, 5
 HEAD = 0.6
 """By so much of the neck the head is beyond its joint."""
 FLAT = world.Box((-20.0, 20.0), (-20.0, 20.0), 0.0, 0.0)
-THICK = {
-    "hip": 0.12,
-    "spine": 0.12,
-    "chest": 0.12,
-    "head": 0.1,
-    "upleg": 0.085,
-    "thigh": 0.085,
-    "leg": 0.062,
-    "arm": 0.055,
-    "": 0.045,
-}
+THICK = {"hip": 0.12, "spine": 0.12, "chest": 0.12, "head": 0.1, "upleg": 0.085, "leg": 0.062, "arm": 0.055, "": 0.045}
 """Words in the names of joints, and the radius of a bone, in metres."""
 
 

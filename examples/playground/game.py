@@ -13,7 +13,7 @@ import numpy as np
 import contextdb as cdb
 from contextdb import motion
 from examples.playground import world
-from examples.playground.actor import Actor, Stock
+from examples.playground.actor import LAST_MINUTE, Actor, Stock
 from examples.playground.ball import Ball
 from examples.playground.stick import GAITS, REST, Stick
 
@@ -59,8 +59,8 @@ class Game:
         for actor in self.actors:
             self.asking = actor.name
             actor.update(dt, stick if actor is self.player else self._rival_s_stick())
-            if self.link is not None and self.link.is_heard and actor.playing in actor.valid.assets:
-                actor.moves.pick(actor.valid.only([actor.playing]))  # the editor marks the row that the search picked
+            if self.link is not None and self.link.is_heard and actor.playing in actor.readout.valid.assets:
+                actor.moves.pick(actor.readout.valid.only([actor.playing]))  # the editor marks the row that the search picked
         try:
             self._vault(self.player)
             if self.ball is not None:
@@ -120,6 +120,20 @@ class Game:
     def _refused(self, error: cdb.ContextDBError) -> None:
         """What was saved cannot be used: what was good plays on."""
         self.trouble = str(error.faults[0])
+
+    @property
+    def state(self) -> list[str]:
+        """What there is to say beside what plays: the breath, the gate, the ball, the link, the record, what is wrong."""
+        lines = [f"{'tired' if self.player.is_tired else 'stamina'}  {100 * self.player.stamina:.0f} %"]
+        if self.gate is not None and self.gate.seen is not None:
+            lines.append(f"gate  {self.gate.seen}")
+        if self.ball is not None:
+            lines.append("the ball is free" if self.ball.holder is None else self.ball.said)
+        if self.link is not None:
+            lines.append(f"link  {self.link.name}, {'followed' if self.link.is_heard else 'nobody follows'}")
+        if self.player.trace.most > LAST_MINUTE:
+            lines.append(f"recording  {len(self.player.trace)} moments")
+        return lines if not self.trouble else [*lines, f"not loaded: {self.trouble}"]
 
     def __enter__(self) -> Game:
         return self

@@ -32,13 +32,12 @@ from examples.playground.actor import LAST_MINUTE, LONGEST
 from examples.playground.drawing import CLIP, Scene
 from examples.playground.game import Game
 from examples.playground.stick import Stick
-from examples.playground.words import Words
 
 LONGEST_FRAME_S, SLOW = 0.05, 0.2
 TURN_PER_PIXEL, TURN_DPS = 0.2, 140.0
 KEYS = {"w": "ahead", "s": "back", "a": "left", "d": "right", "q": "strafe", "mouse3": "strafe", "shift": "run", "lshift": "run"}
 KEYS |= {"arrow_up": "ahead", "arrow_down": "back", "arrow_left": "left", "arrow_right": "right"}
-SIZE = 0.048
+SIZE, MOST_ROWS = 0.048, 6
 SHADES = {"big": CLIP, "plays": CLIP, "dim": LColor(0.68, 0.72, 0.8, 1.0), "alarm": LColor(1.0, 0.5, 0.45, 1.0)}
 HELP = """\
 W A S D, arrows, left stick\twalk
@@ -76,7 +75,7 @@ class Window:
 
     def __init__(self, game: Game, is_offscreen: bool = False, size: tuple[int, int] = (1280, 720), words: float = SIZE) -> None:
         self.game, self.base, self.is_offscreen = game, opened(is_offscreen, size), is_offscreen
-        self.scene, self.words = Scene(self.base, game), Words(game)
+        self.scene = Scene(self.base, game)
         self.notice, self.is_slow, self.shows_help, self.held = "", False, False, set[str]()
         self.gamepads = partial(self.base.devices.getDevices, InputDevice.DeviceClass.gamepad)
         self.paging: threading.Thread | None = None
@@ -114,12 +113,13 @@ class Window:
     def show(self) -> None:
         """Bring what is drawn and written up to date."""
         self.scene.show()
-        words = self.words
-        rows = [_in("plays", text) if plays else text for text, plays in words.rows]
-        rows = rows or [_in("alarm", "no row is valid: here"), words.gap]
-        heads = [_in("big", words.title), words.why, "", _in("dim", "valid rows of moves")]
-        self.top.setText("\n".join([*heads, *rows, "", _in("dim", words.facts)]))
-        self.state.setText("\n".join(words.state if not self.notice else [*words.state, _in("plays", self.notice)]))
+        said, player = self.game.player.readout, self.game.player
+        rows = [_in("plays", text) if plays else text for text, plays in said.rows[:MOST_ROWS]]
+        rows += [f"and {len(said.rows) - MOST_ROWS} more"] * (len(said.rows) > MOST_ROWS)
+        rows = rows or [_in("alarm", "no row is valid: here"), said.gap]
+        heads = [_in("big", said.title), player.why, "", _in("dim", "valid rows of moves")]
+        self.top.setText("\n".join([*heads, *rows, "", _in("dim", said.facts)]))
+        self.state.setText("\n".join([*self.game.state, _in("plays", self.notice)] if self.notice else self.game.state))
         self.middle.setText(HELP if self.shows_help else "")
 
     def picture(self) -> NDArray[np.uint8]:

@@ -415,6 +415,9 @@ CALLS: dict[str, Call] = {
     "Character.update(path)": lambda x: PLAYER.copy().update(0.1, path=x),
     "Character.update(tags)": lambda x: PLAYER.copy().update(0.1, tags=x),
     "Character.update(valid)": lambda x: PLAYER.copy().update(0.1, valid=x),
+    "Readout.update(updated)": lambda x: motion.Readout().update(x, 0),  # type: ignore[arg-type]
+    "Readout.update(table)": lambda x: motion.Readout().update(PLAYER.copy().update(0.1), x),
+    "Readout.update(shown)": lambda x: motion.Readout().update(PLAYER.copy().update(0.1), 0, x),  # type: ignore[arg-type]
     "path_from(root)": lambda x: motion.path_from(x, PATH),
     "path_from(path)": lambda x: motion.path_from((0.0, 0.0, 0.0), x),
     "path_from(halflife_s)": lambda x: motion.path_from((0.0, 0.0, 1.0), PATH, halflife_s=x),

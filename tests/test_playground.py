@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import unquote, urlparse
 
@@ -251,6 +252,12 @@ def test_the_pictures_of_the_page_show_what_is_drawn_now():
     assert np.abs(drawn - kept).mean() < 4.0, "run: make docs"
 
 
+def test_the_game_is_as_small_as_its_page_says():
+    lines = [line for file in (ROOT / "examples" / "playground").glob("*.py") for line in file.read_text("utf-8").splitlines()]
+    assert sum(bool(line.strip()) for line in lines) < 900
+    assert "under 900 lines" in (ROOT / "docs" / "playground.md").read_text(encoding="utf-8")
+
+
 def test_the_pages_name_what_there_is():
     page = (ROOT / "docs" / "playground.md").read_text(encoding="utf-8")
     for name in (
@@ -290,6 +297,21 @@ def test_the_picture_shows_the_player_and_what_is_said_without_a_screen(window: 
     assert abs(warm[:, 1].mean() - 320) < 120
     words = (picture[:120, :300].min(axis=2) > 200).mean()
     assert 0.002 < words < 0.3
+
+
+def test_a_gamepad_steers_looks_round_and_runs(window: Any):
+    pushed = {"left_y": 1.0, "right_trigger": 0.9, "right_x": 0.5}
+    pad = SimpleNamespace(
+        findAxis=lambda axis: SimpleNamespace(value=pushed.get(axis.name, 0.0)),
+        findButton=lambda name: SimpleNamespace(pressed=name == "lshoulder"),
+    )
+    window.gamepads = lambda: [pad]
+    stick = window._stick()
+    assert (stick.x, stick.z, stick.run, stick.strafe) == (pytest.approx(0.0), pytest.approx(1.0), True, True)
+    window._look(0.1)
+    assert window.scene.turn == pytest.approx(-7.0)
+    turned = window._stick()
+    assert math.degrees(math.atan2(turned.x, turned.z)) == pytest.approx(-7.0)
 
 
 def test_keys_steer_and_the_f_keys_do_what_the_help_says(window: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -114,7 +114,7 @@ class Scene:
             body.show()
         gate, player = self.game.gate, self.game.player
         may_vault = gate is not None and gate.seen is not None and bool(gate.seen.hit)
-        paint(self.wall, STONE * 0.6 + (HOLDS if player.once is not None else CLIP if may_vault else STONE) * 0.4)
+        paint(self.wall, STONE * 0.6 + (HOLDS if player.playing.startswith("vault") else CLIP if may_vault else STONE) * 0.4)
         self._show_ball()
         x, y, z = here(player.pose.positions[0])
         turn, tilt = math.radians(self.turn), math.radians(self.tilt)
